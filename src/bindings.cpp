@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// kurumaisu._core: the code the chair runs, for the simulator and the critic. Vectorised over numpy arrays.
+#include <pybind11/eigen.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <stdexcept>
+
+#include "kalman/whiten.h"
+#include "model/laser_error.h"
+#include "model/unicycle.h"
+#include "model/voltage_law.h"
+
+namespace py = pybind11;
+namespace k = kurumaisu;
+
+namespace {
+
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+void requireSameSize(const Array& a, const Array& b, const char* what) {
+  if (a.ndim() != 1 || b.ndim() != 1 || a.size() != b.size()) {
+    throw std::invalid_argument(std::string(what) + " must be one-dimensional and of the same length");
+  }
+}
+
+/// The whole sequence through one AxisInverse; sign: -1, 0, +1, or NaN where the sample does not carry it.
+Array ratesAlong(k::AxisInverse& inverse, const Array& volts, const Array& sign) {
+  requireSameSize(volts, sign, "volts and sign");
+  Array out(volts.size());
+  for (py::ssize_t i = 0; i < volts.size(); ++i) {
+    const double s = sign.at(i);
+    const auto commanded = std::isnan(s) ? std::nullopt : std::optional<int>((s > 0) - (s < 0));
+    out.mutable_at(i) = inverse.rate(volts.at(i), commanded);
+  }
+  return out;
+}
+
+Array integrate(const Array& v, const Array& w, const Array& dt, const std::array<double, 3>& start) {
+  requireSameSize(v, w, "v and w");
+  requireSameSize(v, dt, "v and dt");
+  Array out({v.size() + 1, static_cast<py::ssize_t>(3)});
+  k::Pose2D pose{start[0], start[1], start[2]};
+  auto poses = out.mutable_unchecked<2>();
+  for (py::ssize_t i = 0;; ++i) {
+    poses(i, 0) = pose.x;
+    poses(i, 1) = pose.y;
+    poses(i, 2) = pose.theta;
+    if (i == v.size()) return out;
+    pose = k::advance(pose, v.at(i), w.at(i), dt.at(i));
+  }
+}
+
+void bindModel(py::module_& m) {
+  py::class_<k::Branch>(m, "Branch", "One side of a voltage law: volts = slope * rate + intercept.")
+      .def(py::init([](double slope, double intercept) { return k::Branch{slope, intercept}; }),
+           py::arg("slope"), py::arg("intercept"))
+      .def_readonly("slope", &k::Branch::slope)
+      .def_readonly("intercept", &k::Branch::intercept);
+
+  py::class_<k::AxisLaw>(m, "AxisLaw", "Voltage law of one axis, equation (1) or (2).")
+      .def(py::init([](k::Branch positive, k::Branch negative) {
+             const k::AxisLaw law{positive, negative};
+             k::validate(law);
+             return law;
+           }),
+           py::arg("positive"), py::arg("negative"))
+      .def_readonly("positive", &k::AxisLaw::positive)
+      .def_readonly("negative", &k::AxisLaw::negative)
+      .def("volts", py::vectorize([](const k::AxisLaw* law, double rate) { return law->volts(rate); }),
+           py::arg("rate"), "Volts that stand for rates [m/s or rad/s], elementwise.")
+      .def("gain", py::vectorize([](const k::AxisLaw* law, double rate) { return law->gain(rate); }),
+           py::arg("rate"), "Rate per volt on the branch of the rate's sign, elementwise.")
+      .def("ambiguous", py::vectorize([](const k::AxisLaw* law, double volts) { return law->ambiguous(volts); }),
+           py::arg("volts"), "True where two rates answer to the volts, elementwise.");
+
+  py::class_<k::AxisInverse>(m, "AxisInverse", "Single-valued inverse of an AxisLaw along a sequence.")
+      .def(py::init<const k::AxisLaw&>(), py::arg("law"))
+      .def("rates", &ratesAlong, py::arg("volts"), py::arg("sign"),
+           "Rates for volts, shape (n,); sign (n,): -1, 0, +1 as commanded, NaN where unknown. Keeps its state.")
+      .def_property_readonly("ambiguous_samples", &k::AxisInverse::ambiguousSamples);
+
+  m.def("integrate", &integrate, py::arg("v"), py::arg("w"), py::arg("dt"),
+        py::arg("start") = std::array<double, 3>{0, 0, 0},
+        "Equation (3): poses (n + 1, 3) [m, m, rad] from v [m/s], w [rad/s], dt [s], each (n,).");
+
+  py::class_<k::LaserError>(m, "LaserError", "Equation (4) with quantisation and range gate.")
+      .def(py::init([](double scale, double datum_offset, std::array<double, 3> sigma, double resolution,
+                       double range_min, double range_max) {
+             const k::LaserError error{scale, datum_offset, sigma, resolution, range_min, range_max};
+             k::validate(error);
+             return error;
+           }),
+           py::kw_only(), py::arg("scale"), py::arg("datum_offset"), py::arg("sigma"), py::arg("resolution"),
+           py::arg("range_min"), py::arg("range_max"))
+      .def("mean", py::vectorize([](const k::LaserError* e, double r) { return e->mean(r); }), py::arg("r"),
+           "Mean reading [m] at true range r [m], elementwise.")
+      .def("deviation", py::vectorize([](const k::LaserError* e, double r) { return e->deviation(r); }),
+           py::arg("r"), "Standard deviation [m] at true range r [m], elementwise.")
+      .def("reading",
+           py::vectorize([](const k::LaserError* e, double r, double z) { return e->reading(r, z); }),
+           py::arg("r"), py::arg("standard_normal"),
+           "Reading [m] of true range r [m] for standard normal draws; +inf = no return, NaN = below range_min.");
+}
+
+void bindKalman(py::module_& m) {
+  m.def(
+      "whiten",
+      [](const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
+         double position_sd, double heading_sd, const Eigen::Vector3d& process_sd, double process_tau) {
+        const auto out = k::whiten(poses, times, columns, {position_sd, heading_sd, process_sd, process_tau});
+        return py::make_tuple(out.columns, out.log_determinant);
+      },
+      py::arg("poses"), py::arg("times"), py::arg("columns"), py::kw_only(), py::arg("position_sd"),
+      py::arg("heading_sd"), py::arg("process_sd"), py::arg("process_tau"),
+      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and the log determinant.");
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_core, m) {
+  m.doc() = "Equations (1)-(4) of the paper, ray casting and whitening, in C++.";
+  bindModel(m);
+  bindKalman(m);
+}

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Kalman filter that whitens the residuals of body increments between noisy reference poses.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace kurumaisu {
+
+/// Noise of the reference pose and of the motion itself.
+struct MotionNoise {
+  double position_sd;          ///< reference pose, each axis of the map frame [m]
+  double heading_sd;           ///< reference pose [rad]
+  Eigen::Vector3d process_sd;  ///< stationary sd of the Ornstein-Uhlenbeck rates: v [m/s], lateral [m/s], w [rad/s]
+  double process_tau;          ///< their time constant [s]
+};
+
+/// Whitened columns (rows: 3 per increment) and the log determinant of the residuals' covariance.
+struct Whitened {
+  Eigen::MatrixXd columns;
+  double log_determinant;
+};
+
+/// Whitens columns of residual increments: L^-1 X with L L' the joint covariance of all increments of a run.
+///
+/// poses: (n + 1, 3) reference x, y, theta; times: n + 1, increasing [s]; columns: (3 n, m), row 3k..3k+2 being
+/// dx, dy [m] and dtheta [rad] of increment k in the body frame at pose k. The error of pose k is shared by the
+/// increments k - 1 and k; it lives in the map frame, so its share rotates with the robot. Cost O(n m).
+/// Throws std::invalid_argument for shapes that do not fit, times that do not increase, or noise that is not positive.
+Whitened whiten(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
+                const MotionNoise& noise);
+
+}  // namespace kurumaisu

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Autonomous electric wheelchair: simulator, SLAM and the critic of its own simulation."""

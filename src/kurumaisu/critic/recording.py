@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A recording in memory: what was measured, whatever file it came from. SI units, radians, seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from kurumaisu.types import FloatArray
+
+
+@dataclass(frozen=True)
+class Series:
+    """Samples over time: t (n,) increasing [s]; values (n, m), one named column each."""
+
+    t: FloatArray
+    values: FloatArray
+    columns: tuple[str, ...]
+
+    def column(self, name: str) -> FloatArray:
+        """Return one column, (n,)."""
+        return self.values[:, self.columns.index(name)]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One drive. Any part may be missing.
+
+    command: v, w (held); voltage: v_f, v_s (held); pose: x, y, theta in the map frame, theta unwrapped;
+    odom: x, y, theta, v, w; scan: r0, r1, ...; covariates: any further named columns;
+    queries: (q, 2) of t0, t1 in a test run; source of the pose: 'measured' or how it was estimated.
+    """
+
+    name: str
+    command: Series | None = None
+    voltage: Series | None = None
+    pose: Series | None = None
+    odom: Series | None = None
+    scan: Series | None = None
+    covariates: dict[str, Series] = field(default_factory=dict)
+    queries: FloatArray | None = None
+    pose_source: str = "measured"
+
+
+@dataclass(frozen=True)
+class LaserMount:
+    """Nominal mounting base_from_laser [m, rad] and the fan [rad]."""
+
+    x: float
+    y: float
+    yaw: float
+    angle_min: float
+    angle_increment: float
+    beams: int
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Runs of one robot, split into those to fit and those to judge by.
+
+    train, test: names of runs; test is empty when gain is measured by leaving one run out.
+    truth: sd of the reference pose, position [m] and heading [rad]; None = the critic estimates it.
+    problems: what the reader found wrong and mended or dropped, in words.
+    """
+
+    name: str
+    runs: tuple[Run, ...]
+    train: tuple[str, ...]
+    test: tuple[str, ...] = ()
+    model: Path | None = None
+    world: Path | None = None
+    laser: LaserMount | None = None
+    truth: tuple[float, float] | None = None
+    problems: tuple[str, ...] = ()

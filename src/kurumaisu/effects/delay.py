@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""base.delay: everything happens later than commanded."""
+
+import numpy as np
+
+from kurumaisu.effects.base import Effect, Motion, Parameter, Stage
+from kurumaisu.types import FloatArray
+
+
+class Delay(Effect):
+    """Both rates late by a pure delay; between samples of the grid the motion is interpolated."""
+
+    id = "base.delay"
+    stage = Stage.TRANSPORT
+    parameters = (Parameter("delay", "s", null=0.0, scale=0.05, lower=0.0, upper=1.0),)
+    sentence = "the motion follows the command after a pure delay"
+
+    _past: FloatArray | None = None  # the last samples of v and w, (2, m)
+
+    def apply(self, motion: Motion) -> Motion:
+        """Shift v and w; before the first sample the chair was at rest."""
+        whole, part = divmod(self.values["delay"] / motion.dt, 1.0)
+        keep = int(whole) + 1
+        if self._past is None:
+            self._past = np.zeros((2, keep))
+        samples = np.hstack([self._past, np.stack([motion.v, motion.w])])
+        n = len(motion.v)
+        shifted = (1 - part) * samples[:, 1 : n + 1] + part * samples[:, :n]
+        self._past = samples[:, -keep:]
+        return Motion(motion.dt, shifted[0], shifted[1])

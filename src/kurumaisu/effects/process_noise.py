@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""base.process_noise: floor, tyres and casters disturb the rates."""
+
+import numpy as np
+from scipy.signal import lfilter
+
+from kurumaisu.effects.base import Effect, Motion, Parameter, Stage
+
+
+class ProcessNoise(Effect):
+    """Ornstein-Uhlenbeck noise on both rates; it starts at rest and acts only on a moving chair."""
+
+    id = "base.process_noise"
+    stage = Stage.RESPONSE
+    parameters = (
+        Parameter("sd_v", "m/s", null=0.0, scale=0.01, lower=0.0, upper=1.0),
+        Parameter("sd_w", "rad/s", null=0.0, scale=0.02, lower=0.0, upper=2.0),
+        Parameter("tau", "s", null=0.3, scale=0.3, lower=1.0e-3, upper=30.0),
+    )
+    sentence = "the rates fluctuate about their command"
+    random = True
+
+    _level = (0.0, 0.0)  # of the unit noises of v and w
+
+    def apply(self, motion: Motion) -> Motion:
+        """Add noise to v and w where either is not 0."""
+        decay = np.exp(-motion.dt / self.values["tau"])
+        draws = np.sqrt(1 - decay**2) * self.context.rng.standard_normal((len(motion.v), 2))
+        noise = [lfilter([1], [1, -decay], draws[:, i], zi=[decay * self._level[i]])[0] for i in range(2)]
+        self._level = (float(noise[0][-1]), float(noise[1][-1]))
+        moving = (motion.v != 0) | (motion.w != 0)
+        return Motion(
+            motion.dt,
+            motion.v + moving * self.values["sd_v"] * noise[0],
+            motion.w + moving * self.values["sd_w"] * noise[1],
+        )

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Poses in the plane: arrays (..., 3) of x [m], y [m], theta [rad]."""
+
+import numpy as np
+
+from kurumaisu.types import FloatArray
+
+
+def wrap(angle: FloatArray | float) -> FloatArray:
+    """Return angles [rad] in [-pi, pi)."""
+    return np.asarray((np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi, dtype=np.float64)
+
+
+def compose(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return map_from_b = map_from_a * a_from_b for poses (..., 3)."""
+    c, s = np.cos(a[..., 2]), np.sin(a[..., 2])
+    return np.stack(
+        [
+            a[..., 0] + c * b[..., 0] - s * b[..., 1],
+            a[..., 1] + s * b[..., 0] + c * b[..., 1],
+            a[..., 2] + b[..., 2],
+        ],
+        axis=-1,
+    )
+
+
+def between(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return a_from_b for poses a, b (..., 3) in the same frame; the angle is not wrapped."""
+    c, s = np.cos(a[..., 2]), np.sin(a[..., 2])
+    dx, dy = b[..., 0] - a[..., 0], b[..., 1] - a[..., 1]
+    return np.stack([c * dx + s * dy, -s * dx + c * dy, b[..., 2] - a[..., 2]], axis=-1)
+
+
+def interpolate(times: FloatArray, poses: FloatArray, at: FloatArray) -> FloatArray:
+    """Return poses (m, 3) at times `at` (m,), linear between samples (n, 3) whose theta is unwrapped."""
+    return np.stack([np.interp(at, times, poses[:, i]) for i in range(3)], axis=-1)
