@@ -95,8 +95,8 @@ def load_model(path: Path) -> Model:
     """Read a model file. Raise Error naming file and key for anything missing, unknown or senseless."""
     top = settings.load(path)
     laws = top.section("voltage_laws")
-    law_name = top.text("voltage_law", choices=laws.keys())
-    parsed = {name: _voltage_law(laws.section(name)) for name in laws.keys()}
+    law_name = top.text("voltage_law", choices=laws.names())
+    parsed = {name: _voltage_law(laws.section(name)) for name in laws.names()}
     model = Model(
         name=top.text("name"),
         law_name=law_name,
@@ -173,6 +173,6 @@ def _laser(section: settings.Section) -> Laser:
 
 def _effect(section: settings.Section) -> EffectSetting:
     parameters = section.section("parameters")
-    setting = EffectSetting(section.text("id"), {name: parameters.number(name) for name in parameters.keys()})
+    setting = EffectSetting(section.text("id"), {name: parameters.number(name) for name in parameters.names()})
     section.end()
     return setting

@@ -93,7 +93,7 @@ class Section:
     def end(self) -> None:
         """Raise unless every key has been taken."""
         if self._values:
-            raise self.error(self.keys()[0], "is not a known key")
+            raise self.error(self.names()[0], "is not a known key")
 
 
 def load(path: Path) -> Section:
