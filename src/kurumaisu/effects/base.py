@@ -31,7 +31,7 @@ class Stage(IntEnum):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of an effect. unit may be 'V', which a model without a voltage law reads as its own rate unit.
+    """A number of an effect.
 
     null: value at which the effect is absent; scale: a typical size; lower, upper: bounds of a fit.
     """
@@ -55,10 +55,10 @@ class Motion:
 
 @dataclass(frozen=True)
 class Context:
-    """What effects may know of the chair. A law of None means that rates follow the input directly."""
+    """What effects may know of the chair."""
 
-    translation: AxisLaw | None
-    steering: AxisLaw | None
+    translation: AxisLaw
+    steering: AxisLaw
     rng: np.random.Generator
 
 

@@ -12,9 +12,9 @@ from kurumaisu.types import FloatArray
 _WIDTH = (Parameter("width", "V", null=0.0, scale=0.03, lower=-0.3, upper=0.5),)
 
 
-def _swallow(rate: FloatArray, width: float, law: AxisLaw | None) -> FloatArray:
+def _swallow(rate: FloatArray, width: float, law: AxisLaw) -> FloatArray:
     """Return rates without what the width [V] stands for on their branch; a negative width adds it."""
-    lost = width * (np.abs(law.gain(rate)) if law is not None else 1.0)
+    lost = width * np.abs(law.gain(rate))
     return np.asarray(np.sign(rate) * np.maximum(np.abs(rate) - lost, 0.0))
 
 

@@ -7,23 +7,15 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu._core import AxisInverse
-from kurumaisu.params import EffectSetting, Model
+from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
 
 class Plant:
     """Turns inputs into rates on a uniform time grid, chunk by chunk."""
 
-    def __init__(
-        self,
-        model: Model,
-        settings: tuple[EffectSetting, ...],
-        dt: float,
-        rng: np.random.Generator,
-        *,
-        law: bool = True,
-    ) -> None:
-        """Start at rest. settings: the effects to apply; law False: rates follow commands.
+    def __init__(self, model: Model, dt: float, rng: np.random.Generator) -> None:
+        """Start at rest, with the effects of the model; dt [s] is the grid's step.
 
         Raise Error for effects that are unknown or whose parameters do not fit.
         """
@@ -31,12 +23,7 @@ class Plant:
         self._translation = AxisInverse(model.translation)
         self._steering = AxisInverse(model.steering)
         self._effects = effects.build(
-            settings,
-            effects.Context(
-                translation=model.translation if law else None,
-                steering=model.steering if law else None,
-                rng=rng,
-            ),
+            model.effects, effects.Context(translation=model.translation, steering=model.steering, rng=rng)
         )
 
     @property
