@@ -97,12 +97,12 @@ def _scan(problem: Problem, centre: Fit, ids: tuple[str, ...]) -> list[_Guess]:
     return guesses[:_REFITS]
 
 
-def _linear(
-    problem: Problem, centre: Fit, chosen: frozenset[str], gram: FloatArray, b: FloatArray
-) -> _Guess | None:
+def _linear(problem: Problem, centre: Fit, chosen: frozenset[str], gram: FloatArray, b: FloatArray) -> _Guess | None:
     """Return a set's estimate and score by the linearisation; None where a parameter leaves its bounds."""
     fitted = {(term.id, term.parameter.name): value for term, value in zip(centre.terms, centre.values, strict=True)}
-    known = np.array([(fitted.get((t.id, t.parameter.name), t.null) - t.null) / t.parameter.scale for t in problem.terms])
+    known = np.array(
+        [(fitted.get((t.id, t.parameter.name), t.null) - t.null) / t.parameter.scale for t in problem.terms]
+    )
     use = np.array([term.id in chosen for term in problem.terms])
     # All offsets from null: those of effects taken out of the fit fall back to 0 and return to the residual.
     target = b + gram @ known
