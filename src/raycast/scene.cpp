@@ -73,9 +73,8 @@ struct Axis {
 
   /// Cell at a distance along the ray, kept within `reach` of the present one.
   int cellAt(double distance, double direction, int reach) const {
-    const double cell = std::floor(origin + distance * direction);
-    return static_cast<int>(
-        std::clamp(cell, static_cast<double>(at - reach), static_cast<double>(at + reach)));
+    const int cell = static_cast<int>(origin + distance * direction);  // truncates; never below -1 within the box
+    return std::min(std::max(cell, at - reach), at + reach);
   }
 
   bool inside() const { return at >= 0 && at < count; }
