@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,8 @@ _DARKEST_FREE = 128  # first channel of a pixel that is not a wall, as in Stage
 def outline(entity: Entity, size: FloatArray, folder: Path) -> FloatArray:
     """Return the segments (m, 4) of a model, centred, its bounding box being size (2,) [m].
 
-    As in Stage: all blocks together, or the occupied pixels of a bitmap (relative to the folder), are stretched to
-    the size; a model with neither, and without a boundary, is a box; blocks displace the boundary.
+    As in Stage: all blocks together, or the occupied pixels of a bitmap (relative to the folder), fill the
+    size; a model with neither, and without a boundary, is a box; blocks displace the boundary.
     Raise Error with file, line and column.
     """
     blocks = [child for child in entity.children if child.type == "block"]
@@ -37,7 +38,7 @@ def transform(segments: FloatArray, pose: FloatArray) -> FloatArray:
     """Return map segments for segments (m, 4) in the frame of a pose (3,)."""
     c, s = np.cos(pose[2]), np.sin(pose[2])
     turn = np.array([[c, s], [-s, c]])
-    return (segments.reshape(-1, 2) @ turn + pose[:2]).reshape(-1, 4)
+    return np.asarray(segments.reshape(-1, 2) @ turn + pose[:2]).reshape(-1, 4)
 
 
 def _polygon(points: FloatArray) -> FloatArray:
@@ -53,7 +54,9 @@ def _points(block: Entity) -> FloatArray:
         raise block.name.error("block needs points")
     count = block.properties["points"].numbers(1, 1)[0]
     if count != int(count) or count < 3:
-        raise block.properties["points"].name.error(f"points must be a whole number of at least 3, not {count:g}")
+        raise block.properties["points"].name.error(
+            f"points must be a whole number of at least 3, not {count:g}"
+        )
     points = []
     for i in range(int(count)):
         if f"point[{i}]" not in block.properties:
@@ -67,7 +70,7 @@ def _fit(segments: FloatArray, size: FloatArray, entity: Entity) -> FloatArray:
     low, high = points.min(axis=0), points.max(axis=0)
     if (high <= low).any():
         raise entity.name.error(f"the shape of {entity.name.text} has no area")
-    return ((points - (low + high) / 2) * (size / (high - low))).reshape(-1, 4)
+    return np.asarray((points - (low + high) / 2) * (size / (high - low))).reshape(-1, 4)
 
 
 def _occupied(bitmap: Property, folder: Path) -> BoolArray:
@@ -99,7 +102,7 @@ def _runs(occupied: BoolArray) -> FloatArray:
     segments = []
     for y in np.flatnonzero(step.any(axis=1)):
         edges = np.flatnonzero(np.diff(step[y]))
-        for start, stop in zip(edges, edges[1:], strict=False):
+        for start, stop in pairwise(edges.tolist()):
             if step[y, start + 1]:
                 segments.append((start, y, stop, y))
     return np.array(segments, dtype=np.float64).reshape(-1, 4)

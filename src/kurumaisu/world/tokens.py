@@ -45,7 +45,7 @@ class Token:
 
 _WITH_TEXT = (Kind.WORD, Kind.NUMBER, Kind.STRING)
 
-# Stage's rules: brackets belong to words (point[0]), numbers have no exponent, strings no escapes and no line end.
+# Stage's rules: brackets belong to words (point[0]), numbers have no exponent, strings no escapes.
 _TOKEN = re.compile(
     r"""(?P<blank>[ \t]+|\#[^\r\n]*)
       | (?P<line_end>\r\n|\n\r|\r|\n)

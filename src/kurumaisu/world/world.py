@@ -29,8 +29,8 @@ class Start:
 class World:
     """What a world file says.
 
-    segments: (m, 4), x and y of both ends of all that a laser sees [m]; obstacles: (n, 4), all that a chair bumps
-    into; starts: in file order; bounds: smallest x, smallest y, largest x, largest y [m];
+    segments: (m, 4), x and y of both ends of all that a laser sees [m]; obstacles: (n, 4), all that a chair
+    bumps into; starts: in file order; bounds: smallest x, smallest y, largest x, largest y [m];
     warnings: what the file says and this reader does not heed, in words.
     """
 
