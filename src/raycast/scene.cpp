@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+constexpr double kOnWall = 1e-12;  // [m] rounding may put a wall that the origin is on this far behind it
+
 struct Ray {
   double x, y;    // origin [m]
   double dx, dy;  // unit direction
@@ -44,7 +46,7 @@ double rangeTo(const Ray& ray, const Segment& s) {
   const double along_a = ray.dx * ax + ray.dy * ay;
   const double along_b = ray.dx * bx + ray.dy * by;
   const double range = (along_b * side_a - along_a * side_b) / spread;
-  return range < 0 ? kInfinity : range;
+  return range < -kOnWall ? kInfinity : std::fmax(range, 0.0);
 }
 
 std::vector<Segment> checked(std::vector<Segment> segments) {

@@ -71,6 +71,8 @@ def tokenize(text: str, file: Path) -> list[Token]:
         if name != "blank":
             tokens.append(Token(Kind[name.upper()], match.group(), file, line, here.column))
         at = match.end()
+        if name == "number" and text[at : at + 1].isalpha():
+            raise here.error(f"{match.group()}{text[at]} is not a number: exponents are not allowed")
         if name == "line_end":
             line, line_start = line + 1, at
     tokens.append(Token(Kind.END, "", file, line, at - line_start + 1))
