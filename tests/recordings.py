@@ -30,9 +30,7 @@ def full_run(name="run_1", start=0.0):
         command=series(t[::5], "vw", rng.uniform(-0.4, 0.8, 20), rng.uniform(-1, 1, 20)),
         voltage=series(t, ("v_f", "v_s"), rng.normal(size=100), rng.normal(size=100)),
         pose=series(t, ("x", "y", "theta"), rng.normal(size=100), rng.normal(size=100), theta),
-        odom=series(
-            t, ("x", "y", "theta", "v", "w"), *rng.normal(size=(2, 100)), theta, *rng.normal(size=(2, 100))
-        ),
+        odom=series(t, ("x", "y", "theta", "v", "w"), *rng.normal(size=(2, 100)), theta, *rng.normal(size=(2, 100))),
         scan=series(t, [f"r{i}" for i in range(BEAMS)], ranges),
         covariates={
             "battery": series(t[::10], ["battery"], np.linspace(25.2, 24.9, 10)),
@@ -82,9 +80,7 @@ class Bag:
         return self.make("geometry_msgs/msg/Twist", linear=self.vector(x=v), angular=self.vector(z=w))
 
     def pose(self, x, y, theta):
-        turn = self.make(
-            "geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=np.sin(theta / 2), w=np.cos(theta / 2)
-        )
+        turn = self.make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=np.sin(theta / 2), w=np.cos(theta / 2))
         return self.make("geometry_msgs/msg/Pose", position=self.vector(x, y, kind="Point"), orientation=turn)
 
     def pose_stamped(self, t, pose):

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from recordings import BEAMS, assert_same, full_run, write_bag
+from recordings import BEAMS, PACKAGE, Bag, assert_same, full_run, write_bag
 from rosbags.rosbag1 import Writer
 
 from kurumaisu.critic.reading import read_recording
@@ -79,3 +79,47 @@ def test_a_cut_bag_is_an_error_not_a_traceback(tmp_path):
         path.write_bytes(data[:size])
         with pytest.raises(Error, match=r"cut\.bag: is not a whole ROS 1 bag"):
             read_recording(path)
+
+
+def test_damage_anywhere_in_a_bag_is_an_error_that_names_it_or_harmless(tmp_path):
+    write_bag(tmp_path / "whole.bag", full_run())
+    data = bytearray((tmp_path / "whole.bag").read_bytes())
+    rng = np.random.default_rng(7)
+    path = tmp_path / "damaged.bag"
+    messages = []
+    for _ in range(40):
+        damaged = data.copy()
+        for at in rng.integers(0, len(data), 30):
+            damaged[at] = rng.integers(256)
+        path.write_bytes(damaged)
+        try:
+            read_recording(path)
+        except Error as error:
+            messages.append(str(error))
+    assert messages
+    assert all("damaged.bag" in message for message in messages)
+
+
+def test_every_type_of_pose_is_read(tmp_path):
+    for name, make in {
+        "odometry": lambda bag, t: bag.odometry(t, (t, 2.0, 0.5), 0.0, 0.0),
+        "stamped": lambda bag, t: bag.pose_stamped(t, (t, 2.0, 0.5)),
+    }.items():
+        bag = Bag(tmp_path / f"{name}.bag")
+        for t in (1.0, 2.0, 3.0):
+            bag.write("/ground_truth", make(bag, t), t)
+            bag.write("/cmd_vel", bag.twist(0.5, 0.1), t)
+        bag.writer.close()
+    for run in read_recording(tmp_path).runs:
+        np.testing.assert_allclose(run.pose.values, [[1, 2, 0.5], [2, 2, 0.5], [3, 2, 0.5]], atol=1e-15)
+
+
+def test_a_bag_of_2010_by_a_real_urg_is_read():
+    path = PACKAGE.parent / "shared" / "data" / "scan_tools" / "demo.bag"
+    if not path.exists():
+        pytest.skip(f"needs the recording {path.name} of scan_tools beside the repository")
+    (run,) = read_recording(path).runs
+    assert run.scan.values.shape == (360, 681)
+    # Written by that driver as 0 m or as error codes of 1 to 19 mm.
+    assert np.isnan(run.scan.values).mean() == pytest.approx(0.054, abs=0.001)
+    assert np.nanmin(run.scan.values) > 0.02

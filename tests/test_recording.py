@@ -148,9 +148,7 @@ def test_theta_is_unwrapped_whatever_the_convention(tmp_path):
 def test_degrees_are_not_unwrapped_as_radians(tmp_path):
     t = np.arange(100) / 10
     degrees = np.rad2deg(0.9 * t + np.pi) % 360 - 180
-    write_csv_run(
-        tmp_path, Run("r", pose=series(t, ("x", "y", "theta"), t, t, degrees), command=full_run().command)
-    )
+    write_csv_run(tmp_path, Run("r", pose=series(t, ("x", "y", "theta"), t, t, degrees), command=full_run().command))
     recording = read_recording(tmp_path)
     assert any("degrees" in text for text in recording.invalid)
     np.testing.assert_array_equal(recording.runs[0].pose.column("theta"), degrees)
@@ -210,6 +208,4 @@ def test_meta_is_read_strictly(folder):
 
 def test_a_table_with_an_unknown_name_is_told(folder):
     shutil.copy(folder / "run_1" / "pose.csv", folder / "run_1" / "poses.csv")
-    assert (
-        read_recording(folder).problems[0].startswith("run_1/poses.csv: not read: it is none of command.csv")
-    )
+    assert read_recording(folder).problems[0].startswith("run_1/poses.csv: not read: it is none of command.csv")

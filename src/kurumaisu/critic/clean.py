@@ -78,9 +78,7 @@ def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | Non
     return _unwrapped(table.where, series, faults) if "theta" in table.columns else series
 
 
-def _report(
-    table: Table, bad: BoolArray, faults: Faults, noted: str, fatal: str, share: float = HICCUP_SHARE
-) -> None:
+def _report(table: Table, bad: BoolArray, faults: Faults, noted: str, fatal: str, share: float = HICCUP_SHARE) -> None:
     count = int(bad.sum())
     if count:
         faults.add(f"{table.where}: {_rows(count)} {noted} (first: {table.place(int(np.argmax(bad)))})")
@@ -123,10 +121,10 @@ def _out_of_order(table: Table, kept: IntArray, faults: Faults) -> None:
 
 def _ranges(where: str, series: Series, faults: Faults) -> Series:
     values = np.where(series.values == -np.inf, np.nan, series.values)
-    negative = values < 0
-    if negative.any():
-        faults.add(f"{where}: {int(negative.sum())} negative ranges taken as no valid reading")
-    values = np.where(negative, np.nan, values)
+    senseless = values <= 0
+    if senseless.any():
+        faults.add(f"{where}: {int(senseless.sum())} ranges that are 0 or less are taken as no valid reading")
+    values = np.where(senseless, np.nan, values)
     if not np.isfinite(values).any():
         faults.add(f"{where}: no reading is valid")
     return Series(series.t, values, series.columns)

@@ -12,6 +12,8 @@ import numpy as np
 
 from kurumaisu.critic.recording import Fan
 
+# Parts of a run that have a type of their own; any other topic is a covariate.
+PARTS = ("command", "voltage", "pose", "odom", "scan")
 COLUMNS = {
     "command": ("v", "w"),
     "voltage": ("v_f", "v_s", "v", "w"),
@@ -30,15 +32,15 @@ Converter = Callable[[Any], Any]
 
 
 def converter(part: str, kind: str) -> Converter | None:
-    """Return the function from a message to its row for a part of a run, None for a type it cannot be."""
-    if part == "covariate":
+    """Return the function from a message to its row for a part of a run, None where the type does not fit."""
+    if part not in PARTS:
         return lambda message: _numbers(message, MAIN_FIELD.get(kind, "data"))
     return _CONVERTERS[part].get(kind)
 
 
 def accepted(part: str) -> list[str]:
-    """Return the message types of a part as ROS 1 writes them."""
-    return [kind.replace("/msg/", "/") for kind in _CONVERTERS[part]]
+    """Return the message types that a part may have."""
+    return list(_CONVERTERS[part])
 
 
 def _twist(message: Any) -> tuple[float, ...]:
@@ -59,7 +61,7 @@ def _yaw(q: Any) -> float:
 def _scan(message: Any) -> tuple[Fan, Any]:
     ranges = np.round(np.asarray(message.ranges, dtype=np.float64), RANGE_DECIMALS)
     # REP 117 for drivers that predate it: below the limit there is no reading, above it no return.
-    ranges[ranges < round(message.range_min, RANGE_DECIMALS)] = np.nan
+    ranges[(ranges < round(message.range_min, RANGE_DECIMALS)) | (ranges <= 0)] = np.nan
     if message.range_max > message.range_min:
         ranges[ranges > round(message.range_max, RANGE_DECIMALS)] = np.inf
     numbers = (message.angle_min, message.angle_increment, message.time_increment, message.scan_time)
@@ -77,11 +79,7 @@ def _leaves(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
     for item in fields(message):
         value = getattr(message, item.name)
         # rosbags gives a message's constants as fields; ROS writes their names in capitals.
-        if (
-            item.name == "header"
-            or item.name.isupper()
-            or type(value).__name__.startswith("builtin_interfaces")
-        ):
+        if item.name == "header" or item.name.isupper() or type(value).__name__.startswith("builtin_interfaces"):
             continue
         if isinstance(value, (bool, int, float, np.number)):
             yield f"{prefix}{item.name}", float(value)

@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Read a run from a ROS 1 bag, without ROS: a bag carries the definitions of its messages."""
+"""Read a run from the topics of a ROS 1 bag."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from rosbags.rosbag1 import Reader, ReaderError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from kurumaisu.critic import messages
+from kurumaisu.critic.bag import Topic, read_topics
 from kurumaisu.critic.clean import Faults, Table, clean
 from kurumaisu.critic.recording import Fan, Run, Series
 from kurumaisu.errors import Error
@@ -27,31 +23,9 @@ TOPICS = {
     "battery": "battery",
     "temperature": "temperature",
 }
-PARTS = ("command", "voltage", "pose", "odom", "scan")
+PARTS = messages.PARTS
 # Stamps and times of receipt further apart than this do not come from one clock [s].
 CLOCK_TOLERANCE = 1.0
-
-
-@dataclass
-class _Topic:
-    """Messages of one topic in the order of receipt: times [ns], whether stamped, one row each."""
-
-    name: str
-    type: str
-    received: list[int] = field(default_factory=list)
-    stamps: list[int | None] = field(default_factory=list)
-    rows: list[Any] = field(default_factory=list)
-
-    def times(self) -> Any:
-        """Return the stamp of each message, or else when it was received, (n,) [s]."""
-        pairs = zip(self.stamps, self.received, strict=True)
-        # Integers divide to the float nearest to the decimal number of seconds, the one CSV reads.
-        return np.array([(stamp or received) / 1_000_000_000 for stamp, received in pairs])
-
-    def lateness(self) -> float | None:
-        """Return the median of receipt minus stamp [s], None when nothing is stamped."""
-        late = [r - s for s, r in zip(self.stamps, self.received, strict=True) if s]
-        return float(np.median(late)) / 1e9 if late else None
 
 
 def read_bag_run(path: Path, topics: dict[str, str], faults: Faults) -> Run:
@@ -64,7 +38,7 @@ def read_bag_run(path: Path, topics: dict[str, str], faults: Faults) -> Run:
     shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
     if shared:
         raise Error(f"topics: {shared[0]} is given to two parts of a run")
-    found = _read(path, {topic: part for part, topic in wanted.items()})
+    found = read_topics(path, {topic: part for part, topic in wanted.items()})
     for part in sorted(set(_parts(topics)) - set(found)):
         faults.add(f"{path.name}: there is no topic {wanted[part]}")
     _check_clocks(path.name, found, faults)
@@ -104,61 +78,7 @@ def _parts(topics: dict[str, str]) -> dict[str, str]:
     return {by_topic.get(name, name): topic for name, topic in topics.items()}
 
 
-def _read(path: Path, parts: dict[str, str]) -> dict[str, _Topic]:
-    try:
-        with Reader(path) as reader:
-            chosen = [connection for connection in reader.connections if connection.topic in parts]
-            converters = {connection.id: _converter(path, parts, connection) for connection in chosen}
-            found: dict[str, _Topic] = {}
-            for connection, received, data in reader.messages(chosen) if chosen else ():
-                part = parts[connection.topic]
-                topic = found.setdefault(part, _Topic(connection.topic, connection.msgtype))
-                message, row = converters[connection.id](data)
-                topic.received.append(received)
-                topic.stamps.append(_stamp(message))
-                topic.rows.append(row)
-            return found
-    except OSError as error:
-        raise Error(f"{path}: {error.strerror}") from error
-    except (ReaderError, ValueError, EOFError) as error:
-        raise Error(f"{path}: is not a whole ROS 1 bag (rosbag reindex may help): {error}") from error
-
-
-def _converter(path: Path, parts: dict[str, str], connection: Any) -> Callable[[bytes], tuple[Any, Any]]:
-    """Return a function from raw data to a message and its row, built from the bag's own definition."""
-    part, kind = parts[connection.topic], connection.msgtype
-    to_row = messages.converter(part if part in PARTS else "covariate", kind)
-    if to_row is None:
-        accepted = ", ".join(messages.accepted(part))
-        raise Error(f"{path}: {connection.topic}: is of type {_ros(kind)}, not of {accepted}")
-    store = get_typestore(Stores.EMPTY)
-    try:
-        store.register(get_types_from_msg(connection.msgdef.data, kind))
-    except Exception as error:
-        raise Error(
-            f"{path}: {connection.topic}: definition of {_ros(kind)} is unreadable: {error}"
-        ) from error
-
-    def convert(data: bytes) -> tuple[Any, Any]:
-        try:
-            message = store.deserialize_ros1(data, kind)
-            return message, to_row(message)
-        except (AttributeError, AssertionError) as error:
-            text = f"{path}: {connection.topic}: message is not the {_ros(kind)} it should be: {error}"
-            raise Error(text) from error
-
-    return convert
-
-
-def _stamp(message: Any) -> int | None:
-    header = getattr(message, "header", None)
-    if header is None:
-        return None
-    stamp = int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
-    return stamp or None
-
-
-def _check_clocks(name: str, found: dict[str, _Topic], faults: Faults) -> None:
+def _check_clocks(name: str, found: dict[str, Topic], faults: Faults) -> None:
     late = {topic.name: topic.lateness() for topic in found.values()}
     stamped = {topic: value for topic, value in late.items() if value is not None}
     # A topic without stamps lives on the clock of receipt.
@@ -168,24 +88,22 @@ def _check_clocks(name: str, found: dict[str, _Topic], faults: Faults) -> None:
         faults.add(f"{name}: stamps come from different clocks; receipt minus stamp: {told}", fatal=True)
 
 
-def _scan(where: str, topic: _Topic, faults: Faults) -> tuple[Series | None, Fan | None]:
+def _scan(where: str, topic: Topic, faults: Faults) -> tuple[Series | None, Fan | None]:
     fan = topic.rows[0][0]
     keep = [i for i, (other, _) in enumerate(topic.rows) if other == fan]
     if len(keep) < len(topic.rows):
-        faults.add(
-            f"{where}: {len(topic.rows) - len(keep)} scans dropped: their fan is not that of the first"
-        )
+        faults.add(f"{where}: {len(topic.rows) - len(keep)} scans dropped: their fan is not that of the first")
     ranges = np.stack([topic.rows[i][1] for i in keep])
     columns = tuple(f"r{i}" for i in range(fan.beams))
     return clean(Table(where, topic.times()[keep], ranges, columns, "scan", 1), faults, ranges=True), fan
 
 
-def _covariates(name: str, where: str, topic: _Topic, faults: Faults) -> dict[str, Series]:
+def _covariates(name: str, where: str, topic: Topic, faults: Faults) -> dict[str, Series]:
     fields = topic.rows[0].keys()
     t = topic.times()
     covariates = {}
     if not fields:
-        raise Error(f"{where}: {_ros(topic.type)} has no numeric field, so it is no covariate")
+        raise Error(f"{where}: {topic.type} has no numeric field, so it is no covariate")
     for key in fields:
         values = np.array([row[key] for row in topic.rows], dtype=np.float64)
         # A driver that does not measure a field leaves it at 0 or nan.
@@ -196,7 +114,3 @@ def _covariates(name: str, where: str, topic: _Topic, faults: Faults) -> dict[st
         if series is not None:
             covariates[column] = series
     return covariates
-
-
-def _ros(kind: str) -> str:
-    return kind.replace("/msg/", "/")

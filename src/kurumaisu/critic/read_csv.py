@@ -144,9 +144,7 @@ def _check_header(path: Path, columns: list[str], required: tuple[str, ...]) -> 
             raise Error(f"{path}:1: column {name!r} {'is there twice' if name else 'has no name'}")
 
 
-def _read_cells(
-    path: Path, columns: list[str], required: tuple[str, ...]
-) -> tuple[list[str], FloatArray, list[str]]:
+def _read_cells(path: Path, columns: list[str], required: tuple[str, ...]) -> tuple[list[str], FloatArray, list[str]]:
     """Read cell by cell: slow, but finds the fault, and takes quotes and the empty cells of covariates."""
     cells, lines = [], []
     with path.open(encoding="utf-8-sig", newline="") as stream:

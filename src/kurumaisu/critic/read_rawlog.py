@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu import geometry
 from kurumaisu.critic.clean import Faults, Table, clean
-from kurumaisu.critic.recording import Run
+from kurumaisu.critic.recording import LaserMount, Run
 from kurumaisu.errors import Error, one_line
 from kurumaisu.types import FloatArray
 
@@ -22,28 +22,30 @@ def is_rawlog(path: Path) -> bool:
     return path.is_file() and (path.suffix == ".rawlog" or path.name.endswith(".rawlog.gz"))
 
 
-def read_rawlog_run(path: Path, faults: Faults) -> Run:
-    """Read a rawlog. Raise Error for what MRPT cannot read."""
+def read_rawlog_run(path: Path, faults: Faults) -> tuple[Run, LaserMount]:
+    """Read a rawlog: the run, and the mounting and fan of its laser. Raise Error for what MRPT cannot read."""
     try:
-        t, odom, scans = import_module("kurumaisu._slam").read_rawlog(str(path))
+        t, odom, ranges, fan = import_module("kurumaisu._slam").read_rawlog(str(path))
     except ImportError as error:
         raise Error(f"{path}: this build has no reader of rawlogs: {error}") from error
     except (OSError, RuntimeError, ValueError) as error:
         raise Error(f"{path}: {one_line(error)}") from error
-    return to_run(path.name.split(".")[0], t, odom, scans, faults)
+    run = to_run(path.name.split(".")[0], t, odom, np.asarray(ranges, dtype=np.float64), faults)
+    x, y, yaw = fan.base_from_laser
+    return run, LaserMount(x, y, yaw, fan.angle_min, fan.angle_increment, ranges.shape[1])
 
 
-def to_run(name: str, t: FloatArray, odom: FloatArray, scans: FloatArray, faults: Faults) -> Run:
-    """Return a run from times (n,) [s], odometry poses (n, 3) and scans (n, beams) [m].
+def to_run(name: str, t: FloatArray, odom: FloatArray, ranges: FloatArray, faults: Faults) -> Run:
+    """Return a run from times of scans (n,) [s], odometry poses there (n, 3) and ranges (n, beams) [m].
 
     The rates of a row are those of the interval that ends there; the first row's are those of the second.
     """
     rows = np.column_stack([odom, _rates(t, odom)])
-    beams = tuple(f"r{i}" for i in range(scans.shape[1]))
+    beams = tuple(f"r{i}" for i in range(ranges.shape[1]))
     return Run(
         name=name,
         odom=clean(Table(f"{name} odometry", t, rows, ODOM, "entry", 1), faults),
-        scan=clean(Table(f"{name} scans", t, scans, beams, "entry", 1), faults, ranges=True),
+        scan=clean(Table(f"{name} scans", t, ranges, beams, "entry", 1), faults, ranges=True),
     )
 
 

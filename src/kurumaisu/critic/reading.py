@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from kurumaisu.critic.meta import Meta, read_meta
 from kurumaisu.critic.read_bag import read_bag_run, resolve
 from kurumaisu.critic.read_csv import QUERY, is_csv_run, read_csv_run, read_queries
 from kurumaisu.critic.read_rawlog import is_rawlog, read_rawlog_run
-from kurumaisu.critic.recording import Recording, Run
+from kurumaisu.critic.recording import LaserMount, Recording, Run
 from kurumaisu.errors import Error
 
 
@@ -27,19 +28,23 @@ def read_recording(path: Path) -> Recording:
     meta_file = path / "meta.yaml"
     meta = read_meta(meta_file) if meta_file.is_file() else Meta()
     faults = Faults()
-    runs = tuple(_read_run(source, meta, faults) for source in _sources(path))
-    for run in runs:
-        check_run(run, meta.laser, faults)
+    laser = meta.laser
+    runs = []
+    for source in _sources(path):
+        run, mount = _read_run(source, meta, faults)
+        laser = laser or mount
+        check_run(run, laser, faults)
+        runs.append(run)
     _require_use(path, runs, meta, faults)
     train, test = _split(meta_file, meta, [run.name for run in runs])
     return Recording(
         name=path.resolve().stem if path.is_file() else path.resolve().name,
-        runs=runs,
+        runs=tuple(runs),
         train=train,
         test=test,
         model=meta.model,
         world=meta.world,
-        laser=meta.laser,
+        laser=laser,
         truth=meta.truth,
         problems=tuple(faults.notes),
         invalid=tuple(faults.invalid),
@@ -70,18 +75,19 @@ def _sources(path: Path) -> list[Path]:
     if twice:
         raise Error(f"{path}: the run {twice[0]} is there twice")
     if not bags and not folders:
-        raise Error(
-            f"{path}: holds no run: neither a .bag, nor a .rawlog, nor a folder with tables like pose.csv"
-        )
+        raise Error(f"{path}: holds no run: neither a .bag, nor a .rawlog, nor a folder with tables like pose.csv")
     return sorted(bags + folders, key=lambda item: item.stem)
 
 
-def _read_run(source: Path, meta: Meta, faults: Faults) -> Run:
+def _read_run(source: Path, meta: Meta, faults: Faults) -> tuple[Run, LaserMount | None]:
+    """Return a run, and the laser's mounting where the file itself states it."""
     if source.is_dir():
-        return read_csv_run(source, source.resolve().name, faults)
-    run = read_rawlog_run(source, faults) if is_rawlog(source) else read_bag_run(source, meta.topics, faults)
+        return read_csv_run(source, source.resolve().name, faults), None
+    if is_rawlog(source):
+        return read_rawlog_run(source, faults)
+    run = read_bag_run(source, meta.topics, faults)
     queries = source.with_suffix("") / f"{QUERY}.csv"
-    return replace(run, queries=read_queries(queries)) if queries.is_file() else run
+    return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
 
 
 def _split(meta_file: Path, meta: Meta, names: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -96,7 +102,7 @@ def _split(meta_file: Path, meta: Meta, names: list[str]) -> tuple[tuple[str, ..
     return train, meta.test
 
 
-def _require_use(path: Path, runs: tuple[Run, ...], meta: Meta, faults: Faults) -> None:
+def _require_use(path: Path, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
     """Raise Error unless a run says something about base or laser; note the runs that do not."""
     useless = [run for run in runs if not usable(run)]
     for run in useless:
@@ -112,7 +118,5 @@ def _require_use(path: Path, runs: tuple[Run, ...], meta: Meta, faults: Faults) 
 
 
 def _has(run: Run) -> str:
-    parts = [
-        part for part in ("command", "voltage", "pose", "odom", "scan") if getattr(run, part) is not None
-    ]
+    parts = [part for part in ("command", "voltage", "pose", "odom", "scan") if getattr(run, part) is not None]
     return f"only {' and '.join(parts)}" if parts else "no part of a run"
