@@ -37,7 +37,7 @@ class Fan:
 class Run:
     """One drive. Any part may be missing.
 
-    command: v, w (held); voltage: v_f, v_s (held) and, where the recording has them, v, w that they stand for;
+    command: v, w (held); voltage: v_f, v_s (held) and, where known, v, w that they stand for;
     pose: x, y, theta in the map frame, theta unwrapped; odom: x, y, theta, v, w, theta unwrapped;
     scan: r0, r1, ... at the time of the first beam, nan = no valid reading, inf = no return;
     covariates: one Series of one column per name, finite values;

@@ -10,7 +10,7 @@ from kurumaisu.types import FloatArray
 
 @dataclass(frozen=True)
 class Overlay:
-    """One run from above, metres: measured path (n, 2), simulated paths (m, 2); held_out: no model fitted it."""
+    """One run from above [m]: measured path (n, 2), simulated paths (m, 2); held_out: no model fitted it."""
 
     run: str
     measured: FloatArray
@@ -21,7 +21,7 @@ class Overlay:
 
 @dataclass(frozen=True)
 class Bins:
-    """Means of the residual in bins of the covariate, all (k,): centre, mean, and the mean's 90 % interval."""
+    """Means of the residual in bins of the covariate, all (k,), each mean with its 90 % interval."""
 
     centre: FloatArray
     mean: FloatArray
@@ -50,7 +50,7 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Rival:
-    """An explanation that was weighed and lost: log evidence relative to the winner [nat], and why it lost."""
+    """An explanation that was weighed and lost: log evidence over the winner [nat], and why it lost."""
 
     id: str
     nats: float
@@ -73,7 +73,7 @@ class Story:
     """All that the report tells and the verdict does not hold.
 
     headline: the verdict in one sentence; details: what a reader should know next, one sentence each;
-    unexplained: what remains, one sentence each; next_drive: what to drive next and why, empty if nothing helps;
+    unexplained: what remains, one sentence each; next_drive: what to drive next and why, or empty;
     pose_source: where the reference pose came from; provenance: seeds, versions, files, by name.
     """
 

@@ -30,7 +30,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Cause:
-    """One effect of the catalogue: its id, probability, parameters, and log evidence over doing without it."""
+    """One effect of the catalogue: its id, probability, parameters, and log evidence over its absence."""
 
     id: str
     p: float
@@ -40,7 +40,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class Unknown:
-    """A misfit outside the catalogue: where it shows, what it follows, its shape in words, its probability."""
+    """A misfit outside the catalogue: where it shows, what it follows, shape, probability."""
 
     channel: str
     covariate: str
@@ -50,7 +50,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """The drive that would tell most: its id, duration [s], expected log evidence, and the causes it separates."""
+    """The drive that would tell most: id, duration [s], expected log evidence, what it separates."""
 
     id: str
     seconds: float
@@ -83,7 +83,7 @@ class RmseGain:
 
 @dataclass(frozen=True)
 class Gain:
-    """What the extension is worth on data that it did not fit. rmse: by what is predicted, as a reader says it."""
+    """What the extension is worth on data that it did not fit. rmse: by what is predicted, in words."""
 
     log_density_per_sample: LogDensityGain
     rmse: dict[str, RmseGain] = field(default_factory=dict)
