@@ -11,6 +11,7 @@ from collections import deque
 
 import numpy as np
 
+from kurumaisu.sim.joystick import joystick
 from kurumaisu.types import FloatArray
 
 # id: from, to, of either sign
@@ -45,7 +46,7 @@ def draw_size(effect: str, rng: np.random.Generator) -> float:
 def make_run(effect: str | None, size: float, seed: int, seconds: float) -> dict[str, FloatArray]:
     """Return one drive as tables: command (t, v, w), voltage (t, v_f, v_s), pose (t, x, y, theta) at 10 Hz."""
     rng = np.random.default_rng(seed)
-    command = _joystick(seconds, rng)
+    command = joystick(seconds, rng)
     voltage = np.array([[t, _volts(v, _FORWARD), _volts(w, _STEER)] for t, v, w in command])
     steps = round((seconds + 1.0) / _STEP)
     asked = command[np.searchsorted(command[:, 0], np.arange(steps) * _STEP, side="right") - 1, 1:]
@@ -58,19 +59,6 @@ def make_run(effect: str | None, size: float, seed: int, seconds: float) -> dict
             poses.append([k * _STEP, *(np.array([chair.x, chair.y, chair.theta]) + error)])
         chair.step(float(asked[k, 0]), float(asked[k, 1]), float(noise[k, 0]), float(noise[k, 1]))
     return {"command": command, "voltage": voltage, "pose": np.array(poses)}
-
-
-def _joystick(seconds: float, rng: np.random.Generator) -> FloatArray:
-    """Return commands as a person with a joystick gives them: held for a while, sometimes at rest or reversing."""
-    rows, t = [], 0.0
-    while t < seconds:
-        kind = rng.random()
-        v = 0.0 if kind < 0.15 else rng.uniform(0.15, 0.7) * (-1 if kind > 0.85 else 1)
-        w = 0.0 if rng.random() < 0.25 else rng.uniform(0.1, 0.7) * rng.choice([-1, 1])
-        rows.append((t, v, w))
-        t += rng.uniform(0.8, 3.0)
-    rows.append((seconds, 0.0, 0.0))
-    return np.array(rows)
 
 
 def _ornstein_uhlenbeck(steps: int, rng: np.random.Generator) -> FloatArray:
