@@ -54,7 +54,9 @@ Array integrate(const Array& v, const Array& w, const Array& dt, const std::arra
 
 void bindModel(py::module_& m) {
   py::class_<k::Branch>(m, "Branch", "One side of a voltage law: volts = slope * rate + intercept.")
-      .def(py::init([](double slope, double intercept) { return k::Branch{slope, intercept}; }),
+      .def(py::init([](double slope, double intercept) {
+             return k::Branch{slope, intercept};
+           }),
            py::arg("slope"), py::arg("intercept"))
       .def_readonly("slope", &k::Branch::slope)
       .def_readonly("intercept", &k::Branch::intercept);
@@ -72,13 +74,15 @@ void bindModel(py::module_& m) {
            py::arg("rate"), "Volts that stand for rates [m/s or rad/s], elementwise.")
       .def("gain", py::vectorize([](const k::AxisLaw* law, double rate) { return law->gain(rate); }),
            py::arg("rate"), "Rate per volt on the branch of the rate's sign, elementwise.")
-      .def("ambiguous", py::vectorize([](const k::AxisLaw* law, double volts) { return law->ambiguous(volts); }),
+      .def("ambiguous",
+           py::vectorize([](const k::AxisLaw* law, double volts) { return law->ambiguous(volts); }),
            py::arg("volts"), "True where two rates answer to the volts, elementwise.");
 
   py::class_<k::AxisInverse>(m, "AxisInverse", "Single-valued inverse of an AxisLaw along a sequence.")
       .def(py::init<const k::AxisLaw&>(), py::arg("law"))
       .def("rates", &ratesAlong, py::arg("volts"), py::arg("sign"),
-           "Rates for volts, shape (n,); sign (n,): -1, 0, +1 as commanded, NaN where unknown. Keeps its state.")
+           "Rates for volts, shape (n,); sign (n,): -1, 0, +1 as commanded, NaN where unknown. Keeps its "
+           "state.")
       .def_property_readonly("ambiguous_samples", &k::AxisInverse::ambiguousSamples);
 
   m.def("integrate", &integrate, py::arg("v"), py::arg("w"), py::arg("dt"),
@@ -101,7 +105,8 @@ void bindModel(py::module_& m) {
       .def("reading",
            py::vectorize([](const k::LaserError* e, double r, double z) { return e->reading(r, z); }),
            py::arg("r"), py::arg("standard_normal"),
-           "Reading [m] of true range r [m] for standard normal draws; +inf = no return, NaN = below range_min.");
+           "Reading [m] of true range r [m] for standard normal draws; +inf = no return, NaN = below "
+           "range_min.");
 }
 
 void bindKalman(py::module_& m) {
@@ -114,7 +119,8 @@ void bindKalman(py::module_& m) {
       },
       py::arg("poses"), py::arg("times"), py::arg("columns"), py::kw_only(), py::arg("position_sd"),
       py::arg("heading_sd"), py::arg("process_sd"), py::arg("process_tau"),
-      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and log determinants (n,).");
+      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and log determinants "
+      "(n,).");
 }
 
 }  // namespace
