@@ -173,9 +173,7 @@ def _laser(section: settings.Section) -> Laser:
 
 def _effect(section: settings.Section) -> EffectSetting:
     parameters = section.section("parameters")
-    setting = EffectSetting(
-        section.text("id"), {name: parameters.number(name) for name in parameters.names()}
-    )
+    setting = EffectSetting(section.text("id"), {name: parameters.number(name) for name in parameters.names()})
     section.end()
     return setting
 

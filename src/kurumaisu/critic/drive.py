@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -47,7 +48,9 @@ def prepare(run: Run, model: Model) -> Drive:
     source, times, v, w = _inputs(run, model)
     pose_times, poses = _thin(run.pose, times[0])
     if len(pose_times) < 3:
-        raise Error(f"{run.name}: has {len(pose_times)} reference poses after the first {source}; at least 3 are needed")
+        raise Error(
+            f"{run.name}: has {len(pose_times)} reference poses after the first {source}; at least 3 are needed"
+        )
     edges = np.arange(min(times[0], pose_times[0]), pose_times[-1] + GRID, GRID)
     return Drive(
         name=run.name,
@@ -64,8 +67,13 @@ def split(drive: Drive, parts: int) -> list[Drive]:
     """Return the drive cut into parts of equally many increments; each keeps all inputs, so effects keep their past."""
     bounds = np.linspace(0, len(drive.times) - 1, parts + 1).astype(int)
     return [
-        replace(drive, name=f"{drive.name}[{i + 1}/{parts}]", times=drive.times[a : b + 1], poses=drive.poses[a : b + 1])
-        for i, (a, b) in enumerate(zip(bounds[:-1], bounds[1:], strict=True))
+        replace(
+            drive,
+            name=f"{drive.name}[{i + 1}/{parts}]",
+            times=drive.times[a : b + 1],
+            poses=drive.poses[a : b + 1],
+        )
+        for i, (a, b) in enumerate(pairwise(bounds))
         if b - a >= 2
     ]
 
@@ -81,9 +89,7 @@ def _inputs(run: Run, model: Model) -> tuple[str, FloatArray, FloatArray, FloatA
     raise Error(f"{run.name}: has neither voltages nor commands nor odometry")
 
 
-def _from_voltages(
-    voltage: Series, command: Series | None, model: Model
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _from_voltages(voltage: Series, command: Series | None, model: Model) -> tuple[FloatArray, FloatArray, FloatArray]:
     rates = []
     for law, volts, rate in ((model.translation, "v_f", "v"), (model.steering, "v_s", "w")):
         sign = np.full(len(voltage.t), np.nan)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -52,7 +52,7 @@ class Fit:
     @property
     def settings(self) -> tuple[EffectSetting, ...]:
         """Return the effects as a model file has them."""
-        return _settings(self.terms, self.values)
+        return settings_of(self.terms, self.values)
 
 
 def catalogue(model: Model) -> tuple[Term, ...]:
@@ -80,25 +80,30 @@ class Problem:
         chosen = set(ids)
         return tuple(term for term in self.terms if term.id in chosen)
 
+    def simulated(self, drive: Drive, settings: Sequence[EffectSetting]) -> FloatArray:
+        """Return the simulated body increments of a drive, (m, 3)."""
+        return replay.increments(drive, self.model, settings)
+
+    def simulated_columns(self, drive: Drive, fit: Fit) -> FloatArray:
+        """Return the derivative of the simulated increments by every term at a fit, per scale, (3 m, k)."""
+        here = self.simulated(drive, fit.settings)
+        moved = [
+            (self.simulated(drive, settings), step) for settings, step in self._moves(fit.terms, fit.values, self.terms)
+        ]
+        return np.column_stack([(increments - here).ravel() / step for increments, step in moved])
+
     def residual(self, terms: Sequence[Term], values: FloatArray) -> FloatArray:
         """Return the whitened residual with these parameters, (rows,)."""
-        settings = _settings(terms, values)
+        settings = settings_of(terms, values)
         return np.concatenate([self._whitened(drive, settings) for drive in self.drives])
 
     def columns(self, terms: Sequence[Term], values: FloatArray, of: Sequence[Term]) -> FloatArray:
         """Return minus the derivative of the residual by each term of `of` at a fit, per scale, (rows, k)."""
         here = self.residual(terms, values)
         out = np.empty((len(here), len(of)))
-        known = {(term.id, term.parameter.name): i for i, term in enumerate(terms)}
-        for j, term in enumerate(of):
-            i = known.get((term.id, term.parameter.name))
-            at = term.null if i is None else values[i]
-            step = _STEP * term.parameter.scale * (1 if at + term.parameter.scale <= term.parameter.upper else -1)
-            if i is None:
-                moved = self.residual((*terms, term), np.append(values, at + step))
-            else:
-                moved = self.residual(terms, np.where(np.arange(len(values)) == i, at + step, values))
-            out[:, j] = (here - moved) / step * term.parameter.scale
+        for j, (settings, step) in enumerate(self._moves(terms, values, of)):
+            moved = np.concatenate([self._whitened(drive, settings) for drive in self.drives])
+            out[:, j] = (here - moved) / step
         return out
 
     def fit(self, ids: Iterable[str], start: dict[str, float]) -> Fit:
@@ -129,8 +134,23 @@ class Problem:
         z = np.abs(solution.x - [term.null for term in terms]) / sds
         return Fit(frozenset(ids), terms, solution.x, sds, likelihood, likelihood - float(occam(z).sum()))
 
+    def _moves(
+        self, terms: Sequence[Term], values: FloatArray, of: Sequence[Term]
+    ) -> Iterator[tuple[tuple[EffectSetting, ...], float]]:
+        """Yield, for each term of `of`, the fit's settings with that term moved, and the step in units of its scale."""
+        known = {(term.id, term.parameter.name): i for i, term in enumerate(terms)}
+        for term in of:
+            i = known.get((term.id, term.parameter.name))
+            at = term.null if i is None else float(values[i])
+            step = _STEP if at + _STEP * term.parameter.scale <= term.parameter.upper else -_STEP
+            moved = at + step * term.parameter.scale
+            if i is None:
+                yield settings_of((*terms, term), np.append(values, moved)), step
+            else:
+                yield settings_of(terms, np.where(np.arange(len(values)) == i, moved, values)), step
+
     def _whitened(self, drive: Drive, settings: tuple[EffectSetting, ...]) -> FloatArray:
-        residual = drive.measured - replay.increments(drive, self.model, settings)
+        residual = drive.measured - self.simulated(drive, settings)
         return whitened(drive, residual.reshape(-1, 1), self.noise)[0][:, 0]
 
 
@@ -153,7 +173,8 @@ def _occam_table() -> tuple[FloatArray, FloatArray]:
     return grid, np.array(costs)
 
 
-def _settings(terms: Sequence[Term], values: FloatArray) -> tuple[EffectSetting, ...]:
+def settings_of(terms: Sequence[Term], values: FloatArray) -> tuple[EffectSetting, ...]:
+    """Return the effects of fitted terms as a model file has them."""
     by_id: dict[str, dict[str, float]] = {}
     for term, value in zip(terms, values, strict=True):
         by_id.setdefault(term.id, {})[term.parameter.name] = float(value)

@@ -19,9 +19,11 @@ from kurumaisu.types import FloatArray
 
 @dataclass(frozen=True)
 class Noise:
-    """Reference pose: position_sd [m], heading_sd [rad]. Rates: Ornstein-Uhlenbeck with stationary sd_v [m/s],
-    sd_lateral [m/s], sd_w [rad/s] and time constant tau [s].
-    """  # noqa: D205
+    """Of the reference pose and of the rates.
+
+    position_sd [m], heading_sd [rad]: white; sd_v [m/s], sd_lateral [m/s], sd_w [rad/s]: stationary sd of
+    Ornstein-Uhlenbeck processes of time constant tau [s].
+    """
 
     position_sd: float
     heading_sd: float
@@ -31,15 +33,15 @@ class Noise:
     tau: float
 
 
-# Where the search starts, and how far from there a value remains plausible (natural log, 1 sd).
-_START = Noise(position_sd=0.01, heading_sd=0.005, sd_v=0.02, sd_lateral=0.005, sd_w=0.03, tau=0.3)
+# Where the search for the noise starts, and how far from there a value remains plausible (natural log, 1 sd).
+START = Noise(position_sd=0.01, heading_sd=0.005, sd_v=0.02, sd_lateral=0.005, sd_w=0.03, tau=0.3)
 _SPREAD = np.array([2.0, 2.0, 2.0, 2.0, 2.0, 1.0])
 _FLOOR = np.array([1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 0.02])
 _CEILING = np.array([1.0, 1.0, 3.0, 3.0, 10.0, 20.0])
 
 
 def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
-    """Return L^-1 X for columns X (3 m, k) of increment residuals, L L' their covariance, and its log det in m parts."""
+    """Return L^-1 X for columns X (3 m, k) of increment residuals, L L' their covariance; its log det in m parts."""
     return whiten(
         drive.poses,
         drive.times,
@@ -62,7 +64,7 @@ def estimate(
     residuals: (m, 3) per drive, measured minus simulated; columns: (3 m, k) per drive, effects to project out, so
     that a real effect does not pass for noise; truth: known sd of the reference, else it is estimated too.
     """
-    start = np.array(list(vars(_START).values()))
+    start = np.array(list(vars(START).values()))
     if truth is not None:
         start[:2] = np.maximum(truth, _FLOOR[:2])
     free = np.arange(0 if truth is None else 2, 6)
