@@ -39,12 +39,8 @@ class Check:
 def main() -> int:
     """Run the checks that the arguments select. Return 1 if anything failed, or nothing ran."""
     parser = argparse.ArgumentParser(prog="scripts/test", description="Run every check and every test.")
-    parser.add_argument(
-        "--fast", action="store_true", help="leave out what takes minutes: catkin build, rostests"
-    )
-    parser.add_argument(
-        "-k", metavar="WORD", default="", help="only the checks and test files whose name has WORD"
-    )
+    parser.add_argument("--fast", action="store_true", help="leave out what takes minutes: catkin build, rostests")
+    parser.add_argument("-k", metavar="WORD", default="", help="only the checks and test files whose name has WORD")
     arguments = parser.parse_args()
     LOGS.mkdir(parents=True, exist_ok=True)
     total = Counts()
@@ -71,9 +67,7 @@ def _checks() -> list[Check]:
         Check("ruff check", ["ruff", "check", *python]),
         Check("ruff format", ["ruff", "format", "--check", *python]),
         Check("mypy", ["mypy"]),
-        Check(
-            "mypy .ci", ["mypy", "--config-file=", "--strict", *(str(p) for p in (ROOT / ".ci").glob("*.py"))]
-        ),
+        Check("mypy .ci", ["mypy", "--config-file=", "--strict", *(str(p) for p in (ROOT / ".ci").glob("*.py"))]),
         Check("clang-format", ["clang-format", "--dry-run", "-Werror", *cpp]),
         Check("catkin_lint", ["catkin_lint", "--offline", "--strict", "-W2", str(ROOT / ".ws/src")]),
         # scripts/setup --dev built the rest; there, too, a warning is an error.
@@ -92,9 +86,7 @@ def _checks() -> list[Check]:
 
 def _tests(word: str) -> list[Check]:
     """Return a check for each test program; one that fails where CMake does not know the file."""
-    listing = subprocess.run(
-        ["make", "-C", str(BUILD), "help"], check=True, capture_output=True, text=True
-    ).stdout
+    listing = subprocess.run(["make", "-C", str(BUILD), "help"], check=True, capture_output=True, text=True).stdout
     targets = [line.split()[1] for line in listing.splitlines() if f" {TARGET}" in line]
     checks = []
     for path in [*(ROOT / "tests").glob("test_*.cpp"), *(ROOT / "tests").glob("*.test")]:

@@ -57,9 +57,7 @@ def _dependencies(unit: dict[str, str]) -> set[Path]:
     depfile = Path(unit["directory"]) / f"{words[words.index('-o') + 1]}.d"
     names = depfile.read_text().replace("\\\n", " ").split()[1:] if depfile.exists() else []
     headers = {Path(name).resolve() for name in names} or set(sources.files(".h"))
-    return {p for p in headers if p.is_relative_to(sources.ROOT) and p.exists()} | {
-        Path(unit["file"]).resolve()
-    }
+    return {p for p in headers if p.is_relative_to(sources.ROOT) and p.exists()} | {Path(unit["file"]).resolve()}
 
 
 if __name__ == "__main__":
