@@ -120,7 +120,8 @@ void bindKalman(py::module_& m) {
       },
       py::arg("poses"), py::arg("times"), py::arg("columns"), py::kw_only(), py::arg("position_sd"),
       py::arg("heading_sd"), py::arg("process_sd"), py::arg("process_tau"),
-      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and log determinants (n,).");
+      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and log determinants "
+      "(n,).");
 }
 
 std::vector<k::Segment> segmentsOf(const Array& array) {
