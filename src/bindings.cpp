@@ -11,6 +11,7 @@
 #include "model/laser_error.h"
 #include "model/unicycle.h"
 #include "model/voltage_law.h"
+#include "raycast/scene.h"
 
 namespace py = pybind11;
 namespace k = kurumaisu;
@@ -54,7 +55,9 @@ Array integrate(const Array& v, const Array& w, const Array& dt, const std::arra
 
 void bindModel(py::module_& m) {
   py::class_<k::Branch>(m, "Branch", "One side of a voltage law: volts = slope * rate + intercept.")
-      .def(py::init([](double slope, double intercept) { return k::Branch{slope, intercept}; }),
+      .def(py::init([](double slope, double intercept) {
+             return k::Branch{slope, intercept};
+           }),
            py::arg("slope"), py::arg("intercept"))
       .def_readonly("slope", &k::Branch::slope)
       .def_readonly("intercept", &k::Branch::intercept);
@@ -72,13 +75,15 @@ void bindModel(py::module_& m) {
            py::arg("rate"), "Volts that stand for rates [m/s or rad/s], elementwise.")
       .def("gain", py::vectorize([](const k::AxisLaw* law, double rate) { return law->gain(rate); }),
            py::arg("rate"), "Rate per volt on the branch of the rate's sign, elementwise.")
-      .def("ambiguous", py::vectorize([](const k::AxisLaw* law, double volts) { return law->ambiguous(volts); }),
+      .def("ambiguous",
+           py::vectorize([](const k::AxisLaw* law, double volts) { return law->ambiguous(volts); }),
            py::arg("volts"), "True where two rates answer to the volts, elementwise.");
 
   py::class_<k::AxisInverse>(m, "AxisInverse", "Single-valued inverse of an AxisLaw along a sequence.")
       .def(py::init<const k::AxisLaw&>(), py::arg("law"))
       .def("rates", &ratesAlong, py::arg("volts"), py::arg("sign"),
-           "Rates for volts, shape (n,); sign (n,): -1, 0, +1 as commanded, NaN where unknown. Keeps its state.")
+           "Rates for volts, shape (n,); sign (n,): -1, 0, +1 as commanded, NaN where unknown. Keeps its "
+           "state.")
       .def_property_readonly("ambiguous_samples", &k::AxisInverse::ambiguousSamples);
 
   m.def("integrate", &integrate, py::arg("v"), py::arg("w"), py::arg("dt"),
@@ -101,7 +106,8 @@ void bindModel(py::module_& m) {
       .def("reading",
            py::vectorize([](const k::LaserError* e, double r, double z) { return e->reading(r, z); }),
            py::arg("r"), py::arg("standard_normal"),
-           "Reading [m] of true range r [m] for standard normal draws; +inf = no return, NaN = below range_min.");
+           "Reading [m] of true range r [m] for standard normal draws; +inf = no return, NaN = below "
+           "range_min.");
 }
 
 void bindKalman(py::module_& m) {
@@ -114,7 +120,54 @@ void bindKalman(py::module_& m) {
       },
       py::arg("poses"), py::arg("times"), py::arg("columns"), py::kw_only(), py::arg("position_sd"),
       py::arg("heading_sd"), py::arg("process_sd"), py::arg("process_tau"),
-      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and log determinants (n,).");
+      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and log determinants "
+      "(n,).");
+}
+
+std::vector<k::Segment> segmentsOf(const Array& array) {
+  if (array.ndim() != 2 || array.shape(1) != 4)
+    throw std::invalid_argument("segments must have shape (m, 4)");
+  std::vector<k::Segment> segments;
+  segments.reserve(static_cast<std::size_t>(array.shape(0)));
+  const auto rows = array.unchecked<2>();
+  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
+    segments.push_back({rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3)});
+  }
+  return segments;
+}
+
+Array castBeams(const k::Scene& scene, const Array& poses, const Array& bearings, double max_range) {
+  const bool one_pose = poses.ndim() == 1;
+  if (bearings.ndim() != 1) throw std::invalid_argument("bearings must have shape (n,)");
+  if (poses.ndim() > 2 || poses.ndim() < 1 || poses.shape(poses.ndim() - 1) != 3 ||
+      (!one_pose && poses.shape(0) != bearings.size())) {
+    throw std::invalid_argument("poses must have shape (3,), or (n, 3) with one row per bearing");
+  }
+  if (!(max_range >= 0)) throw std::invalid_argument("max_range must not be negative");
+  std::vector<k::Pose2D> origins;
+  for (py::ssize_t i = 0; i < poses.size(); i += 3) {
+    origins.push_back({poses.data()[i], poses.data()[i + 1], poses.data()[i + 2]});
+  }
+  Array out(bearings.size());
+  double* ranges = out.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    scene.cast(origins.data(), one_pose, bearings.data(), static_cast<std::size_t>(bearings.size()),
+               max_range, ranges);
+  }
+  return out;
+}
+
+void bindRaycast(py::module_& m) {
+  py::class_<k::Scene>(m, "Scene", "Immutable line segments that answer rays exactly.")
+      .def(py::init([](const Array& segments) { return k::Scene(segmentsOf(segments)); }),
+           py::arg("segments"),
+           "From segments (m, 4): x, y of both ends [m]. Raises ValueError for one that is not finite.")
+      .def("__len__", &k::Scene::size)
+      .def("cast", &castBeams, py::arg("poses"), py::arg("bearings"), py::arg("max_range"),
+           "Ranges (n,) [m] of beams that leave poses (n, 3), or one pose (3,), at bearings (n,) [rad]; +inf "
+           "beyond\n"
+           "max_range [m]. Poses are of the laser, in the map frame.");
 }
 
 }  // namespace
@@ -123,4 +176,5 @@ PYBIND11_MODULE(_core, m) {
   m.doc() = "Equations (1)-(4) of the paper, ray casting and whitening, in C++.";
   bindModel(m);
   bindKalman(m);
+  bindRaycast(m);
 }

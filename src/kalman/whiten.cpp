@@ -9,8 +9,8 @@ namespace kurumaisu {
 namespace {
 
 using Matrix3 = Eigen::Matrix3d;
-using State = Eigen::Matrix<double, 6, 6>;        // of e_k (pose error, map frame) and u_k (rate error)
-using Increments = Eigen::Matrix<double, 3, 6>;   // e_k, u_k to one increment
+using State = Eigen::Matrix<double, 6, 6>;       // of e_k (pose error, map frame) and u_k (rate error)
+using Increments = Eigen::Matrix<double, 3, 6>;  // e_k, u_k to one increment
 
 /// Discrete Ornstein-Uhlenbeck process of unit variance over dt, with its integral over the interval.
 struct OuStep {
@@ -26,8 +26,8 @@ OuStep ouStep(double dt, double tau) {
   const double decay = std::exp(-x);
   const double lost = -std::expm1(-x);
   // For small x the closed form cancels to nothing; its series does not.
-  const double spread = x < 1e-2 ? 2.0 / 3.0 * x * x * x - 0.5 * x * x * x * x
-                                 : 2.0 * x - 4.0 * lost - std::expm1(-2.0 * x);
+  const double spread =
+      x < 1e-2 ? 2.0 / 3.0 * x * x * x - 0.5 * x * x * x * x : 2.0 * x - 4.0 * lost - std::expm1(-2.0 * x);
   return {decay, tau * lost, -std::expm1(-2.0 * x), tau * tau * spread, tau * lost * lost};
 }
 
@@ -74,8 +74,11 @@ Whitened whiten(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, cons
                 const MotionNoise& noise) {
   check(poses, times, columns, noise);
   const Eigen::Index n = poses.rows() - 1;
-  const Matrix3 pose_cov =
-      Eigen::Vector3d(noise.position_sd, noise.position_sd, noise.heading_sd).array().square().matrix().asDiagonal();
+  const Matrix3 pose_cov = Eigen::Vector3d(noise.position_sd, noise.position_sd, noise.heading_sd)
+                               .array()
+                               .square()
+                               .matrix()
+                               .asDiagonal();
   const Matrix3 rate_cov = noise.process_sd.array().square().matrix().asDiagonal();
 
   Whitened out{Eigen::MatrixXd(columns.rows(), columns.cols()), Eigen::VectorXd(n)};

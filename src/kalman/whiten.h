@@ -8,10 +8,11 @@ namespace kurumaisu {
 
 /// Noise of the reference pose and of the motion itself.
 struct MotionNoise {
-  double position_sd;          ///< reference pose, each axis of the map frame [m]
-  double heading_sd;           ///< reference pose [rad]
-  Eigen::Vector3d process_sd;  ///< stationary sd of the Ornstein-Uhlenbeck rates: v [m/s], lateral [m/s], w [rad/s]
-  double process_tau;          ///< their time constant [s]
+  double position_sd;  ///< reference pose, each axis of the map frame [m]
+  double heading_sd;   ///< reference pose [rad]
+  Eigen::Vector3d
+      process_sd;      ///< stationary sd of the Ornstein-Uhlenbeck rates: v [m/s], lateral [m/s], w [rad/s]
+  double process_tau;  ///< their time constant [s]
 };
 
 /// Whitened columns (rows: 3 per increment) and, per increment, the log determinant of its covariance given the

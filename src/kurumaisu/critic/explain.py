@@ -10,11 +10,11 @@ import numpy as np
 import scipy
 
 from kurumaisu import effects
-from kurumaisu.critic import misfit, replay
+from kurumaisu.critic import misfit, naming, replay
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem, Term
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.naming import NAMED, Naming
+from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Noise, Overlay, Rival, Story
 from kurumaisu.critic.verdict import Cause, Estimate, Gain, Kind, Verdict
@@ -128,7 +128,8 @@ def _estimate(model: Model, term: Term, value: float, sd: float) -> Estimate:
 def _headline(verdict: Verdict, best: Fit, material: bool) -> str:
     if verdict.verdict == "named":
         said = [_sentence(cause.id) for cause in verdict.causes]
-        return "; ".join(said).capitalize() + f" ({', '.join(cause.id for cause in verdict.causes)})."
+        text = "; ".join(said)
+        return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in verdict.causes)})."
     if verdict.verdict == "confounded":
         group = " or ".join(verdict.confounded[0])
         return f"Something is missing in the model, but these drives cannot tell which: {group}."
@@ -153,7 +154,8 @@ def _details(problem: Problem, found: Naming, drives: Sequence[Drive], share: fl
         )
     if found.best.ids:
         details.append(f"It moves the rates by {share:.1%} of their size (rms).")
-    details.append(f"Noise alone would look as much like some effect in {found.false_alarm:.1%} of drives like these.")
+    alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
+    details.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
     return tuple(details)
 
 
@@ -199,6 +201,6 @@ def _pose_source(recording: Recording) -> str:
 
 def _provenance() -> dict[str, str]:
     return {
-        "named from": f"posterior {NAMED:g}",
+        "named from": f"posterior {naming.NAMED:g}",
         "numpy, scipy": f"{np.__version__}, {scipy.__version__}",
     }

@@ -18,7 +18,7 @@ _RIVAL = 0.05  # posterior from which an effect counts as a rival of another
 _PRIOR = 0.1  # of any one effect to be at work, before the data
 _LARGEST = 3  # effects in a set that the linear scan tries; larger sets grow from the best ones
 _REFITS = 8  # sets refitted after each scan
-_NULLS = 2000  # draws of the null calibration
+NULLS = 2000  # draws of the null calibration
 
 
 @dataclass(frozen=True)
@@ -145,5 +145,5 @@ def _false_alarm(problem: Problem, empty: Fit, ids: tuple[str, ...]) -> float:
     correlation = (columns / seen).T @ (columns / seen)
     observed = columns.T @ problem.residual((), np.empty(0)) / seen
     roots = np.linalg.cholesky(correlation + 1e-9 * np.eye(len(seen)))
-    draws = np.random.default_rng(0).standard_normal((_NULLS, len(seen))) @ roots.T
+    draws = np.random.default_rng(0).standard_normal((NULLS, len(seen))) @ roots.T
     return float(np.mean(np.abs(draws).max(axis=1) >= np.abs(observed).max()))

@@ -41,7 +41,7 @@ _CEILING = np.array([1.0, 1.0, 3.0, 3.0, 10.0, 20.0])
 
 
 def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
-    """Return L^-1 X for columns X (3 m, k) of increment residuals, L L' their covariance, and its log det in m parts."""
+    """Return L^-1 X for columns X (3 m, k) of increment residuals, L L' their covariance; its log det in m parts."""
     return whiten(
         drive.poses,
         drive.times,

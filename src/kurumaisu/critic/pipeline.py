@@ -22,19 +22,21 @@ from kurumaisu.params import Model, follow_commands, load_model
 Progress = Callable[[str], None]
 
 
-def criticise(recording: Recording, model_file: Path, progress: Progress) -> Criticism:
+def criticise(recording: Recording, model_file: Path, progress: Progress, *, assume_law: bool = False) -> Criticism:
     """Return the criticism of a model by a recording whose runs have reference poses.
 
+    Without voltages the model is "velocity follows command", unless the recording names a model or assume_law says
+    that the robot has the model's voltage law.
     Raise Error when a run has no reference, or nothing that drove the robot.
     """
     model = load_model(model_file)
-    if recording.model is None and all(run.voltage is None for run in recording.runs):
+    if not assume_law and recording.model is None and all(run.voltage is None for run in recording.runs):
         model = follow_commands(model)
     drives = {run.name: prepare(run, model) for run in recording.runs}
     train = [drives[name] for name in recording.train]
     test = [drives[name] for name in recording.test]
 
-    wrong = [*recording.problems, *sanity.suspicions(train, model)]
+    wrong = [*recording.invalid, *sanity.suspicions(train, model)]
     if wrong:
         return explain.invalid(recording, model, wrong, train)
 

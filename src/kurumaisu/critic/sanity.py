@@ -21,6 +21,7 @@ _TRANSFORMS: dict[str, Callable[[Drive], Drive]] = {
     "the heading of the reference pose is in degrees": lambda d: _pose(d, [0, 1, 2], [1, 1, np.pi / 180]),
     "the reference pose is in millimetres": lambda d: _pose(d, [0, 1, 2], [1e-3, 1e-3, 1]),
     "x and y of the reference pose are swapped": lambda d: _pose(d, [1, 0, 2], [1, 1, 1]),
+    "x of the reference pose has the wrong sign": lambda d: _pose(d, [0, 1, 2], [-1, 1, 1]),
     "y of the reference pose has the wrong sign": lambda d: _pose(d, [0, 1, 2], [1, -1, 1]),
 }
 

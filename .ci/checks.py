@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every check of scripts/test: a line for each, the end of its output if it failed, and their count."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import results
+import sources
+from results import Counts
+
+ROOT = sources.ROOT
+BUILD = ROOT / ".ws/build"
+XUNIT = BUILD / "test_results/kurumaisu"
+LOGS = ROOT / ".ws/log"
+TARGET = "_run_tests_kurumaisu_"
+TAIL = 60  # lines of a failed check's output that are shown
+
+
+@dataclass(frozen=True)
+class Check:
+    """A command that succeeds or fails; with tests, its results count instead of its exit status."""
+
+    name: str
+    command: list[str]
+    timeout: float = 600.0  # [s]
+    slow: bool = False  # left out by --fast
+    tests: bool = False
+    reads: list[Path] = field(default_factory=list)  # if given: not run again until one of these changes
+
+
+def main() -> int:
+    """Run the checks that the arguments select. Return 1 if anything failed, or nothing ran."""
+    parser = argparse.ArgumentParser(prog="scripts/test", description="Run every check and every test.")
+    parser.add_argument("--fast", action="store_true", help="leave out what takes minutes: catkin build, rostests")
+    parser.add_argument("-k", metavar="WORD", default="", help="only the checks and test files whose name has WORD")
+    arguments = parser.parse_args()
+    LOGS.mkdir(parents=True, exist_ok=True)
+    total = Counts()
+    for check in [*_checks(), *_tests(arguments.k)]:
+        if arguments.k not in check.name and not _holds(check, arguments.k):
+            continue
+        if check.slow and arguments.fast:
+            total += Counts(skipped=1)
+            _line("skip", check.name, "--fast", 0.0)
+        else:
+            total += _run(check, arguments.k)
+    if total == Counts():
+        print(f"no check and no test file has {arguments.k!r} in its name")
+        total = Counts(failed=1)
+    print(total)
+    return 1 if total.failed else 0
+
+
+def _checks() -> list[Check]:
+    python = [str(path) for path in sources.python_files()]
+    cpp = [str(path) for path in sources.files(".cpp", ".h")]
+    inside = [path for path in sources.files() if path.suffix != ".md"]
+    return [
+        Check("ruff check", ["ruff", "check", *python]),
+        Check("ruff format", ["ruff", "format", "--check", *python]),
+        Check("mypy", ["mypy"]),
+        Check("mypy .ci", ["mypy", "--config-file=", "--strict", *(str(p) for p in (ROOT / ".ci").glob("*.py"))]),
+        Check("clang-format", ["clang-format", "--dry-run", "-Werror", *cpp]),
+        Check("catkin_lint", ["catkin_lint", "--offline", "--strict", "-W2", str(ROOT / ".ws/src")]),
+        # scripts/setup --dev built the rest; there, too, a warning is an error.
+        Check("build tests", ["cmake", "--build", str(BUILD), "--target", "tests"], timeout=1200),
+        Check("clang-tidy", ["python", str(ROOT / ".ci/tidy.py")], timeout=1800),
+        Check("install space", ["bash", str(ROOT / ".ci/install_space.bash")], timeout=1200),
+        Check(
+            "catkin build",
+            ["bash", str(ROOT / ".ci/catkin_build.bash")],
+            timeout=1800,
+            slow=True,
+            reads=inside,
+        ),
+    ]
+
+
+def _tests(word: str) -> list[Check]:
+    """Return a check for each test program; one that fails where CMake does not know the file."""
+    listing = subprocess.run(["make", "-C", str(BUILD), "help"], check=True, capture_output=True, text=True).stdout
+    targets = [line.split()[1] for line in listing.splitlines() if f" {TARGET}" in line]
+    checks = []
+    for path in [*(ROOT / "tests").glob("test_*.cpp"), *(ROOT / "tests").glob("*.test")]:
+        ending = f"rostest_tests_{path.name}" if path.suffix == ".test" else f"gtest_{path.stem}"
+        command = ["cmake", "--build", str(BUILD), "--target", TARGET + ending]
+        if TARGET + ending not in targets:
+            command = ["bash", "-c", f"echo tests/CMakeLists.txt does not run {path.name}; false"]
+        checks.append(Check(path.name, command, slow=path.suffix == ".test", tests=True))
+    pytest = ["cmake", "--build", str(BUILD), "--target", f"{TARGET}pytest_unit"]
+    if word and word not in "pytest":
+        pytest = ["env", f"PYTEST_ADDOPTS=-k {word}", *pytest]
+    return [Check("pytest", pytest, timeout=1200, tests=True), *checks]
+
+
+def _pytest_files() -> set[str]:
+    return {path.stem for path in (ROOT / "tests").glob("test_*.py")}
+
+
+def _holds(check: Check, word: str) -> bool:
+    """Say whether a check consists of several files, one of which has the word in its name."""
+    return check.name == "pytest" and any(word in stem for stem in _pytest_files())
+
+
+def _run(check: Check, word: str) -> Counts:
+    stamp = LOGS / f"{check.name}.clean"
+    state = sources.content_hash(check.reads)
+    if check.reads and stamp.exists() and stamp.read_text() == state:
+        _line("ok", check.name, "nothing changed since it passed", 0.0)
+        return Counts(passed=1)
+    start = time.monotonic()
+    log = LOGS / f"{check.name}.log"
+    problem = _execute(check, log)
+    counts = Counts(failed=1) if problem else Counts(passed=1)
+    if check.tests and not problem:
+        counts = results.read(sorted(XUNIT.glob("*.xml")))
+        silent = _silent(check, word)
+        if silent:
+            problem = f"no test ran in: {', '.join(silent)}"
+            counts += Counts(failed=len(silent))
+    note = problem or (str(counts) if check.tests else "")
+    _line("FAILED" if counts.failed else "ok", check.name, note, time.monotonic() - start)
+    if counts.failed:
+        lines = log.read_text(errors="replace").splitlines()
+        print("\n".join(f"    {line}" for line in lines[-TAIL:]), f"\n    (whole output: {log})", flush=True)
+    elif check.reads:
+        stamp.write_text(state)
+    return counts
+
+
+def _silent(check: Check, word: str) -> list[str]:
+    """Return the test files of pytest without any result: they must not look like success."""
+    if check.name != "pytest" or (word and word not in "pytest"):
+        return []
+    return sorted(_pytest_files() - results.classes(XUNIT / "pytest-unit.xml"))
+
+
+def _execute(check: Check, log: Path) -> str:
+    """Run the command in a session of its own, output to the log. Return what went wrong, or nothing."""
+    with log.open("w") as output:
+        output.write(f"{' '.join(check.command)[:400]}\n")
+        output.flush()
+        process = subprocess.Popen(
+            check.command,
+            cwd=ROOT,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            start_new_session=True,
+        )
+        try:
+            status = process.wait(check.timeout)
+        except subprocess.TimeoutExpired:
+            return f"not done after {check.timeout:.0f} s"
+        finally:
+            _end(process)
+    return f"exit status {status}" if status else ""
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End what is left of the session: after a time-out, an interrupt, or a node that outlived its test."""
+    try:
+        os.killpg(process.pid, signal.SIGTERM)
+        process.wait(10)
+    except ProcessLookupError:
+        return
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def _line(verdict: str, name: str, note: str, seconds: float) -> None:
+    print(f"{verdict:<7} {name:<24} {seconds:6.1f} s  {note}".rstrip(), flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

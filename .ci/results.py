@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Counts of test results in xunit files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many tests passed, failed and were skipped."""
+
+    passed: int = 0
+    failed: int = 0
+    skipped: int = 0
+
+    def __add__(self, other: Counts) -> Counts:
+        """Add field by field."""
+        return Counts(self.passed + other.passed, self.failed + other.failed, self.skipped + other.skipped)
+
+    def __str__(self) -> str:
+        """Return the verdict line."""
+        skipped = f", {self.skipped} skipped" if self.skipped else ""
+        return f"{self.passed} passed, {self.failed} failed{skipped}"
+
+
+def read(paths: list[Path]) -> Counts:
+    """Return what the files of one test program say. No case at all, or an unreadable file, is a failure."""
+    try:
+        cases = [case for path in paths for case in ElementTree.parse(path).iter("testcase")]
+    except (ElementTree.ParseError, OSError):
+        return Counts(failed=1)
+    total = sum((_verdict(case) for case in cases), Counts())
+    return total if total != Counts() else Counts(failed=1)
+
+
+def classes(path: Path) -> set[str]:
+    """Return the last part of the class (or module) names of the cases in a file, empty if unreadable."""
+    try:
+        cases = list(ElementTree.parse(path).iter("testcase"))
+    except (ElementTree.ParseError, OSError):
+        return set()
+    return {part for case in cases for part in case.get("classname", "").split(".")}
+
+
+def _verdict(case: ElementTree.Element) -> Counts:
+    if case.find("failure") is not None or case.find("error") is not None:
+        return Counts(failed=1)
+    if case.find("skipped") is not None or case.get("status") == "notrun":
+        return Counts(skipped=1)
+    # rostest's own case says that the test program ran; the program's cases are in another file.
+    return Counts() if case.get("classname") == "rostest.runner.RosTest" else Counts(passed=1)

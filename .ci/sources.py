@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The files of the source tree, and a hash of what a check read."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+from collections.abc import Iterable
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def files(*suffixes: str) -> list[Path]:
+    """Return the files that git tracks or would track, of these suffixes (all if none are given)."""
+    command = ["git", "-C", str(ROOT), "ls-files", "-z", "-co", "--exclude-standard"]
+    names = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split("\0")
+    paths = (ROOT / name for name in sorted(set(names)) if name)
+    return [path for path in paths if path.is_file() and (not suffixes or path.suffix in suffixes)]
+
+
+def python_files() -> list[Path]:
+    """Return the Python files, scripts without suffix included."""
+    scripts = (path for path in files("") if b"python" in path.read_bytes().split(b"\n", 1)[0])
+    return [*files(".py"), *scripts]
+
+
+def content_hash(paths: Iterable[Path], *more: str) -> str:
+    """Return a hash of the names and contents of files, and of more text."""
+    digest = hashlib.sha256()
+    for path in sorted(paths):
+        digest.update(f"{path}\0{path.stat().st_mode}\0{path.stat().st_size}\0".encode())
+        digest.update(path.read_bytes())
+    for text in more:
+        digest.update(text.encode() + b"\0")
+    return digest.hexdigest()

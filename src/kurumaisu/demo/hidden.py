@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Draw an effect, hide it in the plant, record drives, ask the critic, reveal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from kurumaisu import effects
+from kurumaisu.critic import cli
+from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.params import EffectSetting, Model, load_model, shipped
+from kurumaisu.sim.joystick import joystick
+from kurumaisu.sim.settings import load_physics, with_effects
+from kurumaisu.sim.simulator import NEUTRAL, Command, Simulator
+from kurumaisu.types import FloatArray
+from kurumaisu.world import load_world
+
+_DRIVES, _SECONDS = 3, 45.0
+_POSE_EVERY = 0.1  # [s]
+_POSE_SD = (0.005, 0.005, 0.005)  # [m, m, rad], as of a motion-capture system
+
+
+def run(folder: Path, seed: int) -> None:
+    """Do it all and print the critic's answer and the truth. Raise Error for what cannot be read or written."""
+    rng = np.random.default_rng(seed)
+    secret = draw(rng)
+    record(folder / "recording", secret, rng)
+    answer = cli.run(folder / "recording", folder, None, seed=seed)
+    print(cli.summary(answer))
+    size = ", ".join(f"{name} {value:.3g}" for name, value in secret.parameters.items())
+    right = [cause.id for cause in answer.verdict.causes] == [secret.id]
+    print(f"what was hidden (seed {seed}): {secret.id}, {size}: {'found' if right else 'NOT found'}")
+
+
+def draw(rng: np.random.Generator) -> EffectSetting:
+    """Return one effect of the catalogue, of a size that matters."""
+    candidates = [effect for effect in effects.ALL if not effect.random]
+    effect = candidates[rng.integers(len(candidates))]
+    values = {}
+    for parameter in effect.parameters:
+        sign = rng.choice([-1, 1]) if parameter.lower < parameter.null else 1
+        values[parameter.name] = float(parameter.null + sign * parameter.scale * rng.uniform(1.0, 2.5))
+    return EffectSetting(effect.id, values)
+
+
+def record(folder: Path, secret: EffectSetting, rng: np.random.Generator) -> None:
+    """Simulate drives of a chair with the secret effect on an uneven floor, and write them as a recording."""
+    model = with_effects(load_model(shipped("launch/md100.yaml")), shipped("launch/uneven_floor.yaml"))
+    model = replace(model, effects=(*model.effects, secret))
+    physics = load_physics(shipped("launch/sim_node.yaml"))
+    simulator = Simulator(model, load_world(shipped("worlds/hall.world")), physics)
+    for i in range(_DRIVES):
+        print(f"  driving {i + 1} of {_DRIVES} ...", flush=True)
+        write_csv_run(folder / f"drive_{i + 1}", _drive(f"drive_{i + 1}", simulator, model, rng))
+    meta = {"truth": {"position_sd": _POSE_SD[0], "heading_sd": _POSE_SD[2]}}
+    (folder / "meta.yaml").write_text(yaml.safe_dump(meta), encoding="utf-8")
+
+
+def _drive(name: str, simulator: Simulator, model: Model, rng: np.random.Generator) -> Run:
+    commands = joystick(_SECONDS, rng)
+    voltages = np.column_stack([model.translation.volts(commands[:, 1]), model.steering.volts(commands[:, 2])])
+    observation = simulator.reset(int(rng.integers(2**31)))
+    poses, row, command = [], -1, NEUTRAL
+    while observation.time < _SECONDS:
+        while row + 1 < len(commands) and commands[row + 1, 0] <= observation.time:
+            row += 1
+            command = Command(*voltages[row], *np.sign(commands[row, 1:]))
+        if observation.time >= len(poses) * _POSE_EVERY - 1e-9:
+            poses.append([observation.time, *(observation.pose + rng.standard_normal(3) * _POSE_SD)])
+        observation = simulator.step(command)
+    return Run(
+        name,
+        command=_series(commands, "v", "w"),
+        voltage=_series(np.column_stack([commands[:, 0], voltages]), "v_f", "v_s"),
+        pose=_series(np.array(poses), "x", "y", "theta"),
+    )
+
+
+def _series(table: FloatArray, *columns: str) -> Series:
+    return Series(table[:, 0], table[:, 1:], columns)

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Private parameters of sim_node: launch/sim_node.yaml and the arguments of sim.launch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kurumaisu.params import Model, load_model
+from kurumaisu.settings import Section
+from kurumaisu.sim.settings import Physics, read_physics, with_effects
+from kurumaisu.world import World, load_world
+
+
+@dataclass(frozen=True)
+class SimSettings:
+    """What sim_node needs to know; see launch/sim_node.yaml for units and meaning."""
+
+    model: Model
+    world: World
+    seed: int
+    speed: float
+    start_time: float
+    clock_every: int  # [steps]
+    ground_truth_every: int  # [steps]
+    map_frame: str
+    base_frame: str
+    voltage_timeout: float
+    voltage_horizon: float
+    voltage_lead: float
+    voltage_patience: float
+    physics: Physics
+
+
+def read_settings(values: Any, where: str) -> SimSettings:
+    """Return the settings of a parameter tree. Raise Error naming the file or key for anything wrong."""
+    top = Section(values, where)
+    physics = read_physics(top.section("physics"))
+    settings = SimSettings(
+        model=_model(top),
+        world=load_world(Path(top.text("world"))),
+        seed=top.integer("seed", at_least=0),
+        speed=top.number("speed", at_least=0),
+        start_time=top.number("start_time", above=0),
+        clock_every=_every(top, "clock_rate", physics.step),
+        ground_truth_every=_every(top, "ground_truth_rate", physics.step),
+        map_frame=_frame(top, "map_frame"),
+        base_frame=_frame(top, "base_frame"),
+        voltage_timeout=top.number("voltage_timeout", above=0),
+        voltage_horizon=top.number("voltage_horizon", at_least=0),
+        voltage_lead=top.number("voltage_lead", above=0),
+        voltage_patience=top.number("voltage_patience", at_least=0),
+        physics=physics,
+    )
+    top.end()
+    return settings
+
+
+def _model(top: Section) -> Model:
+    model = load_model(Path(top.text("model")))
+    effects = top.text("effects")
+    return model if effects == "none" else with_effects(model, Path(effects))
+
+
+def _frame(top: Section, key: str) -> str:
+    frame = top.text(key)
+    if frame.startswith("/"):
+        raise top.error(key, f"must not start with a slash, which tf2 rejects: {frame}")
+    return frame
+
+
+def _every(top: Section, key: str, step: float) -> int:
+    """Return how many steps a rate [Hz] of simulated time is apart."""
+    rate = top.number(key, above=0)
+    every = 1 / (rate * step)
+    rounding = 1e-6
+    if round(every) < 1 or abs(every - round(every)) > rounding:
+        raise top.error(key, f"must divide 1 / physics.step = {1 / step:g} Hz: {rate:g}")
+    return round(every)

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How the simulator behaves: the section `physics` of launch/sim_node.yaml, and files of further effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from kurumaisu import settings
+from kurumaisu.params import EffectSetting, Model
+
+
+@dataclass(frozen=True)
+class Physics:
+    """Step [s] and contacts: slop [m]; bias: share of an overlap left after 1 s; friction, iterations [-]."""
+
+    step: float
+    contact_substeps: int
+    collision_slop: float
+    collision_bias: float
+    iterations: int
+    friction: float
+
+
+def read_physics(section: settings.Section) -> Physics:
+    """Return the settings of a section. Raise Error naming file and key."""
+    physics = Physics(
+        step=section.number("step", above=0),
+        contact_substeps=section.integer("contact_substeps", at_least=1),
+        collision_slop=section.number("collision_slop", at_least=0),
+        collision_bias=section.number("collision_bias", above=0),
+        iterations=section.integer("iterations", at_least=1),
+        friction=section.number("friction", at_least=0),
+    )
+    section.end()
+    return physics
+
+
+def load_physics(path: Path) -> Physics:
+    """Read the section `physics` of a sim_node.yaml, for a simulation without ROS."""
+    return read_physics(settings.load(path).section("physics"))
+
+
+def with_effects(model: Model, path: Path) -> Model:
+    """Return the model with the effects of a file besides its own: `effects: [{id: ..., parameters: {...}}]`.
+
+    Raise Error naming file and key.
+    """
+    top = settings.load(path)
+    more = []
+    for item in top.items("effects"):
+        parameters = item.section("parameters")
+        more.append(
+            EffectSetting(item.text("id"), {name: parameters.number(name) for name in parameters.names()})
+        )
+        item.end()
+    top.end()
+    return replace(model, effects=(*model.effects, *more))
