@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The report's pictures as SVG that takes its colours from the page, so that it reads in light, dark and print."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from kurumaisu.critic.story import Misfit, Overlay
+from kurumaisu.types import BoolArray, FloatArray
+
+# Stand-ins that the page's style sheet replaces; the names are its variables.
+INK, FAINT, BASELINE, EXTENDED = "#010101", "#020202", "#030303", "#040404"
+_VARIABLES = {INK: "currentColor", FAINT: "var(--faint)", BASELINE: "var(--baseline)", EXTENDED: "var(--extended)"}
+_STYLE = {
+    "svg.fonttype": "path",
+    "text.parse_math": False,  # names come from recordings: a dollar is a dollar
+    "font.size": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.linewidth": 0.8,
+    "grid.color": FAINT,
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "legend.handlelength": 2.6,
+}
+# More points than this are a blot in a picture of this size, and megabytes of SVG.
+MOST_POINTS = 1500
+# Left, bottom, width, height of what the legend leaves, as shares of the picture.
+_BELOW_LEGEND = (0.0, 0.0, 1.0, 0.925)
+# Share of the points that a picture's height is made for; the rest would squeeze it.
+_SHOWN_QUANTILES = (0.005, 0.995)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A misfit's points in the picture: which, and the limits of its ordinate."""
+
+    index: BoolArray
+    low: float
+    high: float
+
+
+def overlay_svg(overlay: Overlay, name: str) -> str:
+    """Return the run from above; name: prefix of the ids inside, unique in the page."""
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
+        figure = Figure(figsize=(5.0, 4.1))
+        figure.set_layout_engine("constrained", rect=_BELOW_LEGEND)
+        axes = figure.subplots()
+        axes.plot(*overlay.measured.T, color=INK, linewidth=2.6, alpha=0.55, label="measured")
+        axes.plot(*overlay.baseline.T, color=BASELINE, linewidth=1.5, linestyle=(0, (5, 2)), label="model as it was")
+        if overlay.extended is not None:
+            axes.plot(*overlay.extended.T, color=EXTENDED, linewidth=1.5, label="extended")
+        if len(overlay.measured):
+            axes.plot(*overlay.measured[0], marker="o", markersize=7, color=INK, linestyle="none", label="start")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.grid(visible=True)
+        axes.set_xlabel("x [m]")
+        axes.set_ylabel("y [m]")
+        _legend(figure, columns=4)
+        return _svg(figure, name)
+
+
+def misfit_svg(misfit: Misfit, shown: Shown, name: str) -> str:
+    """Return measured minus simulated over the covariate; name as in overlay_svg."""
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
+        figure = Figure(figsize=(5.0, 4.1))
+        figure.set_layout_engine("constrained", rect=_BELOW_LEGEND)
+        axes = figure.subplots()
+        points = misfit.covariate[shown.index], misfit.residual[shown.index]
+        axes.plot(*points, ".", color=INK, alpha=0.3, markersize=4.5, markeredgewidth=0, label="samples")
+        axes.axhline(0.0, color=INK, linewidth=0.8)
+        if misfit.curve is not None:
+            axes.plot(*misfit.curve.T, color=EXTENDED, linewidth=2.0, label="extension")
+        bins = misfit.bins
+        reach = np.abs(np.stack([bins.mean - bins.lo90, bins.hi90 - bins.mean]))
+        bars: dict[str, Any] = {"fmt": "o", "markersize": 4, "capsize": 2.5, "elinewidth": 1.2, "color": BASELINE}
+        axes.errorbar(bins.centre, bins.mean, yerr=reach, **bars, label="mean, 90 % interval")
+        axes.set_ylim(shown.low, shown.high)
+        axes.grid(visible=True)
+        axes.set_xlabel(_label(misfit.covariate_name, misfit.covariate_unit))
+        axes.set_ylabel(_label(f"misfit of {misfit.channel}", misfit.unit))
+        for line in _legend(figure, columns=3).get_lines():
+            line.set_alpha(1.0)
+        return _svg(figure, name)
+
+
+def shown_points(misfit: Misfit) -> Shown:
+    """Return which points a picture shows: evenly thinned, within limits that also hold means and curve."""
+    finite = np.isfinite(misfit.covariate) & np.isfinite(misfit.residual)
+    drawn = [misfit.residual[finite]]
+    low, high = np.quantile(drawn[0], _SHOWN_QUANTILES) if finite.any() else (0.0, 0.0)
+    ends = [low, high, 0.0, *misfit.bins.lo90, *misfit.bins.hi90]
+    ends += [] if misfit.curve is None else list(misfit.curve[:, 1])
+    bounds = np.array(ends)[np.isfinite(ends)]
+    margin = 0.05 * (np.ptp(bounds) or 1.0)
+    low, high = float(bounds.min() - margin), float(bounds.max() + margin)
+    inside = np.flatnonzero(finite & (misfit.residual >= low) & (misfit.residual <= high))
+    index = np.zeros(len(misfit.residual), dtype=bool)
+    index[inside[:: max(1, -(-len(inside) // MOST_POINTS))]] = True
+    return Shown(index, low, high)
+
+
+def distance_at_end(measured: FloatArray, simulated: FloatArray) -> float:
+    """Return how far apart two paths end [m]."""
+    return float(np.hypot(*(measured[-1] - simulated[-1])))
+
+
+def _legend(figure: Figure, columns: int) -> Any:
+    """Put the legend above the picture, where it hides nothing."""
+    legend = figure.legend(loc="upper left", ncols=columns, fontsize=9, columnspacing=1.3, handletextpad=0.5)
+    legend.set_in_layout(False)
+    return legend
+
+
+def _label(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _svg(figure: Figure, name: str) -> str:
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r'\bid="', f'id="{name}-', text)
+    text = re.sub(r"(href=\"|url\()#", rf"\1#{name}-", text)
+    for stand_in, variable in _VARIABLES.items():
+        text = text.replace(stand_in, variable)
+    # The page sets the size; the picture itself is hidden from screen readers, which get the figure's label.
+    return re.sub(r'<svg (.*?)height="[^"]*"(.*?)width="[^"]*"', r'<svg aria-hidden="true" \1\2', text, count=1)
