@@ -116,11 +116,11 @@ void bindKalman(py::module_& m) {
       [](const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
          double position_sd, double heading_sd, const Eigen::Vector3d& process_sd, double process_tau) {
         const auto out = k::whiten(poses, times, columns, {position_sd, heading_sd, process_sd, process_tau});
-        return py::make_tuple(out.columns, out.log_determinant);
+        return py::make_tuple(out.columns, out.log_determinants);
       },
       py::arg("poses"), py::arg("times"), py::arg("columns"), py::kw_only(), py::arg("position_sd"),
       py::arg("heading_sd"), py::arg("process_sd"), py::arg("process_tau"),
-      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and the log determinant.");
+      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and log determinants (n,).");
 }
 
 std::vector<k::Segment> segmentsOf(const Array& array) {

@@ -78,7 +78,7 @@ Whitened whiten(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, cons
       Eigen::Vector3d(noise.position_sd, noise.position_sd, noise.heading_sd).array().square().matrix().asDiagonal();
   const Matrix3 rate_cov = noise.process_sd.array().square().matrix().asDiagonal();
 
-  Whitened out{Eigen::MatrixXd(columns.rows(), columns.cols()), 0.0};
+  Whitened out{Eigen::MatrixXd(columns.rows(), columns.cols()), Eigen::VectorXd(n)};
   State cov = State::Zero();
   cov.topLeftCorner<3, 3>() = pose_cov;
   cov.bottomRightCorner<3, 3>() = rate_cov;
@@ -97,7 +97,7 @@ Whitened whiten(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, cons
     if (llt.info() != Eigen::Success) throw std::invalid_argument("the increments' covariance is singular");
     const Eigen::MatrixXd innovation = columns.middleRows(3 * k, 3) - h * mean;
     out.columns.middleRows(3 * k, 3) = llt.matrixL().solve(innovation);
-    out.log_determinant += 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+    out.log_determinants[k] = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
 
     // Next state (e_{k+1}, u_{k+1}) and its covariance with this increment.
     State f = State::Zero();

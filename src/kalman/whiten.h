@@ -14,10 +14,11 @@ struct MotionNoise {
   double process_tau;          ///< their time constant [s]
 };
 
-/// Whitened columns (rows: 3 per increment) and the log determinant of the residuals' covariance.
+/// Whitened columns (rows: 3 per increment) and, per increment, the log determinant of its covariance given the
+/// increments before it; their sum is that of the joint covariance.
 struct Whitened {
   Eigen::MatrixXd columns;
-  double log_determinant;
+  Eigen::VectorXd log_determinants;
 };
 
 /// Whitens columns of residual increments: L^-1 X with L L' the joint covariance of all increments of a run.

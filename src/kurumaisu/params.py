@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -173,8 +173,12 @@ def _laser(section: settings.Section) -> Laser:
 
 def _effect(section: settings.Section) -> EffectSetting:
     parameters = section.section("parameters")
-    setting = EffectSetting(
-        section.text("id"), {name: parameters.number(name) for name in parameters.names()}
-    )
+    setting = EffectSetting(section.text("id"), {name: parameters.number(name) for name in parameters.names()})
     section.end()
     return setting
+
+
+def follow_commands(model: Model) -> Model:
+    """Return the model for a robot of another make: 1 V stands for 1 m/s and 1 rad/s, no dead zone."""
+    identity = AxisLaw(Branch(1.0, 0.0), Branch(1.0, 0.0))
+    return replace(model, name="velocity follows command", law_name="identity", translation=identity, steering=identity)

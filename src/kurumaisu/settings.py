@@ -78,9 +78,7 @@ class Section:
         value = self.take(key)
         if not isinstance(value, list):
             raise self.error(key, f"must be a list, not {_kind(value)}")
-        return [
-            Section(item, self._where, f"{self._path}.{key}[{i}]".lstrip(".")) for i, item in enumerate(value)
-        ]
+        return [Section(item, self._where, f"{self._path}.{key}[{i}]".lstrip(".")) for i, item in enumerate(value)]
 
     def section(self, key: str) -> Section:
         """Return a required mapping."""

@@ -11,7 +11,7 @@ from kurumaisu.types import FloatArray
 
 @dataclass(frozen=True)
 class Series:
-    """Samples over time: t (n,) increasing [s]; values (n, m), one named column each."""
+    """Samples over time: t (n,) strictly increasing [s]; values (n, m), one named column each."""
 
     t: FloatArray
     values: FloatArray
@@ -23,11 +23,24 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Fan:
+    """The fan as the scans themselves state it [rad, s]; known in a bag, not in CSV."""
+
+    angle_min: float
+    angle_increment: float
+    beams: int
+    time_increment: float
+    scan_time: float
+
+
+@dataclass(frozen=True)
 class Run:
     """One drive. Any part may be missing.
 
-    command: v, w (held); voltage: v_f, v_s (held); pose: x, y, theta in the map frame, theta unwrapped;
-    odom: x, y, theta, v, w; scan: r0, r1, ...; covariates: any further named columns;
+    command: v, w (held); voltage: v_f, v_s (held) and, where known, v, w that they stand for;
+    pose: x, y, theta in the map frame, theta unwrapped; odom: x, y, theta, v, w, theta unwrapped;
+    scan: r0, r1, ... at the time of the first beam, nan = no valid reading, inf = no return;
+    covariates: one Series of one column per name, finite values;
     queries: (q, 2) of t0, t1 in a test run; source of the pose: 'measured' or how it was estimated.
     """
 
@@ -40,6 +53,7 @@ class Run:
     covariates: dict[str, Series] = field(default_factory=dict)
     queries: FloatArray | None = None
     pose_source: str = "measured"
+    fan: Fan | None = None
 
 
 @dataclass(frozen=True)
@@ -60,7 +74,8 @@ class Recording:
 
     train, test: names of runs; test is empty when gain is measured by leaving one run out.
     truth: sd of the reference pose, position [m] and heading [rad]; None = the critic estimates it.
-    problems: what the reader found wrong and mended or dropped, in words.
+    problems: all that the reader found wrong and mended or dropped, in words;
+    invalid: those of the problems that forbid a verdict on causes.
     """
 
     name: str
@@ -72,3 +87,4 @@ class Recording:
     laser: LaserMount | None = None
     truth: tuple[float, float] | None = None
     problems: tuple[str, ...] = ()
+    invalid: tuple[str, ...] = ()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The catalogue of effects: one mechanism per file, and ALL, the only list of them."""
 
-from kurumaisu.effects.base import Context, Effect, Motion, Parameter, Stage
+from kurumaisu.effects.base import Context, Effect, Follows, Motion, Parameter, Rate, Stage
 from kurumaisu.effects.dead_zone import DeadZoneV, DeadZoneW
 from kurumaisu.effects.delay import Delay
 from kurumaisu.effects.gain import GainV, GainW
@@ -26,20 +26,25 @@ ALL: tuple[type[Effect], ...] = (
 )
 
 
+def by_id(name: str) -> type[Effect]:
+    """Return the effect of an id. Raise Error when it is not in the catalogue."""
+    for effect in ALL:
+        if effect.id == name:
+            return effect
+    raise Error(f"effects: {name!r} is not in the catalogue: {', '.join(effect.id for effect in ALL)}")
+
+
 def build(settings: tuple[EffectSetting, ...], context: Context) -> tuple[Effect, ...]:
     """Return the effects of a model file in the order in which they act.
 
     Raise Error for an unknown id, an id given twice, or parameters that do not fit.
     """
-    by_id = {effect.id: effect for effect in ALL}
     ids = [setting.id for setting in settings]
     for name in ids:
-        if name not in by_id:
-            raise Error(f"effects: {name!r} is not in the catalogue: {', '.join(by_id)}")
         if ids.count(name) > 1:
             raise Error(f"effects: {name!r} is given twice")
-    effects = [by_id[setting.id](setting.parameters, context) for setting in settings]
+    effects = [by_id(setting.id)(setting.parameters, context) for setting in settings]
     return tuple(sorted(effects, key=lambda effect: effect.stage))
 
 
-__all__ = ["ALL", "Context", "Effect", "Motion", "Parameter", "Stage", "build"]
+__all__ = ["ALL", "Context", "Effect", "Follows", "Motion", "Parameter", "Rate", "Stage", "build", "by_id"]

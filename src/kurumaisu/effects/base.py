@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import Enum, IntEnum
 from typing import ClassVar
 
 import numpy as np
@@ -27,6 +27,22 @@ class Stage(IntEnum):
     THRESHOLD = 1  # what the joystick input swallows
     GAIN = 2  # steady state
     RESPONSE = 3  # motors, chair and floor
+
+
+class Rate(Enum):
+    """The rate in which an effect shows."""
+
+    V = "forward speed"
+    W = "yaw rate"
+
+
+class Follows(Enum):
+    """The quantity that an effect follows, so that a residual drawn over it shows the effect's shape."""
+
+    V = "forward speed asked for"
+    W = "yaw rate asked for"
+    V_CHANGE = "change of the forward speed asked for"
+    W_CHANGE = "change of the yaw rate asked for"
 
 
 @dataclass(frozen=True)
@@ -69,14 +85,14 @@ class Effect(ABC):
     stage: ClassVar[Stage]
     parameters: ClassVar[tuple[Parameter, ...]]
     sentence: ClassVar[str]
+    shows_in: ClassVar[Rate]
+    follows: ClassVar[Follows]
     random: ClassVar[bool] = False  # it draws noise, so its mean effect on the motion is none
 
     def __init__(self, values: Mapping[str, float], context: Context) -> None:
         names = [parameter.name for parameter in self.parameters]
         if sorted(values) != sorted(names):
-            raise Error(
-                f"{self.id}: needs the parameters {', '.join(names)}; got {', '.join(values) or 'none'}"
-            )
+            raise Error(f"{self.id}: needs the parameters {', '.join(names)}; got {', '.join(values) or 'none'}")
         for parameter in self.parameters:
             value = values[parameter.name]
             if not parameter.lower <= value <= parameter.upper:

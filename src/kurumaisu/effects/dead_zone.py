@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu._core import AxisLaw
-from kurumaisu.effects.base import Effect, Motion, Parameter, Stage
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 from kurumaisu.types import FloatArray
 
 _WIDTH = (Parameter("width", "V", null=0.0, scale=0.03, lower=-0.3, upper=0.5),)
@@ -25,6 +25,8 @@ class DeadZoneV(Effect):
     stage = Stage.THRESHOLD
     parameters = _WIDTH
     sentence = "small translation voltages are swallowed: the dead zone of V_f is wider than modelled"
+    shows_in = Rate.V
+    follows = Follows.V
 
     def apply(self, motion: Motion) -> Motion:
         """Shrink v towards 0."""
@@ -38,6 +40,8 @@ class DeadZoneW(Effect):
     stage = Stage.THRESHOLD
     parameters = _WIDTH
     sentence = "small steering voltages are swallowed: the dead zone of V_s is wider than modelled"
+    shows_in = Rate.W
+    follows = Follows.W
 
     def apply(self, motion: Motion) -> Motion:
         """Shrink w towards 0."""

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from kurumaisu.effects.base import Effect, Motion, Parameter, Stage
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 from kurumaisu.types import FloatArray
 
 
@@ -14,6 +14,8 @@ class Delay(Effect):
     stage = Stage.TRANSPORT
     parameters = (Parameter("delay", "s", null=0.0, scale=0.05, lower=0.0, upper=1.0),)
     sentence = "the motion follows the command after a pure delay"
+    shows_in = Rate.V
+    follows = Follows.V_CHANGE
 
     _past: FloatArray | None = None  # the last samples of v and w, (2, m)
 

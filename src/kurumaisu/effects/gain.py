@@ -3,7 +3,7 @@
 
 from dataclasses import replace
 
-from kurumaisu.effects.base import Effect, Motion, Parameter, Stage
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 
 _GAIN = (Parameter("gain", "1", null=0.0, scale=0.05, lower=-0.9, upper=4.0),)
 
@@ -15,6 +15,8 @@ class GainV(Effect):
     stage = Stage.GAIN
     parameters = _GAIN
     sentence = "the chair drives faster or slower than commanded, in proportion to the speed"
+    shows_in = Rate.V
+    follows = Follows.V
 
     def apply(self, motion: Motion) -> Motion:
         """Scale v."""
@@ -28,6 +30,8 @@ class GainW(Effect):
     stage = Stage.GAIN
     parameters = _GAIN
     sentence = "the chair turns more or less than commanded, in proportion to the yaw rate (effective track)"
+    shows_in = Rate.W
+    follows = Follows.W
 
     def apply(self, motion: Motion) -> Motion:
         """Scale w."""

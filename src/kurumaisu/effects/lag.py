@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
-from kurumaisu.effects.base import Effect, Motion, Parameter, Stage
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 from kurumaisu.types import FloatArray
 
 _TAU = (Parameter("tau", "s", null=0.0, scale=0.1, lower=0.0, upper=3.0),)
@@ -35,6 +35,8 @@ class LagV(_Lag):
     stage = Stage.RESPONSE
     parameters = _TAU
     sentence = "the forward speed follows its command with a first-order lag"
+    shows_in = Rate.V
+    follows = Follows.V_CHANGE
 
     def apply(self, motion: Motion) -> Motion:
         """Filter v."""
@@ -48,6 +50,8 @@ class LagW(_Lag):
     stage = Stage.RESPONSE
     parameters = _TAU
     sentence = "the yaw rate follows its command with a first-order lag"
+    shows_in = Rate.W
+    follows = Follows.W_CHANGE
 
     def apply(self, motion: Motion) -> Motion:
         """Filter w."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.effects.base import Effect, Motion, Parameter, Stage
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 
 
 class LeftRightGain(Effect):
@@ -15,6 +15,8 @@ class LeftRightGain(Effect):
     stage = Stage.GAIN
     parameters = (Parameter("asymmetry", "1", null=0.0, scale=0.05, lower=-0.9, upper=0.9),)
     sentence = "left and right turns have different gains"
+    shows_in = Rate.W
+    follows = Follows.W
 
     def apply(self, motion: Motion) -> Motion:
         """Scale w by the side of the turn."""

@@ -4,7 +4,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from kurumaisu.effects.base import Effect, Motion, Parameter, Stage
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 
 
 class ProcessNoise(Effect):
@@ -18,6 +18,8 @@ class ProcessNoise(Effect):
         Parameter("tau", "s", null=0.3, scale=0.3, lower=1.0e-3, upper=30.0),
     )
     sentence = "the rates fluctuate about their command"
+    shows_in = Rate.W
+    follows = Follows.W
     random = True
 
     _level = (0.0, 0.0)  # of the unit noises of v and w

@@ -3,7 +3,7 @@
 
 from dataclasses import replace
 
-from kurumaisu.effects.base import Effect, Motion, Parameter, Stage
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 
 
 class Veer(Effect):
@@ -13,6 +13,8 @@ class Veer(Effect):
     stage = Stage.GAIN
     parameters = (Parameter("curvature", "rad/m", null=0.0, scale=0.03, lower=-2.0, upper=2.0),)
     sentence = "the chair veers to one side in proportion to the distance driven (unequal wheels)"
+    shows_in = Rate.W
+    follows = Follows.V
 
     def apply(self, motion: Motion) -> Motion:
         """Add a turn in proportion to v."""

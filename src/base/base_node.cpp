@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cmd_vel in; voltages, odom, tf and diagnostics out. What it does with them is in drive.h.
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <geometry_msgs/Twist.h>
+#include <kurumaisu/Voltages.h>
+#include <nav_msgs/Odometry.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <ros/xmlrpc_manager.h>
+#include <tf2_ros/transform_broadcaster.h>
+
+#include <atomic>
+#include <csignal>
+#include <exception>
+
+#include "base/report.h"
+#include "base/settings.h"
+
+namespace k = kurumaisu;
+
+namespace {
+
+using Status = diagnostic_updater::DiagnosticStatusWrapper;
+
+constexpr double kWarningPeriod = 1.0;  // [s] of throttled warnings
+constexpr double kUnmeasured = 1.0e6;   // variance of what a planar base does not know: z, roll, pitch
+constexpr int kLastSamples = 5;         // neutral at the end: more than one, and time for them to leave
+
+std::atomic<bool> stop_requested{false};
+
+/// The D/A converter as a topic: for the simulator and for drivers in other processes.
+class TopicDac : public k::Dac {
+ public:
+  explicit TopicDac(ros::NodeHandle& nh) : publisher_(nh.advertise<k::Voltages>("voltages", 10)) {
+    stamp = ros::Time::now();
+  }
+
+  void put(const k::Output& output) override {
+    k::Voltages message;
+    message.header.stamp = stamp;
+    message.translation = output.translation;
+    message.steering = output.steering;
+    message.reference = output.reference;
+    message.v = output.v;
+    message.w = output.w;
+    publisher_.publish(message);
+  }
+
+  ros::Time stamp;  ///< of the next sample
+
+ private:
+  ros::Publisher publisher_;
+};
+
+class BaseNode {
+ public:
+  BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings);
+
+  /// Works until asked to stop; neutral is the last thing put out.
+  void run();
+
+ private:
+  void onCommand(const geometry_msgs::Twist& twist);
+  void onTick();
+  void finish();
+  double now();
+  void publishOdometry();
+  static void diagnose(Status& status, const k::Report& report);
+
+  k::BaseSettings settings_;
+  TopicDac dac_;
+  k::Drive drive_;
+  k::DriveCounts reported_;  ///< at the last diagnostics
+  diagnostic_updater::Updater diagnostics_;
+  ros::Publisher odom_;
+  tf2_ros::TransformBroadcaster tf_;
+  ros::Subscriber cmd_vel_;
+  ros::Timer timer_;
+  ros::SteadyTimer steady_timer_;
+};
+
+BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
+    : settings_(settings), dac_(nh), drive_(settings.drive, dac_) {
+  ROS_INFO("voltage law: %s", settings_.law_name.c_str());
+  const std::string warning = k::ambiguity(drive_);
+  if (!warning.empty()) ROS_WARN("BASE_AMBIGUOUS_LAW: %s: %s", settings_.law_name.c_str(), warning.c_str());
+  diagnostics_.setHardwareID("none");
+  diagnostics_.add("voltage law",
+                   [this](Status& status) { diagnose(status, k::reportLaw(drive_, settings_.law_name)); });
+  diagnostics_.add("commands", [this](Status& status) {
+    diagnose(status, k::reportCommands(drive_, reported_));
+    reported_ = drive_.counts();
+  });
+  odom_ = nh.advertise<nav_msgs::Odometry>("odom", 10);
+  cmd_vel_ = nh.subscribe("cmd_vel", 10, &BaseNode::onCommand, this, ros::TransportHints().tcpNoDelay());
+  const double period = 1.0 / settings_.rate;
+  if (ros::Time::isSimTime()) {
+    timer_ = nh.createTimer(ros::Duration(period), [this](const ros::TimerEvent&) { onTick(); });
+  } else {
+    // A system clock that is set back would stall ros::Timer, and the chair would drive on.
+    steady_timer_ =
+        nh.createSteadyTimer(ros::WallDuration(period), [this](const ros::SteadyTimerEvent&) { onTick(); });
+  }
+}
+
+void BaseNode::run() {
+  const ros::WallDuration longest_wait(0.02);
+  try {
+    while (ros::ok() && !stop_requested) ros::getGlobalCallbackQueue()->callAvailable(longest_wait);
+  } catch (...) {
+    finish();
+    throw;
+  }
+  finish();
+}
+
+void BaseNode::finish() {
+  for (int i = 0; i < kLastSamples; ++i) {
+    drive_.stop(now());
+    ros::WallDuration(1.0 / settings_.rate).sleep();
+  }
+}
+
+/// Time [s] of the control loop; also stamps what is put out next.
+double BaseNode::now() {
+  dac_.stamp = ros::Time::now();
+  return ros::Time::isSimTime() ? dac_.stamp.toSec() : ros::SteadyTime::now().toSec();
+}
+
+void BaseNode::onCommand(const geometry_msgs::Twist& twist) {
+  if (twist.linear.y != 0 || twist.linear.z != 0 || twist.angular.x != 0 || twist.angular.y != 0) {
+    drive_.countIgnored();
+    ROS_WARN_THROTTLE(kWarningPeriod,
+                      "BASE_IGNORED_COMPONENT: cmd_vel: only linear.x and angular.z are obeyed: linear.y %g, "
+                      "linear.z %g, angular.x %g, angular.y %g",
+                      twist.linear.y, twist.linear.z, twist.angular.x, twist.angular.y);
+  }
+  if (!drive_.command(twist.linear.x, twist.angular.z, now())) {
+    ROS_WARN_THROTTLE(kWarningPeriod, "BASE_BAD_COMMAND: cmd_vel: refused: linear.x %g, angular.z %g",
+                      twist.linear.x, twist.angular.z);
+  }
+}
+
+void BaseNode::onTick() {
+  const std::uint64_t timeouts = drive_.counts().timeouts;
+  const k::Drive::Tick tick = drive_.tick(now());
+  if (drive_.counts().timeouts > timeouts) {
+    ROS_WARN("BASE_COMMAND_TIMEOUT: cmd_vel: nothing for %g s: neutral", settings_.drive.command_timeout);
+  }
+  if (tick == k::Drive::Tick::kReset) {
+    ROS_WARN("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");
+    diagnostics_.force_update();  // else it would wait until the old time comes again
+  }
+  if (tick != k::Drive::Tick::kRepeated) publishOdometry();
+  diagnostics_.update();
+}
+
+void BaseNode::publishOdometry() {
+  const k::Odometry& odometry = drive_.odometry();
+  nav_msgs::Odometry message;
+  message.header.stamp = dac_.stamp;
+  message.header.frame_id = settings_.odom_frame;
+  message.child_frame_id = settings_.base_frame;
+  message.pose.pose.position.x = odometry.pose().x;
+  message.pose.pose.position.y = odometry.pose().y;
+  message.pose.pose.orientation.z = std::sin(0.5 * odometry.pose().theta);
+  message.pose.pose.orientation.w = std::cos(0.5 * odometry.pose().theta);
+  message.twist.twist.linear.x = odometry.v();
+  message.twist.twist.angular.z = odometry.w();
+  constexpr int kAxes[] = {0, 1, 5};  // x, y, yaw of x, y, z, roll, pitch, yaw
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      message.pose.covariance[6 * kAxes[row] + kAxes[column]] = odometry.covariance()(row, column);
+    }
+    message.twist.covariance[7 * kAxes[row]] = odometry.rateVariance()[row];
+  }
+  for (const int axis : {2, 3, 4}) {
+    message.pose.covariance[7 * axis] = message.twist.covariance[7 * axis] = kUnmeasured;
+  }
+  odom_.publish(message);
+
+  if (!settings_.publish_tf) return;
+  geometry_msgs::TransformStamped odom_from_base;
+  odom_from_base.header = message.header;
+  odom_from_base.child_frame_id = message.child_frame_id;
+  odom_from_base.transform.translation.x = odometry.pose().x;
+  odom_from_base.transform.translation.y = odometry.pose().y;
+  odom_from_base.transform.rotation = message.pose.pose.orientation;
+  tf_.sendTransform(odom_from_base);
+}
+
+void BaseNode::diagnose(Status& status, const k::Report& report) {
+  status.summary(report.warning ? Status::WARN : Status::OK, report.summary);
+  for (const auto& [name, value] : report.values) status.add(name, value);
+}
+
+/// Replaces what roscpp does at `rosnode kill`: it would close the topics before neutral is out.
+void onShutdownCall(XmlRpc::XmlRpcValue& /*parameters*/, XmlRpc::XmlRpcValue& result) {
+  stop_requested = true;
+  result = ros::xmlrpc::responseInt(1, "", 0);
+}
+
+void stopGracefully() {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    std::signal(signal, [](int /*signal*/) { stop_requested = true; });
+  }
+  ros::XMLRPCManager::instance()->unbind("shutdown");
+  ros::XMLRPCManager::instance()->bind("shutdown", onShutdownCall);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "base_node", ros::init_options::NoSigintHandler);
+  ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
+  stopGracefully();
+  try {
+    BaseNode node(nh, k::readBaseSettings(k::Section::load(ros::this_node::getName())));
+    node.run();
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    return 1;
+  }
+  return 0;
+}

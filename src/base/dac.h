@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The three voltages of the joystick, and who puts them out.
+#pragma once
+
+namespace kurumaisu {
+
+/// One sample for the D/A converter, and the rates that it stands for.
+struct Output {
+  double translation;  ///< V_f [V], equation (1)
+  double steering;     ///< V_s [V], equation (2)
+  double reference;    ///< the joystick's constant third voltage [V]
+  double v;            ///< [m/s]
+  double w;            ///< [rad/s]
+};
+
+/// A D/A converter, or what stands for one.
+class Dac {
+ public:
+  virtual ~Dac() = default;
+
+  /// Holds these voltages until the next call.
+  virtual void put(const Output& output) = 0;
+};
+
+}  // namespace kurumaisu

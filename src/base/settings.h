@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What base_node reads: launch/base_node.yaml in its private namespace, the model file in ~model.
+#pragma once
+
+#include <string>
+
+#include "base/drive.h"
+#include "params.h"
+
+namespace kurumaisu {
+
+struct BaseSettings {
+  std::string law_name;
+  DriveSettings drive;
+  double rate;  ///< of voltages and odometry [Hz]
+  std::string odom_frame;
+  std::string base_frame;
+  bool publish_tf;
+};
+
+/// Throws std::invalid_argument naming parameter and value for anything missing, unknown, mistyped or
+/// senseless.
+BaseSettings readBaseSettings(Section node);
+
+}  // namespace kurumaisu

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One run made ready for replay: inputs on a uniform grid, reference poses, measured increments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from kurumaisu import geometry
+from kurumaisu._core import AxisInverse
+from kurumaisu.critic.recording import Run, Series
+from kurumaisu.errors import Error
+from kurumaisu.params import Model
+from kurumaisu.types import FloatArray
+
+GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
+POSE_INTERVAL = 0.1  # [s] least time between reference poses: closer ones add cost, hardly information
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Inputs and reference of one run.
+
+    source: the channel that drives the replay; start [s] of the grid; v, w (n,) rates asked for on the grid;
+    times (m + 1,) and poses (m + 1, 3) of the reference.
+    """
+
+    name: str
+    source: str
+    start: float
+    v: FloatArray
+    w: FloatArray
+    times: FloatArray
+    poses: FloatArray
+
+    @property
+    def measured(self) -> FloatArray:
+        """Body increments of the reference, (m, 3)."""
+        return geometry.between(self.poses[:-1], self.poses[1:])
+
+
+def prepare(run: Run, model: Model) -> Drive:
+    """Return the drive of a run. Raise Error when it has no reference pose or nothing that drove the robot."""
+    if run.pose is None:
+        raise Error(f"{run.name}: has no reference pose")
+    source, times, v, w = _inputs(run, model)
+    pose_times, poses = _thin(run.pose, times[0])
+    if len(pose_times) < 3:
+        raise Error(
+            f"{run.name}: has {len(pose_times)} reference poses after the first {source}; at least 3 are needed"
+        )
+    edges = np.arange(min(times[0], pose_times[0]), pose_times[-1] + GRID, GRID)
+    return Drive(
+        name=run.name,
+        source=source,
+        start=float(edges[0]),
+        v=_mean_rates(times, v, edges),
+        w=_mean_rates(times, w, edges),
+        times=pose_times,
+        poses=poses,
+    )
+
+
+def split(drive: Drive, parts: int) -> list[Drive]:
+    """Return the drive cut into parts of equally many increments; each keeps all inputs, so effects keep their past."""
+    bounds = np.linspace(0, len(drive.times) - 1, parts + 1).astype(int)
+    return [
+        replace(
+            drive,
+            name=f"{drive.name}[{i + 1}/{parts}]",
+            times=drive.times[a : b + 1],
+            poses=drive.poses[a : b + 1],
+        )
+        for i, (a, b) in enumerate(pairwise(bounds))
+        if b - a >= 2
+    ]
+
+
+def _inputs(run: Run, model: Model) -> tuple[str, FloatArray, FloatArray, FloatArray]:
+    """Return the source and its samples t, v, w, each held until the next: voltages, else commands, else odometry."""
+    if run.voltage is not None:
+        return ("voltage", *_from_voltages(run.voltage, run.command, model))
+    if run.command is not None:
+        return "command", run.command.t, run.command.column("v"), run.command.column("w")
+    if run.odom is not None:
+        return ("odom", *_from_odometry(run.odom))
+    raise Error(f"{run.name}: has neither voltages nor commands nor odometry")
+
+
+def _from_voltages(voltage: Series, command: Series | None, model: Model) -> tuple[FloatArray, FloatArray, FloatArray]:
+    rates = []
+    for law, volts, rate in ((model.translation, "v_f", "v"), (model.steering, "v_s", "w")):
+        sign = np.full(len(voltage.t), np.nan)
+        if command is not None:
+            held = np.searchsorted(command.t, voltage.t, side="right") - 1
+            sign = np.where(held >= 0, np.sign(command.column(rate)[np.maximum(held, 0)]), 0.0)
+        rates.append(AxisInverse(law).rates(voltage.column(volts), sign))
+    return voltage.t, rates[0], rates[1]
+
+
+def _from_odometry(odom: Series) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the rates that equation (3) needs to drive along the odometry's poses."""
+    steps = geometry.between(odom.values[:-1, :3], odom.values[1:, :3])
+    dt = np.diff(odom.t)
+    turn = steps[:, 2]
+    arc = np.hypot(steps[:, 0], steps[:, 1]) / np.sinc(turn / (2 * np.pi))
+    forward = np.cos(turn / 2) * steps[:, 0] + np.sin(turn / 2) * steps[:, 1]
+    v, w = np.copysign(arc, forward) / dt, turn / dt
+    return odom.t, np.append(v, 0.0), np.append(w, 0.0)
+
+
+def _thin(pose: Series, since: float) -> tuple[FloatArray, FloatArray]:
+    """Return times and poses at least POSE_INTERVAL apart, from the first input on."""
+    keep: list[int] = []
+    last = -np.inf
+    for i, t in enumerate(pose.t):
+        if t >= since and t - last >= POSE_INTERVAL * (1 - 1e-6):
+            keep.append(i)
+            last = t
+    return pose.t[keep], pose.values[keep, :3]
+
+
+def _mean_rates(times: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
+    """Return the mean over each cell of the grid of samples held until the next; 0 before the first."""
+    knots = np.append(times, max(edges[-1], times[-1]) + GRID)
+    integral = np.concatenate([[0.0], np.cumsum(values * np.diff(knots))])
+    return np.asarray(np.diff(np.interp(edges, knots, integral)) / GRID)

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""extended.yaml: the model with what the critic found, for the simulator to run as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import yaml
+
+from kurumaisu.critic.noise import Noise
+from kurumaisu.errors import Error
+from kurumaisu.params import EffectSetting, Model, load_model
+
+
+def process_noise(noise: Noise) -> EffectSetting:
+    """Return the estimated noise of the rates as the effect that the simulator draws it from."""
+    return EffectSetting("base.process_noise", {"sd_v": noise.sd_v, "sd_w": noise.sd_w, "tau": noise.tau})
+
+
+def write_extended(path: Path, original: Path, model: Model, settings: Sequence[EffectSetting], recording: str) -> None:
+    """Write the model file `original` with these effects in place of its own of the same id, and load it again.
+
+    model: as criticised; where its voltages are the commands themselves, the file gets that law.
+    Raise Error when the file cannot be read, written, or does not load.
+    """
+    try:
+        content = yaml.safe_load(original.read_text(encoding="utf-8"))
+        given = {setting.id for setting in settings}
+        content["effects"] = [own for own in content["effects"] if own["id"] not in given]
+        content["effects"] += [{"id": s.id, "parameters": dict(s.parameters)} for s in settings]
+        if model.law_name not in content["voltage_laws"]:
+            content["name"] = model.name
+            content["voltage_law"] = model.law_name
+            content["voltage_laws"][model.law_name] = {
+                "translation": _axis(model.translation),
+                "steering": _axis(model.steering),
+            }
+        text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
+        path.write_text(f"# {original.name} and what the critic found in {recording}.\n{text}", encoding="utf-8")
+    except OSError as error:
+        raise Error(f"{error.filename}: {error.strerror}") from error
+    load_model(path)
+
+
+def _axis(law: object) -> dict[str, dict[str, float]]:
+    return {
+        side: {"slope": getattr(law, side).slope, "intercept": getattr(law, side).intercept}
+        for side in ("positive", "negative")
+    }

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What an extension is worth on drives that it was not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kurumaisu import geometry
+from kurumaisu.critic import replay
+from kurumaisu.critic.drive import Drive, split
+from kurumaisu.critic.evidence import Fit, Problem
+from kurumaisu.critic.noise import Noise, whitened
+from kurumaisu.critic.verdict import Gain, LogDensityGain, RmseGain
+from kurumaisu.params import EffectSetting, Model
+from kurumaisu.types import FloatArray
+
+HORIZONS = (2.0, 5.0, 20.0)  # [s] over which the path is predicted from the inputs alone
+_PARTS = 4  # of a single run, of which each is held out in turn
+_BLOCK = 5.0  # [s] resampled as a whole: at least ten time constants of the usual process noise
+_DRAWS = 2000
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Drives to fit and drives to judge by."""
+
+    train: tuple[Drive, ...]
+    test: tuple[Drive, ...]
+
+
+def folds(train: Sequence[Drive], test: Sequence[Drive]) -> list[Fold]:
+    """Return train against test; without test runs, each run left out in turn; of a single run, each quarter."""
+    if test:
+        return [Fold(tuple(train), tuple(test))]
+    parts = list(train) if len(train) > 1 else split(train[0], _PARTS)
+    return [Fold(tuple(parts[:i] + parts[i + 1 :]), (parts[i],)) for i in range(len(parts))]
+
+
+def measure(model: Model, splits: Sequence[Fold], fit: Fit, baseline: Noise, extended: Noise) -> Gain:
+    """Return the gain of a set of effects, whose parameters are refitted on each fold's training drives.
+
+    baseline, extended: the noise that either model needs to explain the training data; a model that is wrong pays
+    for it with wide predictions or with surprises.
+    """
+    start = {term.id: float(value) for term, value in zip(fit.terms, fit.values, strict=True)}
+    density: tuple[list[FloatArray], list[FloatArray]] = ([], [])
+    errors: dict[float, tuple[list[FloatArray], list[FloatArray]]] = {horizon: ([], []) for horizon in HORIZONS}
+    for fold in splits:
+        refit = Problem(fold.train, model, extended).fit(fit.ids, start)
+        for drive in fold.test:
+            for side, (settings, noise) in enumerate((((), baseline), (refit.settings, extended))):
+                density[side].extend(_blocks(drive, _log_density(drive, model, settings, noise)))
+                for horizon in HORIZONS:
+                    errors[horizon][side].extend(_open_loop(drive, model, settings, horizon))
+    return Gain(
+        _log_density_gain(*density),
+        {f"position after {horizon:g} s": _rmse(*errors[horizon]) for horizon in HORIZONS if errors[horizon][0]},
+    )
+
+
+def _log_density(drive: Drive, model: Model, settings: Sequence[EffectSetting], noise: Noise) -> FloatArray:
+    """Return the predictive log density of each increment given those before it, (m,) [nats]."""
+    residual = drive.measured - replay.increments(drive, model, settings)
+    white, log_determinants = whitened(drive, residual.reshape(-1, 1), noise)
+    squares = (white.reshape(-1, 3) ** 2).sum(axis=1)
+    return np.asarray(-0.5 * (squares + log_determinants + 3 * np.log(2 * np.pi)))
+
+
+def _blocks(drive: Drive, values: FloatArray) -> list[FloatArray]:
+    """Return per-increment values cut into blocks of _BLOCK seconds."""
+    index = ((drive.times[1:] - drive.times[0]) // _BLOCK).astype(int)
+    return [values[index == i] for i in np.unique(index)]
+
+
+def _open_loop(drive: Drive, model: Model, settings: Sequence[EffectSetting], horizon: float) -> list[FloatArray]:
+    """Return squared position errors [m^2] after a horizon, per start, in blocks of starts that share data."""
+    simulated = replay.path(drive, model, settings)
+    ends = np.searchsorted(drive.times, drive.times + horizon)
+    starts = np.flatnonzero(ends < len(drive.times))
+    ends = ends[starts]
+    predicted = geometry.between(simulated[starts], simulated[ends])
+    measured = geometry.between(drive.poses[starts], drive.poses[ends])
+    squares = ((predicted - measured)[:, :2] ** 2).sum(axis=1)
+    index = ((drive.times[starts] - drive.times[0]) // max(_BLOCK, horizon)).astype(int)
+    return [squares[index == i] for i in np.unique(index)]
+
+
+def _resample(blocks: int) -> FloatArray:
+    """Return bootstrap weights of blocks, (_DRAWS, blocks)."""
+    rng = np.random.default_rng(0)
+    return np.asarray(rng.multinomial(blocks, np.full(blocks, 1 / blocks), size=_DRAWS), dtype=np.float64)
+
+
+def _log_density_gain(baseline: list[FloatArray], extended: list[FloatArray]) -> LogDensityGain:
+    sums = np.array([[b.sum(), e.sum(), len(b)] for b, e in zip(baseline, extended, strict=True)])
+    drawn = _resample(len(sums)) @ sums
+    lo, hi = np.quantile((drawn[:, 1] - drawn[:, 0]) / drawn[:, 2], [0.05, 0.95])
+    b, e = sums[:, :2].sum(axis=0) / sums[:, 2].sum()
+    return LogDensityGain(float(b), float(e), float(e - b), float(lo), float(hi))
+
+
+def _rmse(baseline: list[FloatArray], extended: list[FloatArray]) -> RmseGain:
+    sums = np.array([[b.sum(), e.sum(), len(b)] for b, e in zip(baseline, extended, strict=True)])
+    drawn = _resample(len(sums)) @ sums
+    gains = np.sqrt(drawn[:, 0] / drawn[:, 2]) - np.sqrt(drawn[:, 1] / drawn[:, 2])
+    lo, hi = np.quantile(gains, [0.05, 0.95])
+    b, e = np.sqrt(sums[:, :2].sum(axis=0) / sums[:, 2].sum())
+    return RmseGain(float(b), float(e), float(b - e), float(lo), float(hi), "m")

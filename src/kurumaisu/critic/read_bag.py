@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Read a run from the topics of a ROS 1 bag."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from kurumaisu.critic import messages
+from kurumaisu.critic.bag import Topic, read_topics
+from kurumaisu.critic.clean import Faults, Table, clean
+from kurumaisu.critic.recording import Fan, Run, Series
+from kurumaisu.errors import Error
+
+# Topic of each part, where meta.yaml names no other.
+TOPICS = {
+    "command": "cmd_vel",
+    "voltage": "voltages",
+    "pose": "ground_truth",
+    "odom": "odom",
+    "scan": "scan",
+    "battery": "battery",
+    "temperature": "temperature",
+}
+PARTS = messages.PARTS
+# Stamps and times of receipt further apart than this do not come from one clock [s].
+CLOCK_TOLERANCE = 1.0
+
+
+def read_bag_run(path: Path, topics: dict[str, str], faults: Faults) -> Run:
+    """Read the topics of a bag. topics: from meta.yaml, by default name or by name of a covariate.
+
+    A message's time is its header's stamp, or where it has none, when the bag received it.
+    Raise Error naming file, topic and type for what cannot be read.
+    """
+    wanted = resolve(topics)
+    shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
+    if shared:
+        raise Error(f"topics: {shared[0]} is given to two parts of a run")
+    found = read_topics(path, {topic: part for part, topic in wanted.items()})
+    for part in sorted(set(_parts(topics)) - set(found)):
+        faults.add(f"{path.name}: there is no topic {wanted[part]}")
+    _check_clocks(path.name, found, faults)
+    series: dict[str, Series | None] = {}
+    fan, covariates = None, {}
+    for part, topic in found.items():
+        where = f"{path.name} {topic.name}"
+        if part == "scan":
+            series["scan"], fan = _scan(where, topic, faults)
+        elif part in PARTS:
+            columns, rows = messages.COLUMNS[part], np.asarray(topic.rows, dtype=np.float64)
+            if part == "voltage" and not rows[:, 2:].any():
+                columns, rows = columns[:2], rows[:, :2]
+            series[part] = clean(Table(where, topic.times(), rows, columns, "message", 1), faults)
+        else:
+            covariates.update(_covariates(part, where, topic, faults))
+    return Run(
+        name=path.stem,
+        command=series.get("command"),
+        voltage=series.get("voltage"),
+        pose=series.get("pose"),
+        odom=series.get("odom"),
+        scan=series.get("scan"),
+        covariates=covariates,
+        fan=fan,
+    )
+
+
+def resolve(topics: dict[str, str]) -> dict[str, str]:
+    """Return the absolute topic of each part and covariate."""
+    names = {**TOPICS, **_parts(topics)}
+    return {part: f"/{topic.strip('/')}" for part, topic in names.items()}
+
+
+def _parts(topics: dict[str, str]) -> dict[str, str]:
+    by_topic = {TOPICS[part]: part for part in PARTS}
+    return {by_topic.get(name, name): topic for name, topic in topics.items()}
+
+
+def _check_clocks(name: str, found: dict[str, Topic], faults: Faults) -> None:
+    late = {topic.name: topic.lateness() for topic in found.values()}
+    stamped = {topic: value for topic, value in late.items() if value is not None}
+    # A topic without stamps lives on the clock of receipt.
+    clocks = list(stamped.values()) + ([0.0] if len(stamped) < len(late) else [])
+    if clocks and max(clocks) - min(clocks) > CLOCK_TOLERANCE:
+        told = ", ".join(f"{topic} {value:+.3g} s" for topic, value in stamped.items())
+        faults.add(f"{name}: stamps come from different clocks; receipt minus stamp: {told}", fatal=True)
+
+
+def _scan(where: str, topic: Topic, faults: Faults) -> tuple[Series | None, Fan | None]:
+    fan = topic.rows[0][0]
+    keep = [i for i, (other, _) in enumerate(topic.rows) if other == fan]
+    if len(keep) < len(topic.rows):
+        faults.add(f"{where}: {len(topic.rows) - len(keep)} scans dropped: their fan is not that of the first")
+    ranges = np.stack([topic.rows[i][1] for i in keep])
+    columns = tuple(f"r{i}" for i in range(fan.beams))
+    return clean(Table(where, topic.times()[keep], ranges, columns, "scan", 1), faults, ranges=True), fan
+
+
+def _covariates(name: str, where: str, topic: Topic, faults: Faults) -> dict[str, Series]:
+    fields = topic.rows[0].keys()
+    t = topic.times()
+    covariates = {}
+    if not fields:
+        raise Error(f"{where}: {topic.type} has no numeric field, so it is no covariate")
+    for key in fields:
+        values = np.array([row[key] for row in topic.rows], dtype=np.float64)
+        # A driver that does not measure a field leaves it at 0 or nan.
+        if key and not np.nan_to_num(values).any():
+            continue
+        column = f"{name}.{key}" if key else name
+        series = clean(Table(where, t, values[:, None], (column,), "message", 1), faults)
+        if series is not None:
+            covariates[column] = series
+    return covariates

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Read a recording, whatever it is made of: bags, CSV tables, or an MRPT rawlog."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from kurumaisu.critic.checks import check_run, usable
+from kurumaisu.critic.clean import Faults
+from kurumaisu.critic.meta import Meta, read_meta
+from kurumaisu.critic.read_bag import read_bag_run, resolve
+from kurumaisu.critic.read_csv import QUERY, is_csv_run, read_csv_run, read_queries
+from kurumaisu.critic.read_rawlog import is_rawlog, read_rawlog_run
+from kurumaisu.critic.recording import LaserMount, Recording, Run
+from kurumaisu.errors import Error
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a folder of runs, one folder of CSV tables, one bag or one rawlog.
+
+    Raise Error naming file, line and column, topic or key for anything that cannot be read, and saying what
+    is missing when nothing can be done with what was read.
+    """
+    if not path.exists():
+        raise Error(f"{path}: there is no such file or folder")
+    meta_file = path / "meta.yaml"
+    meta = read_meta(meta_file) if meta_file.is_file() else Meta()
+    faults = Faults()
+    laser = meta.laser
+    runs = []
+    for source in _sources(path):
+        run, mount = _read_run(source, meta, faults)
+        laser = laser or mount
+        check_run(run, laser, faults)
+        runs.append(run)
+    _require_use(path, runs, meta, faults)
+    train, test = _split(meta_file, meta, [run.name for run in runs])
+    return Recording(
+        name=path.resolve().stem if path.is_file() else path.resolve().name,
+        runs=tuple(runs),
+        train=train,
+        test=test,
+        model=meta.model,
+        world=meta.world,
+        laser=laser,
+        truth=meta.truth,
+        problems=tuple(faults.notes),
+        invalid=tuple(faults.invalid),
+    )
+
+
+def _sources(path: Path) -> list[Path]:
+    """Return what each run is read from: a bag, a rawlog, or a folder of tables."""
+    if path.is_file():
+        if path.suffix != ".bag" and not is_rawlog(path):
+            raise Error(f"{path}: is no recording: a folder, a .bag or a .rawlog")
+        return [path]
+    inside = sorted(path.iterdir())
+    bags = [item for item in inside if item.suffix == ".bag" or is_rawlog(item)]
+    folders = [item for item in inside if item.is_dir() and is_csv_run(item)]
+    if is_csv_run(path):
+        if bags or folders:
+            raise Error(f"{path}: holds both tables and runs ({(bags + folders)[0].name}): which is the run?")
+        return [path]
+    # The queries of a bag's run lie in a folder of its name, alone.
+    names = [bag.stem for bag in bags]
+    for folder in [folder for folder in folders if folder.name in names]:
+        others = [item.name for item in folder.glob("*.csv") if item.stem != QUERY]
+        if others:
+            raise Error(f"{folder / others[0]}: the run {folder.name} is there as a bag too")
+        folders.remove(folder)
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise Error(f"{path}: the run {twice[0]} is there twice")
+    if not bags and not folders:
+        raise Error(f"{path}: holds no run: neither a .bag, nor a .rawlog, nor a folder with tables like pose.csv")
+    return sorted(bags + folders, key=lambda item: item.stem)
+
+
+def _read_run(source: Path, meta: Meta, faults: Faults) -> tuple[Run, LaserMount | None]:
+    """Return a run, and the laser's mounting where the file itself states it."""
+    if source.is_dir():
+        return read_csv_run(source, source.resolve().name, faults), None
+    if is_rawlog(source):
+        return read_rawlog_run(source, faults)
+    run = read_bag_run(source, meta.topics, faults)
+    queries = source.with_suffix("") / f"{QUERY}.csv"
+    return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
+
+
+def _split(meta_file: Path, meta: Meta, names: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the runs to fit and the runs to judge by."""
+    for key, chosen in (("train", meta.train), ("test", meta.test)):
+        for name in chosen:
+            if name not in names:
+                raise Error(f"{meta_file}: {key}: there is no run {name!r}; there are: {', '.join(names)}")
+    train = meta.train or tuple(name for name in names if name not in meta.test)
+    if not train:
+        raise Error(f"{meta_file}: train: no run is left to fit: all are in test")
+    return train, meta.test
+
+
+def _require_use(path: Path, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
+    """Raise Error unless a run says something about base or laser; note the runs that do not."""
+    useless = [run for run in runs if not usable(run)]
+    for run in useless:
+        faults.add(f"{run.name}: says nothing: it has {_has(run)}")
+    if len(useless) == len(runs):
+        topic = resolve(meta.topics)
+        raise Error(
+            f"{path}: nothing to criticise a model with: {runs[0].name} has {_has(runs[0])}. "
+            f"Needed are scans (scan.csv or {topic['scan']}), or commands or voltages "
+            f"(command.csv, voltage.csv, {topic['command']} or {topic['voltage']}) "
+            f"together with poses (pose.csv, odom.csv, {topic['pose']} or {topic['odom']})"
+        )
+
+
+def _has(run: Run) -> str:
+    parts = [part for part in ("command", "voltage", "pose", "odom", "scan") if getattr(run, part) is not None]
+    return f"only {' and '.join(parts)}" if parts else "no part of a run"

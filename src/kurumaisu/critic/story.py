@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the report shows beyond the verdict: values only, SI units and radians."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kurumaisu.types import FloatArray
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """One run from above [m]: measured path (n, 2), simulated paths (m, 2); held_out: no model fitted it."""
+
+    run: str
+    measured: FloatArray
+    baseline: FloatArray
+    extended: FloatArray | None
+    held_out: bool
+
+
+@dataclass(frozen=True)
+class Bins:
+    """Means of the residual in bins of the covariate, all (k,), each mean with its 90 % interval."""
+
+    centre: FloatArray
+    mean: FloatArray
+    lo90: FloatArray
+    hi90: FloatArray
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Measured minus simulated, over the covariate that explains it.
+
+    covariate, residual: (n,) points; channel and covariate_name as a reader says them, with their units;
+    explained_by: the id or shape that is blamed; curve: (m, 2) covariate and what the extension adds, if any.
+    """
+
+    channel: str
+    unit: str
+    covariate_name: str
+    covariate_unit: str
+    covariate: FloatArray
+    residual: FloatArray
+    bins: Bins
+    explained_by: str
+    curve: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An explanation that was weighed and lost: log evidence over the winner [nat], and why it lost."""
+
+    id: str
+    nats: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Noise:
+    """One estimated parameter of the noise with its 90 % interval, nan where it has none."""
+
+    name: str
+    estimate: float
+    lo90: float
+    hi90: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Story:
+    """All that the report tells and the verdict does not hold.
+
+    headline: the verdict in one sentence; details: what a reader should know next, one sentence each;
+    unexplained: what remains, one sentence each; next_drive: what to drive next and why, or empty;
+    pose_source: where the reference pose came from; provenance: seeds, versions, files, by name.
+    """
+
+    recording: str
+    model: str
+    headline: str
+    details: tuple[str, ...]
+    pose_source: str
+    provenance: dict[str, str]
+    overlays: tuple[Overlay, ...] = ()
+    misfits: tuple[Misfit, ...] = ()
+    rivals: tuple[Rival, ...] = ()
+    noise: tuple[Noise, ...] = ()
+    unexplained: tuple[str, ...] = ()
+    next_drive: str = ""

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The critic's answer as values, and verdict.json: written and read against verdict.schema.json."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import jsonschema
+
+from kurumaisu.errors import Error
+
+SCHEMA_VERSION = 1
+Kind = Literal["none", "named", "confounded", "unknown", "invalid_data"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter and its 90 % interval, in its own unit."""
+
+    estimate: float
+    lo90: float
+    hi90: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One effect of the catalogue: its id, probability, parameters, and log evidence over its absence."""
+
+    id: str
+    p: float
+    parameters: dict[str, Estimate]
+    gain_nats: float
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A misfit outside the catalogue: where it shows, what it follows, shape, probability."""
+
+    channel: str
+    covariate: str
+    shape: str
+    p: float
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """The drive that would tell most: id, duration [s], expected log evidence, what it separates."""
+
+    id: str
+    seconds: float
+    expected_nats: float
+    separates: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class LogDensityGain:
+    """Held-out log predictive density per sample [nat], of both models; gain with its 90 % interval."""
+
+    baseline: float
+    extended: float
+    gain: float
+    lo90: float
+    hi90: float
+
+
+@dataclass(frozen=True)
+class RmseGain:
+    """Held-out root mean square error of both models; gain = baseline - extended with its 90 % interval."""
+
+    baseline: float
+    extended: float
+    gain: float
+    lo90: float
+    hi90: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What the extension is worth on data that it did not fit. rmse: by what is predicted, in words."""
+
+    log_density_per_sample: LogDensityGain
+    rmse: dict[str, RmseGain] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The critic's answer. gain is None where nothing could be held out or simulated."""
+
+    verdict: Kind
+    causes: tuple[Cause, ...] = ()
+    confounded: tuple[tuple[str, ...], ...] = ()
+    unknown: tuple[Unknown, ...] = ()
+    problems: tuple[str, ...] = ()
+    next_experiment: NextExperiment | None = None
+    gain: Gain | None = None
+
+
+def to_json(verdict: Verdict) -> dict[str, Any]:
+    """Return the content of verdict.json.
+
+    Raise Error naming the field for a number that is not finite or anything the schema forbids.
+    """
+    content = {"schema": SCHEMA_VERSION, **json.loads(json.dumps(asdict(verdict)))}
+    _check(content, "verdict")
+    return content
+
+
+def write_verdict(path: Path, verdict: Verdict) -> None:
+    """Write verdict.json. Raise Error, and write nothing, where to_json does."""
+    text = json.dumps(to_json(verdict), indent=2, allow_nan=False, ensure_ascii=False)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def read_verdict(path: Path) -> Verdict:
+    """Read verdict.json. Raise Error naming the file, and the field where there is one."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise Error(f"{path}: {error.strerror}") from error
+    except ValueError as error:
+        raise Error(f"{path}: is not JSON: {error}") from error
+    _check(content, str(path))
+    return Verdict(
+        verdict=content["verdict"],
+        causes=tuple(_cause(item) for item in content["causes"]),
+        confounded=tuple(tuple(ids) for ids in content["confounded"]),
+        unknown=tuple(Unknown(**item) for item in content["unknown"]),
+        problems=tuple(content["problems"]),
+        next_experiment=_next_experiment(content["next_experiment"]),
+        gain=_gain(content["gain"]),
+    )
+
+
+def _cause(item: dict[str, Any]) -> Cause:
+    parameters = {name: Estimate(**value) for name, value in item["parameters"].items()}
+    return Cause(item["id"], item["p"], parameters, item["gain_nats"])
+
+
+def _next_experiment(item: dict[str, Any] | None) -> NextExperiment | None:
+    return None if item is None else NextExperiment(**{**item, "separates": tuple(item["separates"])})
+
+
+def _gain(item: dict[str, Any] | None) -> Gain | None:
+    if item is None:
+        return None
+    rmse = {name: RmseGain(**value) for name, value in item["rmse"].items()}
+    return Gain(LogDensityGain(**item["log_density_per_sample"]), rmse)
+
+
+def _check(content: Any, where: str) -> None:
+    for name, value in _numbers(content, ""):
+        if not math.isfinite(value):
+            raise Error(f"{where}: {name}: must be a finite number: {value}")
+    schema = json.loads(Path(__file__).with_name("verdict.schema.json").read_text(encoding="utf-8"))
+    fault = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(content))
+    if fault is not None:
+        raise Error(f"{where}: {'.'.join(map(str, fault.absolute_path)) or 'the file'}: {fault.message}")
+    for name, part in _intervals(content, ""):
+        if part["lo90"] > part["hi90"]:
+            raise Error(f"{where}: {name}: lo90 {part['lo90']:g} is above hi90 {part['hi90']:g}")
+
+
+def _numbers(content: Any, name: str) -> Iterator[tuple[str, float]]:
+    if isinstance(content, float):
+        yield name, content
+    for key, value in _members(content):
+        yield from _numbers(value, f"{name}.{key}".lstrip("."))
+
+
+def _intervals(content: Any, name: str) -> Iterator[tuple[str, dict[str, float]]]:
+    if isinstance(content, dict) and "lo90" in content:
+        yield name, content
+    for key, value in _members(content):
+        yield from _intervals(value, f"{name}.{key}".lstrip("."))
+
+
+def _members(content: Any) -> list[tuple[str, Any]]:
+    if isinstance(content, dict):
+        return list(content.items())
+    return [(str(i), item) for i, item in enumerate(content)] if isinstance(content, list) else []

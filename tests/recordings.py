@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A made-up drive, and how to write it as a bag, for the tests of the readers."""
+
+from decimal import Decimal
+from pathlib import Path
+
+import numpy as np
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from kurumaisu.critic.recording import Run, Series
+
+BEAMS = 7
+PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def series(t, columns, *values):
+    return Series(np.asarray(t, dtype=float), np.column_stack(values).astype(float), tuple(columns))
+
+
+def full_run(name="run_1", start=0.0):
+    """A drive with every part; stamps have whole microseconds, which a bag can hold."""
+    rng = np.random.default_rng(4)
+    t = np.round(start + np.arange(1, 101) / 10 + rng.uniform(0, 0.02, 100), 6)
+    theta = 0.9 * (t - start)
+    ranges = np.round(rng.uniform(0.3, 3.9, (100, BEAMS)), 3)
+    ranges[3, 2], ranges[5, 1] = np.nan, np.inf
+    return Run(
+        name=name,
+        command=series(t[::5], "vw", rng.uniform(-0.4, 0.8, 20), rng.uniform(-1, 1, 20)),
+        voltage=series(t, ("v_f", "v_s"), rng.normal(size=100), rng.normal(size=100)),
+        pose=series(t, ("x", "y", "theta"), rng.normal(size=100), rng.normal(size=100), theta),
+        odom=series(t, ("x", "y", "theta", "v", "w"), *rng.normal(size=(2, 100)), theta, *rng.normal(size=(2, 100))),
+        scan=series(t, [f"r{i}" for i in range(BEAMS)], ranges),
+        covariates={
+            "battery": series(t[::10], ["battery"], np.linspace(25.2, 24.9, 10)),
+            "temperature": series(t[::20], ["temperature"], np.linspace(20.0, 24.0, 5)),
+            "tyre": series(t[::50], ["tyre"], np.array([2.1, 2.2])),
+        },
+    )
+
+
+def nanoseconds(t):
+    """Return the decimal number that t prints as; t * 1e9 would be off by a hundred nanoseconds."""
+    return int(Decimal(repr(float(t))) * 10**9)
+
+
+class Bag:
+    """Writes a run's parts as messages, with the rosbags library's own serialiser."""
+
+    def __init__(self, path, compression=None):
+        self.store = get_typestore(Stores.ROS1_NOETIC)
+        text = (PACKAGE / "msg" / "Voltages.msg").read_text(encoding="utf-8")
+        self.store.register(get_types_from_msg(text, "kurumaisu/msg/Voltages"))
+        self.writer = Writer(path)
+        if compression:
+            self.writer.set_compression(compression)
+        self.writer.open()
+        self.connections = {}
+
+    def make(self, kind, **values):
+        return self.store.types[kind](**values)
+
+    def header(self, t):
+        ns = nanoseconds(t)
+        stamp = self.make("builtin_interfaces/msg/Time", sec=ns // 10**9, nanosec=ns % 10**9)
+        return self.make("std_msgs/msg/Header", seq=0, stamp=stamp, frame_id="map")
+
+    def write(self, topic, message, received):
+        kind = message.__msgtype__
+        if topic not in self.connections:
+            self.connections[topic] = self.writer.add_connection(topic, kind, typestore=self.store)
+        data = self.store.serialize_ros1(message, kind)
+        self.writer.write(self.connections[topic], nanoseconds(received), data)
+
+    def vector(self, x=0.0, y=0.0, z=0.0, kind="Vector3"):
+        return self.make(f"geometry_msgs/msg/{kind}", x=x, y=y, z=z)
+
+    def twist(self, v, w):
+        return self.make("geometry_msgs/msg/Twist", linear=self.vector(x=v), angular=self.vector(z=w))
+
+    def pose(self, x, y, theta):
+        turn = self.make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=np.sin(theta / 2), w=np.cos(theta / 2))
+        return self.make("geometry_msgs/msg/Pose", position=self.vector(x, y, kind="Point"), orientation=turn)
+
+    def pose_stamped(self, t, pose):
+        return self.make("geometry_msgs/msg/PoseStamped", header=self.header(t), pose=self.pose(*pose))
+
+    def odometry(self, t, pose, v, w):
+        none = np.zeros(36)
+        return self.make(
+            "nav_msgs/msg/Odometry",
+            header=self.header(t),
+            child_frame_id="base_link",
+            pose=self.make("geometry_msgs/msg/PoseWithCovariance", pose=self.pose(*pose), covariance=none),
+            twist=self.make("geometry_msgs/msg/TwistWithCovariance", twist=self.twist(v, w), covariance=none),
+        )
+
+    def scan(self, t, ranges):
+        fan = {"angle_min": -2.0, "angle_max": -1.4, "angle_increment": 0.1, "scan_time": 0.1}
+        return self.make(
+            "sensor_msgs/msg/LaserScan",
+            header=self.header(t),
+            **fan,
+            time_increment=0.0,
+            range_min=0.06,
+            range_max=4.0,
+            ranges=ranges.astype(np.float32),
+            intensities=np.zeros(0, dtype=np.float32),
+        )
+
+    def voltages(self, t, v_f, v_s):
+        values = {"translation": v_f, "steering": v_s, "reference": 2.5, "v": 0.0, "w": 0.0}
+        return self.make("kurumaisu/msg/Voltages", header=self.header(t), **values)
+
+    def twist_stamped(self, t, v, w):
+        return self.make("geometry_msgs/msg/TwistStamped", header=self.header(t), twist=self.twist(v, w))
+
+    def temperature(self, t, celsius):
+        kind = "sensor_msgs/msg/Temperature"
+        return self.make(kind, header=self.header(t), temperature=celsius, variance=0.0)
+
+    def battery(self, t, volts):
+        unmeasured = {
+            name: float("nan")
+            for name in ("temperature", "current", "charge", "capacity", "design_capacity", "percentage")
+        }
+        return self.make(
+            "sensor_msgs/msg/BatteryState",
+            header=self.header(t),
+            voltage=volts,
+            **unmeasured,
+            power_supply_status=0,
+            power_supply_health=0,
+            power_supply_technology=0,
+            present=False,
+            cell_voltage=np.zeros(0, dtype=np.float32),
+            cell_temperature=np.zeros(0, dtype=np.float32),
+            location="",
+            serial_number="",
+        )
+
+
+def write_bag(path, run, *, compression=None, stamped=True, late=0.0):
+    """Write a full run; late: how long after the stamp a message is received [s]."""
+    bag = Bag(path, compression)
+    to_message = {
+        "/voltages": (run.voltage, lambda t, row: bag.voltages(t, *row)),
+        "/mocap/pose": (run.pose, bag.pose_stamped),
+        "/odom": (run.odom, lambda t, row: bag.odometry(t, row[:3], *row[3:])),
+        "/scan": (run.scan, bag.scan),
+        "/battery": (run.covariates["battery"], lambda t, row: bag.battery(t, *row)),
+        "/temperature": (run.covariates["temperature"], lambda t, row: bag.temperature(t, *row)),
+    }
+    if stamped:
+        to_message["/cmd_vel"] = run.command, lambda t, row: bag.twist_stamped(t, *row)
+    messages = [
+        (t + late, topic, convert(t, row))
+        for topic, (part, convert) in to_message.items()
+        for t, row in zip(part.t, part.values, strict=True)
+    ]
+    if not stamped:
+        rows = zip(run.command.t, run.command.values, strict=True)
+        messages += [(t, "/cmd_vel", bag.twist(*row)) for t, row in rows]
+    tyre = run.covariates["tyre"]
+    for t, (bar,) in zip(tyre.t, tyre.values, strict=True):
+        messages.append((t, "/tyre_pressure", bag.make("std_msgs/msg/Float64", data=bar)))
+    for received, topic, message in sorted(messages, key=lambda item: item[0]):
+        bag.write(topic, message, received)
+    bag.writer.close()
+
+
+def assert_same(a, b, atol):
+    """Compare every array of two runs; battery is float32 in a bag."""
+    for part in ("command", "voltage", "pose", "odom", "scan"):
+        one, other = getattr(a, part), getattr(b, part)
+        assert one.columns == other.columns, part
+        np.testing.assert_array_equal(one.t, other.t, err_msg=part)
+        np.testing.assert_allclose(one.values, other.values, rtol=0, atol=atol, err_msg=part)
+    assert set(a.covariates) == set(b.covariates)
+    for name, one in a.covariates.items():
+        np.testing.assert_array_equal(one.t, b.covariates[name].t, err_msg=name)
+        np.testing.assert_allclose(one.values, b.covariates[name].values, rtol=1e-6, err_msg=name)

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The critic on recordings whose hidden effect comes from code that shares nothing with the package's effects."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import trapezoid
+
+from kurumaisu.bench import hidden_effect
+from kurumaisu.bench.critic import recording
+from kurumaisu.critic import drive, evidence, pipeline, replay
+from kurumaisu.critic.verdict import read_verdict
+from kurumaisu.errors import Error
+from kurumaisu.params import load_model, shipped
+
+MD100 = shipped("launch/md100.yaml")
+
+
+def criticise(data):
+    return pipeline.criticise(data, MD100, lambda _: None)
+
+
+@pytest.mark.parametrize("effect", hidden_effect.EFFECTS)
+def test_a_hidden_effect_is_named_and_measured(effect):
+    size = 0.3 * hidden_effect.draw_size(effect, np.random.default_rng(7))
+    verdict = criticise(recording(effect, size, 70, 40.0)).verdict
+    assert verdict.verdict == "named"
+    assert [cause.id for cause in verdict.causes] == [effect]
+    (estimate,) = verdict.causes[0].parameters.values()
+    error = (estimate.hi90 - estimate.lo90) / (2 * 1.645)
+    assert abs(estimate.estimate - size) < 4 * error + 0.02 * abs(size)
+    assert verdict.gain.log_density_per_sample.lo90 > 0
+
+
+@pytest.mark.parametrize("seed", [81, 82, 83])
+def test_without_an_effect_nothing_is_named(seed):
+    criticism = criticise(recording(None, 0.0, seed, 40.0))
+    assert criticism.verdict.verdict == "none"
+    assert criticism.verdict.causes == ()
+    assert [setting.id for setting in criticism.settings] == ["base.process_noise"]
+
+
+def test_two_effects_at_once_are_both_named():
+    first = recording("base.lag_w", 0.15, 90, 40.0)
+    slower = tuple(
+        replace(run, pose=replace(run.pose, values=run.pose.values * [0.95, 0.95, 1.0])) for run in first.runs
+    )
+    verdict = criticise(replace(first, runs=slower)).verdict
+    assert {cause.id for cause in verdict.causes} == {"base.lag_w", "base.gain_v"}
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ([-1.0, 1.0, 1.0], "x of the reference pose has the wrong sign"),
+        ([1.0, -1.0, 1.0], "y of the reference pose has the wrong sign"),
+        ([1.0, 1.0, 180 / np.pi], "heading of the reference pose is in degrees"),
+        ([1000.0, 1000.0, 1.0], "millimetres"),
+    ],
+)
+def test_wrong_data_are_said_and_not_fitted(columns, words):
+    good = recording(None, 0.0, 91, 40.0)
+    runs = tuple(replace(run, pose=replace(run.pose, values=run.pose.values * columns)) for run in good.runs)
+    verdict = criticise(replace(good, runs=runs)).verdict
+    assert verdict.verdict == "invalid_data"
+    assert verdict.causes == ()
+    assert words in verdict.problems[0]
+
+
+def test_the_extended_model_leaves_nothing_to_find(tmp_path):
+    data = recording("base.lag_w", 0.1, 92, 40.0)
+    criticism = criticise(data)
+    pipeline.write(criticism, MD100, tmp_path)
+    assert [cause.id for cause in read_verdict(tmp_path / "verdict.json").causes] == ["base.lag_w"]
+    assert "base.lag_w" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    extended = tmp_path / "extended.yaml"
+    assert {setting.id for setting in load_model(extended).effects} == {"base.lag_w", "base.process_noise"}
+    again = pipeline.criticise(recording("base.lag_w", 0.1, 93, 40.0), extended, lambda _: None).verdict
+    assert again.verdict == "none"
+
+
+def test_a_robot_without_voltages_follows_its_commands(tmp_path):
+    data = recording("base.gain_w", -0.1, 94, 40.0)
+    data = replace(data, runs=tuple(replace(run, voltage=None) for run in data.runs))
+    criticism = criticise(data)
+    assert [cause.id for cause in criticism.verdict.causes] == ["base.gain_w"]
+    pipeline.write(criticism, MD100, tmp_path)
+    assert load_model(tmp_path / "extended.yaml").translation.volts(0.5) == 0.5
+
+
+def test_one_run_is_judged_on_the_parts_held_out():
+    data = recording("base.gain_v", 0.05, 95, 60.0)
+    verdict = criticise(replace(data, runs=data.runs[:1], train=data.train[:1])).verdict
+    assert [cause.id for cause in verdict.causes] == ["base.gain_v"]
+    assert verdict.gain.log_density_per_sample.lo90 > 0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"pose": None}, "run_1: has no reference pose"),
+        ({"voltage": None, "command": None}, "run_1: has neither voltages nor commands nor odometry"),
+    ],
+)
+def test_missing_parts_are_named(change, message):
+    data = recording(None, 0.0, 96, 5.0)
+    with pytest.raises(Error, match=message):
+        criticise(replace(data, runs=tuple(replace(run, **change) for run in data.runs)))
+
+
+def test_replay_of_a_noiseless_drive_is_exact():
+    """Commands held over the grid, equation (3) in closed form: the replay must end where the arcs end."""
+    data = recording(None, 0.0, 97, 20.0)
+    run, model = data.runs[0], load_model(MD100)
+    prepared = drive.prepare(run, model)
+    pose, t_end = np.zeros(3), prepared.times[-1]
+    command = run.command
+    for t, until, (v, w) in zip(command.t, [*command.t[1:], t_end], command.values, strict=True):
+        dt = until - t
+        if w == 0:
+            local = np.array([v * dt, 0.0, 0.0])
+        else:
+            local = np.array([v / w * np.sin(w * dt), v / w * (1 - np.cos(w * dt)), w * dt])
+        c, s = np.cos(pose[2]), np.sin(pose[2])
+        pose += [c * local[0] - s * local[1], s * local[0] + c * local[1], local[2]]
+    prepared = replace(prepared, poses=np.zeros_like(prepared.poses))
+    np.testing.assert_allclose(replay.path(prepared, model, ())[-1], pose, atol=2e-4)
+
+
+def test_occam_factor_against_quadrature():
+    z = np.array([0.0, 2.0, 5.0, 30.0])
+    x = np.geomspace(3, 3000, 2_000_001)
+    weight = 1 / (2 * np.log(1000) * x)
+    for value, cost in zip(z, evidence.occam(z), strict=True):
+        density = weight * (np.exp(-0.5 * (value - x) ** 2) + np.exp(-0.5 * (value + x) ** 2))
+        assert cost == pytest.approx(-np.log(trapezoid(density, x)), abs=0.02)

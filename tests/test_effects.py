@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects against differential equations solved by scipy, and their promise: chunks do not matter."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from kurumaisu import effects
+from kurumaisu.errors import Error
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+DT = 0.01
+MODEL = load_model(shipped("launch/md100.yaml"))
+TYPICAL = {
+    effect.id: {parameter.name: parameter.null + parameter.scale for parameter in effect.parameters}
+    for effect in effects.ALL
+}
+
+
+def context(seed: int = 0) -> effects.Context:
+    return effects.Context(MODEL.translation, MODEL.steering, np.random.default_rng(seed))
+
+
+def drive(n: int, seed: int) -> effects.Motion:
+    rng = np.random.default_rng(seed)
+    steps = rng.uniform(-0.7, 0.7, (n // 20 + 1, 2)) * (rng.random((n // 20 + 1, 2)) > 0.2)
+    rates = np.repeat(steps, 20, axis=0)[:n]
+    return effects.Motion(DT, rates[:, 0], rates[:, 1])
+
+
+@pytest.mark.parametrize("effect", effects.ALL, ids=lambda effect: effect.id)
+@given(cuts=st.lists(st.integers(1, 299), max_size=6, unique=True), seed=st.integers(0, 1000))
+@settings(max_examples=20, deadline=None)
+def test_chunks_give_the_same_motion_as_the_whole(effect, cuts, seed):
+    motion = drive(300, seed)
+    whole = effect(TYPICAL[effect.id], context()).apply(motion)
+    chunked = effect(TYPICAL[effect.id], context())
+    bounds = [0, *sorted(cuts), 300]
+    parts = [chunked.apply(effects.Motion(DT, motion.v[a:b], motion.w[a:b])) for a, b in pairwise(bounds)]
+    np.testing.assert_allclose(np.concatenate([part.v for part in parts]), whole.v, atol=1e-12)
+    np.testing.assert_allclose(np.concatenate([part.w for part in parts]), whole.w, atol=1e-12)
+
+
+@pytest.mark.parametrize("effect", effects.ALL, ids=lambda effect: effect.id)
+def test_every_effect_changes_the_motion_and_its_null_does_not(effect):
+    motion = drive(400, 3)
+    changed = effect(TYPICAL[effect.id], context()).apply(motion)
+    assert not (np.allclose(changed.v, motion.v) and np.allclose(changed.w, motion.w))
+    null = {parameter.name: parameter.null for parameter in effect.parameters}
+    same = effect(null, context()).apply(motion)
+    np.testing.assert_allclose(same.v, motion.v, atol=1e-12)
+    np.testing.assert_allclose(same.w, motion.w, atol=1e-12)
+
+
+def test_lag_against_the_differential_equation():
+    tau, motion = 0.23, drive(300, 1)
+
+    def slope(t, state):
+        k = min(int(t / DT + 1e-9), 299)
+        return [(motion.w[k] - state[0]) / tau, state[0]]
+
+    solution = solve_ivp(
+        slope, (0, 3.0), [0.0, 0.0], t_eval=np.arange(301) * DT, max_step=DT / 4, rtol=1e-9, atol=1e-12
+    )
+    mean_rates = np.diff(solution.y[1]) / DT
+    lagged = effects.by_id("base.lag_w")({"tau": tau}, context()).apply(motion).w
+    np.testing.assert_allclose(lagged, mean_rates, atol=1e-5)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.123])
+def test_delay_moves_the_integral_in_time(delay):
+    motion = drive(300, 2)
+    late = effects.by_id("base.delay")({"delay": delay}, context()).apply(motion)
+    edges = np.arange(301) * DT
+    integral = np.concatenate([[0.0], np.cumsum(motion.v) * DT])
+    expected = np.diff(np.interp(edges - delay, edges, integral)) / DT
+    np.testing.assert_allclose(late.v, expected, atol=1e-12)
+
+
+def test_dead_zone_swallows_volts_of_each_branch():
+    motion = effects.Motion(DT, np.array([0.5, -0.5, 0.02, 0.0]), np.zeros(4))
+    out = effects.by_id("base.dead_zone_v")({"width": 0.06}, context()).apply(motion).v
+    np.testing.assert_allclose(out, [0.5 - 0.06 / 1.32402, -0.5 + 0.06 / 2.07369, 0.0, 0.0], atol=1e-12)
+
+
+def test_process_noise_has_the_stated_size_and_colour():
+    n, tau = 400_000, 0.3
+    motion = effects.Motion(DT, np.full(n, 0.5), np.full(n, 0.1))
+    noise = effects.by_id("base.process_noise")({"sd_v": 0.01, "sd_w": 0.02, "tau": tau}, context(5))
+    out = noise.apply(motion)
+    samples = n * DT / (2 * tau)  # independent ones
+    for values, sd in ((out.v - 0.5, 0.01), (out.w - 0.1, 0.02)):
+        assert values.std() == pytest.approx(sd, rel=4 / np.sqrt(2 * samples))
+        assert np.corrcoef(values[:-30], values[30:])[0, 1] == pytest.approx(np.exp(-1), abs=4 / np.sqrt(samples))
+
+
+def build(*pairs):
+    return effects.build(tuple(EffectSetting(name, values) for name, values in pairs), context())
+
+
+def test_effects_act_in_the_order_of_the_drive_chain():
+    built = build(("base.lag_v", {"tau": 0.1}), ("base.gain_v", {"gain": 0.1}), ("base.delay", {"delay": 0.1}))
+    assert [effect.id for effect in built] == ["base.delay", "base.gain_v", "base.lag_v"]
+
+
+@pytest.mark.parametrize(
+    ("pairs", "message"),
+    [
+        ([("base.lagv", {"tau": 0.1})], "'base.lagv' is not in the catalogue"),
+        ([("base.lag_v", {"tau": -1.0})], "base.lag_v: tau must be 0 to 3 s: -1"),
+        ([("base.lag_v", {"t": 0.1})], "base.lag_v: needs the parameters tau; got t"),
+        ([("base.gain_v", {"gain": 0.1}), ("base.gain_v", {"gain": 0.2})], "given twice"),
+    ],
+)
+def test_bad_settings_are_refused_by_name(pairs, message):
+    with pytest.raises(Error, match=message):
+        build(*pairs)

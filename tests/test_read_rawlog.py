@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rawlogs: rates from poses, and the way from MRPT's file to a recording."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kurumaisu.critic.clean import Faults
+from kurumaisu.critic.read_rawlog import to_run
+from kurumaisu.critic.reading import read_recording
+from kurumaisu.errors import Error
+
+DATASETS = Path("/usr/share/mrpt/datasets")
+
+
+def test_rates_are_those_of_the_arc_driven():
+    t = np.array([0.0, 0.1, 0.3, 0.4])
+    v, w = 0.7, -2.5
+    odom = np.column_stack([v / w * np.sin(w * t), v / w * (1 - np.cos(w * t)), w * t])
+    ranges = np.ones((4, 3))
+    faults = Faults()
+    run = to_run("a", t, odom, ranges, faults)
+    np.testing.assert_allclose(run.odom.column("v"), v, rtol=1e-12)
+    np.testing.assert_allclose(run.odom.column("w"), w, rtol=1e-12)
+    assert run.scan.values.shape == (4, 3)
+    assert run.pose is None
+    assert faults.notes == []
+
+
+@pytest.mark.skipif(importlib.util.find_spec("kurumaisu._slam") is None, reason="built without kurumaisu._slam")
+def test_a_real_rawlog_is_read(tmp_path):
+    path = DATASETS / "localization_demo.rawlog"
+    if not path.exists():
+        pytest.skip(f"needs {path}, of Debian's mrpt-common")
+    recording = read_recording(path)
+    (run,) = recording.runs
+    assert recording.laser.beams == run.scan.values.shape[1]
+    assert (np.diff(run.scan.t) > 0).all()
+    assert np.isfinite(run.odom.values).all()
+    (tmp_path / "cut.rawlog").write_bytes(b"no rawlog")
+    with pytest.raises(Error, match=r"cut\.rawlog"):
+        read_recording(tmp_path / "cut.rawlog")

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The whitening filter against the joint covariance written out in full."""
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad
+
+from kurumaisu import geometry
+from kurumaisu._core import whiten
+
+NOISE = {"position_sd": 0.01, "heading_sd": 0.004, "process_sd": [0.03, 0.008, 0.05], "process_tau": 0.4}
+
+
+def run(n: int, seed: int):
+    rng = np.random.default_rng(seed)
+    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.05, 0.4, n))])
+    poses = np.cumsum(rng.normal(0, [0.05, 0.02, 0.1], (n + 1, 3)), axis=0)
+    return times, poses
+
+
+def integral_covariance(a, b, c, d, tau):
+    """Of the integrals of a unit OU process over (a, b) and (c, d)."""
+    inner = dblquad(lambda t, s: np.exp(-abs(s - t) / tau), a, b, lambda s: c, lambda s: d, epsabs=1e-12)
+    return inner[0]
+
+
+def joint_covariance(times, poses):
+    """Of all increments' residuals, by numerical derivatives of the increments and quadrature of the OU process."""
+    n = len(times) - 1
+    sds = [NOISE["position_sd"], NOISE["position_sd"], NOISE["heading_sd"]]
+    by_pose = np.zeros((3 * n, 3 * (n + 1)))
+    step = 1e-6
+    for j in range(3 * (n + 1)):
+        up, down = poses.copy(), poses.copy()
+        up.flat[j] += step
+        down.flat[j] -= step
+        by_pose[:, j] = (
+            (geometry.between(up[:-1], up[1:]) - geometry.between(down[:-1], down[1:])) / (2 * step)
+        ).ravel()
+    cov = by_pose @ np.diag(np.tile(np.square(sds), n + 1)) @ by_pose.T
+    motions = []
+    for k in range(n):
+        dx, dy, turn = geometry.between(poses[k], poses[k + 1])
+        c, s = np.cos(turn / 2), np.sin(turn / 2)
+        motions.append(np.array([[c, -s, -dy / 2], [s, c, dx / 2], [0, 0, 1]]))
+    rates = np.diag(np.square(NOISE["process_sd"]))
+    for j in range(n):
+        for k in range(n):
+            shared = integral_covariance(*times[j : j + 2], *times[k : k + 2], NOISE["process_tau"])
+            cov[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] += motions[j] @ (shared * rates) @ motions[k].T
+    return cov
+
+
+def test_against_the_joint_covariance():
+    times, poses = run(6, 1)
+    columns = np.random.default_rng(2).normal(size=(18, 3))
+    white, log_determinants = whiten(poses, times, columns, **NOISE)
+    cov = joint_covariance(times, poses)
+    np.testing.assert_allclose(white.T @ white, columns.T @ np.linalg.solve(cov, columns), rtol=1e-5)
+    assert log_determinants.sum() == pytest.approx(np.linalg.slogdet(cov)[1], abs=1e-4)
+
+
+def test_short_steps_do_not_cancel():
+    times = np.arange(50) * 1e-4
+    poses = np.zeros((50, 3))
+    white, log_determinants = whiten(poses, times, np.ones((147, 1)), **NOISE)
+    assert np.isfinite(white).all()
+    assert np.isfinite(log_determinants).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"times": np.zeros(7)}, "times must increase"),
+        ({"times": np.arange(6.0)}, "same length"),
+        ({"columns": np.zeros((17, 1))}, "three rows per increment"),
+        ({"poses": np.zeros((7, 2))}, "shape"),
+        ({"process_tau": 0.0}, "positive"),
+        ({"process_sd": [0.1, -0.1, 0.1]}, "positive"),
+    ],
+)
+def test_bad_input_is_refused(change, message):
+    times, poses = run(6, 1)
+    arguments = {"poses": poses, "times": times, "columns": np.zeros((18, 1)), **NOISE, **change}
+    with pytest.raises(ValueError, match=message):
+        whiten(**arguments)
