@@ -178,9 +178,7 @@ def test_a_chair_leaves_a_wall(model: Model, physics: Physics, tmp_path: Path) -
     assert back[-1].pose[0] == pytest.approx(blocked.pose[0] - 1.0, abs=0.02)
 
 
-def scans(
-    simulator: Simulator, command: Command, count: int
-) -> Iterator[tuple[FloatArray, FloatArray, float]]:
+def scans(simulator: Simulator, command: Command, count: int) -> Iterator[tuple[FloatArray, FloatArray, float]]:
     found = 0
     while found < count:
         scan = simulator.step(command).scan

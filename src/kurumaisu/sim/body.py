@@ -79,9 +79,7 @@ class ChairBody:
             self._body.angle += self._body.angular_velocity * substep
         self._pose = np.array([*self._body.position, self._body.angle])
 
-    def _impose(
-        self, body: pymunk.Body, _gravity: tuple[float, float], _damping: float, _substep: float
-    ) -> None:
+    def _impose(self, body: pymunk.Body, _gravity: tuple[float, float], _damping: float, _substep: float) -> None:
         v, w = self._imposed
         body.velocity = (v * math.cos(body.angle), v * math.sin(body.angle))
         body.angular_velocity = w

@@ -59,15 +59,11 @@ class Simulator:
         self._world = world
         self._scene = Scene(world.segments)
         if self._new_body().touches():
-            raise Error(
-                f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose"
-            )
+            raise Error(f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose")
 
     def reset(self, seed: int) -> Observation:
         """Put the chair back to its start, at rest, and start time and randomness anew."""
-        plant_rng, laser_rng = (
-            np.random.default_rng(sequence) for sequence in np.random.SeedSequence(seed).spawn(2)
-        )
+        plant_rng, laser_rng = (np.random.default_rng(sequence) for sequence in np.random.SeedSequence(seed).spawn(2))
         self._plant = Plant(self._model, self._physics.step, plant_rng)
         self._scanner = Scanner(self._model.laser, self._scene, laser_rng)
         self._steps = 0
