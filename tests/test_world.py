@@ -53,9 +53,7 @@ def test_blocks_together_fill_the_size(tmp_path: Path) -> None:
     text = (
         """model ( size [8 2 1] pose [4 1 0 0]
       block ( points 3 point[0] [0 0] point[1] [1 0] point[2] [0 1] z [0 1] )
-      block ( points 4 point[0] [1 0] point[1] [2 0] point[2] [2 1] point[3] [1 1] ) )""".replace(
-            "] point", "]\npoint"
-        )
+      block ( points 4 point[0] [1 0] point[1] [2 0] point[2] [2 1] point[3] [1 1] ) )""".replace("] point", "]\npoint")
         .replace("points 3 ", "points 3\n")
         .replace("points 4 ", "points 4\n")
     )
@@ -128,9 +126,7 @@ def test_starts_in_file_order(tmp_path: Path) -> None:
 
 
 def test_known_but_unheeded_is_warned_of_once(tmp_path: Path) -> None:
-    text = (
-        "resolution 0.02\nwindow ( size [1 1] )\nmodel ( mass 3 )\nmodel ( mass 4 )\nposition ( ranger ( ) )"
-    )
+    text = "resolution 0.02\nwindow ( size [1 1] )\nmodel ( mass 3 )\nmodel ( mass 4 )\nposition ( ranger ( ) )"
     (warning,) = read(tmp_path, text).warnings
     assert "resolution (line 1), window (line 2), mass (line 3), ranger (line 5)" in warning
 

@@ -19,17 +19,13 @@ def robot_description(model: Model, base_frame: str) -> str:
     robot = ElementTree.Element("robot", name=model.name)
     chassis, laser = model.chassis, model.laser
     centre = chassis.axle_to_front - chassis.length / 2
-    _link(
-        robot, base_frame, (chassis.length, chassis.width, _SEAT), (centre, 0.0, _SEAT / 2), "0.2 0.3 0.6 0.6"
-    )
+    _link(robot, base_frame, (chassis.length, chassis.width, _SEAT), (centre, 0.0, _SEAT / 2), "0.2 0.3 0.6 0.6")
     _link(robot, laser.frame, _SENSOR, (0.0, 0.0, 0.0), "0.1 0.1 0.1 1")
     joint = ElementTree.SubElement(robot, "joint", name=f"{base_frame}_to_{laser.frame}", type="fixed")
     ElementTree.SubElement(joint, "parent", link=base_frame)
     ElementTree.SubElement(joint, "child", link=laser.frame)
     mount = laser.mount
-    ElementTree.SubElement(
-        joint, "origin", xyz=_text((mount.x, mount.y, mount.z)), rpy=_text((0.0, 0.0, mount.yaw))
-    )
+    ElementTree.SubElement(joint, "origin", xyz=_text((mount.x, mount.y, mount.z)), rpy=_text((0.0, 0.0, mount.yaw)))
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")
 

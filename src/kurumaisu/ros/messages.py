@@ -28,11 +28,7 @@ def quaternion_of(yaw: float) -> Quaternion:
 
 def yaw_of(rotation: Quaternion) -> float:
     """Return the yaw [rad], in (-pi, pi], of a rotation about z."""
-    return (
-        2 * math.atan2(rotation.z, rotation.w)
-        if rotation.w >= 0
-        else 2 * math.atan2(-rotation.z, -rotation.w)
-    )
+    return 2 * math.atan2(rotation.z, rotation.w) if rotation.w >= 0 else 2 * math.atan2(-rotation.z, -rotation.w)
 
 
 def odometry(stamp: rospy.Time, frame: str, child: str, pose: FloatArray, rates: FloatArray) -> Odometry:

@@ -44,9 +44,7 @@ class SimNode:
         self._truth = rospy.Publisher("ground_truth", Odometry, queue_size=10)
         self._static = tf2_ros.StaticTransformBroadcaster()
         laser = settings.model.laser
-        self._static.sendTransform(
-            messages.laser_transform(messages.stamp_of(self._now), laser, settings.base_frame)
-        )
+        self._static.sendTransform(messages.laser_transform(messages.stamp_of(self._now), laser, settings.base_frame))
         self._voltages = rospy.Subscriber("voltages", Voltages, self._hear, queue_size=100)
         self._service = rospy.Service("reset", Empty, self._serve_reset)
 
@@ -126,9 +124,7 @@ class SimNode:
             self._scan.publish(messages.laser_scan(first_beam, settings.model.laser, observation.scan.ranges))
         if self._steps % settings.ground_truth_every == 0:
             self._truth.publish(
-                messages.odometry(
-                    stamp, settings.map_frame, settings.base_frame, observation.pose, observation.rates
-                )
+                messages.odometry(stamp, settings.map_frame, settings.base_frame, observation.pose, observation.rates)
             )
         if self._steps % settings.clock_every == 0:
             self._clock.publish(Clock(stamp))

@@ -18,10 +18,13 @@ from kurumaisu.types import FloatArray
 class ChairBody:
     """A rigid footprint whose rates the motors impose and obstacles limit."""
 
-    def __init__(self, chassis: Chassis, obstacles: FloatArray, physics: Physics) -> None:
-        """Stand at the map's origin. obstacles: segments (n, 4) [m]."""
+    def __init__(self, chassis: Chassis, obstacles: FloatArray, physics: Physics, start: FloatArray) -> None:
+        """Stand at rest at a start pose (3,) among obstacles: segments (n, 4) [m].
+
+        A new run needs a new body: pymunk's contacts remember the forces of the last steps.
+        """
         self._physics = physics
-        self._pose = np.zeros(3)
+        self._pose = np.array(start, dtype=np.float64)
         self._imposed = (0.0, 0.0)
         self._space = pymunk.Space()
         self._space.iterations = physics.iterations
@@ -34,18 +37,12 @@ class ChairBody:
             wall = pymunk.Segment(self._space.static_body, (ax, ay), (bx, by), 0.0)
             wall.friction = physics.friction
             self._space.add(wall)
+        self._follow_pose()
 
     @property
     def pose(self) -> FloatArray:
         """Pose (3,) in the map; theta is not wrapped."""
         return self._pose.copy()
-
-    def place(self, pose: FloatArray) -> None:
-        """Put the chair somewhere, at rest."""
-        self._pose = np.array(pose, dtype=np.float64)
-        self._follow_pose()
-        self._body.velocity = (0.0, 0.0)
-        self._body.angular_velocity = 0.0
 
     def touches(self) -> bool:
         """Return whether the footprint overlaps an obstacle."""
@@ -82,9 +79,7 @@ class ChairBody:
             self._body.angle += self._body.angular_velocity * substep
         self._pose = np.array([*self._body.position, self._body.angle])
 
-    def _impose(
-        self, body: pymunk.Body, _gravity: tuple[float, float], _damping: float, _substep: float
-    ) -> None:
+    def _impose(self, body: pymunk.Body, _gravity: tuple[float, float], _damping: float, _substep: float) -> None:
         v, w = self._imposed
         body.velocity = (v * math.cos(body.angle), v * math.sin(body.angle))
         body.angular_velocity = w

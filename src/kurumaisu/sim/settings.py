@@ -50,9 +50,7 @@ def with_effects(model: Model, path: Path) -> Model:
     more = []
     for item in top.items("effects"):
         parameters = item.section("parameters")
-        more.append(
-            EffectSetting(item.text("id"), {name: parameters.number(name) for name in parameters.names()})
-        )
+        more.append(EffectSetting(item.text("id"), {name: parameters.number(name) for name in parameters.names()}))
         item.end()
     top.end()
     return replace(model, effects=(*model.effects, *more))

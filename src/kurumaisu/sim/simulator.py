@@ -56,24 +56,18 @@ class Simulator:
         """
         self._model = model
         self._physics = physics
-        self._start = world.start
+        self._world = world
         self._scene = Scene(world.segments)
-        self._body = ChairBody(model.chassis, world.obstacles, physics)
-        self._body.place(self._start)
-        if self._body.touches():
-            raise Error(
-                f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose"
-            )
+        if self._new_body().touches():
+            raise Error(f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose")
 
     def reset(self, seed: int) -> Observation:
         """Put the chair back to its start, at rest, and start time and randomness anew."""
-        plant_rng, laser_rng = (
-            np.random.default_rng(sequence) for sequence in np.random.SeedSequence(seed).spawn(2)
-        )
+        plant_rng, laser_rng = (np.random.default_rng(sequence) for sequence in np.random.SeedSequence(seed).spawn(2))
         self._plant = Plant(self._model, self._physics.step, plant_rng)
         self._scanner = Scanner(self._model.laser, self._scene, laser_rng)
         self._steps = 0
-        self._body.place(self._start)
+        self._body = self._new_body()
         scan = self._scanner.observe(0.0, self._body.pose)
         return Observation(0.0, self._body.pose, np.zeros(3), False, scan)
 
@@ -90,6 +84,9 @@ class Simulator:
         time = self._steps * self._physics.step
         pose = self._body.pose
         return Observation(time, pose, rates, contact, self._scanner.observe(time, pose))
+
+    def _new_body(self) -> ChairBody:
+        return ChairBody(self._model.chassis, self._world.obstacles, self._physics, self._world.start)
 
     @property
     def step_time(self) -> float:

@@ -54,9 +54,7 @@ def _points(block: Entity) -> FloatArray:
         raise block.name.error("block needs points")
     count = block.properties["points"].numbers(1, 1)[0]
     if count != int(count) or count < 3:
-        raise block.properties["points"].name.error(
-            f"points must be a whole number of at least 3, not {count:g}"
-        )
+        raise block.properties["points"].name.error(f"points must be a whole number of at least 3, not {count:g}")
     points = []
     for i in range(int(count)):
         if f"point[{i}]" not in block.properties:

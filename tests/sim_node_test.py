@@ -1,0 +1,213 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""sim_node over ROS: clock, arc, scan, static transform, reset, and bad configurations."""
+
+import math
+import subprocess
+import sys
+import threading
+import time
+import unittest
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rospy
+import tf2_ros
+from kurumaisu.msg import Voltages
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
+from std_srvs.srv import Empty
+
+from kurumaisu.params import load_model
+from kurumaisu.ros.messages import yaw_of
+
+STEP = rospy.Duration(0, 10_000_000)
+
+
+class Topic:
+    """Everything heard on a topic; waits with a deadline of wall time."""
+
+    def __init__(self, name, kind):
+        self.messages = []
+        self._changed = threading.Condition()
+        rospy.Subscriber(name, kind, self._hear)
+
+    def _hear(self, message):
+        with self._changed:
+            self.messages.append(message)
+            self._changed.notify_all()
+
+    def wait(self, found, seconds=20.0):
+        """Return the first message, from now on or heard before, that satisfies found."""
+        deadline = time.monotonic() + seconds
+        seen = 0
+        with self._changed:
+            while True:
+                for message in self.messages[seen:]:
+                    if found(message):
+                        return message
+                seen = len(self.messages)
+                remaining = deadline - time.monotonic()
+                if remaining <= 0:
+                    raise AssertionError(f"no such message within {seconds} s, among {seen}")
+                self._changed.wait(remaining)
+
+
+def pose_of(odometry):
+    pose = odometry.pose.pose
+    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])
+
+
+class BadConfiguration:
+    """Tests that run another node, with bad parameters."""
+
+    def start(self, **changes):
+        """Run a second node with the first one's parameters, changed; return its exit code and what it said."""
+        values = rospy.get_param("/sim_node")
+        for key, value in changes.items():
+            values[key] = value
+            if value is None:
+                del values[key]
+        name = f"bad_{self.id().rsplit('.', 1)[-1]}"
+        rospy.set_param(f"/{name}", values)
+        # Not rosrun: in a workspace it finds scripts several times and asks which.
+        node = [sys.executable, "-c", "from kurumaisu.ros.sim_node import main; main()"]
+        command = [*node, f"__name:={name}", "/clock:=/bad_clock", "scan:=bad_scan"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+        return done.returncode, done.stdout + done.stderr
+
+    def refused(self, message, **changes):
+        code, said = self.start(**changes)
+        assert code == 1, said
+        assert message in said
+        assert "Traceback" not in said
+
+    def test_bad_world_file(self):
+        path = Path(self.id() + ".world").absolute()
+        path.write_text("model\n(\n  size [1, 1]\n)\n")
+        try:
+            self.refused(f"{path}:3:10: ',' is not allowed", world=str(path))
+        finally:
+            path.unlink()
+
+    def test_unknown_key(self):
+        self.refused("spede: is not a known key", spede=1.0)
+
+    def test_missing_key(self):
+        self.refused("seed: is missing", seed=None)
+
+    def test_rate_that_does_not_divide(self):
+        self.refused("clock_rate: must divide 1 / physics.step = 100 Hz: 30", clock_rate=30.0)
+
+
+class SimNodeTest(BadConfiguration, unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.model = load_model(Path(rospy.get_param("~model")))
+        cls.clock = Topic("/clock", Clock)
+        cls.truth = Topic("ground_truth", Odometry)
+        cls.scan = Topic("scan", LaserScan)
+        cls.voltages = rospy.Publisher("voltages", Voltages, queue_size=10)
+        deadline = time.monotonic() + 20
+        while cls.voltages.get_num_connections() == 0:
+            if time.monotonic() > deadline:
+                raise AssertionError("sim_node does not listen to voltages")
+            rospy.rostime.wallsleep(0.01)
+
+    def send(self, stamp, v, w):
+        message = Voltages(
+            translation=float(self.model.translation.volts(v)),
+            steering=float(self.model.steering.volts(w)),
+            reference=self.model.reference_voltage,
+            v=v,
+            w=w,
+        )
+        message.header.stamp = stamp
+        self.voltages.publish(message)
+
+    def reset(self):
+        """Return a stamp after a reset."""
+        rospy.wait_for_service("reset", timeout=20)
+        rospy.ServiceProxy("reset", Empty)()
+        newest = self.clock.messages[-1].clock if self.clock.messages else rospy.Time(0)
+        return self.clock.wait(lambda m: m.clock > newest).clock
+
+    def test_clock_advances_step_by_step(self):
+        first = self.clock.wait(lambda _: True)
+        self.clock.wait(lambda m: m.clock >= first.clock + rospy.Duration(2))
+        stamps = np.array([m.clock.to_nsec() for m in self.clock.messages])
+        np.testing.assert_array_less(0, np.diff(stamps) + 1)
+        assert int(np.median(np.diff(stamps))) == STEP.to_nsec()
+        assert rospy.get_param("/use_sim_time")
+
+    def test_voltages_drive_the_arc_of_equation_3(self):
+        start = self.reset() + rospy.Duration(1)
+        v, w, seconds = 0.4, -0.6, 2
+        self.send(start, v, w)
+        self.send(start + rospy.Duration(seconds), 0.0, 0.0)
+        moving = self.truth.wait(lambda m: m.header.stamp > start + rospy.Duration(1))
+        assert moving.twist.twist.linear.x == pytest.approx(v, abs=1e-9)
+        assert moving.twist.twist.angular.z == pytest.approx(w, abs=1e-9)
+        assert (moving.header.frame_id, moving.child_frame_id) == ("map", "base_link")
+        rest = self.truth.wait(lambda m: m.header.stamp > start + rospy.Duration(seconds + 1))
+        turned = w * seconds
+        expected = [1.5 + v / w * math.sin(turned), 2.0 + v / w * (1 - math.cos(turned)), turned]
+        np.testing.assert_allclose(pose_of(rest), expected, atol=1e-9)
+
+    def test_silence_holds_the_last_voltages(self):
+        start = self.reset() + rospy.Duration(0, 500_000_000)
+        self.send(start, 0.1, 0.0)
+        later = self.truth.wait(lambda m: m.header.stamp > start + rospy.Duration(3))
+        assert later.twist.twist.linear.x == pytest.approx(0.1, abs=1e-9)
+
+    def test_reset_brings_back_the_start_while_the_clock_runs_on(self):
+        self.send(self.reset(), 0.3, 0.0)
+        moved = self.truth.wait(lambda m: pose_of(m)[0] > 1.7 and m.header.stamp > self.clock.messages[0].clock)
+        after = self.reset()
+        assert after > moved.header.stamp
+        again = self.truth.wait(lambda m: m.header.stamp > after)
+        np.testing.assert_allclose(pose_of(again), [1.5, 2.0, 0.0], atol=1e-9)
+
+    def test_scan_at_the_start(self):
+        after = self.reset()
+        scan = self.scan.wait(lambda m: m.header.stamp > after)
+        laser = self.model.laser
+        assert len(scan.ranges) == 682
+        assert scan.header.frame_id == "laser"
+        assert scan.time_increment == pytest.approx(0.1 / 1024, abs=1e-9)
+        assert scan.scan_time == pytest.approx(0.1, abs=1e-6)
+        assert scan.angle_min == pytest.approx(laser.angle_min, abs=1e-6)
+        assert scan.angle_max == pytest.approx(laser.bearings[-1], abs=1e-5)
+        assert (round(scan.range_min, 6), scan.range_max) == (0.06, 4.0)
+        bearings, ranges = laser.bearings, np.array(scan.ranges)
+        # The laser stands at (1.8, 2.0), looking east: the east wall is out of reach, these two are not.
+        assert np.isinf(ranges[np.abs(bearings) < 0.1]).all()
+        for side, distance in ((1, 3.0), (-1, 2.0)):
+            beams = np.abs(bearings - side * math.pi / 2) < 0.12  # beyond it the bed is in the way
+            truth = distance / np.abs(np.sin(bearings[beams]))
+            mean = 1.004587 * truth + 0.058826
+            sigma = 0.000199 * truth**2 - 0.000488 * truth + 0.002334
+            np.testing.assert_array_less(np.abs(ranges[beams] - mean), 5 * sigma + 0.001)
+            assert np.std((ranges[beams] - mean) / sigma) > 0.7
+
+    def test_scans_and_truth_share_stamps(self):
+        scan = self.scan.wait(lambda m: m.header.stamp > rospy.Time(2))
+        self.truth.wait(lambda m: m.header.stamp == scan.header.stamp)
+
+    def test_the_laser_is_where_the_model_says(self):
+        buffer = tf2_ros.Buffer()
+        tf2_ros.TransformListener(buffer)
+        found = buffer.lookup_transform("base_link", "laser", rospy.Time(0), rospy.Duration(10)).transform
+        assert (found.translation.x, found.translation.y, found.translation.z) == (0.3, 0.0, 0.4)
+
+    def test_robot_description_names_the_laser(self):
+        assert '<child link="laser"' in rospy.get_param("robot_description")
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("sim_node_test")
+    rostest.rosrun("kurumaisu", "sim_node_test", SimNodeTest, sys.argv)
