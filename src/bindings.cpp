@@ -101,6 +101,8 @@ void bindModel(py::module_& m) {
            py::arg("range_min"), py::arg("range_max"))
       .def("mean", py::vectorize([](const k::LaserError* e, double r) { return e->mean(r); }), py::arg("r"),
            "Mean reading [m] at true range r [m], elementwise.")
+      .def("range", py::vectorize([](const k::LaserError* e, double reading) { return e->range(reading); }),
+           py::arg("reading"), "True range [m] of which a reading [m] is the mean, elementwise.")
       .def("deviation", py::vectorize([](const k::LaserError* e, double r) { return e->deviation(r); }),
            py::arg("r"), "Standard deviation [m] at true range r [m], elementwise.")
       .def("reading",

@@ -37,9 +37,7 @@ def read_route(section: settings.Section) -> Route:
         raise section.error("waypoints", "must name at least one point")
     for point in points:
         point.end()
-    numbers = {
-        name: section.number(name, above=0) for name in ("speed", "turn", "gain", "reach", "pause", "deadline")
-    }
+    numbers = {name: section.number(name, above=0) for name in ("speed", "turn", "gain", "reach", "pause", "deadline")}
     section.end()
     return Route(waypoints, **numbers)
 

@@ -24,6 +24,9 @@ struct LaserError {
   /// Standard deviation [m], never negative.
   double deviation(double r) const;
 
+  /// True range [m] of which a reading is the mean: what a map should be made of.
+  double range(double reading) const { return (reading - datum_offset) / scale; }
+
   /// Reading [m] of true range r, for one draw of the standard normal. An infinite r (no return) stays +inf.
   double reading(double r, double standard_normal) const;
 };

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import beta
 
 from kurumaisu.bench import hidden_effect
+from kurumaisu.bench.table import Table
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.critic.verdict import Verdict
@@ -28,12 +29,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1000)
     options = parser.parse_args(arguments)
     rng = np.random.default_rng(options.seed)
-    print(f"{_RUNS} drives of 60 s, reference 5 mm and 5 mrad at 10 Hz; share (90 % interval) of {options.draws} draws")
-    print(f"{'hidden effect':24}{'size':>6}{'named':>18}{'misnamed':>18}{'none or set':>18}{'CPU s':>8}")
+    title = f"{_RUNS} drives of 60 s, reference 5 mm and 5 mrad at 10 Hz; share (90 % interval) of the draws"
+    table = Table(
+        title, "hidden effect, size", "draws", "named right     ", "misnamed        ", "none, or a set  ", "CPU [s]"
+    )
     for effect in [*hidden_effect.EFFECTS, None]:
         for size in _SIZES if effect else (0.0,):
             draws = options.draws * (1 if effect else len(_SIZES) * 3)
-            _row(effect, size, [_draw(effect, size, rng) for _ in range(draws)])
+            _row(table, effect, size, [_draw(effect, size, rng) for _ in range(draws)])
     return 0
 
 
@@ -66,13 +69,14 @@ def _draw(effect: str | None, share: float, rng: np.random.Generator) -> tuple[V
     return verdict, time.process_time() - start
 
 
-def _row(effect: str | None, size: float, results: list[tuple[Verdict, float]]) -> None:
+def _row(table: Table, effect: str | None, size: float, results: list[tuple[Verdict, float]]) -> None:
     named = [{cause.id for cause in verdict.causes} for verdict, _ in results]
     right = sum(ids == {effect} for ids in named)
     wrong = sum(bool(ids - {effect}) for ids in named)
     n = len(results)
-    cells = "".join(f"{_share(k, n):>18}" for k in (right, wrong, n - right - wrong))
-    print(f"{effect or 'nothing':24}{size:6.1f}{cells}{np.median([cpu for _, cpu in results]):8.1f}", flush=True)
+    shares = [_share(k, n) for k in (right, wrong, n - right - wrong)]
+    cpu = float(np.median([seconds for _, seconds in results]))
+    table.row(f"{effect} x {size:g}" if effect else "nothing", str(n), *shares, cpu)
 
 
 def _share(k: int, n: int) -> str:

@@ -37,7 +37,7 @@ def run(recording_path: Path, output: Path, model: Path | None, seed: int) -> Cr
 
     progress(f"reading {recording_path}")
     recording = read_recording(recording_path)
-    recording = with_reference(recording, shipped("launch/mapping_node.yaml"), seed, progress)
+    recording = with_reference(recording, seed, progress)
     model_file = model or recording.model or shipped("launch/md100.yaml")
     criticism = pipeline.criticise(recording, model_file, progress, assume_law=model is not None)
     pipeline.write(criticism, model_file, output)

@@ -14,6 +14,7 @@ from kurumaisu.critic import misfit, naming, replay
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem, Term
 from kurumaisu.critic.extended import process_noise
+from kurumaisu.critic.material import HORIZON, MATERIAL, moved_share
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Noise, Overlay, Rival, Story
@@ -21,9 +22,8 @@ from kurumaisu.critic.verdict import Cause, Estimate, Gain, Kind, Verdict
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-_MATERIAL = 0.005  # share of the rms rate that an effect must move to matter to a driver
 _NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
-_RIVALS_SHOWN = 8
+_RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
 
 @dataclass(frozen=True)
@@ -56,23 +56,24 @@ def criticism(
 ) -> Criticism:
     """Return the criticism after a search; worth: the gain on held-out drives, None when nothing was found."""
     best = found.best
-    share = moved_share(problem, best)
-    material = worth is not None and worth.log_density_per_sample.lo90 > 0 and share >= _MATERIAL
-    kind = _kind(found, material)
-    causes = tuple(_cause(problem, found, name) for name in found.named) if kind in ("named", "confounded") else ()
+    shares = {name: moved_share(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
+    gains = worth is not None and worth.log_density_per_sample.lo90 > 0
+    matters = {name for name, share in shares.items() if gains and share >= MATERIAL}
+    kind = _kind(found, matters)
+    causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
     settings = best.settings if kind in ("named", "confounded") else ()
     verdict = Verdict(
         kind,
         causes=causes,
-        confounded=found.confounded if kind == "confounded" or causes else (),
+        confounded=found.confounded if kind != "none" else (),
         gain=worth,
     )
     held_out = set(recording.test)
     story = Story(
         recording=recording.name,
         model=problem.model.name,
-        headline=_headline(verdict, best, material),
-        details=_details(problem, found, drives, share),
+        headline=_headline(verdict, best),
+        details=_details(problem, found, drives, shares, matters),
         pose_source=_pose_source(recording),
         provenance=_provenance(),
         overlays=tuple(
@@ -86,25 +87,14 @@ def criticism(
     return Criticism(verdict, story, problem.model, (*settings, process_noise(problem.noise)))
 
 
-def moved_share(problem: Problem, fit: Fit) -> float:
-    """Return how much a fit changes the rates: rms of the change over rms of the rate, the larger of v and w."""
-    shares = []
-    for channel in range(2):
-        change = size = 0.0
-        for drive in problem.drives:
-            without = replay.rates(drive, problem.model, ())[channel]
-            change += float(np.sum((replay.rates(drive, problem.model, fit.settings)[channel] - without) ** 2))
-            size += float(np.sum(without**2))
-        shares.append(np.sqrt(change / size) if size > 0 else 0.0)
-    return float(max(shares))
+def _without(fit: Fit, name: str) -> tuple[EffectSetting, ...]:
+    return tuple(setting for setting in fit.settings if setting.id != name)
 
 
-def _kind(found: Naming, material: bool) -> Kind:
-    if not found.best.ids or not material:
+def _kind(found: Naming, matters: set[str]) -> Kind:
+    if not matters:
         return "none"
-    if found.named and len(found.named) == len(found.best.ids):
-        return "named"
-    return "confounded" if found.confounded else "named" if found.named else "none"
+    return "named" if matters & set(found.named) else "confounded" if found.confounded else "none"
 
 
 def _cause(problem: Problem, found: Naming, name: str) -> Cause:
@@ -125,15 +115,14 @@ def _estimate(model: Model, term: Term, value: float, sd: float) -> Estimate:
     return Estimate(float(value), max(low, term.parameter.lower), min(high, term.parameter.upper), unit)
 
 
-def _headline(verdict: Verdict, best: Fit, material: bool) -> str:
+def _headline(verdict: Verdict, best: Fit) -> str:
     if verdict.verdict == "named":
-        said = [_sentence(cause.id) for cause in verdict.causes]
-        text = "; ".join(said)
+        text = "; ".join(_sentence(cause.id) for cause in verdict.causes)
         return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in verdict.causes)})."
     if verdict.verdict == "confounded":
         group = " or ".join(verdict.confounded[0])
         return f"Something is missing in the model, but these drives cannot tell which: {group}."
-    if best.ids and not material:
+    if best.ids:
         return f"Nothing that matters: {', '.join(sorted(best.ids))} is detectable, but too small to gain anything."
     return "Nothing is missing in the model that these drives could show."
 
@@ -142,36 +131,43 @@ def _sentence(name: str) -> str:
     return effects.by_id(name).sentence
 
 
-def _details(problem: Problem, found: Naming, drives: Sequence[Drive], share: float) -> tuple[str, ...]:
+def _details(
+    problem: Problem, found: Naming, drives: Sequence[Drive], shares: dict[str, float], matters: set[str]
+) -> tuple[str, ...]:
     seconds = sum(float(drive.times[-1] - drive.times[0]) for drive in drives)
     details = [
         f"{len(drives)} drive{'s' * (len(drives) > 1)}, {seconds:.0f} s, replayed from the {drives[0].source} channel.",
     ]
     for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True):
         e = _estimate(problem.model, term, value, sd)
+        weight = "" if term.id in matters else ": detectable, but it does not matter"
         details.append(
-            f"{term.id}: {term.parameter.name} {e.estimate:.3g} {e.unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}."
+            f"{term.id}: {term.parameter.name} {e.estimate:.3g} {e.unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
+            f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."
         )
-    if found.best.ids:
-        details.append(f"It moves the rates by {share:.1%} of their size (rms).")
     alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
     details.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
     return tuple(details)
 
 
 def _rivals(found: Naming) -> tuple[Rival, ...]:
-    rivals = []
-    for fit in found.fits[1 : 1 + _RIVALS_SHOWN]:
-        nats = fit.score - found.best.score
-        likelihood = fit.log_likelihood - found.best.log_likelihood
-        if fit.ids > found.best.ids:
-            why = f"fits better by {likelihood:.1f} nats, less than another effect costs"
-        elif fit.ids < found.best.ids:
-            why = f"leaves {-likelihood:.1f} nats unexplained"
-        else:
-            why = f"fits worse by {-likelihood:.1f} nats" if likelihood < 0 else "fits as well with more effects"
-        rivals.append(Rival(" + ".join(sorted(fit.ids)) or "no effect", nats, why))
-    return tuple(rivals)
+    """Return sets with other causes and sets with more or fewer, the best of each kind, by their evidence."""
+    best = found.best
+    swapped = [fit for fit in found.fits if not (fit.ids >= best.ids or fit.ids < best.ids)]
+    others = [fit for fit in found.fits if fit.ids > best.ids or fit.ids < best.ids]
+    shown = sorted(swapped[:_RIVALS_SHOWN] + others[:_RIVALS_SHOWN], key=lambda fit: -fit.score)
+    return tuple(_rival(fit, best) for fit in shown)
+
+
+def _rival(fit: Fit, best: Fit) -> Rival:
+    likelihood = fit.log_likelihood - best.log_likelihood
+    if fit.ids > best.ids:
+        why = f"fits better by {likelihood:.1f} nats, less than another effect costs"
+    elif fit.ids < best.ids or likelihood < 0:
+        why = f"leaves {-likelihood:.1f} nats unexplained"
+    else:
+        why = f"fits better by {likelihood:.1f} nats, but needs more effects"
+    return Rival(" + ".join(sorted(fit.ids)) or "no effect", fit.score - best.score, why)
 
 
 def _noise(problem: Problem) -> tuple[Noise, ...]:

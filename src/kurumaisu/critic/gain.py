@@ -12,6 +12,7 @@ from kurumaisu import geometry
 from kurumaisu.critic import replay
 from kurumaisu.critic.drive import Drive, split
 from kurumaisu.critic.evidence import Fit, Problem
+from kurumaisu.critic.material import spans
 from kurumaisu.critic.noise import Noise, whitened
 from kurumaisu.critic.verdict import Gain, LogDensityGain, RmseGain
 from kurumaisu.params import EffectSetting, Model
@@ -78,9 +79,7 @@ def _blocks(drive: Drive, values: FloatArray) -> list[FloatArray]:
 def _open_loop(drive: Drive, model: Model, settings: Sequence[EffectSetting], horizon: float) -> list[FloatArray]:
     """Return squared position errors [m^2] after a horizon, per start, in blocks of starts that share data."""
     simulated = replay.path(drive, model, settings)
-    ends = np.searchsorted(drive.times, drive.times + horizon)
-    starts = np.flatnonzero(ends < len(drive.times))
-    ends = ends[starts]
+    starts, ends = spans(drive, horizon)
     predicted = geometry.between(simulated[starts], simulated[ends])
     measured = geometry.between(drive.poses[starts], drive.poses[ends])
     squares = ((predicted - measured)[:, :2] ** 2).sum(axis=1)

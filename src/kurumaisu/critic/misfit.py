@@ -15,7 +15,8 @@ from kurumaisu.effects import Follows, Rate
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
-_BINS = 12
+_BINS = 15
+_FEWEST = 5  # points in a bin
 _CHANGE = 0.5  # [s] over which a change of the input is taken
 _NORMAL90 = 1.645
 _NOTEWORTHY = 4.0  # standard errors from which a remaining correlation is said
@@ -102,15 +103,16 @@ def _samples(
 
 
 def _bins(x: FloatArray, y: FloatArray) -> Bins:
-    """Return means of y in bins of x that hold equally many points, so that each has a fair interval."""
-    edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)))
-    index = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
+    """Return means of y in bins of x of equal width; bins with too few points for an interval are left out."""
+    low, high = np.quantile(x, [0.005, 0.995])
+    index = np.clip(np.floor((x - low) / max(high - low, 1e-12) * _BINS), 0, _BINS - 1)
     rows = []
     for i in np.unique(index):
         inside = index == i
-        error = _NORMAL90 * y[inside].std() / np.sqrt(inside.sum())
-        rows.append((x[inside].mean(), y[inside].mean(), y[inside].mean() - error, y[inside].mean() + error))
-    centre, mean, lo, hi = np.array(rows).T
+        if inside.sum() >= _FEWEST:
+            error = _NORMAL90 * y[inside].std() / np.sqrt(inside.sum())
+            rows.append((x[inside].mean(), y[inside].mean(), y[inside].mean() - error, y[inside].mean() + error))
+    centre, mean, lo, hi = np.array(rows).reshape(-1, 4).T
     return Bins(centre, mean, lo, hi)
 
 

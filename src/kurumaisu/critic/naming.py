@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -52,12 +52,18 @@ def search(problem: Problem, progress: Callable[[str], None]) -> Naming:
     empty = problem.fit((), {})
     fits: dict[frozenset[str], Fit] = {empty.ids: empty}
     centre = empty
+
+    def try_sets(guesses: Iterable[tuple[frozenset[str], dict[str, float]]]) -> Fit:
+        for chosen, start in guesses:
+            if chosen not in fits:
+                progress(f"fitting {', '.join(sorted(chosen))}")
+                fits[chosen] = problem.fit(chosen, start)
+        return max(fits.values(), key=lambda fit: fit.score + log_prior(len(fit.ids), len(ids)))
+
     while True:
-        for guess in _scan(problem, centre, ids):
-            if guess.ids not in fits:
-                progress(f"fitting {', '.join(sorted(guess.ids))}")
-                fits[guess.ids] = problem.fit(guess.ids, guess.start)
-        best = max(fits.values(), key=lambda fit: fit.score + log_prior(len(fit.ids), len(ids)))
+        best = try_sets((guess.ids, guess.start) for guess in _scan(problem, centre, ids))
+        if best is centre:  # the last word is by fits: could any other effect stand in for one of these?
+            best = try_sets(_swaps(best, ids))
         if best is centre:
             break
         centre = best
@@ -69,6 +75,14 @@ def search(problem: Problem, progress: Callable[[str], None]) -> Naming:
 def log_prior(size: int, of: int) -> float:
     """Return the log prior of a set of so many effects out of so many."""
     return float(size * np.log(_PRIOR) + (of - size) * np.log1p(-_PRIOR))
+
+
+def _swaps(fit: Fit, ids: tuple[str, ...]) -> Iterator[tuple[frozenset[str], dict[str, float]]]:
+    for one in sorted(fit.ids):
+        for other in ids:
+            if other not in fit.ids:
+                kept = {term.id: float(value) for term, value in zip(fit.terms, fit.values, strict=True)}
+                yield fit.ids - {one} | {other}, kept
 
 
 @dataclass(frozen=True)

@@ -1,21 +1,86 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A reference pose where nobody measured one: the particle filter's trajectory through the scans."""
+"""A reference pose where nobody measured one: the particle filter's path through the scans."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-from kurumaisu.critic.recording import Recording
+import numpy as np
+
+from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
+from kurumaisu.errors import Error
+from kurumaisu.params import Laser, Model, load_model, shipped
+
+if TYPE_CHECKING:  # loading MRPT takes a third of a second, which a recording with reference poses need not pay
+    from kurumaisu.slam import MappingResult, ScanLog
+
+Progress = Callable[[str], None]
 
 
-def with_reference(recording: Recording, settings: Path, seed: int, progress: Callable[[str], None]) -> Recording:
-    """Return the recording with a pose for every run; settings: the mapping node's file.
+def with_reference(recording: Recording, seed: int, progress: Progress) -> Recording:
+    """Return the recording with a pose for every run, mapping those that have none.
 
     Raise Error for a run that has neither a pose nor scans and odometry to find one from.
     """
+    if all(run.pose is not None for run in recording.runs):
+        return recording
+    model = load_model(recording.model or shipped("launch/md100.yaml"))
     runs = tuple(
-        run if run.pose is not None else _mapped(recording, run, settings, seed, progress) for run in recording.runs
+        run if run.pose is not None else _with_mapped_pose(recording, run, model, seed, progress)
+        for run in recording.runs
     )
     return replace(recording, runs=runs)
+
+
+def map_run(log: ScanLog, seed: int, progress: Progress) -> MappingResult:
+    """Map a log with the settings of mapping_node. Raise Error naming the log and the scan that makes no sense."""
+    slam = import_module("kurumaisu.slam")
+
+    def say(done: int, total: int) -> None:
+        if done == total or done % 200 == 0:
+            progress(f"mapping {log.name}: {done} of {total} scans")
+
+    settings = slam.load_mapping_settings(shipped("launch/mapping_node.yaml"))
+    result: MappingResult = slam.map_scans(settings, log, seed, say)
+    return result
+
+
+def scan_log(run: Run, mount: LaserMount | None, laser: Laser | None) -> ScanLog:
+    """Return a run's scans with their odometry, for mapping.
+
+    mount: as the recording states it; laser: the model of the laser, where it is known: supplies the mounting where
+    the recording does not, and its mean error is taken out of the readings.
+    Raise Error when the run has no scans, no odometry, or nobody knows how the laser is mounted.
+    """
+    slam = import_module("kurumaisu.slam")
+    if run.scan is None or run.odom is None:
+        raise Error(f"{run.name}: has no reference pose, and not both scans and odometry to find one from")
+    place = mount or (laser.mount if laser is not None else None)
+    fan = run.fan or mount or laser
+    if place is None or fan is None:
+        raise Error(f"{run.name}: nobody says how the laser is mounted: give laser in meta.yaml")
+    ranges = run.scan.values if laser is None else laser.error.range(run.scan.values)
+    beams = slam.Fan(
+        angle_min=fan.angle_min,
+        angle_increment=fan.angle_increment,
+        time_increment=run.fan.time_increment if run.fan is not None else 0.0,
+        range_max=laser.range_max
+        if laser is not None
+        else float(np.nanmax(ranges, initial=0.0, where=ranges < np.inf)),
+        base_from_laser=(place.x, place.y, place.yaw),
+    )
+    log: ScanLog = slam.scan_log(
+        run.name, run.scan.t, ranges.astype(np.float32), beams, run.odom.t, run.odom.values[:, :3]
+    )
+    return log
+
+
+def _with_mapped_pose(recording: Recording, run: Run, model: Model, seed: int, progress: Progress) -> Run:
+    ours = recording.model is not None or run.voltage is not None  # else the laser is one we know nothing of
+    log = scan_log(run, recording.laser, model.laser if ours else None)
+    path = map_run(log, seed, progress).trajectory
+    source = f"particle filter over {len(path)} scans (no pose was measured), seed {seed}"
+    return replace(run, pose=Series(path[:, 0], path[:, 1:], ("x", "y", "theta")), pose_source=source)

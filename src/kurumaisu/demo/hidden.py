@@ -29,8 +29,8 @@ def run(folder: Path, seed: int) -> None:
     """Do it all and print the critic's answer and the truth. Raise Error for what cannot be read or written."""
     rng = np.random.default_rng(seed)
     secret = draw(rng)
-    record(folder / "recording", secret, rng)
-    answer = cli.run(folder / "recording", folder, None, seed=seed)
+    record(folder / "hidden_drives", secret, rng)
+    answer = cli.run(folder / "hidden_drives", folder, None, seed=seed)
     print(cli.summary(answer))
     size = ", ".join(f"{name} {value:.3g}" for name, value in secret.parameters.items())
     right = [cause.id for cause in answer.verdict.causes] == [secret.id]
@@ -63,11 +63,13 @@ def record(folder: Path, secret: EffectSetting, rng: np.random.Generator) -> Non
 
 def _drive(name: str, simulator: Simulator, model: Model, rng: np.random.Generator) -> Run:
     commands = joystick(_SECONDS, rng)
+    commands[:, 0] = simulator.step_time * np.round(commands[:, 0] / simulator.step_time)  # when the D/A changes
     voltages = np.column_stack([model.translation.volts(commands[:, 1]), model.steering.volts(commands[:, 2])])
     observation = simulator.reset(int(rng.integers(2**31)))
-    poses, row, command = [], -1, NEUTRAL
+    poses: list[list[float]] = []
+    row, command = -1, NEUTRAL
     while observation.time < _SECONDS:
-        while row + 1 < len(commands) and commands[row + 1, 0] <= observation.time:
+        while row + 1 < len(commands) and commands[row + 1, 0] <= observation.time + 1e-9:
             row += 1
             command = Command(*voltages[row], *np.sign(commands[row, 1:]))
         if observation.time >= len(poses) * _POSE_EVERY - 1e-9:

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Does it matter? How far an effect moves the chair from where it would be without it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kurumaisu import geometry
+from kurumaisu.critic import replay
+from kurumaisu.critic.drive import Drive
+from kurumaisu.critic.evidence import Problem
+from kurumaisu.params import EffectSetting
+from kurumaisu.types import FloatArray, IntArray
+
+MATERIAL = 0.005  # share of the way (or of the turn) from which an effect matters to a driver
+HORIZON = 2.0  # [s] over which ways and turns are compared
+
+
+def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
+    """Return how far the chair is moved within HORIZON by what `settings` have and `without` lack.
+
+    As a share of the way or of the turn made meanwhile (rms over all starts), whichever is larger.
+    """
+    moved, made = np.zeros(2), np.zeros(2)
+    for drive in problem.drives:
+        starts, ends = spans(drive, HORIZON)
+        paths = [replay.path(drive, problem.model, some) for some in (settings, without)]
+        one, other = (geometry.between(path[starts], path[ends]) for path in paths)
+        moved += _squares(one - other)
+        made += _squares(other)
+    return float(np.sqrt((moved / np.maximum(made, 1e-12)).max()))
+
+
+def spans(drive: Drive, horizon: float) -> tuple[IntArray, IntArray]:
+    """Return the indices of reference poses and of those a horizon [s] later, for all starts that have one."""
+    ends = np.searchsorted(drive.times, drive.times + horizon)
+    starts = np.flatnonzero(ends < len(drive.times))
+    return starts, ends[starts]
+
+
+def _squares(increments: FloatArray) -> FloatArray:
+    return np.array([np.sum(increments[:, :2] ** 2), np.sum(increments[:, 2] ** 2)])

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A round in the simulated building: drive, record, map, and compare with the truth."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from kurumaisu import geometry, slam_score
+from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.reference import map_run, scan_log
+from kurumaisu.demo.processes import roslaunch
+from kurumaisu.errors import Error
+from kurumaisu.maps import Grid, draw_map, save_map
+from kurumaisu.params import load_model, shipped
+from kurumaisu.types import FloatArray
+from kurumaisu.world import load_world
+
+_DEADLINE = 200.0  # [s] of wall time for the drive
+_WALL = 65  # [%] occupancy from which a cell counts as wall, as in map_server
+
+
+def run(folder: Path, seed: int, *, gui: bool) -> None:
+    """Do it all and print the figures. Raise Error when the drive fails."""
+    folder.mkdir(parents=True, exist_ok=True)
+    bag = folder / "round.bag"
+    bag.unlink(missing_ok=True)
+    arguments = ["kurumaisu", "round.launch", f"bag:={bag}", f"seed:={seed}", f"gui:={str(gui).lower()}"]
+    roslaunch(arguments, folder / "roslaunch.log", _DEADLINE, "driving")
+    (drive,) = read_recording(bag).runs
+    if drive.odom is None or drive.pose is None:
+        raise Error(f"{bag}: has no odometry or no ground truth")
+
+    log = scan_log(drive, None, load_model(shipped("launch/md100.yaml")).laser)
+    result = map_run(log, seed, lambda words: print(f"  {words}", file=sys.stderr, flush=True))
+    truth = geometry.interpolate(drive.pose.t, drive.pose.values, result.trajectory[:, 0])
+    world_from_map = slam_score.align(result.trajectory[:, 1:], truth)
+    _print_figures(drive, result.trajectory, truth, result.grid, world_from_map)
+    map_from_world = geometry.between(world_from_map, np.zeros(3))
+    seen = np.column_stack([result.trajectory[:, 0], geometry.compose(np.tile(map_from_world, (len(truth), 1)), truth)])
+    draw_map(result.grid, result.trajectory, folder / "map.png", seen, "true path")
+    save_map(result.grid, folder / "map")
+
+
+def _print_figures(
+    drive: Run, trajectory: FloatArray, truth: FloatArray, grid: Grid, world_from_map: FloatArray
+) -> None:
+    assert isinstance(drive.odom, Series)
+    way = np.hypot(*np.diff(truth[:, :2], axis=0).T).sum()
+    print(f"{len(trajectory)} scans, {trajectory[-1, 0] - trajectory[0, 0]:.0f} s, {way:.0f} m driven")
+    odom = geometry.interpolate(drive.odom.t, drive.odom.values[:, :3], trajectory[:, 0])
+    for name, path in (("odometry", odom), ("particle filter", trajectory[:, 1:])):
+        position, heading = slam_score.trajectory_error(path, truth)
+        print(f"  path by {name:16} rms error {position:.3f} m, {np.degrees(heading):.2f} deg")
+    walls = np.argwhere(grid.cells > _WALL)
+    centres = np.column_stack([walls[:, 1], walls[:, 0]]) * grid.resolution + grid.resolution / 2 + [grid.x, grid.y]
+    poses = np.column_stack([centres, np.zeros(len(centres))])
+    in_world = geometry.compose(np.broadcast_to(world_from_map, poses.shape), poses)[:, :2]
+    distance = slam_score.distance_to_walls(in_world, load_world(shipped("worlds/building.world")).segments)
+    print(
+        f"  map: {len(walls)} wall cells of {grid.resolution:g} m; distance to the true walls "
+        f"median {np.median(distance):.3f} m, 95 % below {np.quantile(distance, 0.95):.3f} m"
+    )
