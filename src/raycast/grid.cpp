@@ -11,9 +11,10 @@ namespace {
 constexpr double kMargin = 1e-6;  // of a cell's edge; rounding of a walk over the grid is below 1e-10 of it
 
 // Cells per segment, and bounds on their number. Clearances make empty cells nearly free, so many small cells
-// with few segments each win; measured on building plans and bitmaps, the optimum is flat.
-constexpr double kCellsPerSegment = 64.0;
-constexpr double kFewestCells = 1 << 14;
+// with few segments each win: of 16, 64 and 256, 16 was fastest for 4000 pixel edges, and for 130 walls all
+// were alike.
+constexpr double kCellsPerSegment = 16.0;
+constexpr double kFewestCells = 1 << 12;
 constexpr double kMostCells = 1 << 22;
 
 int clampCell(double position, int count) {

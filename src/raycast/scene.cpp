@@ -75,7 +75,8 @@ struct Axis {
 
   /// Cell at a distance along the ray, kept within `reach` of the present one.
   int cellAt(double distance, double direction, int reach) const {
-    const int cell = static_cast<int>(origin + distance * direction);  // truncates; never below -1 within the box
+    const int cell =
+        static_cast<int>(origin + distance * direction);  // truncates; never below -1 within the box
     return std::min(std::max(cell, at - reach), at + reach);
   }
 
