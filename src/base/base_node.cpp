@@ -24,7 +24,8 @@ using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
 constexpr double kWarningPeriod = 1.0;  // [s] of throttled warnings
 constexpr double kUnmeasured = 1.0e6;   // variance of what a planar base does not know: z, roll, pitch
-constexpr int kLastSamples = 5;         // neutral at the end: more than one, and time for them to leave
+constexpr int kLastSamples = 5;         // of neutral at the end, with
+constexpr double kLastPause = 0.02;     // [s] after each, time for it to leave the process
 
 std::atomic<bool> stop_requested{false};
 
@@ -52,6 +53,30 @@ class TopicDac : public k::Dac {
   ros::Publisher publisher_;
 };
 
+void warn(const std::string& text) { ROS_WARN("%s", text.c_str()); }
+
+void logLaw(const std::string& name, const std::string& ambiguity) {
+  ROS_INFO("voltage law: %s", name.c_str());
+  if (!ambiguity.empty()) warn("BASE_AMBIGUOUS_LAW: " + name + ": " + ambiguity);
+}
+
+void warnIgnored(const geometry_msgs::Twist& twist) {
+  ROS_WARN_THROTTLE(kWarningPeriod,
+                    "BASE_IGNORED_COMPONENT: cmd_vel: only linear.x and angular.z are obeyed: linear.y %g, "
+                    "linear.z %g, angular.x %g, angular.y %g",
+                    twist.linear.y, twist.linear.z, twist.angular.x, twist.angular.y);
+}
+
+void warnRefused(const geometry_msgs::Twist& twist) {
+  ROS_WARN_THROTTLE(kWarningPeriod, "BASE_BAD_COMMAND: cmd_vel: refused: linear.x %g, angular.z %g",
+                    twist.linear.x, twist.angular.z);
+}
+
+/// Time [s] of the control loop: simulated time, or one that nobody can set.
+double loopTime(const ros::Time& stamp) {
+  return ros::Time::isSimTime() ? stamp.toSec() : ros::SteadyTime::now().toSec();
+}
+
 class BaseNode {
  public:
   BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings);
@@ -63,14 +88,14 @@ class BaseNode {
   void onCommand(const geometry_msgs::Twist& twist);
   void onTick();
   void finish();
-  double now();
   void publishOdometry();
   static void diagnose(Status& status, const k::Report& report);
 
   k::BaseSettings settings_;
   TopicDac dac_;
   k::Drive drive_;
-  k::DriveCounts reported_;  ///< at the last diagnostics
+  k::DriveCounts reported_;      ///< at the last diagnostics
+  double last_diagnostics_ = 0;  ///< [s]
   diagnostic_updater::Updater diagnostics_;
   ros::Publisher odom_;
   tf2_ros::TransformBroadcaster tf_;
@@ -81,9 +106,7 @@ class BaseNode {
 
 BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     : settings_(settings), dac_(nh), drive_(settings.drive, dac_) {
-  ROS_INFO("voltage law: %s", settings_.law_name.c_str());
-  const std::string warning = k::ambiguity(drive_);
-  if (!warning.empty()) ROS_WARN("BASE_AMBIGUOUS_LAW: %s: %s", settings_.law_name.c_str(), warning.c_str());
+  logLaw(settings_.law_name, k::ambiguity(drive_));
   diagnostics_.setHardwareID("none");
   diagnostics_.add("voltage law",
                    [this](Status& status) { diagnose(status, k::reportLaw(drive_, settings_.law_name)); });
@@ -116,43 +139,37 @@ void BaseNode::run() {
 
 void BaseNode::finish() {
   for (int i = 0; i < kLastSamples; ++i) {
-    drive_.stop(now());
-    ros::WallDuration(1.0 / settings_.rate).sleep();
+    dac_.stamp = ros::Time::now();
+    drive_.stop(loopTime(dac_.stamp));
+    ros::WallDuration(kLastPause).sleep();
   }
-}
-
-/// Time [s] of the control loop; also stamps what is put out next.
-double BaseNode::now() {
-  dac_.stamp = ros::Time::now();
-  return ros::Time::isSimTime() ? dac_.stamp.toSec() : ros::SteadyTime::now().toSec();
 }
 
 void BaseNode::onCommand(const geometry_msgs::Twist& twist) {
   if (twist.linear.y != 0 || twist.linear.z != 0 || twist.angular.x != 0 || twist.angular.y != 0) {
     drive_.countIgnored();
-    ROS_WARN_THROTTLE(kWarningPeriod,
-                      "BASE_IGNORED_COMPONENT: cmd_vel: only linear.x and angular.z are obeyed: linear.y %g, "
-                      "linear.z %g, angular.x %g, angular.y %g",
-                      twist.linear.y, twist.linear.z, twist.angular.x, twist.angular.y);
+    warnIgnored(twist);
   }
-  if (!drive_.command(twist.linear.x, twist.angular.z, now())) {
-    ROS_WARN_THROTTLE(kWarningPeriod, "BASE_BAD_COMMAND: cmd_vel: refused: linear.x %g, angular.z %g",
-                      twist.linear.x, twist.angular.z);
-  }
+  if (!drive_.command(twist.linear.x, twist.angular.z, loopTime(ros::Time::now()))) warnRefused(twist);
 }
 
 void BaseNode::onTick() {
+  dac_.stamp = ros::Time::now();
+  const double t = loopTime(dac_.stamp);
   const std::uint64_t timeouts = drive_.counts().timeouts;
-  const k::Drive::Tick tick = drive_.tick(now());
+  const k::Drive::Tick tick = drive_.tick(t);
   if (drive_.counts().timeouts > timeouts) {
-    ROS_WARN("BASE_COMMAND_TIMEOUT: cmd_vel: nothing for %g s: neutral", settings_.drive.command_timeout);
+    warn("BASE_COMMAND_TIMEOUT: cmd_vel: nothing for " + std::to_string(settings_.drive.command_timeout) +
+         " s: neutral");
   }
   if (tick == k::Drive::Tick::kReset) {
-    ROS_WARN("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");
-    diagnostics_.force_update();  // else it would wait until the old time comes again
+    warn("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");
   }
   if (tick != k::Drive::Tick::kRepeated) publishOdometry();
-  diagnostics_.update();
+  if (std::abs(t - last_diagnostics_) >= settings_.diagnostic_period) {
+    last_diagnostics_ = t;
+    diagnostics_.force_update();  // update() would fall silent when the clock is set back
+  }
 }
 
 void BaseNode::publishOdometry() {
@@ -167,14 +184,14 @@ void BaseNode::publishOdometry() {
   message.pose.pose.orientation.w = std::cos(0.5 * odometry.pose().theta);
   message.twist.twist.linear.x = odometry.v();
   message.twist.twist.angular.z = odometry.w();
-  constexpr int kAxes[] = {0, 1, 5};  // x, y, yaw of x, y, z, roll, pitch, yaw
+  constexpr std::size_t kAxes[] = {0, 1, 5};  // x, y, yaw of x, y, z, roll, pitch, yaw
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       message.pose.covariance[6 * kAxes[row] + kAxes[column]] = odometry.covariance()(row, column);
     }
     message.twist.covariance[7 * kAxes[row]] = odometry.rateVariance()[row];
   }
-  for (const int axis : {2, 3, 4}) {
+  for (const std::size_t axis : {2, 3, 4}) {
     message.pose.covariance[7 * axis] = message.twist.covariance[7 * axis] = kUnmeasured;
   }
   odom_.publish(message);

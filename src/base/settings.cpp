@@ -72,7 +72,7 @@ BaseSettings readBaseSettings(Section node) {
   settings.publish_tf = odometry.flag("publish_tf");
   settings.drive.noise = readNoise(odometry.section("noise"));
   odometry.end();
-  node.above("diagnostic_period", 0);  // diagnostic_updater reads it by itself
+  settings.diagnostic_period = node.above("diagnostic_period", 0);
   node.end();
   return settings;
 }

@@ -16,6 +16,7 @@ struct BaseSettings {
   std::string odom_frame;
   std::string base_frame;
   bool publish_tf;
+  double diagnostic_period;  ///< [s]
 };
 
 /// Throws std::invalid_argument naming parameter and value for anything missing, unknown, mistyped or

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""For tests of nodes: wait for what topics say, drive, run a clock."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from geometry_msgs.msg import Twist
+from rosgraph_msgs.msg import Clock
+
+PATIENCE = 20.0  # [s] of wall time for things that take a moment; longer is a failure
+
+
+def wait_for(condition: Callable[[], Any], what: str, patience: float = PATIENCE) -> Any:
+    """Return the condition's value as soon as it is true. Raise AssertionError after so many seconds."""
+    deadline = time.monotonic() + patience
+    while time.monotonic() < deadline:
+        if result := condition():
+            return result
+        time.sleep(0.005)
+    raise AssertionError(f"not within {patience} s: {what}")
+
+
+class Topic:
+    """Everything received on a topic, and the latest of it."""
+
+    def __init__(self, name: str, kind: type) -> None:
+        self.messages: list[Any] = []
+        self._subscriber = rospy.Subscriber(name, kind, self.messages.append, queue_size=None, tcp_nodelay=True)
+
+    @property
+    def last(self) -> Any:
+        """The latest message, or None."""
+        return self.messages[-1] if self.messages else None
+
+    def wait(self, condition: Callable[[Any], bool], what: str) -> Any:
+        """Return the first message from now on that meets the condition."""
+        start = len(self.messages)
+        return wait_for(lambda: next((m for m in self.messages[start:] if condition(m)), None), what)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._subscriber.unregister()
+
+
+class _Repeater:
+    """Calls a function at a fixed wall period [s] in a thread of its own."""
+
+    def __init__(self, period: float, action: Callable[[], None]) -> None:
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(period, action), daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self, period: float, action: Callable[[], None]) -> None:
+        while not self._stop.wait(period):
+            action()
+
+
+class Commander:
+    """Repeats a command at 50 Hz of wall time, until it is silenced."""
+
+    def __init__(self, topic: str) -> None:
+        self.publisher = rospy.Publisher(topic, Twist, queue_size=1, tcp_nodelay=True)
+        self._twist: Twist | None = None
+        self._repeater = _Repeater(0.02, self._publish)
+
+    def say(self, v: float, w: float) -> None:
+        """From now on command v [m/s], w [rad/s]."""
+        twist = Twist()
+        twist.linear.x, twist.angular.z = v, w
+        self._twist = twist
+
+    def silence(self) -> None:
+        """Command nothing any more."""
+        self._twist = None
+
+    def close(self) -> None:
+        """End the topic."""
+        self._repeater.close()
+        self.publisher.unregister()
+
+    def _publish(self) -> None:
+        twist = self._twist
+        if twist is not None:
+            self.publisher.publish(twist)
+
+
+class SimulatedClock:
+    """/clock at so many times the wall's pace, in steps of 20 ms of simulated time."""
+
+    STEP = 0.02  # [s]
+
+    def __init__(self, start: float, factor: float) -> None:
+        self._lock = threading.Lock()
+        self._now = start
+        self._publisher = rospy.Publisher("/clock", Clock, queue_size=1, tcp_nodelay=True)
+        self._repeater = _Repeater(self.STEP / factor, self._advance)
+
+    @property
+    def now(self) -> float:
+        """Simulated time [s]."""
+        return self._now
+
+    def jump(self, to: float) -> None:
+        """Set simulated time [s]."""
+        with self._lock:
+            self._now = to
+
+    def close(self) -> None:
+        """End the clock."""
+        self._repeater.close()
+        self._publisher.unregister()
+
+    def _advance(self) -> None:
+        with self._lock:
+            self._now += self.STEP
+        self._publisher.publish(Clock(rospy.Time.from_sec(self._now)))

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The strict parameter reader, and base_node's settings through it. No master: values are made here.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "base/settings.h"
+#include "params.h"
+
+namespace k = kurumaisu;
+using Value = XmlRpc::XmlRpcValue;
+
+namespace {
+
+/// The message that the action throws; empty if it throws none.
+std::string complaint(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "";
+}
+
+Value values() {
+  Value v;
+  v["rate"] = 50.0;
+  v["count"] = 3;
+  v["word"] = std::string("odom");
+  v["on"] = true;
+  v["exponent"] = std::string("1e-3");
+  v["inner"]["x"] = 1.5;
+  v["list"][0] = 1;
+  v["list"][1] = 2.5;
+  return v;
+}
+
+Value branch(double slope, double intercept) {
+  Value v;
+  v["slope"] = slope;
+  v["intercept"] = intercept;
+  return v;
+}
+
+Value law() {
+  Value v;
+  v["translation"]["positive"] = branch(1.32402, 0.127906);
+  v["translation"]["negative"] = branch(2.07369, -0.108783);
+  v["steering"]["positive"] = branch(-0.499211, 0.104181);
+  v["steering"]["negative"] = branch(-0.469278, -0.169476);
+  return v;
+}
+
+/// What base.launch loads, in small.
+Value nodeValues() {
+  Value v;
+  v["rate"] = 50;
+  v["command_timeout"] = 0.25;
+  v["diagnostic_period"] = 1.0;
+  for (const char* key : {"v_forward", "v_reverse", "w"}) v["limits"][key] = 1.0;
+  v["odometry"]["frame"] = std::string("odom");
+  v["odometry"]["child_frame"] = std::string("base_link");
+  v["odometry"]["publish_tf"] = true;
+  for (const char* key : {"forward_per_distance", "forward_per_turn", "lateral_per_distance",
+                          "heading_per_distance", "heading_per_turn"}) {
+    v["odometry"]["noise"][key] = 0.01;
+  }
+  v["model"]["name"] = std::string("MD-100");
+  v["model"]["chassis"]["length"] = 1.0;
+  v["model"]["voltage_law"] = std::string("published");
+  v["model"]["voltage_laws"]["published"] = law();
+  v["model"]["voltage_laws"]["custom"] = law();
+  v["model"]["reference_voltage"] = 2.5;
+  return v;
+}
+
+std::string complaintOf(const Value& value) {
+  return complaint([&value] { k::readBaseSettings({value, "/base_node"}); });
+}
+
+}  // namespace
+
+TEST(Section, ReadsEachType) {
+  k::Section section(values(), "/n");
+  EXPECT_EQ(section.number("rate"), 50.0);
+  EXPECT_EQ(section.number("count"), 3.0);  // an integer is a number
+  EXPECT_EQ(section.choice("word", {"map", "odom"}), "odom");
+  EXPECT_TRUE(section.flag("on"));
+  EXPECT_EQ(section.numbers("list", 2), (std::vector<double>{1.0, 2.5}));
+  k::Section inner = section.section("inner");
+  EXPECT_EQ(inner.above("x", 0), 1.5);
+  inner.end();
+  EXPECT_EQ(section.names(), std::vector<std::string>{"exponent"});
+  section.ignore("exponent");
+  section.ignore("never there");
+  section.end();
+}
+
+TEST(Section, NamesParameterAndValueOfWhatIsWrong) {
+  k::Section s(values(), "/n");
+  EXPECT_EQ(complaint([s]() mutable { s.number("rat"); }), "/n/rat: is missing");
+  EXPECT_EQ(complaint([s]() mutable { s.end(); }), "/n/count: is not a known key; its value is 3");
+  EXPECT_EQ(complaint([s]() mutable { s.number("word"); }),
+            "/n/word: must be a number, not odom, a string (YAML wants 1.0e-3, not 1e-3)");
+  EXPECT_NE(
+      complaint([s]() mutable { s.number("exponent"); }).find("/n/exponent: must be a number, not 1e-3"),
+      std::string::npos);
+  EXPECT_NE(complaint([s]() mutable { s.number("on"); }).find("/n/on: must be a number"), std::string::npos);
+  EXPECT_NE(complaint([s]() mutable { s.integer("rate", 0); }).find("/n/rate: must be an integer, not 50"),
+            std::string::npos);
+  EXPECT_EQ(complaint([s]() mutable { s.integer("count", 4); }), "/n/count: must be at least 4: 3");
+  EXPECT_EQ(complaint([s]() mutable { s.above("rate", 50); }), "/n/rate: must be above 50: 50");
+  EXPECT_EQ(complaint([s]() mutable { s.atLeast("rate", 51); }), "/n/rate: must be at least 51: 50");
+  EXPECT_EQ(complaint([s]() mutable { s.choice("word", {"a", "b"}); }), "/n/word: must be one of a, b: odom");
+  EXPECT_NE(complaint([s]() mutable { s.text("count"); }).find("/n/count: must be a string, not 3"),
+            std::string::npos);
+  EXPECT_NE(complaint([s]() mutable { s.flag("count"); }).find("/n/count: must be true or false, not 3"),
+            std::string::npos);
+  EXPECT_NE(complaint([s]() mutable { s.numbers("list", 3); }).find("/n/list: must be a list of 3 numbers"),
+            std::string::npos);
+  EXPECT_NE(complaint([s]() mutable { s.section("rate"); }).find("/n/rate: must be a mapping, not 50"),
+            std::string::npos);
+  EXPECT_EQ(complaint([s]() mutable { s.section("inner").end(); }),
+            "/n/inner/x: is not a known key; its value is 1.5");
+}
+
+TEST(Section, AKeyIsReadOnce) {
+  k::Section section(values(), "/n");
+  section.number("rate");
+  EXPECT_EQ(complaint([&section] { section.number("rate"); }), "/n/rate: is missing");
+}
+
+TEST(Section, WhatIsNotFiniteIsNoNumber) {
+  for (const double bad :
+       {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    Value value = values();
+    value["rate"] = bad;
+    value["list"][1] = bad;
+    k::Section section(value, "/n");
+    EXPECT_NE(complaint([&section] { section.number("rate"); }).find("/n/rate: must be finite"),
+              std::string::npos);
+    EXPECT_NE(complaint([&section] { section.numbers("list", 2); }).find("/n/list: must be finite"),
+              std::string::npos);
+  }
+}
+
+TEST(BaseSettings, AreReadFromAWholeConfiguration) {
+  const k::BaseSettings settings = k::readBaseSettings({nodeValues(), "/base_node"});
+  EXPECT_EQ(settings.law_name, "published");
+  EXPECT_EQ(settings.drive.law.steering.negative.intercept, -0.169476);
+  EXPECT_EQ(settings.drive.reference_voltage, 2.5);
+  EXPECT_EQ(settings.rate, 50.0);
+}
+
+TEST(BaseSettings, EveryMistakeIsNamed) {
+  Value v = nodeValues();
+  v["comand_timeout"] = 0.3;
+  EXPECT_EQ(complaintOf(v), "/base_node/comand_timeout: is not a known key; its value is 0.3");
+
+  v = nodeValues();
+  v["model"]["voltage_law"] = std::string("publshed");
+  EXPECT_EQ(complaintOf(v), "/base_node/model/voltage_law: must be one of custom, published: publshed");
+
+  v = nodeValues();  // in a law that is not in use
+  v["model"]["voltage_laws"]["custom"]["steering"]["positive"]["slope"] = 0;
+  EXPECT_EQ(complaintOf(v), "/base_node/model/voltage_laws/custom/steering/positive/slope: must not be 0: 0");
+
+  v = nodeValues();
+  v["model"]["voltage_laws"]["custom"]["steering"]["positive"]["slope"] = 0.5;
+  EXPECT_NE(complaintOf(v).find("/base_node/model/voltage_laws/custom/steering: the slopes"),
+            std::string::npos);
+
+  v = nodeValues();
+  v["rate"] = 0;
+  EXPECT_EQ(complaintOf(v), "/base_node/rate: must be above 0: 0");
+
+  v = nodeValues();
+  v["odometry"]["noise"]["heading_per_turn"] = -0.01;
+  EXPECT_EQ(complaintOf(v), "/base_node/odometry/noise/heading_per_turn: must be at least 0: -0.01");
+
+  v = nodeValues();
+  v["model"]["wheels"] = 4;
+  EXPECT_EQ(complaintOf(v), "/base_node/model/wheels: is not a known key; its value is 4");
+}
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}
