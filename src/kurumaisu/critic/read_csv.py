@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from pathlib import Path
 
 import numpy as np
@@ -122,17 +123,18 @@ def _read(path: Path, required: tuple[str, ...]) -> tuple[list[str], FloatArray,
         with path.open(encoding="utf-8-sig", newline="") as stream:
             columns = [name.strip() for name in next(csv.reader(stream), [])]
             _check_header(path, columns, required)
-            try:
-                rows = np.loadtxt(stream, delimiter=",", comments=None, ndmin=2)
-            except ValueError:
-                rows = None
+            body = stream.read()
     except OSError as error:
         raise Error(f"{path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise Error(f"{path}: is not UTF-8 text") from error
-    if rows is not None and rows.shape[1] == len(columns):
-        return columns, rows, []
-    return _read_cells(path, columns, required)
+    if not body.strip():
+        return columns, np.empty((0, len(columns))), []
+    try:
+        rows = np.loadtxt(io.StringIO(body), delimiter=",", comments=None, ndmin=2)
+    except ValueError:
+        return _read_cells(path, columns, required)
+    return (columns, rows, []) if rows.shape[1] == len(columns) else _read_cells(path, columns, required)
 
 
 def _check_header(path: Path, columns: list[str], required: tuple[str, ...]) -> None:

@@ -29,7 +29,7 @@ def read_rawlog_run(path: Path, faults: Faults) -> tuple[Run, LaserMount]:
     except ImportError as error:
         raise Error(f"{path}: this build has no reader of rawlogs: {error}") from error
     except (OSError, RuntimeError, ValueError) as error:
-        raise Error(f"{path}: {one_line(error)}") from error
+        raise Error(one_line(error)) from error  # it names the file
     run = to_run(path.name.split(".")[0], t, odom, np.asarray(ranges, dtype=np.float64), faults)
     x, y, yaw = fan.base_from_laser
     return run, LaserMount(x, y, yaw, fan.angle_min, fan.angle_increment, ranges.shape[1])

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Properties of the CSV reader: any numbers survive, and no text brings anything but a run or an Error."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.errors import Error
+
+NUMBER = st.floats(allow_nan=False, allow_infinity=False)
+ROWS = st.lists(st.tuples(NUMBER, NUMBER, NUMBER), min_size=1, max_size=20, unique_by=lambda row: row[0])
+TEXT = st.text(alphabet=st.sampled_from('0123456789.,-+enaift \n\r"#\tx,,\n\n'), max_size=200)
+
+
+@settings(max_examples=60, deadline=None)
+@given(ROWS)
+def test_any_finite_numbers_survive(rows):
+    table = np.array(sorted(rows))
+    voltage = Series(table[:, 0], table[:, 1:], ("v_f", "v_s"))
+    scan = Series(table[:, 0], np.abs(table[:, 1:]) + 1e-3, ("r0", "r1"))
+    with tempfile.TemporaryDirectory() as folder:
+        write_csv_run(Path(folder), Run("r", voltage=voltage, scan=scan))
+        (run,) = read_recording(Path(folder)).runs
+    for part, back in ((voltage, run.voltage), (scan, run.scan)):
+        np.testing.assert_array_equal(part.t, back.t)
+        np.testing.assert_array_equal(part.values, back.values)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.sampled_from(["t,r0,r1\n", "t,x,y,theta\n", "t,tyre\n", ""]), TEXT)
+def test_any_text_is_read_or_refused_with_the_file_named(header, text):
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("scan", "pose", "covariate"):
+            (Path(folder) / f"{name}.csv").write_text(header + text, newline="")
+        try:
+            recording = read_recording(Path(folder))
+        except Error as error:
+            message = str(error)
+        else:
+            message = folder
+            assert all((np.diff(run.scan.t) > 0).all() for run in recording.runs if run.scan is not None)
+    assert folder in message
