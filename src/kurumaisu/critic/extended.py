@@ -8,6 +8,7 @@ from pathlib import Path
 
 import yaml
 
+from kurumaisu import effects
 from kurumaisu.critic.noise import Noise
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model, load_model
@@ -15,7 +16,8 @@ from kurumaisu.params import EffectSetting, Model, load_model
 
 def process_noise(noise: Noise) -> EffectSetting:
     """Return the estimated noise of the rates as the effect that the simulator draws it from."""
-    return EffectSetting("base.process_noise", {"sd_v": noise.sd_v, "sd_w": noise.sd_w, "tau": noise.tau})
+    (random,) = (effect.id for effect in effects.ALL if effect.random)
+    return EffectSetting(random, {"sd_v": noise.sd_v, "sd_w": noise.sd_w, "tau": noise.tau})
 
 
 def write_extended(path: Path, original: Path, model: Model, settings: Sequence[EffectSetting], recording: str) -> None:

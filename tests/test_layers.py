@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Dependencies point one way: scripts -> ros, critic -> sim -> effects, world -> model. ROS stays in its rooms."""
+
+import ast
+import os
+import pkgutil
+import re
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from kurumaisu import effects
+
+ROOT = Path(__file__).resolve().parents[1]
+ROS_PYTHON = (
+    r"(rospy|rosbag|roslib|roslaunch|rospkg|rosgraph|rosnode|rosparam|rostopic|rosservice|roscpp|genpy|actionlib"
+    r"|tf|tf2\w*|\w+_msgs|std_srvs|kurumaisu\.msg|kurumaisu\.srv)(\.|$)"
+)
+ROS_CPP = r"<(ros\w*|tf2?|tf2_\w+|xmlrpcpp|actionlib|nodelet|diagnostic_updater|\w+_msgs|std_srvs|kurumaisu)/"
+MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - {"base"}
+CONCRETE = rf"kurumaisu\.effects\.({'|'.join([*MODULES, *(effect.__name__ for effect in effects.ALL)])})(\.|$)"
+IDS = {effect.id for effect in effects.ALL}
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What (a regular expression) must not be reached from where (one over the file's path)."""
+
+    where: str
+    what: str
+    why: str
+
+
+PYTHON_RULES = [
+    Rule(r"kurumaisu/(?!ros/)", ROS_PYTHON, "only kurumaisu/ros knows ROS"),
+    Rule(r"kurumaisu/(?!sim/)", r"pymunk(\.|$)", "only kurumaisu/sim knows pymunk"),
+    Rule(r"kurumaisu/(?!slam\.py|critic/|ros/)", r"kurumaisu\._slam$", "MRPT is reached through kurumaisu.slam"),
+    Rule(r"kurumaisu/(?!ros/|bench/|demo/)", r"kurumaisu\.ros(\.|$)", "only entry points come before kurumaisu/ros"),
+    Rule(r"kurumaisu/(?!critic/|ros/|bench/|demo/)", r"kurumaisu\.critic(\.|$)", "nothing rests on the critic"),
+    Rule(r"kurumaisu/(?!bench/|demo/)", r"kurumaisu\.(bench|demo)(\.|$)", "nothing rests on a benchmark or the demo"),
+    Rule(r"kurumaisu/(effects|world)/", r"kurumaisu\.sim(\.|$)", "the simulator rests on effects and world"),
+    Rule(r"kurumaisu/world/", r"kurumaisu\.effects(\.|$)", "a world knows no chair"),
+    Rule(r"kurumaisu/(critic|sim|world)/", rf"{CONCRETE}|effect id", "it iterates over effects.ALL and names none"),
+    Rule(r"kurumaisu/\w+\.py", r"kurumaisu\.(sim|world|viewer)(\.|$)", "what all share rests on nothing"),
+]
+CPP_RULES = [
+    Rule(r"(?!.*_node\.cpp|params\.h)", ROS_CPP, "ROS headers only in *_node.cpp and params.h"),
+    Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
+    Rule(r"(?!.*bindings\.cpp)", r"<pybind11/", "pybind11 only in bindings.cpp"),
+    Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
+    Rule(r"(kalman|raycast)/", r'"(?!model/|kalman/|raycast/)', "numerics rest on the equations at most"),
+]
+
+
+def violations(root: Path) -> list[str]:
+    """Return a line for each dependency in src/ and each script that the rules forbid."""
+    found = []
+    for path in sorted((root / "src/kurumaisu").rglob("*.py*")):
+        if path.suffix in (".py", ".pyi"):
+            found += _forbidden(path, path.relative_to(root / "src"), _imports(path, root / "src"), PYTHON_RULES)
+    for path in sorted((root / "src").rglob("*.[ch]*")):
+        if path.suffix in (".cpp", ".h"):
+            found += _forbidden(path, path.relative_to(root / "src"), _includes(path), CPP_RULES)
+    for path in sorted((root / "scripts").iterdir()) if (root / "scripts").exists() else []:
+        lines = path.read_text().splitlines()
+        if "python" in lines[0] and len(lines) >= 15:
+            found.append(f"{path}:15: a Python script only calls main (less than 15 lines)")
+    return found
+
+
+def _forbidden(path: Path, place: Path, used: Iterator[tuple[int, str]], rules: list[Rule]) -> list[str]:
+    return [
+        f"{path}:{line}: {name}: {rule.why}"
+        for line, name in used
+        for rule in rules
+        if re.match(rule.where, place.as_posix()) and re.match(rule.what, name)
+    ]
+
+
+def _includes(path: Path) -> Iterator[tuple[int, str]]:
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        match = re.match(r'\s*#\s*include\s*(["<].*)', line)
+        if match:
+            yield number, match.group(1)
+
+
+def _imports(path: Path, source: Path) -> Iterator[tuple[int, str]]:
+    """Yield line and full name of every import: at the top, in functions, relative, or by import_module."""
+    package = path.relative_to(source).parent.parts
+    for node in ast.walk(ast.parse(path.read_text(), str(path))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else ()
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("import_module", "__import__")):
+            yield node.lineno, str(getattr(node.args[0], "value", "a name that is not written out"))
+        elif isinstance(node, ast.Attribute):
+            # from kurumaisu import effects; effects.GainV
+            yield node.lineno, f"kurumaisu.{ast.unparse(node)}"
+        elif isinstance(node, ast.Constant) and node.value in IDS:
+            yield node.lineno, f"effect id {node.value}"
+
+
+def test_the_tree_keeps_the_rules():
+    assert violations(ROOT) == []
+
+
+PLANTED = {
+    "src/kurumaisu/critic/a.py": "import rospy",
+    "src/kurumaisu/sim/b.py": "def f():\n    from sensor_msgs.msg import LaserScan",
+    "src/kurumaisu/critic/c.py": "import rosbag",
+    "src/kurumaisu/viewer/d.py": "from kurumaisu.msg import Voltages",
+    "src/kurumaisu/critic/e.py": "import pymunk",
+    "src/kurumaisu/world/f.py": "import kurumaisu._slam",
+    "src/kurumaisu/sim/g.py": "from importlib import import_module\nimport_module('kurumaisu._slam')",
+    "src/kurumaisu/sim/h.py": "from kurumaisu.critic import recording",
+    "src/kurumaisu/sim/i.py": "from kurumaisu import critic",
+    "src/kurumaisu/sim/j.py": "from ..critic import recording",
+    "src/kurumaisu/critic/k.py": "from kurumaisu.ros import sim_node",
+    "src/kurumaisu/effects/l.py": "from kurumaisu.sim.plant import Plant",
+    "src/kurumaisu/critic/m.py": "from kurumaisu.effects.lag import LagV",
+    "src/kurumaisu/critic/n.py": "from kurumaisu.effects import LagV",
+    "src/kurumaisu/critic/o.py": "from kurumaisu import effects\neffects.LagV",
+    "src/kurumaisu/critic/o2.py": "chosen = 'base.lag_v'",
+    "src/kurumaisu/world/p.py": "from kurumaisu import effects",
+    "src/kurumaisu/geometry.py": "from kurumaisu.sim import plant",
+    "src/kurumaisu/sim/q.py": "from kurumaisu.bench import table",
+    "src/model/r.cpp": "#include <ros/ros.h>",
+    "src/base/s.h": "#include <geometry_msgs/Twist.h>",
+    "src/base/t.cpp": "# include  <mrpt/random.h>",
+    "src/slam/u.cpp": "#include <kurumaisu/Voltages.h>",
+    "src/raycast/v.h": "#include <pybind11/numpy.h>",
+    "src/model/w.h": '#include "slam/mapper.h"',
+    "src/kalman/x.cpp": '#include "base/drive.h"',
+    "scripts/y": "#!/usr/bin/env python3\n" + "pass\n" * 15,
+}
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_finds_a_planted_violation(tmp_path, name):
+    (tmp_path / name).parent.mkdir(parents=True)
+    (tmp_path / name).write_text(PLANTED[name] + "\n")
+    found = violations(tmp_path)
+    assert found
+    assert all(str(tmp_path / name) in line for line in found)
+
+
+ALLOWED = {
+    "src/kurumaisu/ros/a.py": "import rospy\nfrom kurumaisu.sim import plant\nfrom kurumaisu.critic import recording",
+    "src/kurumaisu/critic/b.py": "import rosbags\nfrom kurumaisu import effects\neffects.ALL, effects.base.Rate",
+    "src/kurumaisu/critic/c.py": "from kurumaisu.effects import Context\nfrom kurumaisu.sim.plant import Plant",
+    "src/kurumaisu/sim/d.py": "import pymunk",
+    "src/base/base_node.cpp": "#include <ros/ros.h>",
+    "src/slam/e.cpp": '#include <mrpt/random.h>\n#include "model/unicycle.h"',
+    "scripts/f": "#!/usr/bin/env bash\n" + "true\n" * 30,
+}
+
+
+@pytest.mark.parametrize("name", ALLOWED)
+def test_lets_pass_what_is_allowed(tmp_path, name):
+    (tmp_path / name).parent.mkdir(parents=True)
+    (tmp_path / name).write_text(ALLOWED[name] + "\n")
+    assert violations(tmp_path) == []
+
+
+def machine_paths(root: Path) -> list[str]:
+    """Return the places in files that git tracks, or would, that name a folder of one machine."""
+    # written in pieces, or this file would be one of them
+    folders = ["/" + "work/", "/" + "root/", "/" + "tmp/bash_jobs", "/" + "home/"]
+    pattern = re.compile("|".join([*map(re.escape, folders), re.escape(str(root)) + r"(?!\w)"]))
+    listing = ["git", "-C", str(root), "ls-files", "-z", "-co", "--exclude-standard"]
+    names = subprocess.run(listing, check=True, capture_output=True).stdout.split(b"\0")
+    paths = (root / os.fsdecode(name) for name in names if name)
+    return [
+        f"{path}:{number}: {line}"
+        for path in paths
+        if path.is_file() and not path.is_symlink()
+        for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1)
+        if pattern.search(line)
+    ]
+
+
+def test_no_file_names_this_machine():
+    assert machine_paths(ROOT) == []
+
+
+def test_finds_a_planted_machine_path(tmp_path):
+    subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
+    (tmp_path / "good").write_text("framework/ /tmp/x https://example.org/work\n")
+    assert machine_paths(tmp_path) == []
+    (tmp_path / "bad").write_text("cd /" + "work/tree\n")
+    (tmp_path / "here").write_text(f"cd {tmp_path}\n")
+    assert len(machine_paths(tmp_path)) == 2

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Everything shipped loads: configuration, launch files with their nodes, worlds, and scripts where rosrun looks."""
+
+import importlib
+import os
+import re
+from pathlib import Path
+
+import pytest
+import roslaunch.xmlloader
+import roslib.packages
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+YAMLS = sorted((ROOT / "launch").glob("*.yaml"))
+LAUNCHES = sorted((ROOT / "launch").glob("*.launch"))
+WORLDS = sorted((ROOT / "worlds").glob("*.world"))
+SOURCE_TREE_TOOLS = {"bench", "demo", "run", "setup", "test"}  # they build or need the source tree
+
+# The strict readers of private parameters, by node type. Nodes in C++ read theirs when they start: rostests.
+READERS = {"sim_node": "kurumaisu.ros.sim_settings:read_settings"}
+
+
+def name(path):
+    return path.name
+
+
+def call(target, *arguments):
+    module, function = target.split(":")
+    return getattr(importlib.import_module(module), function)(*arguments)
+
+
+def scalars(node, keys=()):
+    """Yield (line, keys, value as YAML reads it) of every scalar; a key given twice fails."""
+    if isinstance(node, yaml.MappingNode):
+        names = [key.value for key, _ in node.value]
+        twice = sorted({key for key in names if names.count(key) > 1})
+        assert not twice, f"line {node.start_mark.line + 1}: given twice: {twice}"
+        for key, value in node.value:
+            yield from scalars(value, (*keys, key.value))
+    elif isinstance(node, yaml.SequenceNode):
+        for value in node.value:
+            yield from scalars(value, keys)
+    else:
+        yield node.start_mark.line + 1, keys, yaml.safe_load(yaml.serialize(node))
+
+
+def looks_like_a_number(text):
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("path", YAMLS, ids=name)
+def test_yaml_numbers_are_numbers(path):
+    """YAML takes 1e-3 for text, and the last of two equal keys without a word."""
+    found = list(scalars(yaml.compose(path.read_text())))
+    assert found
+    assert [entry for entry in found if isinstance(entry[2], str) and looks_like_a_number(entry[2])] == []
+
+
+@pytest.mark.parametrize("text", ["a: 1e-3", "a: {b: 1, b: 2}", "a: [1.0, '2']"])
+def test_finds_numbers_that_are_none(tmp_path, text):
+    (tmp_path / "bad.yaml").write_text(text)
+    with pytest.raises(AssertionError):
+        test_yaml_numbers_are_numbers(tmp_path / "bad.yaml")
+
+
+@pytest.mark.parametrize("path", YAMLS, ids=name)
+def test_every_yaml_has_a_reader(path):
+    """A file that no launch file and no line of code names is never loaded."""
+    places = [*LAUNCHES, *(ROOT / "src").rglob("*.py"), *(ROOT / "src").rglob("*.cpp")]
+    readers = [place for place in places if re.search(rf"\b{re.escape(path.name)}\b", place.read_text())]
+    assert readers
+
+
+def load(path):
+    """Load a launch file as roslaunch does; what it leaves to the user gets the argument's name."""
+    loader = roslaunch.xmlloader.XmlLoader()
+    config = roslaunch.config.ROSLaunchConfig()
+    unset = re.findall(r'<arg name="(\w+)"(?![^>]*(?:default|value)=)', path.read_text())
+    loader.load(str(path), config, argv=[f"{argument}:={argument}" for argument in unset], verbose=False)
+    return config
+
+
+def parameters(config, node):
+    """Return the private parameters of a node as one tree."""
+    tree = {}
+    prefix = f"{node.namespace}{node.name}/"
+    for key, parameter in config.params.items():
+        if key.startswith(prefix):
+            *sections, leaf = key[len(prefix) :].split("/")
+            place = tree
+            for section in sections:
+                place = place.setdefault(section, {})
+            place[leaf] = parameter.value
+    return tree
+
+
+def leaves(tree):
+    for key, value in tree.items():
+        yield key
+        if isinstance(value, dict):
+            yield from leaves(value)
+
+
+@pytest.mark.parametrize("path", LAUNCHES, ids=name)
+def test_launch_file_loads_and_its_nodes_exist(path):
+    config = load(path)
+    assert config.config_errors == []
+    assert config.nodes
+    for node in config.nodes:
+        assert roslib.packages.find_node(node.package, node.type), f"{node.package}/{node.type}"
+
+
+@pytest.mark.parametrize("path", LAUNCHES, ids=name)
+def test_launch_file_gives_its_nodes_what_they_read(path):
+    config = load(path)
+    sources = [*(ROOT / "src").rglob("*.cpp"), *(ROOT / "src").rglob("*.h"), *(ROOT / "src").rglob("*.py")]
+    text = "".join(source.read_text() for source in sources)
+    laws = yaml.safe_load((ROOT / "launch/md100.yaml").read_text())["voltage_laws"]  # their names are the user's
+    for node in config.nodes:
+        if node.package == "kurumaisu":
+            tree = parameters(config, node)
+            # a key that is in no source is misspelt, or no longer read
+            assert [key for key in leaves(tree) if key not in laws and f'"{key}"' not in text] == []
+            if node.type in READERS:
+                call(READERS[node.type], tree, path.name)
+
+
+@pytest.mark.parametrize("path", LAUNCHES, ids=name)
+def test_files_that_a_launch_file_names_exist(path):
+    """Also those of a branch that load() does not take, as with gui."""
+    named = re.findall(r"\$\(find kurumaisu\)/([\w./-]+)", path.read_text())
+    assert [file for file in named if not (ROOT / file).exists()] == []
+
+
+@pytest.mark.parametrize("path", WORLDS, ids=name)
+def test_world_loads(path):
+    call("kurumaisu.world:load_world", path)
+
+
+def test_model_loads():
+    call("kurumaisu.params:load_model", ROOT / "launch/md100.yaml")
+
+
+def test_scripts_are_executable_and_installed():
+    """rosrun and the install space have every script but those that build or need the source tree."""
+    cmake = (ROOT / "CMakeLists.txt").read_text()
+    installed = set(re.findall(r"scripts/(\w+)", "".join(re.findall(r"catkin_install_python\([^)]*\)", cmake))))
+    there = {path.name for path in (ROOT / "scripts").iterdir() if not path.suffix}
+    assert there - SOURCE_TREE_TOOLS == installed
+    assert [name for name in sorted(there) if not os.access(ROOT / "scripts" / name, os.X_OK)] == []
+
+
+def test_test_nodes_are_installed():
+    """Found in the source tree, a test node would run with the python on the path, which may not be the right one."""
+    cmake = (ROOT / "tests/CMakeLists.txt").read_text()
+    installed = re.findall(r"(\w+_test\.py)", "".join(re.findall(r"catkin_install_python\([^)]*\)", cmake)))
+    assert sorted(installed) == sorted(path.name for path in (ROOT / "tests").glob("*_test.py"))
