@@ -106,6 +106,10 @@ PYBIND11_MODULE(_slam, m) {
 
   m.def("setting_names", &k::settingNames, "Names of the mapper's settings.");
 
+  m.def(
+      "check_settings", [](const py::dict& settings) { settingsOf(settings); }, py::arg("settings"),
+      "Raise ValueError naming the first key that is missing, unknown or senseless.");
+
   py::class_<k::Mapper>(m, "Mapper", "Builds a map from scans and odometry.")
       .def(py::init([](const py::dict& settings, std::uint32_t seed) {
              return std::make_unique<k::Mapper>(settingsOf(settings), seed);

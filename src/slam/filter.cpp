@@ -91,13 +91,11 @@ struct Filter::Particles {
   CParticleFilter filter;
 };
 
-Filter::Filter(const MapperSettings& settings, std::uint32_t seed)
-    : settings_(settings), seed_(seed), particles_(std::make_unique<Particles>(settings)) {}
-Filter::~Filter() = default;
-
-void Filter::start(const Pose2D& map_from_base) {
+Filter::Filter(const MapperSettings& settings, std::uint32_t seed, const Pose2D& map_from_base)
+    : settings_(settings), seed_(seed), particles_(std::make_unique<Particles>(settings)) {
   particles_->pdf.clear(mrpt::poses::CPose2D(map_from_base.x, map_from_base.y, map_from_base.theta));
 }
+Filter::~Filter() = default;
 
 void Filter::localise(const Scan& scan, const Pose2D& motion) {
   seedRandom();

@@ -14,18 +14,17 @@ namespace kurumaisu {
 /// Particles, each a path and the map seen along it.
 class Filter {
  public:
-  Filter(const MapperSettings& settings, std::uint32_t seed);
+  /// All particles start at one pose, with empty maps.
+  Filter(const MapperSettings& settings, std::uint32_t seed, const Pose2D& map_from_base);
   ~Filter();
 
-  /// Puts all particles at one pose, with empty maps.
-  void start(const Pose2D& map_from_base);
   /// Moves the particles by a motion with the settings' noise and weighs them by a de-skewed scan.
   void localise(const Scan& scan, const Pose2D& motion);
   /// Adds a de-skewed scan to every particle's map, at its last pose.
   void insert(const Scan& scan);
 
   Pose2D bestPose() const;
-  /// Poses of the likeliest particle: at start() and after every localise().
+  /// Poses of the likeliest particle: at the start and after every localise().
   std::vector<Pose2D> bestPath() const;
   std::array<double, 9> covariance() const;
   OccupancyGrid grid() const;

@@ -12,9 +12,11 @@
 namespace kurumaisu {
 namespace {
 
-// A line is fitted to the readings within this distance of one [m], so many to each side at most. Short
-// enough for door frames, long enough that 3 mm of noise turn it by 2 degrees.
+// A line is fitted to the readings within this distance of one [m], or within so many spacings of the beams
+// at its range where that is more; so many to each side at most. Short enough for door frames, long enough
+// that 3 mm of noise turn it by 2 degrees.
 constexpr double kLineReach = 0.12;
+constexpr double kLineSpacings = 4;
 constexpr int kLineBeams = 12;
 constexpr int kLinePoints = 4;
 // Smaller spread over larger spread of a line's points [-]: above it they are no line.
@@ -49,14 +51,14 @@ std::vector<Eigen::Vector2d> pointsOf(const Scan& scan) {
 }
 
 /// Normal of the line through the readings around one; false where there is none.
-bool normalAt(const std::vector<Eigen::Vector2d>& points, int centre, Eigen::Vector2d& normal) {
+bool normalAt(const std::vector<Eigen::Vector2d>& points, int centre, double reach, Eigen::Vector2d& normal) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
   int count = 0;
   const int last = std::min(static_cast<int>(points.size()) - 1, centre + kLineBeams);
   for (int i = std::max(0, centre - kLineBeams); i <= last; ++i) {
     const Eigen::Vector2d offset = points[i] - points[centre];
-    if (!(offset.squaredNorm() < kLineReach * kLineReach)) continue;
+    if (!(offset.squaredNorm() < reach * reach)) continue;
     mean += offset;
     square += offset * offset.transpose();
     ++count;
@@ -174,7 +176,9 @@ void Matcher::insert(const Scan& scan) {
   const Eigen::Vector2d eye(base_from_laser_.x, base_from_laser_.y);
   for (int i = 0; i < static_cast<int>(points.size()); ++i) {
     Eigen::Vector2d normal;
-    if (!points[i].allFinite() || !normalAt(points, i, normal)) continue;
+    const double spacing = std::abs(scan.fan.angle_increment) * scan.ranges[i];
+    const double reach = std::fmax(kLineReach, kLineSpacings * spacing);
+    if (!points[i].allFinite() || !normalAt(points, i, reach, normal)) continue;
     if (normal.dot(eye - points[i]) < 0) normal = -normal;
     lines.push_back({apply(pose_, points[i]), apply(turn, normal)});
   }

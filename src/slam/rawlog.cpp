@@ -12,6 +12,7 @@
 #include <mrpt/serialization/CArchive.h>
 
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -28,6 +29,7 @@ constexpr double kLevel = 0.1;  // [rad] a laser tilted by more does not measure
 /// The decompressed bytes. In memory, because only there the end of the last object can be told from a file
 /// that was cut off.
 std::vector<std::uint8_t> contents(const std::string& path) {
+  if (!std::ifstream(path).good()) throw std::runtime_error("cannot be read");
   mrpt::io::CFileGZInputStream file;
   if (!file.open(path)) throw std::runtime_error("cannot be read");
   std::vector<std::uint8_t> bytes;

@@ -23,6 +23,7 @@ void visitSettings(MapperSettings& s, Visit&& visit) {
   visit("match_prior_angle", s.match.prior_angle, 0, 10);
   visit("match_prior_floor", s.match.prior_floor, 1e-6, 10);
   visit("match_prior_angle_floor", s.match.prior_angle_floor, 1e-6, 10);
+  visit("slip_gain", s.slip_gain, 0, 1);
   visit("resolution", s.resolution, 0.005, 1);
   visit("range", s.range, 0.1, 200);
   visit("certainty", s.certainty, 0.51, 0.99);

@@ -12,6 +12,7 @@ namespace kurumaisu {
 
 struct MapperSettings {
   MatchSettings match;
+  double slip_gain;  ///< share of odometry's rate of error, per scan, that is learnt for the next [-]
 
   double resolution;  ///< of the grid [m]
   double range;       ///< readings beyond are not mapped; beams without a return clear so far [m]
