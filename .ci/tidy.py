@@ -22,12 +22,13 @@ def main() -> int:
     """Check the files, as many at once as there are cores; return 1 if any has findings."""
     CLEAN.mkdir(parents=True, exist_ok=True)
     version = subprocess.run(["clang-tidy", "--version"], check=True, capture_output=True, text=True).stdout
+    configs = [path for path in sources.files() if path.name == ".clang-tidy"]
     units = [unit for unit in json.loads((BUILD / "compile_commands.json").read_text()) if _ours(unit)]
     missing = set(sources.files(".cpp")) - {Path(unit["file"]).resolve() for unit in units}
     for path in sorted(missing):
         print(f"{path}: is in no target, so nothing compiles it")
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        findings = [text for text in pool.map(lambda unit: _check(unit, version), units) if text]
+        findings = [text for text in pool.map(lambda unit: _check(unit, configs, version), units) if text]
     print("\n".join(findings) or f"{len(units)} files")
     return 1 if findings or missing else 0
 
@@ -37,9 +38,8 @@ def _ours(unit: dict[str, str]) -> bool:
     return path.is_relative_to(sources.ROOT) and not path.is_relative_to(sources.ROOT / ".ws")
 
 
-def _check(unit: dict[str, str], version: str) -> str:
+def _check(unit: dict[str, str], configs: list[Path], version: str) -> str:
     """Return clang-tidy's findings, empty if there are none."""
-    configs = sources.ROOT.glob("**/.clang-tidy")
     state = sources.content_hash({*_dependencies(unit), *configs}, version, unit["command"])
     if (CLEAN / state).exists():
         return ""
