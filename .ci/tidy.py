@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -38,15 +39,16 @@ def _ours(unit: dict[str, str]) -> bool:
 
 def _check(unit: dict[str, str], version: str) -> str:
     """Return clang-tidy's findings, empty if there are none."""
-    config = (sources.ROOT / ".clang-tidy").read_text()
-    state = sources.content_hash(_dependencies(unit), config, version, unit["command"])
+    configs = sources.ROOT.glob("**/.clang-tidy")
+    state = sources.content_hash({*_dependencies(unit), *configs}, version, unit["command"])
     if (CLEAN / state).exists():
         return ""
     # Links into the workspace are kept: HeaderFilterRegex and clang then see the same paths as gcc does.
     command = ["clang-tidy", "--quiet", "-p", str(BUILD), unit["file"]]
     run = subprocess.run(command, check=False, capture_output=True, text=True)
     if run.returncode != 0:
-        return run.stdout + run.stderr
+        lines = [line for line in run.stdout.splitlines() if re.search(r": (error|warning): ", line)]
+        return "\n".join(dict.fromkeys(lines)) or run.stdout + run.stderr
     (CLEAN / state).touch()
     return ""
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Everything shipped loads: configuration, launch files with their nodes, worlds, and scripts where rosrun looks."""
+"""Everything shipped loads: configuration, launch files with their nodes, worlds, and scripts where rosrun looks.
+
+Run twice: in the devel space, and by .ci/install_space.bash in the install space.
+"""
 
 import importlib
 import os
@@ -9,12 +12,14 @@ from pathlib import Path
 import pytest
 import roslaunch.xmlloader
 import roslib.packages
+import rospkg
 import yaml
 
-ROOT = Path(__file__).resolve().parents[1]
-YAMLS = sorted((ROOT / "launch").glob("*.yaml"))
-LAUNCHES = sorted((ROOT / "launch").glob("*.launch"))
-WORLDS = sorted((ROOT / "worlds").glob("*.world"))
+TREE = Path(__file__).resolve().parents[1]
+SHARE = Path(rospkg.RosPack().get_path("kurumaisu"))
+YAMLS = sorted((SHARE / "launch").glob("*.yaml"))
+LAUNCHES = sorted((SHARE / "launch").glob("*.launch"))
+WORLDS = sorted((SHARE / "worlds").glob("*.world"))
 SOURCE_TREE_TOOLS = {"bench", "demo", "run", "setup", "test"}  # they build or need the source tree
 
 # The strict readers of private parameters, by node type. Nodes in C++ read theirs when they start: rostests.
@@ -71,7 +76,7 @@ def test_finds_numbers_that_are_none(tmp_path, text):
 @pytest.mark.parametrize("path", YAMLS, ids=name)
 def test_every_yaml_has_a_reader(path):
     """A file that no launch file and no line of code names is never loaded."""
-    places = [*LAUNCHES, *(ROOT / "src").rglob("*.py"), *(ROOT / "src").rglob("*.cpp")]
+    places = [*LAUNCHES, *(TREE / "src").rglob("*.py"), *(TREE / "src").rglob("*.cpp")]
     readers = [place for place in places if re.search(rf"\b{re.escape(path.name)}\b", place.read_text())]
     assert readers
 
@@ -118,9 +123,9 @@ def test_launch_file_loads_and_its_nodes_exist(path):
 @pytest.mark.parametrize("path", LAUNCHES, ids=name)
 def test_launch_file_gives_its_nodes_what_they_read(path):
     config = load(path)
-    sources = [*(ROOT / "src").rglob("*.cpp"), *(ROOT / "src").rglob("*.h"), *(ROOT / "src").rglob("*.py")]
+    sources = [path for kind in ("cpp", "h", "py") for path in (TREE / "src").rglob(f"*.{kind}")]
     text = "".join(source.read_text() for source in sources)
-    laws = yaml.safe_load((ROOT / "launch/md100.yaml").read_text())["voltage_laws"]  # their names are the user's
+    laws = yaml.safe_load((SHARE / "launch/md100.yaml").read_text())["voltage_laws"]  # their names are the user's
     for node in config.nodes:
         if node.package == "kurumaisu":
             tree = parameters(config, node)
@@ -134,7 +139,7 @@ def test_launch_file_gives_its_nodes_what_they_read(path):
 def test_files_that_a_launch_file_names_exist(path):
     """Also those of a branch that load() does not take, as with gui."""
     named = re.findall(r"\$\(find kurumaisu\)/([\w./-]+)", path.read_text())
-    assert [file for file in named if not (ROOT / file).exists()] == []
+    assert [file for file in named if not (TREE / file).exists()] == []
 
 
 @pytest.mark.parametrize("path", WORLDS, ids=name)
@@ -143,7 +148,13 @@ def test_world_loads(path):
 
 
 def test_model_loads():
-    call("kurumaisu.params:load_model", ROOT / "launch/md100.yaml")
+    call("kurumaisu.params:load_model", SHARE / "launch/md100.yaml")
+
+
+def test_all_that_the_tree_ships_is_here():
+    for folder in ("launch", "worlds"):
+        names = {path.name for path in (TREE / folder).iterdir()}
+        assert names == {path.name for path in (SHARE / folder).iterdir()}
 
 
 def test_scripts_are_installed_or_executable():
@@ -151,15 +162,15 @@ def test_scripts_are_installed_or_executable():
 
     In the source tree only the latter may be executable: rosrun would find the others twice and ask which is meant.
     """
-    cmake = (ROOT / "CMakeLists.txt").read_text()
+    cmake = (TREE / "CMakeLists.txt").read_text()
     installed = set(re.findall(r"scripts/(\w+)", "".join(re.findall(r"catkin_install_python\([^)]*\)", cmake))))
-    there = {path.name for path in (ROOT / "scripts").iterdir() if not path.suffix}
+    there = {path.name for path in (TREE / "scripts").iterdir() if not path.suffix}
     assert there - SOURCE_TREE_TOOLS == installed
-    assert {name for name in there if os.access(ROOT / "scripts" / name, os.X_OK)} == SOURCE_TREE_TOOLS
+    assert {name for name in there if os.access(TREE / "scripts" / name, os.X_OK)} == SOURCE_TREE_TOOLS
 
 
 def test_test_nodes_are_installed():
     """Found in the source tree, a test node would run with the python on the path, which may not be the right one."""
-    cmake = (ROOT / "tests/CMakeLists.txt").read_text()
+    cmake = (TREE / "tests/CMakeLists.txt").read_text()
     installed = re.findall(r"(\w+_test\.py)", "".join(re.findall(r"catkin_install_python\([^)]*\)", cmake)))
-    assert sorted(installed) == sorted(path.name for path in (ROOT / "tests").glob("*_test.py"))
+    assert sorted(installed) == sorted(path.name for path in (TREE / "tests").glob("*_test.py"))
