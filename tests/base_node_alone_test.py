@@ -41,7 +41,7 @@ def set_parameters(name: str, changes: dict[str, Any]) -> None:
 def start(name: str, changes: dict[str, Any]) -> subprocess.Popen[str]:
     """Start a base_node of its own, its topics under /NAME."""
     set_parameters(f"/{name}/base_node", changes)
-    command = ["rosrun", "kurumaisu", "base_node_test", f"__ns:=/{name}"]
+    command = ["rosrun", "kurumaisu", "base_node", f"__ns:=/{name}"]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 

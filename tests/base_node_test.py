@@ -13,6 +13,7 @@ import rospy
 import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist
 from kurumaisu.msg import Voltages
 from nav_msgs.msg import Odometry
 
@@ -93,6 +94,15 @@ class BaseNode(unittest.TestCase):
         message = self.voltages.wait(lambda m: m.v != 0, "motion")
         assert (message.v, message.w) == (-0.8, 1.5)
         wait_for(lambda: self.count("clamped commands") > clamped, "the clamp is counted")
+
+    def test_sideways_is_not_obeyed(self) -> None:
+        ignored = self.count("commands with ignored components")
+        twist = Twist()
+        twist.linear.x, twist.linear.y = 0.1, 0.5
+        self.commander.publisher.publish(twist)
+        message = self.voltages.wait(lambda m: m.v != 0, "motion")
+        assert (message.v, message.w) == (0.1, 0.0)
+        wait_for(lambda: self.count("commands with ignored components") == ignored + 1, "it is counted")
 
     def test_odometry_and_tf_are_what_was_put_out(self) -> None:
         buffer = tf2_ros.Buffer()

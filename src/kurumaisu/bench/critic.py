@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import beta
@@ -14,7 +15,6 @@ from kurumaisu.bench import hidden_effect
 from kurumaisu.bench.table import Table
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.recording import Recording, Run, Series
-from kurumaisu.critic.verdict import Verdict
 from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray
 
@@ -30,13 +30,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     rng = np.random.default_rng(options.seed)
     title = f"{_RUNS} drives of 60 s, reference 5 mm and 5 mrad at 10 Hz; share (90 % interval) of the draws"
-    table = Table(
-        title, "hidden effect, size", "draws", "named right     ", "misnamed        ", "none, or a set  ", "CPU [s]"
-    )
-    for effect in [*hidden_effect.EFFECTS, None]:
-        for size in _SIZES if effect else (0.0,):
-            draws = options.draws * (1 if effect else len(_SIZES) * 3)
-            _row(table, effect, size, [_draw(effect, size, rng) for _ in range(draws)])
+    headings = ("named right     ", "misnamed        ", "none, or a set  ", "interval covers ")
+    table = Table(title, "hidden effect, size", "draws", *headings, "CPU [s]")
+    for effect in hidden_effect.EFFECTS:
+        for size in _SIZES:
+            draws = [_draw(effect, size, rng) for _ in range(options.draws)]
+            _row(table, f"{effect} x {size:g}", effect, draws)
+    _row(table, "nothing", None, [_draw(None, 0.0, rng) for _ in range(10 * options.draws)])
     return 0
 
 
@@ -61,22 +61,38 @@ def _series(table: FloatArray, *columns: str) -> Series:
     return Series(table[:, 0], table[:, 1:], columns)
 
 
-def _draw(effect: str | None, share: float, rng: np.random.Generator) -> tuple[Verdict, float]:
+@dataclass(frozen=True)
+class _Draw:
+    """named: the causes; covered: the 90 % interval of the hidden effect holds its size, None where not named."""
+
+    named: frozenset[str]
+    covered: bool | None
+    cpu: float
+
+
+def _draw(effect: str | None, share: float, rng: np.random.Generator) -> _Draw:
     size = share * hidden_effect.draw_size(effect, rng) if effect else 0.0
     data = recording(effect, size, int(rng.integers(1, 2**31)), 60.0)
     start = time.process_time()
-    verdict = pipeline.criticise(data, shipped("launch/md100.yaml"), lambda _: None).verdict
-    return verdict, time.process_time() - start
+    causes = pipeline.criticise(data, shipped("launch/md100.yaml"), lambda _: None).verdict.causes
+    cpu = time.process_time() - start
+    estimates = [estimate for cause in causes if cause.id == effect for estimate in cause.parameters.values()]
+    covered = estimates[0].lo90 <= size <= estimates[0].hi90 if estimates else None
+    return _Draw(frozenset(cause.id for cause in causes), covered, cpu)
 
 
-def _row(table: Table, effect: str | None, size: float, results: list[tuple[Verdict, float]]) -> None:
-    named = [{cause.id for cause in verdict.causes} for verdict, _ in results]
-    right = sum(ids == {effect} for ids in named)
-    wrong = sum(bool(ids - {effect}) for ids in named)
-    n = len(results)
-    shares = [_share(k, n) for k in (right, wrong, n - right - wrong)]
-    cpu = float(np.median([seconds for _, seconds in results]))
-    table.row(f"{effect} x {size:g}" if effect else "nothing", str(n), *shares, cpu)
+def _row(table: Table, label: str, effect: str | None, draws: Sequence[_Draw]) -> None:
+    right = sum(draw.named == {effect} for draw in draws)
+    wrong = sum(bool(draw.named - {effect}) for draw in draws)
+    n = len(draws)
+    covered = [draw.covered for draw in draws if draw.covered is not None]
+    table.row(
+        label,
+        str(n),
+        *(_share(k, n) for k in (right, wrong, n - right - wrong)),
+        _share(sum(covered), len(covered)) if covered else "-",
+        float(np.median([draw.cpu for draw in draws])),
+    )
 
 
 def _share(k: int, n: int) -> str:

@@ -93,7 +93,9 @@ def _from_voltages(voltage: Series, command: Series | None, model: Model) -> tup
     rates = []
     for law, volts, rate in ((model.translation, "v_f", "v"), (model.steering, "v_s", "w")):
         sign = np.full(len(voltage.t), np.nan)
-        if command is not None:
+        if rate in voltage.columns:  # the very rates that the voltages stand for
+            sign = np.sign(voltage.column(rate))
+        elif command is not None:
             held = np.searchsorted(command.t, voltage.t, side="right") - 1
             sign = np.where(held >= 0, np.sign(command.column(rate)[np.maximum(held, 0)]), 0.0)
         rates.append(AxisInverse(law).rates(voltage.column(volts), sign))

@@ -38,7 +38,8 @@ class Criticism:
 
 def invalid(recording: Recording, model: Model, problems: Sequence[str], drives: Sequence[Drive]) -> Criticism:
     """Return the criticism of data that must be mended before anything is fitted."""
-    verdict = Verdict("invalid_data", problems=tuple(problems))
+    notes = tuple(note for note in recording.problems if note not in problems)
+    verdict = Verdict("invalid_data", problems=(*problems, *notes))
     story = Story(
         recording=recording.name,
         model=model.name,
@@ -66,6 +67,7 @@ def criticism(
         kind,
         causes=causes,
         confounded=found.confounded if kind != "none" else (),
+        problems=recording.problems,
         gain=worth,
     )
     held_out = set(recording.test)

@@ -15,6 +15,7 @@ from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray, IntArray
 
 MATERIAL = 0.005  # share of the way (or of the turn) from which an effect matters to a driver
+_SAME = 1e-6  # [s] less than any clock resolves: stamps of equal spacing differ by rounding
 HORIZON = 2.0  # [s] over which ways and turns are compared
 
 
@@ -35,7 +36,7 @@ def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Se
 
 def spans(drive: Drive, horizon: float) -> tuple[IntArray, IntArray]:
     """Return the indices of reference poses and of those a horizon [s] later, for all starts that have one."""
-    ends = np.searchsorted(drive.times, drive.times + horizon)
+    ends = np.searchsorted(drive.times, drive.times + horizon - _SAME)
     starts = np.flatnonzero(ends < len(drive.times))
     return starts, ends[starts]
 

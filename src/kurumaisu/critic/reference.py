@@ -55,9 +55,9 @@ def scan_log(run: Run, mount: LaserMount | None, laser: Laser | None) -> ScanLog
     the recording does not, and its mean error is taken out of the readings.
     Raise Error when the run has no scans, no odometry, or nobody knows how the laser is mounted.
     """
-    slam = import_module("kurumaisu.slam")
     if run.scan is None or run.odom is None:
         raise Error(f"{run.name}: has no reference pose, and not both scans and odometry to find one from")
+    slam = import_module("kurumaisu.slam")
     place = mount or (laser.mount if laser is not None else None)
     fan = run.fan or mount or laser
     if place is None or fan is None:

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Types of the C++ module (src/slam/bindings.cpp); its docstrings are there."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kurumaisu.types import FloatArray
+
+Floats = NDArray[np.float32] | FloatArray
+
+class Fan:
+    def __init__(
+        self,
+        *,
+        angle_min: float,
+        angle_increment: float,
+        time_increment: float,
+        range_max: float,
+        base_from_laser: Sequence[float],
+    ) -> None: ...
+    @property
+    def angle_min(self) -> float: ...
+    @property
+    def angle_increment(self) -> float: ...
+    @property
+    def time_increment(self) -> float: ...
+    @property
+    def range_max(self) -> float: ...
+    @property
+    def base_from_laser(self) -> list[float]: ...
+
+def setting_names() -> list[str]: ...
+def check_settings(settings: Mapping[str, float]) -> None: ...
+
+class Mapper:
+    def __init__(self, settings: Mapping[str, float], seed: int) -> None: ...
+    def add(
+        self, stamp: float, ranges: Floats, fan: Fan, start: Sequence[float], end: Sequence[float]
+    ) -> tuple[list[float], FloatArray, bool]: ...
+    def trajectory(self) -> FloatArray: ...
+    def grid(self) -> tuple[NDArray[np.int8], float, list[float]]: ...
+
+def read_rawlog(path: str) -> tuple[FloatArray, FloatArray, NDArray[np.float32], Fan]: ...

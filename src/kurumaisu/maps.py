@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Occupancy grids and their files: the pair that map_server reads, and a picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kurumaisu.errors import Error
+from kurumaisu.types import FloatArray
+
+# map_server's own convention: shades, and the occupancy above or below which a cell counts [%].
+_OCCUPIED, _FREE, _UNKNOWN = 0, 254, 205
+_OCCUPIED_ABOVE, _FREE_BELOW = 65, 19.6
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Occupancy: cells (height, width) from the lower left corner, 0 free to 100 occupied, -1 never seen.
+
+    resolution: edge of a cell [m]; x, y: of the lower left corner [m].
+    """
+
+    cells: NDArray[np.int8]
+    resolution: float
+    x: float
+    y: float
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top [m]."""
+        height, width = self.cells.shape
+        return (self.x, self.x + width * self.resolution, self.y, self.y + height * self.resolution)
+
+
+def save_map(grid: Grid, path: Path) -> tuple[Path, Path]:
+    """Write path.pgm and path.yaml for map_server and return their names; path has no suffix.
+
+    Raise Error naming the file that cannot be written.
+    """
+    shades = np.full(grid.cells.shape, _UNKNOWN, dtype=np.uint8)
+    shades[grid.cells > _OCCUPIED_ABOVE] = _OCCUPIED
+    shades[(grid.cells >= 0) & (grid.cells < _FREE_BELOW)] = _FREE
+    height, width = shades.shape
+    image, text = path.with_name(path.name + ".pgm"), path.with_name(path.name + ".yaml")
+    try:
+        image.write_bytes(f"P5\n{width} {height}\n255\n".encode() + shades[::-1].tobytes())
+        text.write_text(
+            f"image: {image.name}\nresolution: {grid.resolution:.6f}\n"
+            f"origin: [{grid.x:.6f}, {grid.y:.6f}, 0.0]\nnegate: 0\n"
+            f"occupied_thresh: {_OCCUPIED_ABOVE / 100}\nfree_thresh: {_FREE_BELOW / 100}\n",
+            encoding="utf-8",
+        )
+    except OSError as error:
+        raise Error(f"{error.filename}: {error.strerror}") from error
+    return image, text
+
+
+def draw_map(
+    grid: Grid,
+    trajectory: FloatArray,
+    path: Path,
+    other: FloatArray | None = None,
+    other_name: str = "",
+) -> None:
+    """Write a picture of a map and the trajectory (n, 4) of t, x, y, theta; other (m, 4) is drawn for comparison.
+
+    Both must be in the map's frame. Raise Error naming the file that cannot be written.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    left, right, bottom, top = grid.extent
+    wide = (right - left) / max(top - bottom, 1e-9)
+    figure = Figure(figsize=(9 * min(wide, 1.6) + 1, 9 / max(wide / 1.6, 1) + 1), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    shades = np.where(grid.cells < 0, 0.8, 1 - grid.cells / 100.0)
+    axes.imshow(shades, cmap="gray", vmin=0, vmax=1, origin="lower", extent=grid.extent, interpolation="none")
+    if other is not None:
+        axes.plot(other[:, 1], other[:, 2], color="tab:orange", linewidth=1, label=other_name)
+    axes.plot(trajectory[:, 1], trajectory[:, 2], color="tab:blue", linewidth=1, label="mapped path")
+    axes.plot(*trajectory[0, 1:3], "o", color="tab:green", label="start")
+    axes.plot(*trajectory[-1, 1:3], "s", color="tab:red", label="end")
+    axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=(left, right), ylim=(bottom, top))
+    axes.legend(loc="upper right", framealpha=0.9)
+    try:
+        figure.savefig(path, dpi=130)
+    except OSError as error:
+        raise Error(f"{path}: {error.strerror}") from error

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "slam/filter.h"
+
+#include <mrpt/bayes/CParticleFilter.h>
+#include <mrpt/maps/CMultiMetricMapPDF.h>
+#include <mrpt/maps/COccupancyGridMap2D.h>
+#include <mrpt/obs/CActionCollection.h>
+#include <mrpt/obs/CActionRobotMovement2D.h>
+#include <mrpt/obs/CSensoryFrame.h>
+#include <mrpt/random.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "slam/grid.h"
+#include "slam/observation.h"
+#include "slam/pose.h"
+
+namespace kurumaisu {
+namespace {
+
+using mrpt::bayes::CParticleFilter;
+using mrpt::maps::CMultiMetricMapPDF;
+using mrpt::maps::COccupancyGridMap2D;
+
+CParticleFilter::TParticleFilterOptions filterOptions(const MapperSettings& s) {
+  CParticleFilter::TParticleFilterOptions options;
+  options.adaptiveSampleSize = false;
+  options.sampleSize = static_cast<unsigned>(s.particles);
+  options.PF_algorithm = CParticleFilter::pfStandardProposal;
+  options.resamplingMethod = CParticleFilter::prSystematic;
+  options.BETA = s.resample_below;
+  options.powFactor = s.likelihood_power;
+  return options;
+}
+
+mrpt::maps::TSetOfMetricMapInitializers mapDefinition(const MapperSettings& s) {
+  COccupancyGridMap2D::TMapDefinition grid;
+  grid.resolution = static_cast<float>(s.resolution);
+  // It grows as scans come in.
+  grid.min_x = grid.min_y = -1;
+  grid.max_x = grid.max_y = 1;
+  grid.insertionOpts.maxDistanceInsertion = static_cast<float>(s.range);
+  grid.insertionOpts.maxOccupancyUpdateCertainty = static_cast<float>(s.certainty);
+  grid.insertionOpts.considerInvalidRangesAsFreeSpace = false;  // insertionObservation() says what is free
+  grid.likelihoodOpts.likelihoodMethod = COccupancyGridMap2D::lmLikelihoodField_Thrun;
+  grid.likelihoodOpts.LF_stdHit = static_cast<float>(s.hit_deviation);
+  grid.likelihoodOpts.LF_zHit = static_cast<float>(s.hit_share);
+  grid.likelihoodOpts.LF_zRandom = static_cast<float>(1 - s.hit_share);
+  grid.likelihoodOpts.LF_maxRange = static_cast<float>(s.range);
+  grid.likelihoodOpts.LF_maxCorrsDistance = static_cast<float>(s.hit_reach);
+  grid.likelihoodOpts.LF_decimation = static_cast<std::uint32_t>(s.hit_every);
+  grid.likelihoodOpts.enableLikelihoodCache = true;
+  mrpt::maps::TSetOfMetricMapInitializers maps;
+  maps.push_back(grid);
+  return maps;
+}
+
+mrpt::obs::CActionCollection action(const MapperSettings& s, const Pose2D& motion) {
+  mrpt::obs::CActionRobotMovement2D::TMotionModelOptions model;
+  model.modelSelection = mrpt::obs::CActionRobotMovement2D::mmGaussian;
+  model.gaussianModel.a1 = static_cast<float>(s.distance_per_distance);
+  model.gaussianModel.a2 = static_cast<float>(s.distance_per_angle);
+  model.gaussianModel.a3 = static_cast<float>(s.angle_per_distance);
+  model.gaussianModel.a4 = static_cast<float>(s.angle_per_angle);
+  model.gaussianModel.minStdXY = static_cast<float>(s.distance_floor);
+  model.gaussianModel.minStdPHI = static_cast<float>(s.angle_floor);
+  mrpt::obs::CActionRobotMovement2D movement;
+  movement.computeFromOdometry({motion.x, motion.y, wrapAngle(motion.theta)}, model);
+  mrpt::obs::CActionCollection actions;
+  actions.insert(movement);
+  return actions;
+}
+
+Pose2D poseOf(const mrpt::math::TPose3D& pose) { return {pose.x, pose.y, pose.yaw}; }
+
+}  // namespace
+
+struct Filter::Particles {
+  explicit Particles(const MapperSettings& s) : pdf(filterOptions(s), mapDefinition(s), {}) {
+    filter.m_options = filterOptions(s);
+    filter.setMinLoggingLevel(mrpt::system::LVL_ERROR);
+  }
+
+  const mrpt::maps::CRBPFParticleData& best() const {
+    const auto heavier = [](const auto& a, const auto& b) { return a.log_w < b.log_w; };
+    return *std::max_element(pdf.m_particles.begin(), pdf.m_particles.end(), heavier)->d;
+  }
+
+  CMultiMetricMapPDF pdf;
+  CParticleFilter filter;
+};
+
+Filter::Filter(const MapperSettings& settings, std::uint32_t seed, const Pose2D& map_from_base)
+    : settings_(settings), seed_(seed), particles_(std::make_unique<Particles>(settings)) {
+  particles_->pdf.clear(mrpt::poses::CPose2D(map_from_base.x, map_from_base.y, map_from_base.theta));
+}
+Filter::~Filter() = default;
+
+void Filter::localise(const Scan& scan, const Pose2D& motion) {
+  seedRandom();
+  const auto actions = action(settings_, motion);
+  mrpt::obs::CSensoryFrame frame;
+  frame.insert(likelihoodObservation(scan));
+  particles_->filter.executeOn(particles_->pdf, &actions, &frame);
+}
+
+void Filter::insert(const Scan& scan) {
+  mrpt::obs::CSensoryFrame frame;
+  frame.insert(insertionObservation(scan, settings_.range));
+  particles_->pdf.insertObservation(frame);
+}
+
+/// MRPT's generator belongs to the thread and keeps half a pair of normal draws over a new seed, so it is
+/// replaced before every use: the result depends neither on the thread nor on who drew before.
+void Filter::seedRandom() {
+  constexpr std::uint32_t kGolden = 2654435769U;  // spreads consecutive rounds over the seeds
+  mrpt::random::getRandomGenerator() = mrpt::random::CRandomGenerator(seed_ + kGolden * ++rounds_);
+}
+
+Pose2D Filter::bestPose() const { return poseOf(particles_->best().robotPath.back()); }
+
+std::vector<Pose2D> Filter::bestPath() const {
+  std::vector<Pose2D> path;
+  for (const auto& pose : particles_->best().robotPath) path.push_back(poseOf(pose));
+  return path;
+}
+
+std::array<double, 9> Filter::covariance() const {
+  const Pose2D centre = bestPose();
+  std::array<double, 9> sum{};
+  double total = 0;
+  for (const auto& particle : particles_->pdf.m_particles) {
+    const Pose2D pose = poseOf(particle.d->robotPath.back());
+    const std::array<double, 3> offset{pose.x - centre.x, pose.y - centre.y,
+                                       wrapAngle(pose.theta - centre.theta)};
+    const double weight = std::exp(particle.log_w);
+    total += weight;
+    for (int i = 0; i < 9; ++i) sum[i] += weight * offset[i / 3] * offset[i % 3];
+  }
+  for (double& value : sum) value /= total;
+  return sum;
+}
+
+OccupancyGrid Filter::grid() const {
+  return occupancyOf(*particles_->best().mapTillNow.mapByClass<COccupancyGridMap2D>());
+}
+
+}  // namespace kurumaisu

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Motion from scan to scan: point-to-line matching against the scans of the last metres, odometry as the
+// prior.
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+#include <unordered_map>
+#include <vector>
+
+#include "slam/scan.h"
+
+namespace kurumaisu {
+
+struct MatchSettings {
+  int iterations;            ///< at most so many linearisations
+  int every;                 ///< every n-th reading is matched
+  double reach;              ///< farthest correspondence [m]
+  double deviation;          ///< of a point from its line [m]; above it a point counts less
+  double key_distance;       ///< a scan joins the local map after so much way [m]
+  double key_angle;          ///< or so much turn [rad]
+  int key_scans;             ///< scans in the local map
+  double prior_distance;     ///< odometry's deviation per way driven [m/m]
+  double prior_angle;        ///< odometry's deviation per angle turned [rad/rad]
+  double prior_floor;        ///< odometry's deviation at least, per scan [m]
+  double prior_angle_floor;  ///< odometry's deviation at least, per scan [rad]
+};
+
+/// Follows a chair through its scans. Poses are in a frame of its own, which starts as the odometry's and
+/// drifts.
+class Matcher {
+ public:
+  explicit Matcher(const MatchSettings& settings) : settings_(settings) {}
+
+  struct Match {
+    Pose2D pose;                 ///< of base
+    Eigen::Matrix3d covariance;  ///< of the pose given the last one: x, y [m], heading [rad], in this frame
+  };
+
+  /// Pose of base at a de-skewed scan; motion: what odometry says of the way since the last scan.
+  Match add(const Scan& scan, const Pose2D& motion);
+
+ private:
+  using Points = std::vector<Eigen::Vector2d>;
+  struct Line {
+    Eigen::Vector2d point;
+    Eigen::Vector2d normal;  ///< towards the laser that saw it
+  };
+
+  Match align(const Points& points, const Pose2D& start, const Pose2D& motion) const;
+  bool linearise(const Points& points, const Pose2D& pose, double reach, Eigen::Matrix3d& information,
+                 Eigen::Vector3d& gradient) const;
+  const Line* nearest(const Eigen::Vector2d& point, const Eigen::Vector2d& eye, double reach) const;
+  void insert(const Scan& scan);
+  void rebuild();
+
+  MatchSettings settings_;
+  bool started_ = false;
+  Pose2D pose_{0, 0, 0};
+  Pose2D key_pose_{0, 0, 0};
+  Pose2D base_from_laser_{0, 0, 0};
+  std::deque<std::vector<Line>> keys_;
+  std::unordered_map<std::int64_t, std::vector<Line>> cells_;
+};
+
+}  // namespace kurumaisu

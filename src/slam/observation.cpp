@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "slam/observation.h"
+
+#include <cmath>
+
+#include "slam/pose.h"
+
+namespace kurumaisu {
+namespace {
+
+using mrpt::obs::CObservation2DRangeScan;
+
+/// intervals: how many steps of the fan's angle MRPT divides the aperture into.
+CObservation2DRangeScan::Ptr observation(const Scan& scan, std::size_t intervals) {
+  const Fan& fan = scan.fan;
+  auto out = CObservation2DRangeScan::Create();
+  const double width = fan.angle_increment * static_cast<double>(intervals);
+  out->aperture = static_cast<float>(std::abs(width));
+  out->rightToLeft = width > 0;
+  const Pose2D centre = compose(fan.base_from_laser, {0, 0, fan.angle_min + width / 2});
+  out->sensorPose = mrpt::poses::CPose3D(centre.x, centre.y, 0, wrapAngle(centre.theta), 0, 0);
+  out->maxRange = static_cast<float>(fan.range_max);
+  out->resizeScanAndAssign(scan.ranges.size(), 0.0F, false);
+  for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
+    if (!std::isfinite(scan.ranges[i])) continue;
+    out->setScanRange(i, scan.ranges[i]);
+    out->setScanRangeValidity(i, true);
+  }
+  return out;
+}
+
+}  // namespace
+
+CObservation2DRangeScan::Ptr likelihoodObservation(const Scan& scan) {
+  return observation(scan, scan.ranges.size() - 1);
+}
+
+CObservation2DRangeScan::Ptr insertionObservation(const Scan& scan, double free_range) {
+  // MRPT 2.5.8 divides the aperture of n beams by n when it inserts, but by n - 1 when it makes points of it:
+  // with one observation for both, the map would be turned against the likelihood, by a beam at the last one.
+  auto out = observation(scan, scan.ranges.size());
+  for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
+    if (!std::isinf(scan.ranges[i])) continue;
+    // A valid reading beyond the grid's limit: free up to the limit, and no wall at its end.
+    out->setScanRange(i, static_cast<float>(2 * free_range));
+    out->setScanRangeValidity(i, true);
+  }
+  return out;
+}
+
+}  // namespace kurumaisu

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "slam/settings.h"
+
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+
+namespace kurumaisu {
+namespace {
+
+/// Calls visit(name, member, lower bound, upper bound) for every setting.
+template <typename Visit>
+void visitSettings(MapperSettings& s, Visit&& visit) {
+  visit("match_iterations", s.match.iterations, 1, 100);
+  visit("match_every", s.match.every, 1, 100);
+  visit("match_reach", s.match.reach, 0.01, 10);
+  visit("match_deviation", s.match.deviation, 1e-3, 1);
+  visit("match_key_distance", s.match.key_distance, 0, 100);
+  visit("match_key_angle", s.match.key_angle, 0, 10);
+  visit("match_key_scans", s.match.key_scans, 1, 1000);
+  visit("match_prior_distance", s.match.prior_distance, 0, 10);
+  visit("match_prior_angle", s.match.prior_angle, 0, 10);
+  visit("match_prior_floor", s.match.prior_floor, 1e-6, 10);
+  visit("match_prior_angle_floor", s.match.prior_angle_floor, 1e-6, 10);
+  visit("slip_gain", s.slip_gain, 0, 1);
+  visit("resolution", s.resolution, 0.005, 1);
+  visit("range", s.range, 0.1, 200);
+  visit("certainty", s.certainty, 0.51, 0.99);
+  visit("particles", s.particles, 1, 10000);
+  visit("localise_distance", s.localise_distance, 0, 100);
+  visit("localise_angle", s.localise_angle, 0, 10);
+  visit("insert_distance", s.insert_distance, 0, 100);
+  visit("insert_angle", s.insert_angle, 0, 10);
+  visit("distance_per_distance", s.distance_per_distance, 0, 10);
+  visit("distance_per_angle", s.distance_per_angle, 0, 10);
+  visit("angle_per_distance", s.angle_per_distance, 0, 10);
+  visit("angle_per_angle", s.angle_per_angle, 0, 10);
+  visit("distance_floor", s.distance_floor, 1e-6, 10);
+  visit("angle_floor", s.angle_floor, 1e-6, 10);
+  visit("hit_deviation", s.hit_deviation, 1e-3, 10);
+  visit("hit_reach", s.hit_reach, 1e-2, 10);
+  visit("hit_share", s.hit_share, 0.01, 0.999);
+  visit("hit_every", s.hit_every, 1, 1000);
+  visit("likelihood_power", s.likelihood_power, 1e-3, 10);
+  visit("resample_below", s.resample_below, 0, 1);
+}
+
+void assign(double value, double& member) { member = value; }
+void assign(double value, int& member) {
+  if (value != std::nearbyint(value)) throw std::invalid_argument("must be a whole number");
+  member = static_cast<int>(value);
+}
+
+}  // namespace
+
+std::vector<std::string> settingNames() {
+  std::vector<std::string> names;
+  MapperSettings settings{};
+  visitSettings(settings, [&names](const char* name, const auto& /*member*/, double, double) {
+    names.emplace_back(name);
+  });
+  return names;
+}
+
+MapperSettings makeSettings(const std::function<double(const std::string&)>& value_of) {
+  MapperSettings settings{};
+  visitSettings(settings, [&value_of](const std::string& name, auto& member, double lower, double upper) {
+    const double value = value_of(name);
+    std::ostringstream text;
+    if (!(value >= lower && value <= upper)) {
+      text << name << ": must be " << lower << " to " << upper << ": " << value;
+      throw std::invalid_argument(text.str());
+    }
+    try {
+      assign(value, member);
+    } catch (const std::invalid_argument& error) {
+      text << name << ": " << error.what() << ": " << value;
+      throw std::invalid_argument(text.str());
+    }
+  });
+  return settings;
+}
+
+}  // namespace kurumaisu
