@@ -141,8 +141,8 @@ class Bag:
         )
 
 
-def write_bag(path, run, *, compression=None, stamped=True, late=0.0):
-    """Write a full run; late: how long after the stamp a message is received [s]."""
+def write_bag(path, run, *, compression=None, stamped=True, late=0.0, slash="/"):
+    """Write a full run; late: how long after the stamp a message is received [s]; slash: what topics begin with."""
     bag = Bag(path, compression)
     to_message = {
         "/voltages": (run.voltage, lambda t, row: bag.voltages(t, *row)),
@@ -166,7 +166,7 @@ def write_bag(path, run, *, compression=None, stamped=True, late=0.0):
     for t, (bar,) in zip(tyre.t, tyre.values, strict=True):
         messages.append((t, "/tyre_pressure", bag.make("std_msgs/msg/Float64", data=bar)))
     for received, topic, message in sorted(messages, key=lambda item: item[0]):
-        bag.write(topic, message, received)
+        bag.write(slash + topic[1:], message, received)
     bag.writer.close()
 
 

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from kurumaisu import geometry
 from kurumaisu.bench import hidden_effect
 from kurumaisu.bench.critic import recording
 from kurumaisu.critic import drive, evidence, pipeline, replay
+from kurumaisu.critic.recording import Series
 from kurumaisu.critic.verdict import read_verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
@@ -94,6 +96,34 @@ def test_one_run_is_judged_on_the_parts_held_out():
     verdict = criticise(replace(data, runs=data.runs[:1], train=data.train[:1])).verdict
     assert [cause.id for cause in verdict.causes] == ["base.gain_v"]
     assert verdict.gain.log_density_per_sample.lo90 > 0
+
+
+def with_jittered_odometry(data, gain):
+    """The commands integrated as odometry whose heading is stamped up to 0.1 s off: noise in the input itself."""
+    runs = []
+    for run in data.runs:
+        rng = np.random.default_rng(len(runs))
+        times = np.arange(0.0, run.pose.t[-1], 0.25)
+        truth = geometry.interpolate(run.pose.t, run.pose.values, times + rng.uniform(-0.1, 0.1, len(times)))
+        steps = geometry.between(truth[:-1], truth[1:]) / [1, 1, 1 + gain]
+        poses = [np.zeros(3)]
+        for step in steps:
+            poses.append(geometry.compose(poses[-1], step))
+        odom = Series(times, np.column_stack([poses, np.zeros((len(times), 2))]), ("x", "y", "theta", "v", "w"))
+        runs.append(replace(run, odom=odom, voltage=None, command=None))
+    return replace(data, runs=tuple(runs), truth=None)
+
+
+def test_noise_of_the_odometry_does_not_pass_for_a_gain():
+    data = with_jittered_odometry(recording(None, 0.0, 98, 60.0), 0.0)
+    assert criticise(data).verdict.verdict == "none"
+
+
+def test_a_gain_of_the_odometry_is_named():
+    data = with_jittered_odometry(recording(None, 0.0, 98, 60.0), 0.1)
+    verdict = criticise(data).verdict
+    assert [cause.id for cause in verdict.causes] == ["base.gain_w"]
+    assert verdict.causes[0].parameters["gain"].estimate == pytest.approx(0.1, abs=0.03)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@
 import json
 
 import pytest
+
 from kurumaisu.bench.critic import recording
 from kurumaisu.critic.cli import main
 from kurumaisu.critic.write_csv import write_csv_run

@@ -38,6 +38,14 @@ def test_a_twist_without_a_stamp_counts_when_received(tmp_path):
     assert_same(run, read_recording(tmp_path).runs[0], atol=1e-12)
 
 
+def test_topics_recorded_by_relative_names_count_too(tmp_path):
+    """As `rosbag record scan odom` writes them."""
+    run = full_run()
+    (tmp_path / "meta.yaml").write_text(META)
+    write_bag(tmp_path / "run_1.bag", run, slash="")
+    assert_same(run, read_recording(tmp_path).runs[0], atol=1e-12)
+
+
 def test_stamps_of_another_clock_forbid_a_verdict(tmp_path):
     (tmp_path / "meta.yaml").write_text(META)
     write_bag(tmp_path / "run_1.bag", full_run(), stamped=False, late=30.0)

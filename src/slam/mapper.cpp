@@ -51,6 +51,9 @@ class Mapper::Impl {
       throw std::invalid_argument("a scan of " + std::to_string(raw.stamp) + " s after one of " +
                                   std::to_string(steps_.back().stamp) + " s");
     }
+    for (const double value : {start.x, start.y, start.theta, end.x, end.y, end.theta, raw.stamp}) {
+      if (!std::isfinite(value)) throw std::invalid_argument("odometry and stamp must be finite");
+    }
     const bool first = steps_.empty();
     const Pose2D motion = first ? start : between(odom_, start);
     const double duration = first ? 0 : raw.stamp - steps_.back().stamp;

@@ -22,6 +22,7 @@ from kurumaisu.critic.verdict import Cause, Estimate, Gain, Kind, Verdict
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
+_MINUTE = 60.0  # [s]
 _NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
@@ -74,7 +75,7 @@ def criticism(
     story = Story(
         recording=recording.name,
         model=problem.model.name,
-        headline=_headline(verdict, best),
+        headline=_headline(verdict, best, found.p),
         details=_details(problem, found, drives, shares, matters),
         pose_source=_pose_source(recording),
         provenance=_provenance(),
@@ -84,7 +85,7 @@ def criticism(
         misfits=misfit.figures(problem, best.settings, sorted(best.ids)),
         rivals=_rivals(found),
         noise=_noise(problem),
-        unexplained=misfit.remaining(problem, best),
+        unexplained=(*_suspects(found), *misfit.remaining(problem, best)),
     )
     return Criticism(verdict, story, problem.model, (*settings, process_noise(problem.noise)))
 
@@ -117,7 +118,7 @@ def _estimate(model: Model, term: Term, value: float, sd: float) -> Estimate:
     return Estimate(float(value), max(low, term.parameter.lower), min(high, term.parameter.upper), unit)
 
 
-def _headline(verdict: Verdict, best: Fit) -> str:
+def _headline(verdict: Verdict, best: Fit, p: dict[str, float]) -> str:
     if verdict.verdict == "named":
         text = "; ".join(_sentence(cause.id) for cause in verdict.causes)
         return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in verdict.causes)})."
@@ -126,6 +127,9 @@ def _headline(verdict: Verdict, best: Fit) -> str:
         return f"Something is missing in the model, but these drives cannot tell which: {group}."
     if best.ids:
         return f"Nothing that matters: {', '.join(sorted(best.ids))} is detectable, but too small to gain anything."
+    nearest = max(p, key=lambda name: p[name])
+    if p[nearest] >= naming.RIVAL:
+        return f"Nothing can be named: noise explains these drives as well. The nearest suspect is {nearest}."
     return "Nothing is missing in the model that these drives could show."
 
 
@@ -147,9 +151,22 @@ def _details(
             f"{term.id}: {term.parameter.name} {e.estimate:.3g} {e.unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
             f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."
         )
+    wander = np.degrees(problem.noise.sd_w * np.sqrt(2 * problem.noise.tau * _MINUTE))
+    details.append(
+        f"Besides, the yaw rate fluctuates so that the heading wanders by {wander:.1f} deg (sd) in a minute."
+    )
     alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
     details.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
     return tuple(details)
+
+
+def _suspects(found: Naming) -> tuple[str, ...]:
+    """Return a sentence on the effects that may act, for all that these drives show."""
+    some = sorted((name for name in found.p if naming.RIVAL <= found.p[name] < naming.NAMED), key=lambda n: -found.p[n])
+    if not some:
+        return ()
+    listed = ", ".join(f"{name} ({found.p[name]:.2f})" for name in some)
+    return (f"Not certain enough to be named (probability): {listed}. More drives that excite them would decide.",)
 
 
 def _rivals(found: Naming) -> tuple[Rival, ...]:
@@ -163,7 +180,9 @@ def _rivals(found: Naming) -> tuple[Rival, ...]:
 
 def _rival(fit: Fit, best: Fit) -> Rival:
     likelihood = fit.log_likelihood - best.log_likelihood
-    if fit.ids > best.ids:
+    if fit.score > best.score:
+        why = f"fits better by {likelihood:.1f} nats, too little for one more effect, which is rare beforehand"
+    elif fit.ids > best.ids:
         why = f"fits better by {likelihood:.1f} nats, less than another effect costs"
     elif fit.ids < best.ids or likelihood < 0:
         why = f"leaves {-likelihood:.1f} nats unexplained"

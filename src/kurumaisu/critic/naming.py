@@ -14,7 +14,7 @@ from kurumaisu.critic.evidence import Fit, Problem, occam
 from kurumaisu.types import FloatArray
 
 NAMED = 0.9  # posterior from which a cause is named
-_RIVAL = 0.05  # posterior from which an effect counts as a rival of another
+RIVAL = 0.05  # posterior from which an effect counts as a rival of another
 _PRIOR = 0.1  # of any one effect to be at work, before the data
 _LARGEST = 3  # effects in a set that the linear scan tries; larger sets grow from the best ones
 _REFITS = 8  # sets refitted after each scan
@@ -146,7 +146,7 @@ def _posterior(fits: list[Fit], ids: tuple[str, ...]) -> dict[str, float]:
 def _confounded(best: Fit, p: dict[str, float]) -> tuple[tuple[str, ...], ...]:
     """Return the best set's uncertain effects, each with the rivals that could stand in for it."""
     uncertain = sorted(name for name in best.ids if p[name] < NAMED)
-    rivals = sorted(name for name in p if name not in best.ids and p[name] >= _RIVAL)
+    rivals = sorted(name for name in p if name not in best.ids and p[name] >= RIVAL)
     group = tuple(uncertain + rivals)
     return (group,) if uncertain and len(group) > 1 else ()
 

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What mapping_node reads from its parameters.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "params.h"
+#include "slam/settings.h"
+
+namespace kurumaisu {
+
+struct MappingNodeSettings {
+  std::string map_frame;
+  std::string odom_frame;
+  std::string base_frame;
+  double map_period;           ///< least time between two maps [s]
+  double transform_period;     ///< between two map -> odom [s]
+  double transform_tolerance;  ///< map -> odom is stamped so far ahead [s]
+  double transform_deadline;   ///< a scan waits for its transforms so long at most [s]
+  std::uint32_t seed;
+  MapperSettings mapper;
+};
+
+/// Reads everything under an absolute name. Throws std::invalid_argument naming the key.
+inline MappingNodeSettings readMappingNodeSettings(const std::string& name) {
+  Section top = Section::load(name);
+  Section node = top.section("node");
+  Section mapper = top.section("mapper");
+  top.end();
+  MappingNodeSettings settings{node.text("map_frame"),
+                               node.text("odom_frame"),
+                               node.text("base_frame"),
+                               node.above("map_period", 0),
+                               node.above("transform_period", 0),
+                               node.atLeast("transform_tolerance", 0),
+                               node.above("transform_deadline", 0),
+                               static_cast<std::uint32_t>(node.integer("seed", 0)),
+                               {}};
+  node.end();
+  std::map<std::string, double> values;
+  for (const std::string& key : settingNames()) values[key] = mapper.number(key);
+  mapper.end();
+  try {
+    settings.mapper = makeSettings([&values](const std::string& key) { return values.at(key); });
+  } catch (const std::invalid_argument& error) {
+    throw mapper.error("", error.what());
+  }
+  return settings;
+}
+
+}  // namespace kurumaisu
