@@ -33,9 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     world = load_world(shipped("worlds/building.world"))
     laser = load_model(shipped("launch/md100.yaml")).laser
     rounds = [drive(world, seed, options.seconds) for seed in range(1, options.seeds + 1)]
-    title = (
-        f"round in {world.name}, uneven floor, {options.seeds} seeds: median (worst)"
-    )
+    title = f"round in {world.name}, uneven floor, {options.seeds} seeds: median (worst)"
     table = Table(title, "path by", "position [m]     ", "heading [deg]    ", "map to wall [m]  ", "CPU [ms/scan]")
     table.row("odometry", *_spread([slam_score.trajectory_error(log.odom, truth) for log, truth in rounds]), "-", "-")
     for name, error in (("filter, readings as they are", None), ("filter, mean error taken out", laser.error)):
