@@ -6,7 +6,7 @@ source "$(dirname "$0")/../scripts/environment.bash"   # without it, .ws would b
 workspace=$root/.ws/tools
 rm -rf "$workspace"
 mkdir -p "$workspace/src"
-link_package "$workspace/src/kurumaisu"
+ln -s "$root/.ws/src/kurumaisu" "$workspace/src/kurumaisu"
 catkin config --workspace "$workspace" --init --no-extend --install \
   --cmake-args "-DPYTHON_EXECUTABLE=$root/.venv/bin/python" -DCMAKE_BUILD_TYPE=Debug -DCATKIN_ENABLE_TESTING=OFF
 catkin build --workspace "$workspace" --no-status --no-notify --force-cmake --jobs "$(jobs)"

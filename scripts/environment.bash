@@ -12,13 +12,3 @@ jobs() {   # how many compilers at once: one per core, but a unit that includes 
   [ "${room:-1}" -lt "$cores" ] || room=$cores
   printf '%d' $((room > 1 ? room : 1))
 }
-
-# link_package FOLDER: makes FOLDER a package whose parts are this tree's. Not a link to the tree itself: rosrun looks for
-# programs below the package and would find those of .ws, too, and ask which is meant.
-link_package() {
-  local part
-  rm -rf "$1"
-  mkdir -p "$1"
-  for part in CMakeLists.txt setup.py launch msg scripts src tests worlds; do ln -s "$root/$part" "$1/$part"; done
-  cp -p "$root/package.xml" "$1"   # it is installed as it is: a link would be installed as a link
-}

@@ -5,8 +5,6 @@
 import math
 import subprocess
 import sys
-import threading
-import time
 import unittest
 from pathlib import Path
 
@@ -22,37 +20,9 @@ from std_srvs.srv import Empty
 
 from kurumaisu.params import load_model
 from kurumaisu.ros.messages import yaw_of
+from kurumaisu.ros.testing import Topic, wait_for
 
 STEP = rospy.Duration(0, 10_000_000)
-
-
-class Topic:
-    """Everything heard on a topic; waits with a deadline of wall time."""
-
-    def __init__(self, name, kind):
-        self.messages = []
-        self._changed = threading.Condition()
-        rospy.Subscriber(name, kind, self._hear)
-
-    def _hear(self, message):
-        with self._changed:
-            self.messages.append(message)
-            self._changed.notify_all()
-
-    def wait(self, found, seconds=20.0):
-        """Return the first message, from now on or heard before, that satisfies found."""
-        deadline = time.monotonic() + seconds
-        seen = 0
-        with self._changed:
-            while True:
-                for message in self.messages[seen:]:
-                    if found(message):
-                        return message
-                seen = len(self.messages)
-                remaining = deadline - time.monotonic()
-                if remaining <= 0:
-                    raise AssertionError(f"no such message within {seconds} s, among {seen}")
-                self._changed.wait(remaining)
 
 
 def pose_of(odometry):
@@ -110,11 +80,7 @@ class SimNodeTest(BadConfiguration, unittest.TestCase):
         cls.truth = Topic("ground_truth", Odometry)
         cls.scan = Topic("scan", LaserScan)
         cls.voltages = rospy.Publisher("voltages", Voltages, queue_size=10)
-        deadline = time.monotonic() + 20
-        while cls.voltages.get_num_connections() == 0:
-            if time.monotonic() > deadline:
-                raise AssertionError("sim_node does not listen to voltages")
-            rospy.rostime.wallsleep(0.01)
+        wait_for(lambda: cls.voltages.get_num_connections(), "sim_node listens to voltages")
 
     def send(self, stamp, v, w):
         message = Voltages(
@@ -132,11 +98,11 @@ class SimNodeTest(BadConfiguration, unittest.TestCase):
         rospy.wait_for_service("reset", timeout=20)
         rospy.ServiceProxy("reset", Empty)()
         newest = self.clock.messages[-1].clock if self.clock.messages else rospy.Time(0)
-        return self.clock.wait(lambda m: m.clock > newest).clock
+        return self.clock.wait(lambda m: m.clock > newest, "the clock runs on after a reset").clock
 
     def test_clock_advances_step_by_step(self):
-        first = self.clock.wait(lambda _: True)
-        self.clock.wait(lambda m: m.clock >= first.clock + rospy.Duration(2))
+        first = self.clock.wait(lambda _: True, "the clock")
+        self.clock.wait(lambda m: m.clock >= first.clock + rospy.Duration(2), "2 s later")
         stamps = np.array([m.clock.to_nsec() for m in self.clock.messages])
         np.testing.assert_array_less(0, np.diff(stamps) + 1)
         assert int(np.median(np.diff(stamps))) == STEP.to_nsec()
@@ -147,11 +113,11 @@ class SimNodeTest(BadConfiguration, unittest.TestCase):
         v, w, seconds = 0.4, -0.6, 2
         self.send(start, v, w)
         self.send(start + rospy.Duration(seconds), 0.0, 0.0)
-        moving = self.truth.wait(lambda m: m.header.stamp > start + rospy.Duration(1))
+        moving = self.truth.wait(lambda m: m.header.stamp > start + rospy.Duration(1), "the truth on the arc")
         assert moving.twist.twist.linear.x == pytest.approx(v, abs=1e-9)
         assert moving.twist.twist.angular.z == pytest.approx(w, abs=1e-9)
         assert (moving.header.frame_id, moving.child_frame_id) == ("map", "base_link")
-        rest = self.truth.wait(lambda m: m.header.stamp > start + rospy.Duration(seconds + 1))
+        rest = self.truth.wait(lambda m: m.header.stamp > start + rospy.Duration(seconds + 1), "the truth at rest")
         turned = w * seconds
         expected = [1.5 + v / w * math.sin(turned), 2.0 + v / w * (1 - math.cos(turned)), turned]
         np.testing.assert_allclose(pose_of(rest), expected, atol=1e-9)
@@ -159,20 +125,21 @@ class SimNodeTest(BadConfiguration, unittest.TestCase):
     def test_silence_holds_the_last_voltages(self):
         start = self.reset() + rospy.Duration(0, 500_000_000)
         self.send(start, 0.1, 0.0)
-        later = self.truth.wait(lambda m: m.header.stamp > start + rospy.Duration(3))
+        later = self.truth.wait(lambda m: m.header.stamp > start + rospy.Duration(3), "the truth 3 s later")
         assert later.twist.twist.linear.x == pytest.approx(0.1, abs=1e-9)
 
     def test_reset_brings_back_the_start_while_the_clock_runs_on(self):
-        self.send(self.reset(), 0.3, 0.0)
-        moved = self.truth.wait(lambda m: pose_of(m)[0] > 1.7 and m.header.stamp > self.clock.messages[0].clock)
+        start = self.reset()
+        self.send(start, 0.3, 0.0)
+        moved = self.truth.wait(lambda m: pose_of(m)[0] > 1.7 and m.header.stamp > start, "the chair has moved")
         after = self.reset()
         assert after > moved.header.stamp
-        again = self.truth.wait(lambda m: m.header.stamp > after)
+        again = self.truth.wait(lambda m: m.header.stamp > after, "the truth after the reset")
         np.testing.assert_allclose(pose_of(again), [1.5, 2.0, 0.0], atol=1e-9)
 
     def test_scan_at_the_start(self):
         after = self.reset()
-        scan = self.scan.wait(lambda m: m.header.stamp > after)
+        scan = self.scan.wait(lambda m: m.header.stamp > after, "a scan after the reset")
         laser = self.model.laser
         assert len(scan.ranges) == 682
         assert scan.header.frame_id == "laser"
@@ -193,8 +160,9 @@ class SimNodeTest(BadConfiguration, unittest.TestCase):
             assert np.std((ranges[beams] - mean) / sigma) > 0.7
 
     def test_scans_and_truth_share_stamps(self):
-        scan = self.scan.wait(lambda m: m.header.stamp > rospy.Time(2))
-        self.truth.wait(lambda m: m.header.stamp == scan.header.stamp)
+        scan = self.scan.wait(lambda m: m.header.stamp > rospy.Time(2), "a scan")
+        # Not wait: the truth at the first beam comes before the scan, which ends with the last.
+        wait_for(lambda: any(m.header.stamp == scan.header.stamp for m in self.truth.messages), "the scan's truth")
 
     def test_the_laser_is_where_the_model_says(self):
         buffer = tf2_ros.Buffer()

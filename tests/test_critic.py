@@ -9,7 +9,7 @@ from scipy.integrate import trapezoid
 
 from kurumaisu import geometry
 from kurumaisu.bench import hidden_effect
-from kurumaisu.bench.critic import recording
+from kurumaisu.bench.critic import recording, recording_of
 from kurumaisu.critic import drive, evidence, pipeline, replay
 from kurumaisu.critic.recording import Series
 from kurumaisu.critic.verdict import read_verdict
@@ -96,6 +96,20 @@ def test_one_run_is_judged_on_the_parts_held_out():
     verdict = criticise(replace(data, runs=data.runs[:1], train=data.train[:1])).verdict
     assert [cause.id for cause in verdict.causes] == ["base.gain_v"]
     assert verdict.gain.log_density_per_sample.lo90 > 0
+
+
+def test_what_the_drives_cannot_separate_is_said_as_a_set():
+    """At one speed, a gain and a dead zone of v take the same share of it."""
+    drives = []
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        starts = np.cumsum(rng.uniform(2.0, 4.0, 12))
+        command = np.array([(t, 0.4 * (i % 2 == 0), 0.0) for i, t in enumerate(starts)])
+        drives.append(hidden_effect.drive(command, "base.gain_v", 0.05, rng))
+    verdict = criticise(recording_of("one speed", drives)).verdict
+    assert verdict.verdict == "confounded"
+    assert verdict.causes == ()
+    assert [set(group) for group in verdict.confounded] == [{"base.gain_v", "base.dead_zone_v"}]
 
 
 def with_jittered_odometry(data, gain):

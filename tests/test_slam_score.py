@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kurumaisu import geometry, slam_score
+from kurumaisu.maps import Grid
 
 
 def path(n, seed):
@@ -39,3 +40,13 @@ def test_distance_to_walls_by_hand():
     walls = np.array([[0.0, 0.0, 2.0, 0.0], [5.0, 5.0, 5.0, 5.0]])
     points = np.array([[1.0, 0.3], [-3.0, 4.0], [2.5, 0.0], [5.0, 4.9]])
     np.testing.assert_allclose(slam_score.distance_to_walls(points, walls), [0.3, 5.0, 0.5, 0.1], atol=1e-12)
+
+
+def test_map_error_of_a_map_turned_and_moved_in_the_world():
+    """A wall of cells along x = 1.05 in the map; in the world it lies along y = 3.05, the true wall along y = 3."""
+    cells = np.zeros((10, 30), dtype=np.int8)
+    cells[:, 10] = 100
+    cells[0, 0] = -1
+    grid = Grid(cells, 0.1, 0.0, 0.0)
+    error = slam_score.map_error(grid, np.array([5.0, 2.0, np.pi / 2]), np.array([[0.0, 3.0, 9.0, 3.0]]))
+    np.testing.assert_allclose(error, np.full(10, 0.05), atol=1e-9)

@@ -105,10 +105,22 @@ def load_model(path: Path) -> Model:
         reference_voltage=top.number("reference_voltage"),
         chassis=_chassis(top.section("chassis")),
         laser=_laser(top.section("laser")),
-        effects=tuple(_effect(item) for item in top.items("effects")),
+        effects=effects_of(top),
     )
     top.end()
     return model
+
+
+def effects_of(section: settings.Section) -> tuple[EffectSetting, ...]:
+    """Take a section's required list `effects: [{id: ..., parameters: {...}}]`. Raise Error naming file and key."""
+    return tuple(_effect(item) for item in section.items("effects"))
+
+
+def _effect(item: settings.Section) -> EffectSetting:
+    parameters = item.section("parameters")
+    setting = EffectSetting(item.text("id"), {name: parameters.number(name) for name in parameters.names()})
+    item.end()
+    return setting
 
 
 def _voltage_law(law: settings.Section) -> tuple[AxisLaw, AxisLaw]:
@@ -169,13 +181,6 @@ def _laser(section: settings.Section) -> Laser:
     for part in (mount, error, section):
         part.end()
     return laser
-
-
-def _effect(section: settings.Section) -> EffectSetting:
-    parameters = section.section("parameters")
-    setting = EffectSetting(section.text("id"), {name: parameters.number(name) for name in parameters.names()})
-    section.end()
-    return setting
 
 
 def follow_commands(model: Model) -> Model:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kurumaisu import _slam, settings
-from kurumaisu._slam import Fan
+from kurumaisu._slam import Fan as Fan
 from kurumaisu.errors import Error
 from kurumaisu.geometry import interpolate
 from kurumaisu.maps import Grid

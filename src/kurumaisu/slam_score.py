@@ -6,7 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu import geometry
+from kurumaisu.maps import Grid
 from kurumaisu.types import FloatArray
+
+_WALL = 65  # [%] occupancy from which a cell counts as wall, as in map_server
 
 
 def align(estimate: FloatArray, truth: FloatArray) -> FloatArray:
@@ -24,6 +27,15 @@ def trajectory_error(estimate: FloatArray, truth: FloatArray) -> tuple[float, fl
     position = np.sqrt(np.mean(np.sum((aligned - truth)[:, :2] ** 2, axis=1)))
     heading = np.sqrt(np.mean(geometry.wrap((aligned - truth)[:, 2]) ** 2))
     return float(position), float(heading)
+
+
+def map_error(grid: Grid, world_from_map: FloatArray, segments: FloatArray) -> FloatArray:
+    """Return the distance [m] of every wall cell of a map to the nearest of the true walls (m, 4) of the world."""
+    rows, columns = np.nonzero(grid.cells > _WALL)
+    x, y = grid.x + (columns + 0.5) * grid.resolution, grid.y + (rows + 0.5) * grid.resolution
+    centres = np.column_stack([x, y, np.zeros(len(x))])
+    in_world = geometry.compose(np.broadcast_to(world_from_map, centres.shape), centres)
+    return distance_to_walls(in_world[:, :2], segments)
 
 
 def distance_to_walls(points: FloatArray, segments: FloatArray) -> FloatArray:

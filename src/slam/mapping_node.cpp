@@ -51,8 +51,10 @@ geometry_msgs::TransformStamped stamped(const k::Pose2D& pose, const ros::Time& 
   return out;
 }
 
-/// Throws std::invalid_argument for a laser that does not look into the plane.
-k::Scan scanOf(const sensor_msgs::LaserScan& message, const Planar& base_from_laser) {
+/// A scan without the mean error of its readings: left in, it would draw the map apart and pull the matcher along
+/// corridors. Throws std::invalid_argument for a laser that does not look into the plane.
+k::Scan scanOf(const sensor_msgs::LaserScan& message, const Planar& base_from_laser,
+               const k::LaserError& error) {
   if (std::abs(base_from_laser.up) < kLevel) throw std::invalid_argument("the laser is tilted");
   const double turn = base_from_laser.up > 0 ? 1 : -1;
   k::Scan scan{message.header.stamp.toSec(),
@@ -60,7 +62,8 @@ k::Scan scanOf(const sensor_msgs::LaserScan& message, const Planar& base_from_la
                 message.range_max, base_from_laser.pose},
                message.ranges};
   for (float& range : scan.ranges) {
-    if (range < message.range_min) range = std::numeric_limits<float>::quiet_NaN();
+    const bool near = range < message.range_min;
+    range = near ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(error.range(range));
   }
   return scan;
 }
@@ -172,7 +175,8 @@ void MappingNode::add(const sensor_msgs::LaserScan& message) try {
   const ros::Time end = start + ros::Duration(message.time_increment * (message.ranges.size() - 1.0));
   const k::Pose2D first = at(settings_.odom_frame, settings_.base_frame, start).pose;
   const k::Pose2D last = at(settings_.odom_frame, settings_.base_frame, end).pose;
-  const k::Scan scan = scanOf(message, at(settings_.base_frame, message.header.frame_id, start));
+  const k::Scan scan =
+      scanOf(message, at(settings_.base_frame, message.header.frame_id, start), settings_.laser_error);
   const auto estimate = mapper_->add(scan, first, last);
   map_from_odom_ = k::compose(estimate.map_from_base, k::between(first, {0, 0, 0}));
   last_scan_ = start;

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <vector>
 
+#include "model/laser_error.h"
 #include "params.h"
 #include "slam/settings.h"
 
@@ -21,13 +23,32 @@ struct MappingNodeSettings {
   double transform_deadline;   ///< a scan waits for its transforms so long at most [s]
   std::uint32_t seed;
   MapperSettings mapper;
+  LaserError laser_error;  ///< of the model file: its mean is taken out of the readings
 };
+
+/// Reads laser.error of a model file; the rest of it has other readers.
+inline LaserError readLaserError(Section model) {
+  Section laser = model.section("laser");
+  Section section = laser.section("error");
+  const std::vector<double> sigma = section.numbers("sigma", 3);
+  const LaserError error{section.number("scale"),        section.number("datum_offset"),
+                         {sigma[0], sigma[1], sigma[2]}, section.number("resolution"),
+                         section.number("range_min"),    section.number("range_max")};
+  section.end();
+  try {
+    validate(error);
+  } catch (const std::invalid_argument& problem) {
+    throw section.error("", problem.what());
+  }
+  return error;
+}
 
 /// Reads everything under an absolute name. Throws std::invalid_argument naming the key.
 inline MappingNodeSettings readMappingNodeSettings(const std::string& name) {
   Section top = Section::load(name);
   Section node = top.section("node");
   Section mapper = top.section("mapper");
+  const LaserError laser_error = readLaserError(top.section("model"));
   top.end();
   MappingNodeSettings settings{node.text("map_frame"),
                                node.text("odom_frame"),
@@ -37,7 +58,8 @@ inline MappingNodeSettings readMappingNodeSettings(const std::string& name) {
                                node.atLeast("transform_tolerance", 0),
                                node.above("transform_deadline", 0),
                                static_cast<std::uint32_t>(node.integer("seed", 0)),
-                               {}};
+                               {},
+                               laser_error};
   node.end();
   std::map<std::string, double> values;
   for (const std::string& key : settingNames()) values[key] = mapper.number(key);

@@ -42,19 +42,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def recording(effect: str | None, size: float, seed: int, seconds: float) -> Recording:
     """Return a recording of several runs with a hidden effect, or none."""
-    names = tuple(f"run_{i + 1}" for i in range(_RUNS))
-    runs = []
-    for i, name in enumerate(names):
-        tables = hidden_effect.make_run(effect, size, seed * _RUNS + i, seconds)
-        runs.append(
-            Run(
-                name,
-                command=_series(tables["command"], "v", "w"),
-                voltage=_series(tables["voltage"], "v_f", "v_s"),
-                pose=_series(tables["pose"], "x", "y", "theta"),
-            )
+    tables = [hidden_effect.make_run(effect, size, seed * _RUNS + i, seconds) for i in range(_RUNS)]
+    return recording_of(f"hidden {seed}", tables)
+
+
+def recording_of(name: str, drives: Sequence[dict[str, FloatArray]]) -> Recording:
+    """Return a recording of the tables of some drives."""
+    runs = tuple(
+        Run(
+            f"run_{i}",
+            command=_series(tables["command"], "v", "w"),
+            voltage=_series(tables["voltage"], "v_f", "v_s"),
+            pose=_series(tables["pose"], "x", "y", "theta"),
         )
-    return Recording(f"hidden {seed}", tuple(runs), train=names)
+        for i, tables in enumerate(drives, start=1)
+    )
+    return Recording(name, runs, train=tuple(run.name for run in runs))
 
 
 def _series(table: FloatArray, *columns: str) -> Series:

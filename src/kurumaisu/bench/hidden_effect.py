@@ -46,9 +46,13 @@ def draw_size(effect: str, rng: np.random.Generator) -> float:
 def make_run(effect: str | None, size: float, seed: int, seconds: float) -> dict[str, FloatArray]:
     """Return one drive as tables: command (t, v, w), voltage (t, v_f, v_s), pose (t, x, y, theta) at 10 Hz."""
     rng = np.random.default_rng(seed)
-    command = joystick(seconds, rng)
+    return drive(joystick(seconds, rng), effect, size, rng)
+
+
+def drive(command: FloatArray, effect: str | None, size: float, rng: np.random.Generator) -> dict[str, FloatArray]:
+    """Return the tables of a drive whose commands (n, 3) of t, v, w are given; the last one is rest."""
     voltage = np.array([[t, _volts(v, _FORWARD), _volts(w, _STEER)] for t, v, w in command])
-    steps = round((seconds + 1.0) / _STEP)
+    steps = round((command[-1, 0] + 1.0) / _STEP)
     asked = command[np.searchsorted(command[:, 0], np.arange(steps) * _STEP, side="right") - 1, 1:]
     noise = _ornstein_uhlenbeck(steps, rng)
     chair = _Chair(effect, size)

@@ -52,7 +52,9 @@ def read_topics(path: Path, parts: dict[str, str]) -> dict[str, Topic]:
     try:
         with _Reader(path) as reader:
             chosen = [connection for connection in reader.connections if _absolute(connection.topic) in parts]
-            convert = {connection.id: _converter(path, parts[_absolute(connection.topic)], connection) for connection in chosen}
+            convert = {
+                connection.id: _converter(path, parts[_absolute(connection.topic)], connection) for connection in chosen
+            }
             for connection, received, data in reader.messages(chosen) if chosen else ():
                 part = parts[_absolute(connection.topic)]
                 topic = found.setdefault(part, Topic(connection.topic, _ros(connection.msgtype)))
@@ -88,10 +90,10 @@ class _Reader(Reader):
                 indexes[connection].append(IndexData(seconds * 1_000_000_000 + ns, pos, offset))
 
 
-
 def _absolute(topic: str) -> str:
     """Return a topic's absolute name: rosbag records a relative one as it was typed."""
     return f"/{topic.lstrip('/')}"
+
 
 def _converter(path: Path, part: str, connection: Any) -> Callable[[bytes], tuple[Any, Any]]:
     """Return a function from raw data to a message and its row, built from the bag's own definition."""

@@ -44,12 +44,15 @@ class Drive:
         return geometry.between(self.poses[:-1], self.poses[1:])
 
 
-def prepare(run: Run, model: Model) -> Drive:
-    """Return the drive of a run. Raise Error when it has no reference pose or nothing that drove the robot."""
+def prepare(run: Run, model: Model, interval: float | None = None) -> Drive:
+    """Return the drive of a run; interval: least time between its poses [s] (default: POSE_INTERVAL).
+
+    Raise Error when it has no reference pose or nothing that drove the robot.
+    """
     if run.pose is None:
         raise Error(f"{run.name}: has no reference pose")
     source, times, v, w = _inputs(run, model)
-    pose_times, poses = _thin(run.pose, times[0], POSE_INTERVAL[source])
+    pose_times, poses = _thin(run.pose, times[0], interval or POSE_INTERVAL[source])
     if len(pose_times) < 3:
         raise Error(
             f"{run.name}: has {len(pose_times)} reference poses after the first {source}; at least 3 are needed"

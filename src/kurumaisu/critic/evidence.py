@@ -128,8 +128,8 @@ class Problem:
             xtol=1e-5,
         )
         # The solver's own steps are too small for a delay between samples of the grid: differentiate once more.
-        slopes = self.columns(terms, solution.x, terms) / scale
-        sds = np.sqrt(np.diag(np.linalg.pinv(slopes.T @ slopes)))
+        slopes = self.columns(terms, solution.x, terms)
+        sds = np.sqrt(np.diag(covariance(slopes.T @ slopes))) * scale
         likelihood = -float(solution.cost)
         z = np.abs(solution.x - [term.null for term in terms]) / sds
         return Fit(frozenset(ids), terms, solution.x, sds, likelihood, likelihood - float(occam(z).sum()))
@@ -152,6 +152,14 @@ class Problem:
     def _whitened(self, drive: Drive, settings: tuple[EffectSetting, ...]) -> FloatArray:
         residual = drive.measured - self.simulated(drive, settings)
         return whitened(drive, residual.reshape(-1, 1), self.noise)[0][:, 0]
+
+
+def covariance(gram: FloatArray) -> FloatArray:
+    """Return the covariance of parameters, in units of their scales, for G = J'J with columns per scale.
+
+    A weak prior of 100 scales keeps it finite where the data do not determine a parameter at all.
+    """
+    return np.asarray(np.linalg.inv(gram + 1e-4 * np.eye(len(gram))))
 
 
 def occam(z: FloatArray) -> FloatArray:

@@ -11,18 +11,19 @@ import scipy
 
 from kurumaisu import effects
 from kurumaisu.critic import misfit, naming, replay
-from kurumaisu.critic.drive import Drive
+from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem, Term
 from kurumaisu.critic.extended import process_noise
 from kurumaisu.critic.material import HORIZON, MATERIAL, moved_share
 from kurumaisu.critic.naming import Naming
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.story import Noise, Overlay, Rival, Story
+from kurumaisu.critic.recording import Recording, Run
+from kurumaisu.critic.story import Misfit, Noise, Overlay, Rival, Story
 from kurumaisu.critic.verdict import Cause, Estimate, Gain, Kind, Verdict
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 _MINUTE = 60.0  # [s]
+_PICTURE = 0.1  # [s] between the poses drawn
 _NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
@@ -37,7 +38,7 @@ class Criticism:
     settings: tuple[EffectSetting, ...]
 
 
-def invalid(recording: Recording, model: Model, problems: Sequence[str], drives: Sequence[Drive]) -> Criticism:
+def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Criticism:
     """Return the criticism of data that must be mended before anything is fitted."""
     notes = tuple(note for note in recording.problems if note not in problems)
     verdict = Verdict("invalid_data", problems=(*problems, *notes))
@@ -48,7 +49,7 @@ def invalid(recording: Recording, model: Model, problems: Sequence[str], drives:
         details=tuple(problems),
         pose_source=_pose_source(recording),
         provenance=_provenance(),
-        overlays=tuple(_overlay(drive, model, None, held_out=False) for drive in drives),
+        overlays=tuple(_overlay(run, model, None, held_out=False) for run in recording.runs),
     )
     return Criticism(verdict, story, model, ())
 
@@ -71,7 +72,6 @@ def criticism(
         problems=recording.problems,
         gain=worth,
     )
-    held_out = set(recording.test)
     story = Story(
         recording=recording.name,
         model=problem.model.name,
@@ -80,9 +80,10 @@ def criticism(
         pose_source=_pose_source(recording),
         provenance=_provenance(),
         overlays=tuple(
-            _overlay(drive, problem.model, settings or None, held_out=drive.name in held_out) for drive in drives
+            _overlay(run, problem.model, settings or None, held_out=run.name in recording.test)
+            for run in recording.runs
         ),
-        misfits=misfit.figures(problem, best.settings, sorted(best.ids)),
+        misfits=_misfits(problem, found),
         rivals=_rivals(found),
         noise=_noise(problem),
         unexplained=(*_suspects(found), *misfit.remaining(problem, best)),
@@ -152,9 +153,7 @@ def _details(
             f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."
         )
     wander = np.degrees(problem.noise.sd_w * np.sqrt(2 * problem.noise.tau * _MINUTE))
-    details.append(
-        f"Besides, the yaw rate fluctuates so that the heading wanders by {wander:.1f} deg (sd) in a minute."
-    )
+    details.append(f"The yaw rate fluctuates at random: the heading wanders by {wander:.1f} deg (sd) in a minute.")
     alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
     details.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
     return tuple(details)
@@ -204,7 +203,15 @@ def _noise(problem: Problem) -> tuple[Noise, ...]:
     return tuple(Noise(name, value, float("nan"), float("nan"), unit) for name, value, unit in rows)
 
 
-def _overlay(drive: Drive, model: Model, settings: Sequence[EffectSetting] | None, *, held_out: bool) -> Overlay:
+def _misfits(problem: Problem, found: Naming) -> tuple[Misfit, ...]:
+    """Return a figure per effect of the best set; where that is empty, of the effect that comes nearest."""
+    fit = found.best if found.best.ids else next(fit for fit in found.fits if fit.ids)
+    return misfit.figures(problem, fit.settings, sorted(fit.ids))
+
+
+def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *, held_out: bool) -> Overlay:
+    drive = prepare(run, model, _PICTURE)
+
     def seen(extra: Sequence[EffectSetting]) -> FloatArray:
         return replay.path(drive, model, extra)[:, :2]
 

@@ -15,8 +15,8 @@ from kurumaisu.effects import Follows, Rate
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
-_BINS = 15
-_FEWEST = 5  # points in a bin
+_BINS = 15  # at most
+_FEWEST = 5  # points of which a mean has an interval
 _CHANGE = 0.5  # [s] over which a change of the input is taken
 _NORMAL90 = 1.645
 _NOTEWORTHY = 4.0  # standard errors from which a remaining correlation is said
@@ -72,8 +72,8 @@ def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[ef
             strict=True,
         )
     )
-    bins = _bins(x, residual)
-    curve = _bins(x, added)
+    bins = _bins(x, residual, _FEWEST)
+    curve = _bins(x, added, 1)
     return Misfit(
         channel=effect.shows_in.value,
         unit=_UNITS[effect.shows_in],
@@ -102,14 +102,15 @@ def _samples(
     return covariate(drive, follows), residual, added
 
 
-def _bins(x: FloatArray, y: FloatArray) -> Bins:
-    """Return means of y in bins of x of equal width; bins with too few points for an interval are left out."""
+def _bins(x: FloatArray, y: FloatArray, fewest: int) -> Bins:
+    """Return means of y in bins of x of equal width; bins with fewer points are left out."""
+    count = int(np.clip(len(x) // (2 * _FEWEST), 3, _BINS))
     low, high = np.quantile(x, [0.005, 0.995])
-    index = np.clip(np.floor((x - low) / max(high - low, 1e-12) * _BINS), 0, _BINS - 1)
+    index = np.clip(np.floor((x - low) / max(high - low, 1e-12) * count), 0, count - 1)
     rows = []
     for i in np.unique(index):
         inside = index == i
-        if inside.sum() >= _FEWEST:
+        if inside.sum() >= fewest:
             error = _NORMAL90 * y[inside].std() / np.sqrt(inside.sum())
             rows.append((x[inside].mean(), y[inside].mean(), y[inside].mean() - error, y[inside].mean() + error))
     centre, mean, lo, hi = np.array(rows).reshape(-1, 4).T

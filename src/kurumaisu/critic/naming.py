@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic.evidence import Fit, Problem, occam
+from kurumaisu.critic.evidence import Fit, Problem, covariance, occam
 from kurumaisu.types import FloatArray
 
 NAMED = 0.9  # posterior from which a cause is named
@@ -68,8 +68,13 @@ def search(problem: Problem, progress: Callable[[str], None]) -> Naming:
             break
         centre = best
     ranked = sorted(fits.values(), key=lambda fit: -(fit.score + log_prior(len(fit.ids), len(ids))))
-    p = _posterior(ranked, ids)
-    return Naming(tuple(ranked), p, _confounded(ranked[0], p), _false_alarm(problem, empty, ids))
+    weights = _weights(ranked, ids)
+
+    def p_any(names: Iterable[str]) -> float:
+        return float(sum(w for w, fit in zip(weights, ranked, strict=True) if fit.ids & set(names)))
+
+    p = {name: p_any([name]) for name in ids}
+    return Naming(tuple(ranked), p, _confounded(ranked[0], p, p_any), _false_alarm(problem, empty, ids))
 
 
 def log_prior(size: int, of: int) -> float:
@@ -122,7 +127,7 @@ def _linear(problem: Problem, centre: Fit, chosen: frozenset[str], gram: FloatAr
     target = b + gram @ known
     if not use.any():
         return _Guess(chosen, {}, -0.5 * float(known @ gram @ known) - float(b @ known))
-    inverse = np.linalg.pinv(gram[np.ix_(use, use)], hermitian=True)
+    inverse = covariance(gram[np.ix_(use, use)])
     offsets = inverse @ target[use]
     terms = [term for term, used in zip(problem.terms, use, strict=True) if used]
     values = [term.null + x * term.parameter.scale for term, x in zip(terms, offsets, strict=True)]
@@ -132,23 +137,23 @@ def _linear(problem: Problem, centre: Fit, chosen: frozenset[str], gram: FloatAr
     step[use] = offsets
     step -= known
     gained = float(b @ step) - 0.5 * float(step @ gram @ step)
-    z = offsets / np.sqrt(np.maximum(np.diag(inverse), 1e-12))
+    z = offsets / np.sqrt(np.diag(inverse))
     start = {term.id: value for term, value in zip(terms, values, strict=True)}
     return _Guess(chosen, start, gained - float(occam(z).sum()))
 
 
-def _posterior(fits: list[Fit], ids: tuple[str, ...]) -> dict[str, float]:
+def _weights(fits: Sequence[Fit], ids: tuple[str, ...]) -> FloatArray:
+    """Return the posterior of each fit, all together 1."""
     weights = np.array([fit.score + log_prior(len(fit.ids), len(ids)) for fit in fits])
-    weights = np.exp(weights - logsumexp(weights))
-    return {name: float(sum(w for w, fit in zip(weights, fits, strict=True) if name in fit.ids)) for name in ids}
+    return np.asarray(np.exp(weights - logsumexp(weights)))
 
 
-def _confounded(best: Fit, p: dict[str, float]) -> tuple[tuple[str, ...], ...]:
-    """Return the best set's uncertain effects, each with the rivals that could stand in for it."""
+def _confounded(best: Fit, p: dict[str, float], p_any: Callable[[Iterable[str]], float]) -> tuple[tuple[str, ...], ...]:
+    """Return the best set's uncertain effects with the rivals that could stand in for them, if one of them must act."""
     uncertain = sorted(name for name in best.ids if p[name] < NAMED)
     rivals = sorted(name for name in p if name not in best.ids and p[name] >= RIVAL)
     group = tuple(uncertain + rivals)
-    return (group,) if uncertain and len(group) > 1 else ()
+    return (group,) if uncertain and len(group) > 1 and p_any(group) >= NAMED else ()
 
 
 def _false_alarm(problem: Problem, empty: Fit, ids: tuple[str, ...]) -> float:

@@ -38,7 +38,7 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
 
     wrong = [*recording.invalid, *sanity.suspicions(train, model)]
     if wrong:
-        return explain.invalid(recording, model, wrong, train)
+        return explain.invalid(recording, model, wrong)
 
     progress("estimating the noise")
     empty = Problem(train, model, noise.START).fit((), {})

@@ -20,7 +20,6 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 
 _DEADLINE = 200.0  # [s] of wall time for the drive
-_WALL = 65  # [%] occupancy from which a cell counts as wall, as in map_server
 
 
 def run(folder: Path, seed: int, *, gui: bool) -> None:
@@ -55,12 +54,8 @@ def _print_figures(
     for name, path in (("odometry", odom), ("particle filter", trajectory[:, 1:])):
         position, heading = slam_score.trajectory_error(path, truth)
         print(f"  path by {name:16} rms error {position:.3f} m, {np.degrees(heading):.2f} deg")
-    walls = np.argwhere(grid.cells > _WALL)
-    centres = np.column_stack([walls[:, 1], walls[:, 0]]) * grid.resolution + grid.resolution / 2 + [grid.x, grid.y]
-    poses = np.column_stack([centres, np.zeros(len(centres))])
-    in_world = geometry.compose(np.broadcast_to(world_from_map, poses.shape), poses)[:, :2]
-    distance = slam_score.distance_to_walls(in_world, load_world(shipped("worlds/building.world")).segments)
+    distance = slam_score.map_error(grid, world_from_map, load_world(shipped("worlds/building.world")).segments)
     print(
-        f"  map: {len(walls)} wall cells of {grid.resolution:g} m; distance to the true walls "
+        f"  map: {len(distance)} wall cells of {grid.resolution:g} m; distance to the true walls "
         f"median {np.median(distance):.3f} m, 95 % below {np.quantile(distance, 0.95):.3f} m"
     )

@@ -37,10 +37,10 @@ class Topic:
         """The latest message, or None."""
         return self.messages[-1] if self.messages else None
 
-    def wait(self, condition: Callable[[Any], bool], what: str) -> Any:
+    def wait(self, condition: Callable[[Any], bool], what: str, patience: float = PATIENCE) -> Any:
         """Return the first message from now on that meets the condition."""
         start = len(self.messages)
-        return wait_for(lambda: next((m for m in self.messages[start:] if condition(m)), None), what)
+        return wait_for(lambda: next((m for m in self.messages[start:] if condition(m)), None), what, patience)
 
     def close(self) -> None:
         """Stop listening."""

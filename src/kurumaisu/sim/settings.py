@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from kurumaisu import settings
-from kurumaisu.params import EffectSetting, Model
+from kurumaisu.params import Model, effects_of
 
 
 @dataclass(frozen=True)
@@ -47,10 +47,6 @@ def with_effects(model: Model, path: Path) -> Model:
     Raise Error naming file and key.
     """
     top = settings.load(path)
-    more = []
-    for item in top.items("effects"):
-        parameters = item.section("parameters")
-        more.append(EffectSetting(item.text("id"), {name: parameters.number(name) for name in parameters.names()}))
-        item.end()
+    more = effects_of(top)
     top.end()
     return replace(model, effects=(*model.effects, *more))

@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""base_node, simulator and mapping_node together: a drive along a corridor whose walls hardly tell how far."""
+
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import tf2_ros
+from nav_msgs.msg import OccupancyGrid, Odometry
+
+from kurumaisu import geometry, slam_score
+from kurumaisu.maps import Grid
+from kurumaisu.params import shipped
+from kurumaisu.ros.messages import yaw_of
+from kurumaisu.ros.testing import Commander, Topic, wait_for
+from kurumaisu.world import load_world
+
+WAY = 5.0  # [m]
+
+
+def pose_of(message):
+    pose = message.pose.pose
+    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])
+
+
+class MappingLoop(unittest.TestCase):
+    def test_the_map_says_where_the_chair_is(self):
+        buffer = tf2_ros.Buffer()
+        tf2_ros.TransformListener(buffer)
+        truth, maps = Topic("ground_truth", Odometry), Topic("map", OccupancyGrid)
+        start = pose_of(wait_for(lambda: truth.last, "ground_truth"))
+        commander = Commander("cmd_vel")
+        commander.say(0.5, 0.0)
+        truth.wait(lambda m: pose_of(m)[0] - start[0] > WAY, "the chair to drive down the corridor", patience=60.0)
+        commander.silence()
+        rest = truth.wait(lambda m: m.twist.twist.linear.x == 0, "the chair at rest").header.stamp
+        wait_for(lambda: maps.last and maps.last.header.stamp > rest, "a map after the drive")
+
+        found = wait_for(
+            lambda: (
+                buffer.can_transform("map", "base_link", rest)
+                and buffer.lookup_transform("map", "base_link", rest).transform
+            ),
+            "map -> base_link at rest",
+        )
+        seen = np.array([found.translation.x, found.translation.y, yaw_of(found.rotation)])
+        true = geometry.between(start, pose_of(truth.last))  # the map begins where the chair did
+        assert np.hypot(*(seen - true)[:2]) < 0.2, (seen, true)
+        assert abs(seen[2] - true[2]) < 0.02
+
+        info = maps.last.info
+        cells = np.array(maps.last.data, dtype=np.int8).reshape(info.height, info.width)
+        grid = Grid(cells, info.resolution, info.origin.position.x, info.origin.position.y)
+        error = slam_score.map_error(grid, start, load_world(shipped("worlds/building.world")).segments)
+        assert len(error) > 100
+        assert np.median(error) < info.resolution
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("mapping_loop_test")
+    rostest.rosrun("kurumaisu", "mapping_loop_test", MappingLoop, sys.argv)
