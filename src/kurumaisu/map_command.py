@@ -18,11 +18,15 @@ from kurumaisu.params import shipped
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; return 0, or 2 for bad input, which is told on stderr."""
-    parser = argparse.ArgumentParser(prog="map", description="Make a map from a recording of scans and odometry.")
+    parser = argparse.ArgumentParser(
+        prog="map", description="Make a map from a recording of scans and odometry."
+    )
     parser.add_argument("log", type=Path, metavar="LOG", help="recording of MRPT (.rawlog)")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/map"), metavar="FOLDER")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the particle filter (1)")
-    parser.add_argument("--settings", type=Path, metavar="FILE", help="as launch/mapping_node.yaml, the default")
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE", help="as launch/mapping_node.yaml, the default"
+    )
     options = parser.parse_args(arguments)
     try:
         if not 0 <= options.seed < 2**32:
