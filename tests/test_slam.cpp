@@ -17,7 +17,7 @@ namespace k = kurumaisu;
 
 namespace {
 
-constexpr float kInf = std::numeric_limits<float>::infinity();
+constexpr double kInf = std::numeric_limits<double>::infinity();
 
 struct Wall {
   double x0, y0, x1, y1;
@@ -184,8 +184,9 @@ double strayShare(const k::OccupancyGrid& grid, double distance) {
   int stray = 0;
   for (int i = 0; i < grid.width * grid.height; ++i) {
     if (grid.cells[i] < 65) continue;
+    const int row = i / grid.width;
     const k::Pose2D cell = k::compose(room_from_map, {grid.x + (i % grid.width + 0.5) * grid.resolution,
-                                                      grid.y + (i / grid.width + 0.5) * grid.resolution, 0});
+                                                      grid.y + (row + 0.5) * grid.resolution, 0});
     ++occupied;
     stray += distanceToWall(cell.x, cell.y) > distance;
   }
