@@ -17,7 +17,7 @@ namespace k = kurumaisu;
 
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr float kInf = std::numeric_limits<float>::infinity();
 
 struct Wall {
   double x0, y0, x1, y1;
@@ -31,7 +31,7 @@ const std::vector<Wall> kRoom{{-5, -4, 5, -4},  {5, -4, 5, 4},  {5, 4, -5, 4},
 double rangeAlong(const k::Pose2D& ray) {
   const double c = std::cos(ray.theta);
   const double s = std::sin(ray.theta);
-  double nearest = kInf;
+  auto nearest = static_cast<double>(kInf);
   for (const Wall& wall : kRoom) {
     const double ex = wall.x1 - wall.x0;
     const double ey = wall.y1 - wall.y0;
@@ -47,7 +47,7 @@ double rangeAlong(const k::Pose2D& ray) {
 }
 
 double distanceToWall(double x, double y) {
-  double nearest = kInf;
+  auto nearest = static_cast<double>(kInf);
   for (const Wall& wall : kRoom) {
     const double ex = wall.x1 - wall.x0;
     const double ey = wall.y1 - wall.y0;
