@@ -31,7 +31,7 @@ const std::vector<Wall> kRoom{{-5, -4, 5, -4},  {5, -4, 5, 4},  {5, 4, -5, 4},
 double rangeAlong(const k::Pose2D& ray) {
   const double c = std::cos(ray.theta);
   const double s = std::sin(ray.theta);
-  double nearest = kInf;
+  auto nearest = static_cast<double>(kInf);
   for (const Wall& wall : kRoom) {
     const double ex = wall.x1 - wall.x0;
     const double ey = wall.y1 - wall.y0;
@@ -47,7 +47,7 @@ double rangeAlong(const k::Pose2D& ray) {
 }
 
 double distanceToWall(double x, double y) {
-  double nearest = kInf;
+  auto nearest = static_cast<double>(kInf);
   for (const Wall& wall : kRoom) {
     const double ex = wall.x1 - wall.x0;
     const double ey = wall.y1 - wall.y0;
@@ -184,8 +184,9 @@ double strayShare(const k::OccupancyGrid& grid, double distance) {
   int stray = 0;
   for (int i = 0; i < grid.width * grid.height; ++i) {
     if (grid.cells[i] < 65) continue;
+    const int row = i / grid.width;
     const k::Pose2D cell = k::compose(room_from_map, {grid.x + (i % grid.width + 0.5) * grid.resolution,
-                                                      grid.y + (i / grid.width + 0.5) * grid.resolution, 0});
+                                                      grid.y + (row + 0.5) * grid.resolution, 0});
     ++occupied;
     stray += distanceToWall(cell.x, cell.y) > distance;
   }

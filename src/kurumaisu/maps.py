@@ -66,9 +66,10 @@ def draw_map(
     other: FloatArray | None = None,
     other_name: str = "",
 ) -> None:
-    """Write a picture of a map and the trajectory (n, 4) of t, x, y, theta; other (m, 4) is drawn for comparison.
+    """Write a picture of a map and the trajectory (n, 4) of t, x, y, theta.
 
-    Both must be in the map's frame. Raise Error naming the file that cannot be written.
+    other (m, 4), with its name for the legend, is drawn for comparison. Both must be in the map's frame.
+    Raise Error naming the file that cannot be written.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

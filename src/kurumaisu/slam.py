@@ -24,8 +24,8 @@ MapperSettings = dict[str, float]
 class ScanLog:
     """Scans of one drive, with the odometry that belongs to them.
 
-    times: (n,) of the first beams, increasing [s]; ranges: (n, beams) [m], inf = no return, NaN = nothing known;
-    odom, odom_end: odom_from_base (n, 3) [m, m, rad] at the first and at the last beam of each scan.
+    times: (n,) of the first beams, increasing [s]; ranges: (n, beams) [m], inf = no return, NaN = nothing is
+    known; odom, odom_end: odom_from_base (n, 3) [m, m, rad] at the first and at the last beam of each scan.
     """
 
     name: str
@@ -40,8 +40,8 @@ class ScanLog:
 class MappingResult:
     """What mapping gives.
 
-    trajectory: map_from_base at every scan, (n, 4) of t [s], x, y [m], theta [rad, unwrapped]; the path of the
-    likeliest particle in the light of the whole log, so fit as a reference for the drive.
+    trajectory: map_from_base at every scan, (n, 4) of t [s], x, y [m], theta [rad, unwrapped]; the path of
+    the likeliest particle in the light of the whole log, so fit as a reference for the drive.
     """
 
     trajectory: FloatArray
@@ -113,7 +113,8 @@ def map_scans(
 ) -> MappingResult:
     """Map a log; progress is called with the number of scans done and the total.
 
-    Equal arguments give equal results, bit by bit. Raise Error naming the log and the scan that makes no sense.
+    Equal arguments give equal results, bit by bit. Raise Error naming the log and the scan that makes no
+    sense.
     """
     try:
         mapper = _slam.Mapper(mapper_settings, seed)

@@ -7,6 +7,7 @@
 #include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <limits>
@@ -23,8 +24,8 @@ namespace {
 
 constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
 constexpr double kPollPeriod = 0.02;    // [s] between looks whether transforms have come
-constexpr double kTimeJump = 1.0;       // [s] a scan that much older than the last one is a new beginning
-constexpr double kLevel = 0.99;      // cosine of the tilt beyond which a laser does not measure in the plane
+constexpr double kTimeJump = 1.0;  // [s] a scan or a clock that much behind the last scan is a new beginning
+constexpr double kLevel = 0.99;    // cosine of the tilt beyond which a laser does not measure in the plane
 constexpr std::size_t kQueue = 100;  // scans that may wait for their transforms
 
 struct Planar {
@@ -95,7 +96,6 @@ class MappingNode {
   bool localised_ = false;  ///< map_from_odom_ is known
   bool map_changed_ = false;
   std::uint64_t dropped_ = 0;
-  ros::Time now_;  ///< when work() last looked
   ros::Time last_scan_;
   ros::Time last_transform_;
   ros::SteadyTime last_map_;
@@ -139,9 +139,7 @@ void MappingNode::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) {
 
 void MappingNode::work() {
   const ros::Time now = ros::Time::now();
-  const ros::Duration allowed(ros::Time::isSimTime() ? 0 : kTimeJump);
-  if (now + allowed < now_) reset("time ran backwards");
-  now_ = now;
+  if (last_scan_ > now + ros::Duration(kTimeJump)) reset("time ran backwards");
   while (!waiting_.empty() && take(waiting_.front())) waiting_.pop_front();
   const ros::SteadyTime steady = ros::SteadyTime::now();
   if (map_changed_ && (steady - last_map_).toSec() >= settings_.map_period) {
@@ -154,7 +152,8 @@ void MappingNode::work() {
 bool MappingNode::take(const Waiting& waiting) {
   const auto& header = waiting.scan->header;
   const ros::Time end =
-      header.stamp + ros::Duration(waiting.scan->time_increment * (waiting.scan->ranges.size() - 1.0));
+      header.stamp +
+      ros::Duration(waiting.scan->time_increment * (static_cast<double>(waiting.scan->ranges.size()) - 1.0));
   std::string why;
   if (buffer_.canTransform(settings_.base_frame, header.frame_id, header.stamp, &why) &&
       buffer_.canTransform(settings_.odom_frame, settings_.base_frame, header.stamp, &why) &&
@@ -163,7 +162,9 @@ bool MappingNode::take(const Waiting& waiting) {
     return true;
   }
   if ((ros::SteadyTime::now() - waiting.since).toSec() < settings_.transform_deadline) return false;
-  drop("MAPPING_NO_TRANSFORM", why);
+  drop("MAPPING_NO_TRANSFORM", "none of " + header.frame_id + " and " + settings_.base_frame + " to " +
+                                   settings_.odom_frame + " at " + std::to_string(header.stamp.toSec()) +
+                                   " s within transform_deadline" + why);
   return true;
 }
 
@@ -172,7 +173,8 @@ void MappingNode::add(const sensor_msgs::LaserScan& message) try {
     return planar(buffer_.lookupTransform(parent, child, stamp).transform);
   };
   const ros::Time start = message.header.stamp;
-  const ros::Time end = start + ros::Duration(message.time_increment * (message.ranges.size() - 1.0));
+  const ros::Time end =
+      start + ros::Duration(message.time_increment * (static_cast<double>(message.ranges.size()) - 1.0));
   const k::Pose2D first = at(settings_.odom_frame, settings_.base_frame, start).pose;
   const k::Pose2D last = at(settings_.odom_frame, settings_.base_frame, end).pose;
   const k::Scan scan =
@@ -196,7 +198,9 @@ void MappingNode::drop(const char* code, const std::string& why) {
 void MappingNode::reset(const char* why) {
   ROS_WARN("MAPPING_TIME_RESET: %s: the map starts afresh", why);
   buffer_.clear();
-  waiting_.clear();
+  const ros::Time latest = ros::Time::now() + ros::Duration(kTimeJump);
+  const auto is_old = [&latest](const Waiting& waiting) { return waiting.scan->header.stamp > latest; };
+  waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), is_old), waiting_.end());
   mapper_.emplace(settings_.mapper, settings_.seed);
   localised_ = map_changed_ = false;
   last_scan_ = last_transform_ = ros::Time();

@@ -26,6 +26,8 @@ constexpr double kThinning = 0.04;
 // Fewer correspondences than this leave the odometry alone.
 constexpr int kLeastCorrespondences = 20;
 constexpr double kConverged = 1e-5;  // step [m, rad]
+constexpr double kSettled = 2e-3;    // step [m, rad] after which nothing far off is left to be caught
+constexpr double kShrink = 0.7;      // of the reach, from round to round
 
 std::int64_t cellOf(const Eigen::Vector2d& point, double size) {
   const auto x = static_cast<std::int64_t>(std::floor(point.x() / size));
@@ -87,7 +89,7 @@ Matcher::Match Matcher::add(const Scan& scan, const Pose2D& motion) {
   for (std::size_t i = 0; i < all.size(); i += settings_.every) {
     if (all[i].allFinite()) points.push_back(all[i]);
   }
-  const Match match = align(points, start, motion);
+  Match match = align(points, start, motion);
   pose_ = match.pose;
   const Pose2D since = between(key_pose_, pose_);
   if (std::hypot(since.x, since.y) > settings_.key_distance || std::abs(since.theta) > settings_.key_angle) {
@@ -105,19 +107,21 @@ Matcher::Match Matcher::align(const Points& points, const Pose2D& start, const P
                               1 / (angle_sd * angle_sd));
   Pose2D pose = start;
   Eigen::Matrix3d information = prior.asDiagonal();
+  const double least = 3 * settings_.deviation;
+  double reach = std::fmax(least, settings_.reach);
   for (int i = 0; i < settings_.iterations; ++i) {
-    // Reach shrinks, so that the first rounds may catch an odometry that slipped and the last see true pairs
-    // only.
-    const double reach = std::fmax(3 * settings_.deviation, settings_.reach / (1 + i));
     Eigen::Vector3d gradient;
-    if (!linearise(points, pose, reach, information, gradient))
+    if (!linearise(points, pose, reach, information, gradient)) {
       return {start, prior.cwiseInverse().asDiagonal()};
+    }
     information += prior.asDiagonal();
     gradient +=
         prior.cwiseProduct(Eigen::Vector3d(pose.x - start.x, pose.y - start.y, pose.theta - start.theta));
     const Eigen::Vector3d step = -information.inverse() * gradient;
     pose = {pose.x + step(0), pose.y + step(1), pose.theta + step(2)};
-    if (step.norm() < kConverged) break;
+    if (reach == least && step.norm() < kConverged) break;
+    // The first rounds catch an odometry that slipped, the last see true pairs only.
+    reach = step.norm() < kSettled ? least : std::fmax(least, kShrink * reach);
   }
   return {pose, information.inverse()};
 }
@@ -128,6 +132,8 @@ bool Matcher::linearise(const Points& points, const Pose2D& pose, double reach, 
   gradient.setZero();
   const Pose2D laser = compose(pose, base_from_laser_);
   const Eigen::Vector2d eye(laser.x, laser.y);
+  // While far pairs count, they must pull too, or chance pairs hold the scan where it is.
+  const double deviation = reach / 3;
   int count = 0;
   for (const Eigen::Vector2d& point : points) {
     const Eigen::Vector2d moved = apply(pose, point);
@@ -138,8 +144,7 @@ bool Matcher::linearise(const Points& points, const Pose2D& pose, double reach, 
     const Eigen::Vector3d row(line->normal.x(), line->normal.y(),
                               line->normal.y() * arm.x() - line->normal.x() * arm.y());
     // Cauchy's weight: a chair leg or a passer-by shall not pull.
-    const double scaled = error / settings_.deviation;
-    const double weight = 1 / (settings_.deviation * settings_.deviation * (1 + scaled * scaled));
+    const double weight = 1 / (deviation * deviation + error * error);
     information += weight * row * row.transpose();
     gradient += weight * error * row;
     ++count;

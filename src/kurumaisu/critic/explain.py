@@ -9,23 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from kurumaisu import effects
-from kurumaisu.critic import misfit, naming, replay
+from kurumaisu.critic import misfit, naming, replay, words
 from kurumaisu.critic.drive import Drive, prepare
-from kurumaisu.critic.evidence import Fit, Problem, Term
+from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import HORIZON, MATERIAL, moved_share
+from kurumaisu.critic.material import MATERIAL, moved_share
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.recording import Recording, Run
-from kurumaisu.critic.story import Misfit, Noise, Overlay, Rival, Story
-from kurumaisu.critic.verdict import Cause, Estimate, Gain, Kind, Verdict
+from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
+from kurumaisu.critic.verdict import Cause, Gain, Kind, Verdict
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-_MINUTE = 60.0  # [s]
 _PICTURE = 0.1  # [s] between the poses drawn
-_NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
-_RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
 
 @dataclass(frozen=True)
@@ -75,8 +71,8 @@ def criticism(
     story = Story(
         recording=recording.name,
         model=problem.model.name,
-        headline=_headline(verdict, best, found.p),
-        details=_details(problem, found, drives, shares, matters),
+        headline=words.headline(verdict, found, matters),
+        details=words.details(problem, found, drives, shares, matters),
         pose_source=_pose_source(recording),
         provenance=_provenance(),
         overlays=tuple(
@@ -84,9 +80,9 @@ def criticism(
             for run in recording.runs
         ),
         misfits=_misfits(problem, found),
-        rivals=_rivals(found),
+        rivals=words.rivals(found),
         noise=_noise(problem),
-        unexplained=(*_suspects(found), *misfit.remaining(problem, best)),
+        unexplained=(*words.suspects(found), *misfit.remaining(problem, best)),
     )
     return Criticism(verdict, story, problem.model, (*settings, process_noise(problem.noise)))
 
@@ -104,90 +100,11 @@ def _kind(found: Naming, matters: set[str]) -> Kind:
 def _cause(problem: Problem, found: Naming, name: str) -> Cause:
     without = problem.fit(found.best.ids - {name}, {})
     parameters = {
-        term.parameter.name: _estimate(problem.model, term, value, sd)
+        term.parameter.name: words.estimate(problem.model, term, value, sd)
         for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True)
         if term.id == name
     }
     return Cause(name, min(found.p[name], 1.0), parameters, found.best.score - without.score)
-
-
-def _estimate(model: Model, term: Term, value: float, sd: float) -> Estimate:
-    unit = term.parameter.unit
-    if unit == "V" and model.law_name == "identity":
-        unit = "V (1 V stands for 1 m/s or 1 rad/s)"
-    low, high = value - _NORMAL90 * sd, value + _NORMAL90 * sd
-    return Estimate(float(value), max(low, term.parameter.lower), min(high, term.parameter.upper), unit)
-
-
-def _headline(verdict: Verdict, best: Fit, p: dict[str, float]) -> str:
-    if verdict.verdict == "named":
-        text = "; ".join(_sentence(cause.id) for cause in verdict.causes)
-        return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in verdict.causes)})."
-    if verdict.verdict == "confounded":
-        group = " or ".join(verdict.confounded[0])
-        return f"Something is missing in the model, but these drives cannot tell which: {group}."
-    if best.ids:
-        return f"Nothing that matters: {', '.join(sorted(best.ids))} is detectable, but too small to gain anything."
-    nearest = max(p, key=lambda name: p[name])
-    if p[nearest] >= naming.RIVAL:
-        return f"Nothing can be named: noise explains these drives as well. The nearest suspect is {nearest}."
-    return "Nothing is missing in the model that these drives could show."
-
-
-def _sentence(name: str) -> str:
-    return effects.by_id(name).sentence
-
-
-def _details(
-    problem: Problem, found: Naming, drives: Sequence[Drive], shares: dict[str, float], matters: set[str]
-) -> tuple[str, ...]:
-    seconds = sum(float(drive.times[-1] - drive.times[0]) for drive in drives)
-    details = [
-        f"{len(drives)} drive{'s' * (len(drives) > 1)}, {seconds:.0f} s, replayed from the {drives[0].source} channel.",
-    ]
-    for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True):
-        e = _estimate(problem.model, term, value, sd)
-        weight = "" if term.id in matters else ": detectable, but it does not matter"
-        details.append(
-            f"{term.id}: {term.parameter.name} {e.estimate:.3g} {e.unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
-            f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."
-        )
-    wander = np.degrees(problem.noise.sd_w * np.sqrt(2 * problem.noise.tau * _MINUTE))
-    details.append(f"The yaw rate fluctuates at random: the heading wanders by {wander:.1f} deg (sd) in a minute.")
-    alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
-    details.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
-    return tuple(details)
-
-
-def _suspects(found: Naming) -> tuple[str, ...]:
-    """Return a sentence on the effects that may act, for all that these drives show."""
-    some = sorted((name for name in found.p if naming.RIVAL <= found.p[name] < naming.NAMED), key=lambda n: -found.p[n])
-    if not some:
-        return ()
-    listed = ", ".join(f"{name} ({found.p[name]:.2f})" for name in some)
-    return (f"Not certain enough to be named (probability): {listed}. More drives that excite them would decide.",)
-
-
-def _rivals(found: Naming) -> tuple[Rival, ...]:
-    """Return sets with other causes and sets with more or fewer, the best of each kind, by their evidence."""
-    best = found.best
-    swapped = [fit for fit in found.fits if not (fit.ids >= best.ids or fit.ids < best.ids)]
-    others = [fit for fit in found.fits if fit.ids > best.ids or fit.ids < best.ids]
-    shown = sorted(swapped[:_RIVALS_SHOWN] + others[:_RIVALS_SHOWN], key=lambda fit: -fit.score)
-    return tuple(_rival(fit, best) for fit in shown)
-
-
-def _rival(fit: Fit, best: Fit) -> Rival:
-    likelihood = fit.log_likelihood - best.log_likelihood
-    if fit.score > best.score:
-        why = f"fits better by {likelihood:.1f} nats, too little for one more effect, which is rare beforehand"
-    elif fit.ids > best.ids:
-        why = f"fits better by {likelihood:.1f} nats, less than another effect costs"
-    elif fit.ids < best.ids or likelihood < 0:
-        why = f"leaves {-likelihood:.1f} nats unexplained"
-    else:
-        why = f"fits better by {likelihood:.1f} nats, but needs more effects"
-    return Rival(" + ".join(sorted(fit.ids)) or "no effect", fit.score - best.score, why)
 
 
 def _noise(problem: Problem) -> tuple[Noise, ...]:

@@ -34,6 +34,11 @@ def by_id(name: str) -> type[Effect]:
     raise Error(f"effects: {name!r} is not in the catalogue: {', '.join(effect.id for effect in ALL)}")
 
 
+def fluctuation(sd_v: float, sd_w: float, tau: float) -> EffectSetting:
+    """Return noise of the rates, sd [m/s], [rad/s] and time constant [s], as a model file has it."""
+    return EffectSetting(ProcessNoise.id, {"sd_v": sd_v, "sd_w": sd_w, "tau": tau})
+
+
 def build(settings: tuple[EffectSetting, ...], context: Context) -> tuple[Effect, ...]:
     """Return the effects of a model file in the order in which they act.
 
@@ -47,4 +52,16 @@ def build(settings: tuple[EffectSetting, ...], context: Context) -> tuple[Effect
     return tuple(sorted(effects, key=lambda effect: effect.stage))
 
 
-__all__ = ["ALL", "Context", "Effect", "Follows", "Motion", "Parameter", "Rate", "Stage", "build", "by_id"]
+__all__ = [
+    "ALL",
+    "Context",
+    "Effect",
+    "Follows",
+    "Motion",
+    "Parameter",
+    "Rate",
+    "Stage",
+    "build",
+    "by_id",
+    "fluctuation",
+]

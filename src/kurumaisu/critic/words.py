@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the search found, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic import naming
+from kurumaisu.critic.drive import Drive
+from kurumaisu.critic.evidence import Fit, Problem, Term
+from kurumaisu.critic.material import HORIZON
+from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.story import Rival
+from kurumaisu.critic.verdict import Estimate, Verdict
+from kurumaisu.params import Model
+
+_MINUTE = 60.0  # [s]
+_NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
+_RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
+
+
+def headline(verdict: Verdict, found: Naming, matters: set[str]) -> str:
+    """Return the verdict in one sentence; matters: effects of the best set that move the chair enough."""
+    if verdict.verdict == "named":
+        text = "; ".join(effects.by_id(cause.id).sentence for cause in verdict.causes)
+        return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in verdict.causes)})."
+    if verdict.verdict == "confounded":
+        group = " or ".join(verdict.confounded[0])
+        return f"Something is missing in the model, but these drives cannot tell which: {group}."
+    if found.best.ids and not matters:
+        listed = ", ".join(sorted(found.best.ids))
+        return f"Nothing that matters: {listed} is detectable, but too small to gain anything."
+    nearest = max(found.p, key=lambda name: found.p[name])
+    if found.p[nearest] >= naming.RIVAL:
+        return f"Nothing can be named: noise explains these drives as well. The nearest suspect is {nearest}."
+    return "Nothing is missing in the model that these drives could show."
+
+
+def details(
+    problem: Problem, found: Naming, drives: Sequence[Drive], shares: dict[str, float], matters: set[str]
+) -> tuple[str, ...]:
+    """Return what a reader should know next; shares: how far each effect of the best set moves the chair."""
+    seconds = sum(float(drive.times[-1] - drive.times[0]) for drive in drives)
+    said = [
+        f"{len(drives)} drive{'s' * (len(drives) > 1)}, {seconds:.0f} s, replayed from the {drives[0].source} channel.",
+    ]
+    for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True):
+        e = estimate(problem.model, term, value, sd)
+        weight = "" if term.id in matters else ": detectable, but it does not matter"
+        said.append(
+            f"{term.id}: {term.parameter.name} {e.estimate:.3g} {e.unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
+            f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."
+        )
+    wander = np.degrees(problem.noise.sd_w * np.sqrt(2 * problem.noise.tau * _MINUTE))
+    said.append(f"The yaw rate fluctuates at random: the heading wanders by {wander:.1f} deg (sd) in a minute.")
+    alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
+    said.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
+    return tuple(said)
+
+
+def suspects(found: Naming) -> tuple[str, ...]:
+    """Return a sentence on the effects that may act, for all that these drives show."""
+    some = sorted((name for name in found.p if naming.RIVAL <= found.p[name] < naming.NAMED), key=lambda n: -found.p[n])
+    if not some:
+        return ()
+    listed = ", ".join(f"{name} ({found.p[name]:.2f})" for name in some)
+    return (f"Not certain enough to be named (probability): {listed}. More drives that excite them would decide.",)
+
+
+def rivals(found: Naming) -> tuple[Rival, ...]:
+    """Return sets with other causes and sets with more or fewer, the best of each kind, by their evidence."""
+    best = found.best
+    swapped = [fit for fit in found.fits if not (fit.ids >= best.ids or fit.ids < best.ids)]
+    others = [fit for fit in found.fits if fit.ids > best.ids or fit.ids < best.ids]
+    shown = sorted(swapped[:_RIVALS_SHOWN] + others[:_RIVALS_SHOWN], key=lambda fit: -fit.score)
+    return tuple(_rival(fit, best) for fit in shown)
+
+
+def _rival(fit: Fit, best: Fit) -> Rival:
+    likelihood = fit.log_likelihood - best.log_likelihood
+    if fit.score > best.score:
+        why = f"fits better by {likelihood:.1f} nats, too little for one more effect, which is rare beforehand"
+    elif fit.ids > best.ids:
+        why = f"fits better by {likelihood:.1f} nats, less than another effect costs"
+    elif fit.ids < best.ids or likelihood < 0:
+        why = f"leaves {-likelihood:.1f} nats unexplained"
+    else:
+        why = f"fits better by {likelihood:.1f} nats, but needs more effects"
+    return Rival(" + ".join(sorted(fit.ids)) or "no effect", fit.score - best.score, why)
+
+
+def estimate(model: Model, term: Term, value: float, sd: float) -> Estimate:
+    """Return a fitted parameter with its 90 % interval, which its bounds cut."""
+    unit = term.parameter.unit
+    if unit == "V" and model.law_name == "identity":
+        unit = "V (1 V stands for 1 m/s or 1 rad/s)"
+    low, high = value - _NORMAL90 * sd, value + _NORMAL90 * sd
+    return Estimate(float(value), max(low, term.parameter.lower), min(high, term.parameter.upper), unit)
