@@ -89,7 +89,7 @@ Matcher::Match Matcher::add(const Scan& scan, const Pose2D& motion) {
   for (std::size_t i = 0; i < all.size(); i += settings_.every) {
     if (all[i].allFinite()) points.push_back(all[i]);
   }
-  const Match match = align(points, start, motion);
+  Match match = align(points, start, motion);
   pose_ = match.pose;
   const Pose2D since = between(key_pose_, pose_);
   if (std::hypot(since.x, since.y) > settings_.key_distance || std::abs(since.theta) > settings_.key_angle) {
