@@ -10,7 +10,6 @@
 #include <thread>
 
 #include "slam/mapper.h"
-#include "slam/matcher.h"
 #include "slam/pose.h"
 
 namespace k = kurumaisu;

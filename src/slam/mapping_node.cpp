@@ -69,6 +69,11 @@ k::Scan scanOf(const sensor_msgs::LaserScan& message, const Planar& base_from_la
   return scan;
 }
 
+ros::Time lastBeam(const sensor_msgs::LaserScan& scan) {
+  return scan.header.stamp +
+         ros::Duration(scan.time_increment * (static_cast<double>(scan.ranges.size()) - 1));
+}
+
 class MappingNode {
  public:
   MappingNode(ros::NodeHandle& nh, k::MappingNodeSettings settings);
@@ -151,9 +156,7 @@ void MappingNode::work() {
 /// True when done with the scan: mapped, or dropped.
 bool MappingNode::take(const Waiting& waiting) {
   const auto& header = waiting.scan->header;
-  const ros::Time end =
-      header.stamp +
-      ros::Duration(waiting.scan->time_increment * (static_cast<double>(waiting.scan->ranges.size()) - 1.0));
+  const ros::Time end = lastBeam(*waiting.scan);
   std::string why;
   if (buffer_.canTransform(settings_.base_frame, header.frame_id, header.stamp, &why) &&
       buffer_.canTransform(settings_.odom_frame, settings_.base_frame, header.stamp, &why) &&
@@ -173,8 +176,7 @@ void MappingNode::add(const sensor_msgs::LaserScan& message) try {
     return planar(buffer_.lookupTransform(parent, child, stamp).transform);
   };
   const ros::Time start = message.header.stamp;
-  const ros::Time end =
-      start + ros::Duration(message.time_increment * (static_cast<double>(message.ranges.size()) - 1.0));
+  const ros::Time end = lastBeam(message);
   const k::Pose2D first = at(settings_.odom_frame, settings_.base_frame, start).pose;
   const k::Pose2D last = at(settings_.odom_frame, settings_.base_frame, end).pose;
   const k::Scan scan =

@@ -45,13 +45,11 @@ void setNearest(std::vector<float>& ranges, const Moved& reading) {
 void setBetween(std::vector<float>& ranges, const Moved& a, const Moved& b) {
   const Moved& first = a.beam < b.beam ? a : b;
   const Moved& last = a.beam < b.beam ? b : a;
-  const auto begin = static_cast<std::size_t>(std::fmax(0.0, std::ceil(first.beam)));
-  for (std::size_t i = begin; i < ranges.size() && static_cast<double>(i) <= last.beam; ++i) {
-    const auto ray = static_cast<double>(i);
+  const int end = static_cast<int>(std::fmin(std::floor(last.beam), static_cast<double>(ranges.size()) - 1));
+  for (int ray = static_cast<int>(std::fmax(0.0, std::ceil(first.beam))); ray <= end; ++ray) {
     const double part = last.beam > first.beam ? (ray - first.beam) / (last.beam - first.beam) : 0.0;
     const double range = 1.0 / ((1 - part) / first.range + part / last.range);
-    float& value = ranges[i];
-    if (!(value <= range)) value = static_cast<float>(range);
+    if (!(ranges[ray] <= range)) ranges[ray] = static_cast<float>(range);
   }
 }
 

@@ -6,9 +6,22 @@
 #include <string>
 #include <vector>
 
-#include "slam/matcher.h"
-
 namespace kurumaisu {
+
+/// Of scan matching.
+struct MatchSettings {
+  int iterations;            ///< at most so many linearisations
+  int every;                 ///< every n-th reading is matched
+  double reach;              ///< farthest correspondence [m]
+  double deviation;          ///< of a point from its line [m]; above it a point counts less
+  double key_distance;       ///< a scan joins the local map after so much way [m]
+  double key_angle;          ///< or so much turn [rad]
+  int key_scans;             ///< scans in the local map
+  double prior_distance;     ///< odometry's deviation per way driven [m/m]
+  double prior_angle;        ///< odometry's deviation per angle turned [rad/rad]
+  double prior_floor;        ///< odometry's deviation at least, per scan [m]
+  double prior_angle_floor;  ///< odometry's deviation at least, per scan [rad]
+};
 
 struct MapperSettings {
   MatchSettings match;
