@@ -140,6 +140,14 @@ def test_a_gain_of_the_odometry_is_named():
     assert verdict.causes[0].parameters["gain"].estimate == pytest.approx(0.1, abs=0.03)
 
 
+def test_a_recording_too_short_to_hold_anything_back_names_nothing():
+    data = with_jittered_odometry(recording(None, 0.0, 99, 8.0), 1.0)
+    criticism = criticise(replace(data, runs=data.runs[:1], train=data.train[:1]))
+    assert criticism.verdict.verdict == "none"
+    assert criticism.verdict.gain is None
+    assert criticism.story.headline.startswith("Nothing can be named")
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -6,7 +6,7 @@ import pytest
 
 from kurumaisu import effects
 from kurumaisu.critic.reading import read_recording
-from kurumaisu.demo import hidden, processes
+from kurumaisu.demo import __main__, hidden, processes
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting
 
@@ -37,3 +37,10 @@ def test_a_recorded_drive_shows_the_secret(tmp_path):
 def test_a_failed_launch_is_told_with_the_end_of_its_log(tmp_path):
     with pytest.raises(Error, match=r"roslaunch kurumaisu nowhere.launch ended with code(.|\n)*nowhere.launch"):
         processes.roslaunch(["kurumaisu", "nowhere.launch"], tmp_path / "log", 60.0, "failing")
+
+
+def test_the_demonstration_names_a_folder_that_it_cannot_write(tmp_path, monkeypatch, capsys):
+    (tmp_path / "file").touch()
+    monkeypatch.setattr("sys.argv", ["demo", "-o", str(tmp_path / "file" / "out")])
+    assert __main__.main() == 1
+    assert f"{tmp_path}/file/out: Not a directory" in capsys.readouterr().err

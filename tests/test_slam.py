@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from recordings import full_run, write_bag
 
 from kurumaisu import _slam, map_command, maps, slam
 from kurumaisu.errors import Error
@@ -191,6 +192,14 @@ def test_command_writes_map_picture_and_path(tmp_path: Path, capsys: pytest.Capt
     assert path.shape == (37, 4)
     meta = yaml.safe_load((folder / "map.yaml").read_text(encoding="utf-8"))
     assert (folder / meta["image"]).exists()
+
+
+def test_command_maps_a_bag_as_the_critic_reads_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The full run of the readers' tests: a few scans of a wall, with voltages, so of our own laser."""
+    write_bag(tmp_path / "drive.bag", full_run())
+    assert map_command.main([str(tmp_path / "drive.bag"), "-o", str(tmp_path / "map")]) == 0
+    assert "drive: " in capsys.readouterr().out
+    assert (tmp_path / "map" / "map.pgm").exists()
 
 
 def test_command_refuses_bad_input(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

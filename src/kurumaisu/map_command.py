@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu import slam
+from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.reference import scan_log
 from kurumaisu.errors import Error, one_line
 from kurumaisu.maps import draw_map, save_map
 from kurumaisu.params import shipped
@@ -19,7 +21,7 @@ from kurumaisu.params import shipped
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; return 0, or 2 for bad input, which is told on stderr."""
     parser = argparse.ArgumentParser(prog="map", description="Make a map from a recording of scans and odometry.")
-    parser.add_argument("log", type=Path, metavar="LOG", help="recording of MRPT (.rawlog)")
+    parser.add_argument("log", type=Path, metavar="LOG", help="an MRPT rawlog, a bag, or a folder as critic reads it")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/map"), metavar="FOLDER")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the particle filter (1)")
     parser.add_argument("--settings", type=Path, metavar="FILE", help="as launch/mapping_node.yaml, the default")
@@ -28,11 +30,21 @@ def main(arguments: list[str] | None = None) -> int:
         if not 0 <= options.seed < 2**32:
             raise Error(f"--seed: must be 0 to 4294967295: {options.seed}")
         settings = slam.load_mapping_settings(options.settings or shipped("launch/mapping_node.yaml"))
-        report(slam.read_rawlog(options.log), settings, options.seed, options.output)
+        report(read_log(options.log), settings, options.seed, options.output)
     except Error as error:
         print(f"map: {one_line(error)}", file=sys.stderr)
         return 2
     return 0
+
+
+def read_log(path: Path) -> slam.ScanLog:
+    """Read the scans and odometry of a recording of one run. Raise Error naming what is wrong with it."""
+    if path.suffix != ".bag" and not path.is_dir():
+        return slam.read_rawlog(path)
+    recording = read_recording(path)
+    if len(recording.runs) != 1:
+        raise Error(f"{path}: has {len(recording.runs)} runs; a map is made of one")
+    return scan_log(recording, recording.runs[0])
 
 
 def report(log: slam.ScanLog, settings: slam.MapperSettings, seed: int, folder: Path) -> slam.MappingResult:

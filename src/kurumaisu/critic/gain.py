@@ -33,10 +33,15 @@ class Fold:
 
 
 def folds(train: Sequence[Drive], test: Sequence[Drive]) -> list[Fold]:
-    """Return train against test; without test runs, each run left out in turn; of a single run, each quarter."""
+    """Return train against test; without test runs, each run left out in turn; of a single run, each quarter.
+
+    Nothing when a single run is too short to be cut.
+    """
     if test:
         return [Fold(tuple(train), tuple(test))]
     parts = list(train) if len(train) > 1 else split(train[0], _PARTS)
+    if len(parts) < 2:
+        return []
     return [Fold(tuple(parts[:i] + parts[i + 1 :]), (parts[i],)) for i in range(len(parts))]
 
 

@@ -51,7 +51,8 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
 
     progress("measuring the gain on drives held out")
     baseline = _noise(train, model, empty, recording.truth, project=False)
-    worth = gain.measure(model, gain.folds(train, test), found.best, baseline, final) if found.best.ids else None
+    splits = gain.folds(train, test)
+    worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
     return explain.criticism(recording, problem, found, worth, train + test)
 
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
+from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.errors import Error
-from kurumaisu.params import Laser, Model, load_model, shipped
+from kurumaisu.params import load_model, shipped
 
 if TYPE_CHECKING:  # loading MRPT takes a third of a second, which a recording with reference poses need not pay
     from kurumaisu.slam import MappingResult, ScanLog
@@ -27,10 +27,8 @@ def with_reference(recording: Recording, seed: int, progress: Progress) -> Recor
     """
     if all(run.pose is not None for run in recording.runs):
         return recording
-    model = load_model(recording.model or shipped("launch/md100.yaml"))
     runs = tuple(
-        run if run.pose is not None else _with_mapped_pose(recording, run, model, seed, progress)
-        for run in recording.runs
+        run if run.pose is not None else _with_mapped_pose(recording, run, seed, progress) for run in recording.runs
     )
     return replace(recording, runs=runs)
 
@@ -48,16 +46,19 @@ def map_run(log: ScanLog, seed: int, progress: Progress) -> MappingResult:
     return result
 
 
-def scan_log(run: Run, mount: LaserMount | None, laser: Laser | None) -> ScanLog:
+def scan_log(recording: Recording, run: Run) -> ScanLog:
     """Return a run's scans with their odometry, for mapping.
 
-    mount: as the recording states it; laser: the model of the laser, where it is known: supplies the mounting where
-    the recording does not, and its mean error is taken out of the readings.
+    Where the laser is that of a model (the recording's, or ours for a chair driven by voltages), the model says how it
+    is mounted if the recording does not, and its mean error is taken out of the readings.
     Raise Error when the run has no scans, no odometry, or nobody knows how the laser is mounted.
     """
     if run.scan is None or run.odom is None:
         raise Error(f"{run.name}: has no reference pose, and not both scans and odometry to find one from")
     slam = import_module("kurumaisu.slam")
+    ours = recording.model is not None or run.voltage is not None
+    laser = load_model(recording.model or shipped("launch/md100.yaml")).laser if ours else None
+    mount = recording.laser
     place = mount or (laser.mount if laser is not None else None)
     fan = run.fan or mount or laser
     if place is None or fan is None:
@@ -78,9 +79,7 @@ def scan_log(run: Run, mount: LaserMount | None, laser: Laser | None) -> ScanLog
     return log
 
 
-def _with_mapped_pose(recording: Recording, run: Run, model: Model, seed: int, progress: Progress) -> Run:
-    ours = recording.model is not None or run.voltage is not None  # else the laser is one we know nothing of
-    log = scan_log(run, recording.laser, model.laser if ours else None)
-    path = map_run(log, seed, progress).trajectory
+def _with_mapped_pose(recording: Recording, run: Run, seed: int, progress: Progress) -> Run:
+    path = map_run(scan_log(recording, run), seed, progress).trajectory
     source = f"particle filter over {len(path)} scans (no pose was measured), seed {seed}"
     return replace(run, pose=Series(path[:, 0], path[:, 1:], ("x", "y", "theta")), pose_source=source)

@@ -11,7 +11,7 @@ from kurumaisu import effects
 from kurumaisu.critic import naming
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem, Term
-from kurumaisu.critic.material import HORIZON
+from kurumaisu.critic.material import HORIZON, MATERIAL
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.story import Rival
 from kurumaisu.critic.verdict import Estimate, Verdict
@@ -30,8 +30,10 @@ def headline(verdict: Verdict, found: Naming, matters: set[str]) -> str:
     if verdict.verdict == "confounded":
         group = " or ".join(verdict.confounded[0])
         return f"Something is missing in the model, but these drives cannot tell which: {group}."
+    listed = ", ".join(sorted(found.best.ids))
+    if found.best.ids and verdict.gain is None:
+        return f"Nothing can be named: {listed} is suspected, but too little was recorded to test it on data held out."
     if found.best.ids and not matters:
-        listed = ", ".join(sorted(found.best.ids))
         return f"Nothing that matters: {listed} is detectable, but too small to gain anything."
     nearest = max(found.p, key=lambda name: found.p[name])
     if found.p[nearest] >= naming.RIVAL:
@@ -49,7 +51,10 @@ def details(
     ]
     for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True):
         e = estimate(problem.model, term, value, sd)
-        weight = "" if term.id in matters else ": detectable, but it does not matter"
+        weight = ""
+        if term.id not in matters:
+            small = shares[term.id] < MATERIAL
+            weight = ": detectable, but it does not matter" if small else ": not confirmed on data held out"
         said.append(
             f"{term.id}: {term.parameter.name} {e.estimate:.3g} {e.unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
             f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."

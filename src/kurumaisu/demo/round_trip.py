@@ -15,7 +15,7 @@ from kurumaisu.critic.reference import map_run, scan_log
 from kurumaisu.demo.processes import roslaunch
 from kurumaisu.errors import Error
 from kurumaisu.maps import Grid, draw_map, save_map
-from kurumaisu.params import load_model, shipped
+from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 
@@ -29,11 +29,12 @@ def run(folder: Path, seed: int, *, gui: bool) -> None:
     bag.unlink(missing_ok=True)
     arguments = ["kurumaisu", "round.launch", f"bag:={bag}", f"seed:={seed}", f"gui:={str(gui).lower()}"]
     roslaunch(arguments, folder / "roslaunch.log", _DEADLINE, "driving")
-    (drive,) = read_recording(bag).runs
+    recording = read_recording(bag)
+    (drive,) = recording.runs
     if drive.odom is None or drive.pose is None:
         raise Error(f"{bag}: has no odometry or no ground truth")
 
-    log = scan_log(drive, None, load_model(shipped("launch/md100.yaml")).laser)
+    log = scan_log(recording, drive)
     result = map_run(log, seed, lambda words: print(f"  {words}", file=sys.stderr, flush=True))
     truth = geometry.interpolate(drive.pose.t, drive.pose.values, result.trajectory[:, 0])
     world_from_map = slam_score.align(result.trajectory[:, 1:], truth)
