@@ -105,7 +105,7 @@ def test_what_the_drives_cannot_separate_is_said_as_a_set():
         rng = np.random.default_rng(seed)
         starts = np.cumsum(rng.uniform(2.0, 4.0, 12))
         command = np.array([(t, 0.4 * (i % 2 == 0), 0.0) for i, t in enumerate(starts)])
-        drives.append(hidden_effect.drive(command, "base.gain_v", 0.05, rng))
+        drives.append(hidden_effect.drive(command, "base.gain_v", 0.05, rng, hidden_effect.USUAL))
     verdict = criticise(recording_of("one speed", drives)).verdict
     assert verdict.verdict == "confounded"
     assert verdict.causes == ()

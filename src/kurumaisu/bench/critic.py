@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import beta
 
 from kurumaisu.bench import hidden_effect
+from kurumaisu.bench.hidden_effect import Disturbance
 from kurumaisu.bench.table import Table
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.recording import Recording, Run, Series
@@ -25,24 +26,28 @@ _SIZES = (0.1, 0.3, 1.0)  # of the sizes that hidden_effect draws
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; every draw has its own seed, size and drives."""
     parser = argparse.ArgumentParser(prog="bench critic")
-    parser.add_argument("--draws", type=int, default=4, help="per effect and size")
+    parser.add_argument("--draws", type=int, default=4, help="recordings per effect and size; 0: none")
+    parser.add_argument("--nulls", type=int, default=20, help="recordings without an effect, per kind of noise")
     parser.add_argument("--seed", type=int, default=1000)
     options = parser.parse_args(arguments)
     rng = np.random.default_rng(options.seed)
-    title = f"{_RUNS} drives of 60 s, reference 5 mm and 5 mrad at 10 Hz; share (90 % interval) of the draws"
-    headings = ("named right     ", "misnamed        ", "none, or a set  ", "interval covers ")
-    table = Table(title, "hidden effect, size", "draws", *headings, "CPU [s]")
+    title = f"{_RUNS} drives of 60 s, reference at 10 Hz; share (90 % interval) of the recordings"
+    headings = ("named right     ", "misnamed        ", "a set           ", "nothing         ", "interval covers ")
+    table = Table(title, "hidden effect, size", "number", *headings, "CPU [s]")
     for effect in hidden_effect.EFFECTS:
-        for size in _SIZES:
-            draws = [_draw(effect, size, rng) for _ in range(options.draws)]
+        for size in _SIZES if options.draws else ():
+            draws = [_draw(effect, size, rng, hidden_effect.USUAL) for _ in range(options.draws)]
             _row(table, f"{effect} x {size:g}", effect, draws)
-    _row(table, "nothing", None, [_draw(None, 0.0, rng) for _ in range(10 * options.draws)])
+    for name, disturbance in hidden_effect.DISTURBANCES.items():
+        _row(table, f"nothing, {name}", None, [_draw(None, 0.0, rng, disturbance) for _ in range(options.nulls)])
     return 0
 
 
-def recording(effect: str | None, size: float, seed: int, seconds: float) -> Recording:
+def recording(
+    effect: str | None, size: float, seed: int, seconds: float, disturbance: Disturbance = hidden_effect.USUAL
+) -> Recording:
     """Return a recording of several runs with a hidden effect, or none."""
-    tables = [hidden_effect.make_run(effect, size, seed * _RUNS + i, seconds) for i in range(_RUNS)]
+    tables = [hidden_effect.make_run(effect, size, seed * _RUNS + i, seconds, disturbance) for i in range(_RUNS)]
     return recording_of(f"hidden {seed}", tables)
 
 
@@ -66,33 +71,36 @@ def _series(table: FloatArray, *columns: str) -> Series:
 
 @dataclass(frozen=True)
 class _Draw:
-    """named: the causes; covered: the 90 % interval of the hidden effect holds its size, None where not named."""
+    """verdict, and causes by id; covered: the hidden effect's 90 % interval holds its size, None where not named."""
 
+    verdict: str
     named: frozenset[str]
     covered: bool | None
     cpu: float
 
 
-def _draw(effect: str | None, share: float, rng: np.random.Generator) -> _Draw:
+def _draw(effect: str | None, share: float, rng: np.random.Generator, disturbance: Disturbance) -> _Draw:
     size = share * hidden_effect.draw_size(effect, rng) if effect else 0.0
-    data = recording(effect, size, int(rng.integers(1, 2**31)), 60.0)
+    data = recording(effect, size, int(rng.integers(1, 2**31)), 60.0, disturbance)
     start = time.process_time()
-    causes = pipeline.criticise(data, shipped("launch/md100.yaml"), lambda _: None).verdict.causes
+    verdict = pipeline.criticise(data, shipped("launch/md100.yaml"), lambda _: None).verdict
+    causes = verdict.causes
     cpu = time.process_time() - start
     estimates = [estimate for cause in causes if cause.id == effect for estimate in cause.parameters.values()]
     covered = estimates[0].lo90 <= size <= estimates[0].hi90 if estimates else None
-    return _Draw(frozenset(cause.id for cause in causes), covered, cpu)
+    return _Draw(verdict.verdict, frozenset(cause.id for cause in causes), covered, cpu)
 
 
 def _row(table: Table, label: str, effect: str | None, draws: Sequence[_Draw]) -> None:
     right = sum(draw.named == {effect} for draw in draws)
     wrong = sum(bool(draw.named - {effect}) for draw in draws)
+    a_set = sum(draw.verdict == "confounded" for draw in draws)
     n = len(draws)
     covered = [draw.covered for draw in draws if draw.covered is not None]
     table.row(
         label,
         str(n),
-        *(_share(k, n) for k in (right, wrong, n - right - wrong)),
+        *(_share(k, n) for k in (right, wrong, a_set, n - right - wrong - a_set)),
         _share(sum(covered), len(covered)) if covered else "-",
         float(np.median([draw.cpu for draw in draws])),
     )

@@ -8,6 +8,7 @@ differential equation, a delay is a queue, a dead zone is in volts beyond the th
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,9 +29,25 @@ EFFECTS: dict[str, tuple[float, float, bool]] = {
 }
 _STEP = 0.001  # [s]
 _POSE_EVERY = 100  # steps
-_POSE_SD = (0.005, 0.005, 0.005)  # [m, m, rad]
-_OU_SD = (0.01, 0.02)  # [m/s, rad/s]
-_OU_TAU = 0.3  # [s]
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """Ornstein-Uhlenbeck noise of the rates: sd_v [m/s], sd_w [rad/s], tau [s]; pose_sd [m, rad] of the reference."""
+
+    sd_v: float
+    sd_w: float
+    tau: float
+    pose_sd: float
+
+
+USUAL = Disturbance(sd_v=0.01, sd_w=0.02, tau=0.3, pose_sd=0.005)
+DISTURBANCES = {
+    "usual": USUAL,
+    "slow": Disturbance(sd_v=0.02, sd_w=0.03, tau=2.0, pose_sd=0.005),
+    "rough": Disturbance(sd_v=0.05, sd_w=0.10, tau=0.05, pose_sd=0.02),
+    "poor reference": Disturbance(sd_v=0.01, sd_w=0.02, tau=0.3, pose_sd=0.02),
+}
 
 _Line = tuple[float, float]  # slope, intercept
 _FORWARD: tuple[_Line, _Line] = ((1.32402, 0.127906), (2.07369, -0.108783))
@@ -43,33 +60,37 @@ def draw_size(effect: str, rng: np.random.Generator) -> float:
     return float(rng.uniform(low, high) * (rng.choice([-1, 1]) if signed else 1))
 
 
-def make_run(effect: str | None, size: float, seed: int, seconds: float) -> dict[str, FloatArray]:
+def make_run(
+    effect: str | None, size: float, seed: int, seconds: float, disturbance: Disturbance
+) -> dict[str, FloatArray]:
     """Return one drive as tables: command (t, v, w), voltage (t, v_f, v_s), pose (t, x, y, theta) at 10 Hz."""
     rng = np.random.default_rng(seed)
-    return drive(joystick(seconds, rng), effect, size, rng)
+    return drive(joystick(seconds, rng), effect, size, rng, disturbance)
 
 
-def drive(command: FloatArray, effect: str | None, size: float, rng: np.random.Generator) -> dict[str, FloatArray]:
+def drive(
+    command: FloatArray, effect: str | None, size: float, rng: np.random.Generator, disturbance: Disturbance
+) -> dict[str, FloatArray]:
     """Return the tables of a drive whose commands (n, 3) of t, v, w are given; the last one is rest."""
     voltage = np.array([[t, _volts(v, _FORWARD), _volts(w, _STEER)] for t, v, w in command])
     steps = round((command[-1, 0] + 1.0) / _STEP)
     asked = command[np.searchsorted(command[:, 0], np.arange(steps) * _STEP, side="right") - 1, 1:]
-    noise = _ornstein_uhlenbeck(steps, rng)
+    noise = _ornstein_uhlenbeck(steps, rng, disturbance)
     chair = _Chair(effect, size)
     poses = []
     for k in range(steps):
         if k % _POSE_EVERY == 0:
-            error = rng.standard_normal(3) * _POSE_SD
+            error = rng.standard_normal(3) * disturbance.pose_sd
             poses.append([k * _STEP, *(np.array([chair.x, chair.y, chair.theta]) + error)])
         chair.step(float(asked[k, 0]), float(asked[k, 1]), float(noise[k, 0]), float(noise[k, 1]))
     return {"command": command, "voltage": voltage, "pose": np.array(poses)}
 
 
-def _ornstein_uhlenbeck(steps: int, rng: np.random.Generator) -> FloatArray:
+def _ornstein_uhlenbeck(steps: int, rng: np.random.Generator, like: Disturbance) -> FloatArray:
     out = np.zeros((steps, 2))
-    kick = np.sqrt(2 * _STEP / _OU_TAU) * np.array(_OU_SD) * rng.standard_normal((steps, 2))
+    kick = np.sqrt(2 * _STEP / like.tau) * np.array([like.sd_v, like.sd_w]) * rng.standard_normal((steps, 2))
     for k in range(1, steps):
-        out[k] = out[k - 1] * (1 - _STEP / _OU_TAU) + kick[k]
+        out[k] = out[k - 1] * (1 - _STEP / like.tau) + kick[k]
     return out
 
 
