@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Array types shared by all modules."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
-Mapping = dict[str, Any]

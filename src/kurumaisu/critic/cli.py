@@ -15,6 +15,8 @@ from kurumaisu.critic.reference import with_reference
 from kurumaisu.errors import Error, one_line
 from kurumaisu.params import shipped
 
+_WIDTH = 100  # characters of a line of progress
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Criticise a recording; return 0, or 2 when the input cannot be used."""
@@ -33,7 +35,9 @@ def run(recording_path: Path, output: Path, model: Path | None, seed: int) -> Cr
     """Read, criticise and write into a folder. Raise Error naming what is wrong with the input."""
 
     def progress(message: str) -> None:
-        print(f"critic: {message}", file=sys.stderr, flush=True)
+        """Overwrite one line of a terminal; elsewhere keep every line."""
+        start, end = ("\r\033[K", "") if sys.stderr.isatty() else ("", "\n")
+        print(f"{start}critic: {message}"[:_WIDTH], end=end, file=sys.stderr, flush=True)
 
     progress(f"reading {recording_path}")
     recording = read_recording(recording_path)
@@ -41,6 +45,8 @@ def run(recording_path: Path, output: Path, model: Path | None, seed: int) -> Cr
     model_file = model or recording.model or shipped("launch/md100.yaml")
     criticism = pipeline.criticise(recording, model_file, progress, assume_law=model is not None)
     pipeline.write(criticism, model_file, output)
+    if sys.stderr.isatty():
+        print("\r\033[K", end="", file=sys.stderr, flush=True)
     return criticism
 
 

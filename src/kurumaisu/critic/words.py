@@ -51,12 +51,13 @@ def details(
     ]
     for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True):
         e = estimate(problem.model, term, value, sd)
+        unit = "" if e.unit == "1" else f" {e.unit}"
         weight = ""
         if term.id not in matters:
             small = shares[term.id] < MATERIAL
             weight = ": detectable, but it does not matter" if small else ": not confirmed on data held out"
         said.append(
-            f"{term.id}: {term.parameter.name} {e.estimate:.3g} {e.unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
+            f"{term.id}: {term.parameter.name} {e.estimate:.3g}{unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
             f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."
         )
     wander = np.degrees(problem.noise.sd_w * np.sqrt(2 * problem.noise.tau * _MINUTE))
