@@ -56,17 +56,13 @@ def recording_of(name: str, drives: Sequence[dict[str, FloatArray]]) -> Recordin
     runs = tuple(
         Run(
             f"run_{i}",
-            command=_series(tables["command"], "v", "w"),
-            voltage=_series(tables["voltage"], "v_f", "v_s"),
-            pose=_series(tables["pose"], "x", "y", "theta"),
+            command=Series.of_table(tables["command"], "v", "w"),
+            voltage=Series.of_table(tables["voltage"], "v_f", "v_s"),
+            pose=Series.of_table(tables["pose"], "x", "y", "theta"),
         )
         for i, tables in enumerate(drives, start=1)
     )
     return Recording(name, runs, train=tuple(run.name for run in runs))
-
-
-def _series(table: FloatArray, *columns: str) -> Series:
-    return Series(table[:, 0], table[:, 1:], columns)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from kurumaisu import effects
 from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.story import Bins, Misfit
+from kurumaisu.critic.words import NORMAL90
 from kurumaisu.effects import Follows, Rate
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
@@ -18,7 +19,6 @@ from kurumaisu.types import FloatArray
 _BINS = 15  # at most
 _FEWEST = 5  # points of which a mean has an interval
 _CHANGE = 0.5  # [s] over which a change of the input is taken
-_NORMAL90 = 1.645
 _NOTEWORTHY = 4.0  # standard errors from which a remaining correlation is said
 
 _UNITS = {Rate.V: "m/s", Rate.W: "rad/s", Follows.V: "m/s", Follows.W: "rad/s"}
@@ -111,7 +111,7 @@ def _bins(x: FloatArray, y: FloatArray, fewest: int) -> Bins:
     for i in np.unique(index):
         inside = index == i
         if inside.sum() >= fewest:
-            error = _NORMAL90 * y[inside].std() / np.sqrt(inside.sum())
+            error = NORMAL90 * y[inside].std() / np.sqrt(inside.sum())
             rows.append((x[inside].mean(), y[inside].mean(), y[inside].mean() - error, y[inside].mean() + error))
     centre, mean, lo, hi = np.array(rows).reshape(-1, 4).T
     return Bins(centre, mean, lo, hi)

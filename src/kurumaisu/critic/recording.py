@@ -17,6 +17,11 @@ class Series:
     values: FloatArray
     columns: tuple[str, ...]
 
+    @classmethod
+    def of_table(cls, table: FloatArray, *columns: str) -> Series:
+        """Return the series of a table (n, 1 + m) whose first column is t."""
+        return cls(table[:, 0], table[:, 1:], columns)
+
     def column(self, name: str) -> FloatArray:
         """Return one column, (n,)."""
         return self.values[:, self.columns.index(name)]

@@ -18,7 +18,7 @@ from kurumaisu.critic.verdict import Estimate, Verdict
 from kurumaisu.params import Model
 
 _MINUTE = 60.0  # [s]
-_NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
+NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
 
@@ -103,5 +103,5 @@ def estimate(model: Model, term: Term, value: float, sd: float) -> Estimate:
     unit = term.parameter.unit
     if unit == "V" and model.law_name == "identity":
         unit = "V (1 V stands for 1 m/s or 1 rad/s)"
-    low, high = value - _NORMAL90 * sd, value + _NORMAL90 * sd
+    low, high = value - NORMAL90 * sd, value + NORMAL90 * sd
     return Estimate(float(value), max(low, term.parameter.lower), min(high, term.parameter.upper), unit)

@@ -17,7 +17,6 @@ from kurumaisu.params import EffectSetting, Model, load_model, shipped
 from kurumaisu.sim.joystick import joystick
 from kurumaisu.sim.settings import load_physics, with_effects
 from kurumaisu.sim.simulator import NEUTRAL, Command, Simulator
-from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 
 _DRIVES, _SECONDS = 3, 45.0
@@ -77,11 +76,7 @@ def _drive(name: str, simulator: Simulator, model: Model, rng: np.random.Generat
         observation = simulator.step(command)
     return Run(
         name,
-        command=_series(commands, "v", "w"),
-        voltage=_series(np.column_stack([commands[:, 0], voltages]), "v_f", "v_s"),
-        pose=_series(np.array(poses), "x", "y", "theta"),
+        command=Series.of_table(commands, "v", "w"),
+        voltage=Series.of_table(np.column_stack([commands[:, 0], voltages]), "v_f", "v_s"),
+        pose=Series.of_table(np.array(poses), "x", "y", "theta"),
     )
-
-
-def _series(table: FloatArray, *columns: str) -> Series:
-    return Series(table[:, 0], table[:, 1:], columns)
