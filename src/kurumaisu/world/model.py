@@ -134,7 +134,7 @@ Device = Position | Ranger | Camera | Fiducial | Bumper | Gripper
 
 @dataclass(frozen=True)
 class Hinge:
-    """This package's own addition: the model turns about a point (2,) of its own frame between two angles [rad]."""
+    """An addition to Stage's language: the model turns about a point (2,) of its own frame between two angles [rad]."""
 
     anchor: FloatArray
     lowest: float
