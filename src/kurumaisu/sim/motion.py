@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from kurumaisu._core import Arena
-from kurumaisu.sim.bodies import Bodies, attached, relative
+from kurumaisu.sim.partition import Bodies, attached, relative
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _TURN = 2 * math.pi  # [rad]
