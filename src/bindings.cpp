@@ -160,6 +160,25 @@ Array castBeams(const k::Scene& scene, const Array& poses, const Array& bearings
   return out;
 }
 
+py::tuple castFan(const k::Scene& scene, const std::array<double, 3>& origin, double first, double increment,
+                  std::size_t samples, double max_range) {
+  if (!(max_range >= 0)) throw std::invalid_argument("max_range must not be negative");
+  std::vector<k::Hit> hits(samples);
+  {
+    const py::gil_scoped_release release;
+    scene.castFan({origin[0], origin[1], origin[2]}, first, increment, samples, max_range, hits.data());
+  }
+  Array ranges(static_cast<py::ssize_t>(samples));
+  py::array_t<std::int64_t> segments(static_cast<py::ssize_t>(samples));
+  double* range = ranges.mutable_data();
+  std::int64_t* segment = segments.mutable_data();
+  for (const k::Hit& hit : hits) {
+    *range++ = hit.range;
+    *segment++ = hit.segment;
+  }
+  return py::make_tuple(ranges, segments);
+}
+
 void bindRaycast(py::module_& m) {
   py::class_<k::Scene>(m, "Scene", "Immutable line segments that answer rays exactly.")
       .def(py::init([](const Array& segments) { return k::Scene(segmentsOf(segments)); }),
@@ -169,7 +188,12 @@ void bindRaycast(py::module_& m) {
       .def("cast", &castBeams, py::arg("poses"), py::arg("bearings"), py::arg("max_range"),
            "Ranges (n,) [m] of beams that leave poses (n, 3), or one pose (3,), at bearings (n,) [rad]; +inf "
            "beyond\n"
-           "max_range [m]. Poses are of the laser, in the map frame.");
+           "max_range [m]. Poses are of the laser, in the map frame.")
+      .def("cast_fan", &castFan, py::arg("origin"), py::arg("first"), py::arg("increment"),
+           py::arg("samples"), py::arg("max_range"),
+           "Ranges (samples,) [m] and indices (samples,) of the segments met; +inf and -1: nothing within "
+           "max_range\n"
+           "[m]. Beam i leaves the origin (3,) at bearing first + i * increment [rad].");
 }
 
 }  // namespace
