@@ -108,17 +108,15 @@ void Arena::scan(const std::vector<Viewpoint>& from, const std::vector<Fan>& fan
     std::vector<Hit> hits;
     std::vector<Echo> echoes;
     for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t n = fans[i].samples;
+      const Fan& fan = fans[i];
       const Pose& pose = from[i].pose;
-      hits.resize(n);
-      echoes.resize(n);
-      for (std::size_t j = 0; j < n; ++j) {
-        const double angle = pose.heading + (fans[i].first + static_cast<double>(j) * fans[i].increment);
-        hits[j] = layers[i]->scene.cast(pose.x, pose.y, angle, fans[i].range_max);
-        echoes[j] = echoOf(hits[j], *layers[i], walls_);
-      }
-      seeBodies(bodies_, from[i], fans[i], echoes.data());
-      for (std::size_t j = 0; j < n; ++j) {
+      hits.resize(fan.samples);
+      echoes.resize(fan.samples);
+      layers[i]->scene.castFan({pose.x, pose.y, pose.heading}, fan.first, fan.increment, fan.samples,
+                               fan.range_max, hits.data());
+      for (std::size_t j = 0; j < fan.samples; ++j) echoes[j] = echoOf(hits[j], *layers[i], walls_);
+      seeBodies(bodies_, from[i], fan, echoes.data());
+      for (std::size_t j = 0; j < fan.samples; ++j) {
         ranges[offsets[i] + j] = echoes[j].range;
         returns[offsets[i] + j] = echoes[j].ranger_return;
       }

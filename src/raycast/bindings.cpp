@@ -2,7 +2,11 @@
 // kurumaisu._core: ray casting. Vectorised over numpy arrays.
 #include "bindings.h"
 
+#include <pybind11/stl.h>
+
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <stdexcept>
 #include <vector>
 
@@ -46,6 +50,25 @@ Array castBeams(const Scene& scene, const Array& poses, const Array& bearings, d
   return out;
 }
 
+py::tuple castFan(const Scene& scene, const std::array<double, 3>& origin, double first, double increment,
+                  std::size_t samples, double max_range) {
+  if (!(max_range >= 0)) throw std::invalid_argument("max_range must not be negative");
+  std::vector<Hit> hits(samples);
+  {
+    const py::gil_scoped_release release;
+    scene.castFan({origin[0], origin[1], origin[2]}, first, increment, samples, max_range, hits.data());
+  }
+  Array ranges(static_cast<py::ssize_t>(samples));
+  py::array_t<std::int64_t> segments(static_cast<py::ssize_t>(samples));
+  double* range = ranges.mutable_data();
+  std::int64_t* segment = segments.mutable_data();
+  for (const Hit& hit : hits) {
+    *range++ = hit.range;
+    *segment++ = hit.segment;
+  }
+  return py::make_tuple(ranges, segments);
+}
+
 }  // namespace
 
 void bindRaycast(py::module_& m) {
@@ -56,7 +79,12 @@ void bindRaycast(py::module_& m) {
       .def("cast", &castBeams, py::arg("poses"), py::arg("bearings"), py::arg("max_range"),
            "Ranges (n,) [m] of beams that leave poses (n, 3), or one pose (3,), at bearings (n,) [rad]; +inf "
            "beyond\n"
-           "max_range [m]. Poses are of the laser, in the map frame.");
+           "max_range [m]. Poses are of the laser, in the map frame.")
+      .def("cast_fan", &castFan, py::arg("origin"), py::arg("first"), py::arg("increment"),
+           py::arg("samples"), py::arg("max_range"),
+           "Ranges (samples,) [m] and indices (samples,) of the segments met; +inf and -1: nothing within "
+           "max_range\n"
+           "[m]. Beam i leaves the origin (3,) at bearing first + i * increment [rad].");
   bindArena(m);
 }
 
