@@ -133,12 +133,16 @@ void Arena::cast(const std::vector<Viewpoint>& from, double range_max, double* r
     layers.push_back(&layers_.at(from[i].pose.z, from[i].tree));
   }
   pool_.run(from.size(), [&](std::size_t begin, std::size_t end) {
+    std::vector<Echo> echoes;
     for (std::size_t i = begin; i < end; ++i) {
       const Pose& pose = from[i].pose;
       const Hit wall = layers[i]->scene.cast(pose.x, pose.y, pose.heading, range_max);
-      const Echo echo = seeBodies(bodies_, from[i], range_max, echoOf(wall, *layers[i], walls_));
-      ranges[i] = echo.range;
-      returns[i] = echo.ranger_return;
+      echoes.push_back(echoOf(wall, *layers[i], walls_));
+    }
+    seeBodies(bodies_, from.data() + begin, end - begin, range_max, echoes.data());
+    for (std::size_t i = begin; i < end; ++i) {
+      ranges[i] = echoes[i - begin].range;
+      returns[i] = echoes[i - begin].ranger_return;
     }
   });
 }

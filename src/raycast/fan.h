@@ -18,28 +18,48 @@ struct Fan {
   double range_max;     ///< [m]
 };
 
-/// Calls visit(i) for the beams whose bearing is within `half` [rad] of `middle`, modulo a whole turn.
-///
-/// A few beams beside them may be visited too. With 0 as increment all beams are.
-template <typename Visit>
-void visitBeams(const Fan& fan, double middle, double half, const Visit& visit) {
-  const std::size_t n = fan.samples;
-  const double slack = 1e-12 * (1000 + std::abs(middle) + std::abs(fan.first));  // [rad] far above rounding
-  const double step = std::abs(fan.increment);
-  const double width = half + slack;
-  if (step == 0 || !(2 * width < kTurn)) {
-    for (std::size_t i = 0; i < n; ++i) visit(i);
-    return;
+/// Finds the beams of a fan that leave within an angle, in any turn.
+class Beams {
+ public:
+  /// heading [rad]: of the sensor in the map.
+  Beams(const Fan& fan, double heading)
+      : samples_(fan.samples),
+        step_(std::abs(fan.increment)),
+        inverse_(1.0 / step_),
+        sign_(fan.increment > 0 ? 1.0 : -1.0),
+        start_(std::remainder(heading + fan.first, kTurn)),
+        last_(static_cast<double>(samples_) - 1),
+        slack_(1e-12 * (1000 + std::abs(heading) + std::abs(fan.first))) {}
+
+  /// Calls visit(i) for the beams whose direction in the map is within `half` [rad] of `middle`.
+  ///
+  /// middle: from -pi to pi. A few beams beside them may be visited too; with 0 as increment all are.
+  template <typename Visit>
+  void within(double middle, double half, const Visit& visit) const {
+    const double width = half + slack_;
+    if (step_ == 0 || !(2 * width < kTurn)) {
+      for (std::size_t i = 0; i < samples_; ++i) visit(i);
+      return;
+    }
+    // Angle from the first beam in the order of the beams, the smallest that some beam can have.
+    double at = sign_ * (middle - start_);
+    while (at + width < 0) at += kTurn;
+    while (at + width >= kTurn) at -= kTurn;
+    for (; at - width <= last_ * step_; at += kTurn) {
+      const double from = std::max((at - width) * inverse_, 0.0);
+      const double to = std::min((at + width) * inverse_, last_);
+      auto i = static_cast<std::size_t>(from);
+      if (static_cast<double>(i) < from) ++i;
+      for (; static_cast<double>(i) <= to; ++i) visit(i);
+    }
   }
-  // Angle from the first beam in the direction in which they are numbered, at its smallest that can matter.
-  double at = fan.increment > 0 ? middle - fan.first : fan.first - middle;
-  at += kTurn * std::ceil(-(at + width) / kTurn);
-  const double last = static_cast<double>(n - 1);
-  for (; at - width <= last * step; at += kTurn) {
-    const auto from = static_cast<std::size_t>(std::clamp(std::ceil((at - width) / step), 0.0, last + 1));
-    const double to = std::min(std::floor((at + width) / step), last);
-    for (std::size_t i = from; static_cast<double>(i) <= to; ++i) visit(i);
-  }
-}
+
+ private:
+  std::size_t samples_;
+  double step_, inverse_, sign_;
+  double start_;  ///< direction of the first beam in the map, from -pi to pi
+  double last_;   ///< number of the last beam
+  double slack_;  ///< [rad] far above rounding
+};
 
 }  // namespace kurumaisu

@@ -3,12 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <vector>
 
 namespace kurumaisu {
 namespace {
-
-const double kHalfTurn = kTurn / 2;
 
 Ray rayAt(const Pose& pose, double angle) { return {pose.x, pose.y, std::cos(angle), std::sin(angle)}; }
 
@@ -40,89 +38,127 @@ double atLeastArcsine(double x) {
   return x * (1 + (kTurn / 4 - 1) * x * x);  // all coefficients of the series beyond x put together
 }
 
-/// One body before one fan.
-class Splat {
- public:
-  Splat(const Bodies::Body& body, const Viewpoint& from, const Fan& fan, Echo* echoes)
-      : body_(body), from_(from.pose), fan_(fan), echoes_(echoes) {}
+constexpr double kRough = 2e-5;  // [rad] twice the error of roughDirection
 
-  /// Few beams meet all faces; only where many beams meet many faces does it pay to look where each face is.
-  void whole(double middle, double half, double nearest) const {
-    constexpr double kBeams = 16.0;
-    constexpr std::size_t kFaces = 4;
-    if (body_.faces.size() > kFaces && 2 * half > kBeams * std::abs(fan_.increment)) {
-      for (std::size_t i = 0; i < body_.faces.size(); ++i)
-        if (visible(body_.faces[i], body_.pose.z, from_.z)) face(i);
-      return;
+/// Direction [rad] of a vector; Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.49.
+double roughDirection(double dx, double dy) {
+  const double x = std::abs(dx);
+  const double y = std::abs(dy);
+  const double t = std::min(x, y) / std::max(x, y);
+  const double tt = t * t;
+  double angle = t * (0.9998660 + tt * (-0.3302995 + tt * (0.1801410 + tt * (-0.0851330 + tt * 0.0208351))));
+  if (y > x) angle = kTurn / 4 - angle;
+  if (dx < 0) angle = kTurn / 2 - angle;
+  return dy < 0 ? -angle : angle;
+}
+
+/// The view of bodies through one fan.
+class FanView {
+ public:
+  FanView(const Viewpoint& from, const Fan& fan, Echo* echoes)
+      : from_(from.pose), fan_(fan), beams_(fan, from.pose.heading), echoes_(echoes) {}
+
+  void see(const Bodies::Body& body, const Bodies::Circle& circle) const {
+    const double dx = circle.x - from_.x;
+    const double dy = circle.y - from_.y;
+    const double distance = std::sqrt(dx * dx + dy * dy);
+    if (distance <= circle.radius) {
+      seeWhole(body, 0, kTurn, 0);
+    } else {
+      seeWhole(body, roughDirection(dx, dy), atLeastArcsine(circle.radius / distance) + kRough,
+               distance - circle.radius);
     }
-    visitBeams(fan_, middle, half, [&](std::size_t i) {
-      if (echoes_[i].range < nearest) return;  // something stands before the whole body
-      testRay(body_, rayAt(from_, angle(i)), from_.z, fan_.range_max, echoes_[i]);
-    });
   }
 
  private:
-  double angle(std::size_t beam) const {
-    return from_.heading + (fan_.first + static_cast<double>(beam) * fan_.increment);
-  }
-
-  void face(std::size_t number) const {
-    const Segment& line = body_.placed[number];
-    const double a = std::atan2(line.ay - from_.y, line.ax - from_.x);
-    const double b = std::atan2(line.by - from_.y, line.bx - from_.x);
-    const double span = std::remainder(b - a, kTurn);
-    // On the face itself its ends are opposite or nowhere, and rounding decides on which side of it beams are.
-    constexpr double kNearly = 1e-6;  // [rad]
-    constexpr double kAtEnd = 1e-9;   // [m]
-    const bool on_it = std::abs(span) > kHalfTurn - kNearly || atEnd(line.ax, line.ay, kAtEnd) ||
-                       atEnd(line.bx, line.by, kAtEnd);
-    visitBeams(fan_, a + span / 2 - from_.heading, on_it ? kTurn : std::abs(span) / 2, [&](std::size_t i) {
-      keepNearer(rangeTo(rayAt(from_, angle(i)), line), body_.faces[number].ranger_return, fan_.range_max,
-                 echoes_[i]);
+  /// Few beams meet all faces; only where many beams meet many faces does it pay to look where each face is.
+  void seeWhole(const Bodies::Body& body, double middle, double half, double nearest) const {
+    constexpr double kBeams = 16.0;
+    constexpr std::size_t kFaces = 4;
+    if (body.faces.size() > kFaces && 2 * half > kBeams * std::abs(fan_.increment)) {
+      for (std::size_t i = 0; i < body.faces.size(); ++i)
+        if (visible(body.faces[i], body.pose.z, from_.z)) seeFace(body.faces[i], body.placed[i]);
+      return;
+    }
+    beams_.within(middle, half, [&](std::size_t i) {
+      if (echoes_[i].range < nearest) return;  // something stands before the whole body
+      testRay(body, rayOf(i), from_.z, fan_.range_max, echoes_[i]);
     });
   }
 
-  bool atEnd(double x, double y, double within) const {
-    return std::abs(x - from_.x) < within && std::abs(y - from_.y) < within;
+  void seeFace(const Face& face, const Segment& line) const {
+    const double a = std::atan2(line.ay - from_.y, line.ax - from_.x);
+    const double b = std::atan2(line.by - from_.y, line.bx - from_.x);
+    const double span = std::remainder(b - a, kTurn);
+    // From the face itself its ends are opposite or nowhere, and rounding decides on which side of it beams are.
+    constexpr double kNearly = 1e-6;  // [rad]
+    const bool on_it =
+        std::abs(span) > kTurn / 2 - kNearly || isHere(line.ax, line.ay) || isHere(line.bx, line.by);
+    const double middle = std::remainder(a + span / 2, kTurn);
+    beams_.within(middle, on_it ? kTurn : std::abs(span) / 2, [&](std::size_t i) {
+      keepNearer(rangeTo(rayOf(i), line), face.ranger_return, fan_.range_max, echoes_[i]);
+    });
   }
 
-  const Bodies::Body& body_;
+  bool isHere(double x, double y) const {
+    constexpr double kHere = 1e-9;  // [m]
+    return std::abs(x - from_.x) < kHere && std::abs(y - from_.y) < kHere;
+  }
+
+  Ray rayOf(std::size_t beam) const {
+    return rayAt(from_, from_.heading + (fan_.first + static_cast<double>(beam) * fan_.increment));
+  }
+
   const Pose& from_;
   const Fan& fan_;
+  Beams beams_;
   Echo* echoes_;
 };
+
+void seeAlong(const Bodies& bodies, int number, const Viewpoint& from, double range_max, Echo& echo,
+              const Ray& ray) {
+  const Bodies::Circle& circle = bodies.circle(number);
+  const double dx = circle.x - ray.x;
+  const double dy = circle.y - ray.y;
+  const double aside = ray.dx * dy - ray.dy * dx;
+  const double ahead = ray.dx * dx + ray.dy * dy;
+  if (std::abs(aside) > circle.radius || ahead < -circle.radius || ahead > echo.range + circle.radius) return;
+  if (mayBeSeen(bodies, number, from)) testRay(bodies[number], ray, from.pose.z, range_max, echo);
+}
 
 }  // namespace
 
 void seeBodies(const Bodies& bodies, const Viewpoint& from, const Fan& fan, Echo* echoes) {
   if (fan.samples == 0) return;
+  const FanView view(from, fan, echoes);
   bodies.near(from.pose.x, from.pose.y, fan.range_max, [&](int number) {
-    if (!mayBeSeen(bodies, number, from)) return;
-    const Bodies::Circle& circle = bodies.circle(number);
-    const double dx = circle.x - from.pose.x;
-    const double dy = circle.y - from.pose.y;
-    const double distance = std::sqrt(dx * dx + dy * dy);
-    const Splat splat(bodies[number], from, fan, echoes);
-    if (distance <= circle.radius) {
-      splat.whole(0, kTurn, 0);
-    } else {
-      splat.whole(std::atan2(dy, dx) - from.pose.heading, atLeastArcsine(circle.radius / distance),
-                  distance - circle.radius);
-    }
+    if (mayBeSeen(bodies, number, from)) view.see(bodies[number], bodies.circle(number));
   });
 }
 
-Echo seeBodies(const Bodies& bodies, const Viewpoint& from, double range_max, Echo echo) {
-  const Ray ray = rayAt(from.pose, from.pose.heading);
-  bodies.near(from.pose.x, from.pose.y, std::min(range_max, echo.range), [&](int number) {
-    const Bodies::Circle& circle = bodies.circle(number);
-    const double dx = circle.x - ray.x;
-    const double dy = circle.y - ray.y;
-    const double aside = ray.dx * dy - ray.dy * dx;
-    if (std::abs(aside) > circle.radius || ray.dx * dx + ray.dy * dy < -circle.radius) return;
-    if (mayBeSeen(bodies, number, from)) testRay(bodies[number], ray, from.pose.z, range_max, echo);
-  });
-  return echo;
+// Rays that follow each other mostly leave from nearly the same place: they share one search.
+void seeBodies(const Bodies& bodies, const Viewpoint* from, std::size_t n, double range_max, Echo* echoes) {
+  constexpr double kSamePlace = 0.5;  // [m]
+  std::vector<int> found;
+  std::size_t end = 0;
+  for (std::size_t begin = 0; begin < n; begin = end) {
+    const Pose& place = from[begin].pose;
+    double reach = 0.0;
+    double spread = 0.0;
+    for (end = begin; end < n; ++end) {
+      const double away = std::hypot(from[end].pose.x - place.x, from[end].pose.y - place.y);
+      if (away > kSamePlace) break;
+      reach = std::max(reach, std::min(range_max, echoes[end].range));
+      spread = std::max(spread, away);
+    }
+    found.clear();
+    bodies.near(place.x, place.y, reach + spread, [&](int number) { found.push_back(number); });
+    if (found.empty()) continue;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Ray ray = rayAt(from[i].pose, from[i].pose.heading);
+      for (const int number : found) seeAlong(bodies, number, from[i], range_max, echoes[i], ray);
+    }
+  }
 }
 
 }  // namespace kurumaisu

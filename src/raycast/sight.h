@@ -2,6 +2,8 @@
 // What beams see of bodies that move.
 #pragma once
 
+#include <cstddef>
+
 #include "raycast/bodies.h"
 #include "raycast/fan.h"
 #include "raycast/ray.h"
@@ -23,7 +25,7 @@ struct Echo {
 /// Puts the bodies in the way of a fan's beams; echoes (samples): what the beams meet without them.
 void seeBodies(const Bodies& bodies, const Viewpoint& from, const Fan& fan, Echo* echoes);
 
-/// The nearer of the echo and what a single ray meets of the bodies; from.pose.heading is its direction.
-Echo seeBodies(const Bodies& bodies, const Viewpoint& from, double range_max, Echo echo);
+/// Puts the bodies in the way of single rays along the headings; echoes (n): what they meet without them.
+void seeBodies(const Bodies& bodies, const Viewpoint* from, std::size_t n, double range_max, Echo* echoes);
 
 }  // namespace kurumaisu
