@@ -16,6 +16,8 @@
 namespace py = pybind11;
 namespace k = kurumaisu;
 
+void bindCamera(py::module_& m);  // raycast/camera_bindings.cpp
+
 namespace {
 
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
@@ -179,4 +181,5 @@ PYBIND11_MODULE(_core, m) {
   bindModel(m);
   bindKalman(m);
   bindRaycast(m);
+  bindCamera(m);
 }

@@ -4,7 +4,10 @@
 from collections.abc import Sequence
 from typing import overload
 
-from kurumaisu.types import BoolArray, FloatArray
+import numpy as np
+from numpy.typing import NDArray
+
+from kurumaisu.types import BoolArray, ByteArray, FloatArray, IntArray
 
 class Branch:
     def __init__(self, slope: float, intercept: float) -> None: ...
@@ -71,3 +74,29 @@ class Scene:
     def __init__(self, segments: FloatArray) -> None: ...
     def __len__(self) -> int: ...
     def cast(self, poses: FloatArray, bearings: FloatArray, max_range: float) -> FloatArray: ...
+
+class Panels:
+    def __init__(self, walls: FloatArray, colors: ByteArray, prisms: IntArray, bodies: IntArray) -> None: ...
+    def __len__(self) -> int: ...
+
+class Camera:
+    def __init__(
+        self,
+        *,
+        width: int,
+        height: int,
+        fov_h: float,
+        fov_v: float,
+        near: float,
+        far: float,
+        tilt: float,
+    ) -> None: ...
+    def render(
+        self,
+        panels: Panels,
+        poses: FloatArray,
+        hidden: BoolArray,
+        eye: FloatArray,
+        ground: ByteArray,
+        sky: ByteArray,
+    ) -> tuple[ByteArray, NDArray[np.float32]]: ...
