@@ -70,10 +70,12 @@ class BruteRays:
 
     def cast(self, origins: FloatArray, trees: IntArray, range_max: float) -> tuple[FloatArray, FloatArray]:
         w = self.walls
+        if not len(w):
+            return np.full(len(origins), np.inf), np.zeros(len(origins))
         d = np.stack([np.cos(origins[:, 3]), np.sin(origins[:, 3])], axis=-1)[:, None]
         e = (w[:, 2:4] - w[:, :2])[None]
         to_a = w[None, :, :2] - origins[:, None, :2]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
             cross = d[..., 0] * e[..., 1] - d[..., 1] * e[..., 0]
             t = (to_a[..., 0] * e[..., 1] - to_a[..., 1] * e[..., 0]) / cross
             f = (to_a[..., 0] * d[..., 1] - to_a[..., 1] * d[..., 0]) / cross

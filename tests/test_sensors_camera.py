@@ -2,15 +2,12 @@
 """The camera against geometry worked out by hand, and against one ray per pixel through solid prisms."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sensing import make_model, rectangle
 
-from kurumaisu.errors import Error
 from kurumaisu.sim.sensors import camera as c
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Camera, Model

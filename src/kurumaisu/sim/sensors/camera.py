@@ -52,7 +52,7 @@ def camera_info(camera: Camera) -> CameraInfo:
 
 def mounted_eye(camera: Camera, pose: FloatArray) -> FloatArray:
     """Return where a camera looks from, for the global pose (4,) of its model. Pan turns to the right, as in Stage."""
-    return pose - np.array([0, 0, 0, camera.pan])
+    return np.array([*pose[:3], pose[3] - camera.pan])
 
 
 def stage_eye(camera: Camera, parent: FloatArray, pose: FloatArray) -> FloatArray:
@@ -91,7 +91,7 @@ class Scenery:
 
     def hidden_from(self, root: int) -> BoolArray:
         """Return which models (n,) a camera in the tree of a top-level model does not see: its own."""
-        return self._roots == root
+        return np.asarray(self._roots == root)
 
 
 class CameraSensor:

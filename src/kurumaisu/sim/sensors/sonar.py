@@ -47,7 +47,7 @@ class Sonar:
         origins = place(poses[:, None, :], s.mounts[None, :, :]).reshape(-1, 4)
         ranges, _ = rays.scan(origins, np.repeat(trees, n), np.tile(self._fan, (k * n, 1)))
         nearest = ranges.reshape(k, n, s.rays).min(axis=-1)
-        readings = nearest + s.deviation * rng.standard_normal((k, n))
+        readings: FloatArray = nearest + s.deviation * rng.standard_normal((k, n))
         readings[nearest < s.range_min] = -np.inf
         readings[readings > s.range_max] = np.inf
         return readings
