@@ -17,7 +17,8 @@ from kurumaisu.world.model import Fan, Model, Ranger
 class RangerFan:
     """One fan of a ranger: its model, its number among the ranger's fans, and the robot it is on, -1: on none.
 
-    body: its number in Bodies, -1: the map's frame. mount (4,): x, y, z [m] of the beams' plane and heading [rad] of the fan's middle in the body's frame; bearings (samples,) [rad] about that heading, as in Stage from -fov/2 to fov/2.
+    body: its number in Bodies, -1: the map's frame. mount (4,): x, y, z [m] of the beams' plane and heading [rad] of the
+    fan's middle in the body's frame; bearings (samples,) [rad] about that heading, from -fov/2 to fov/2 as in Stage.
     """
 
     model: Model
@@ -38,10 +39,12 @@ def find(models: Sequence[Model], poses: FloatArray, bodies: Bodies, robots: Seq
         if isinstance(model.device, Ranger):
             body = int(bodies.body_of[model.index])
             for number, fan in enumerate(model.device.fans):
-                eye = fan.pose + [0.0, 0.0, fan.height / 2, 0.0]
+                eye = fan.pose + np.array([0.0, 0.0, fan.height / 2, 0.0])
                 place = attached(attached(poses[model.index], model.origin), eye)
                 found.append(
-                    RangerFan(model, number, robot_of.get(body, -1), body, fan, relative(frames[body], place), bearings(fan))
+                    RangerFan(
+                        model, number, robot_of.get(body, -1), body, fan, relative(frames[body], place), bearings(fan)
+                    )
                 )
     return tuple(found)
 

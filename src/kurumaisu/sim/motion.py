@@ -52,7 +52,8 @@ class StageMotion:
         self._delta, self._new = np.zeros((count, 4)), np.zeros((count, 4))
         self._turns = np.zeros(count)
         self._heading = np.zeros(count, dtype=np.complex128)
-        self._riders = [_riders(bodies, body) for body in range(count)]
+        carriers = set(bodies.carrier.tolist())
+        self._riders = [_riders(bodies, body) if body in carriers else [] for body in range(count)]
         self._carries = np.array([len(riders) > 0 for riders in self._riders], dtype=np.bool_)
         self._apart = not self._carries.any()
 

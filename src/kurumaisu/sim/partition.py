@@ -88,7 +88,7 @@ def outline(models: Sequence[Model], poses: FloatArray, members: IntArray, frame
 def build_arena(
     models: Sequence[Model], poses: FloatArray, bodies: Bodies, threads: int
 ) -> tuple[Arena, IntArray, Outline]:
-    """Return an arena with walls and bodies at their poses (models, 4), the bodies' numbers (b,) in it, and the walls."""
+    """Return an arena of models at poses (models, 4), its numbers (b,) of the bodies, and the walls."""
     walls = outline(models, poses, np.flatnonzero(bodies.body_of < 0), np.zeros(4))
     arena = Arena(walls.faces, walls.returns, walls.solid, walls.trees, threads)
     numbers = np.array([_add(arena, models, poses, bodies, i) for i in range(len(bodies))], dtype=np.int64)

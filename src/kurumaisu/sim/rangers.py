@@ -71,9 +71,7 @@ class _Cohort:
         self._offset = np.empty(len(fans), dtype=np.complex128)
         self._beams = _Beams(fans, sweep) if sweep or self._noise.on_bearings else None
 
-    def measure(
-        self, time: float, count: int, before: FloatArray, now: FloatArray, rng: np.random.Generator
-    ) -> Sweep:
+    def measure(self, time: float, count: int, before: FloatArray, now: FloatArray, rng: np.random.Generator) -> Sweep:
         if self._beams is None:
             ranges, returns = self._arena.scan(self._place(now), self._trees, self._fans)
         else:
