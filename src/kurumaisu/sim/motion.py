@@ -12,6 +12,7 @@ from kurumaisu._core import Arena
 from kurumaisu.sim.partition import Bodies, attached, relative
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
+StateArray = FloatArray | BoolArray
 _TURN = 2 * math.pi  # [rad]
 
 
@@ -27,15 +28,15 @@ class Motion(Protocol):
     def move(self, velocities: FloatArray, dt: float) -> tuple[FloatArray, BoolArray]:
         """Move for dt [s] with wanted velocities (b, 3): forward, leftward [m/s], turn [rad/s]; 0 where nobody drives.
 
-        Return poses (b, 4) and whether each was stopped by something (b,). The arrays are the Motion's own: the caller
-        copies what it keeps.
+        Return poses (b, 4) and whether each was stopped by something (b,). The arrays may be the Motion's own: the
+        caller copies what it keeps.
         """
 
-    def save(self) -> bytes:
-        """Return all that the next moves depend on."""
+    def state(self) -> dict[str, StateArray]:
+        """Return all that the next moves depend on, by name, arrays (b, ...): copies; `poses` is one of them."""
 
-    def load(self, state: bytes) -> None:
-        """Go back to a saved state of the same bodies."""
+    def restore(self, state: dict[str, StateArray]) -> None:
+        """Go back to a state; its arrays have a row for each body."""
 
 
 class StageMotion:
@@ -76,15 +77,14 @@ class StageMotion:
             self._settle(slice(None) if moving.all() else np.flatnonzero(moving))
         return self._poses, self._stalled
 
-    def save(self) -> bytes:
+    def state(self) -> dict[str, StateArray]:
         """Return poses and stalls."""
-        return self._poses.tobytes() + self._stalled.tobytes()
+        return {"poses": self._poses.copy(), "stalled": self._stalled.copy()}
 
-    def load(self, state: bytes) -> None:
-        """Go back to a saved state of the same bodies."""
-        split = self._poses.nbytes
-        self.place(np.frombuffer(state[:split]).reshape(-1, 4))
-        self._stalled[:] = np.frombuffer(state[split:], dtype=np.bool_)
+    def restore(self, state: dict[str, StateArray]) -> None:
+        """Go back to a state."""
+        self.place(np.asarray(state["poses"], dtype=np.float64))
+        self._stalled[:] = state["stalled"]
 
     def _euler(self, velocities: FloatArray, dt: float) -> None:
         """Leave in self._new where each body would go."""

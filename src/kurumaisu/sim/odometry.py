@@ -26,8 +26,9 @@ class Localization:
     Stage moves robots along the heading before it.
     """
 
-    def __init__(self, robots: Sequence[Position], starts: FloatArray, walk: OdometryWalk) -> None:
-        """Start robots that are at poses (n, 4)."""
+    def __init__(self, robots: Sequence[Position], starts: FloatArray, walk: OdometryWalk, exact: bool) -> None:
+        """Start robots that are at poses (n, 4); exact: integrate arcs, and gps is in the map from the start."""
+        self._advance = advance_on_arc if exact else advance
         origins = starts[:, _PLANAR].copy()
         for i, robot in enumerate(robots):
             if robot.localization_origin is not None:
@@ -40,7 +41,9 @@ class Localization:
             if robot.odom_error is not None:
                 self.shares[i] = robot.odom_error[_PLANAR]
         self._odom = np.array([robot.localization == "odom" for robot in robots], dtype=np.bool_)
-        self._all_gps = not self._odom.any()
+        if exact:
+            self.estimates[~self._odom] = starts[~self._odom][:, _PLANAR]
+        self.all_gps = bool(not self._odom.any())
         self._walk = walk
 
     def draw_errors(self, rng: np.random.Generator) -> None:
@@ -48,12 +51,12 @@ class Localization:
         drawn = rng.uniform(-_DEFAULT_ERROR / 2, _DEFAULT_ERROR / 2, (len(self._given), 3))
         np.copyto(self.shares, drawn, where=~self._given[:, np.newaxis])
 
-    def update(self, due: Rows, poses: FloatArray, moved: FloatArray, rng: np.random.Generator) -> None:
-        """Update those due; poses (n, 4) are true; moved (n, 3): wanted velocities times a step, in the robot's frame.
+    def update(self, due: Rows, poses: FloatArray, wanted: FloatArray, rng: np.random.Generator) -> None:
+        """Update those due; poses (n, 4) are true; wanted (n, 3): what one step of it would be without obstacles.
 
         A robot that is updated every few steps still integrates only one, as in Stage.
         """
-        if self._all_gps and isinstance(due, slice):
+        if self.all_gps and isinstance(due, slice):
             self.estimates[:, :2] = poses[:, :2]
             self.estimates[:, 2] = poses[:, 3]
             return
@@ -62,13 +65,13 @@ class Localization:
         gps, odom = np.flatnonzero(is_due & ~self._odom), np.flatnonzero(is_due & self._odom)
         self.estimates[gps] = poses[gps][:, _PLANAR]
         if len(odom):
-            self._integrate(odom, moved[odom], rng)
+            self._integrate(odom, wanted[odom], rng)
 
-    def _integrate(self, rows: IntArray, moved: FloatArray, rng: np.random.Generator) -> None:
-        step = moved * (1.0 + self.shares[rows])
+    def _integrate(self, rows: IntArray, wanted: FloatArray, rng: np.random.Generator) -> None:
+        step = wanted * (1.0 + self.shares[rows])
         if not self._walk.off:
             step += self._stray(step) * rng.standard_normal(step.shape)
-        self.estimates[rows] = advance(self.estimates[rows], step)
+        self.estimates[rows] = self._advance(self.estimates[rows], step)
 
     def _stray(self, step: FloatArray) -> FloatArray:
         """Return standard deviations (n, 3) of a step (n, 3)."""
