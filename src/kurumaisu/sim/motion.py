@@ -72,7 +72,7 @@ class StageMotion:
             if not self._apart:
                 for body in np.flatnonzero(moving & self._carries):
                     self._settle_stack(int(body))
-                self._euler(velocities, dt)  # of those that were carried
+                    self._euler(velocities, dt)  # of those that were carried
                 moving &= ~self._carries
             self._settle(slice(None) if moving.all() else np.flatnonzero(moving))
         return self._poses, self._stalled
