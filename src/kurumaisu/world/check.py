@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -11,9 +12,11 @@ import numpy as np
 
 from kurumaisu._core import Arena
 from kurumaisu.types import FloatArray
-from kurumaisu.world.model import Model, Place, Position, Ranger
 from kurumaisu.world.layout import beam_height, moves, outline_in_map
+from kurumaisu.world.model import Model, Place, Position, Ranger
 from kurumaisu.world.world import World
+
+_MOST_ROBOTS = 10  # that contents() tells of one by one
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ def _thin(world: World) -> Iterator[Finding]:
         if not len(points):
             continue
         extent = points.max(axis=0) - points.min(axis=0)
-        if extent.min() < world.resolution:
+        if extent.min() < world.resolution and model.type == "model":
             yield Finding(
                 model.place,
                 f"{_name(model)} is {1000 * extent.min():.0f} mm thin, less than the resolution of "
@@ -114,7 +117,9 @@ def _sensorless(world: World) -> Iterator[Finding]:
         return
     for robot in robots:
         if not any(isinstance(other.device, Ranger) and other.parent == robot.index for other in world.models):
-            yield Finding(robot.place, f"{_name(robot)} has no laser, but as a position counts as a robot in topic names")
+            yield Finding(
+                robot.place, f"{_name(robot)} has no laser, but as a position counts as a robot in topic names"
+            )
 
 
 def _rangers(world: World) -> Iterator[Finding]:
@@ -122,10 +127,10 @@ def _rangers(world: World) -> Iterator[Finding]:
         if not isinstance(model.device, Ranger):
             continue
         fans = model.device.fans
-        if not fans:
-            yield Finding(model.place, f"{_name(model)} has no sensor, so it publishes nothing")
         if len(fans) > 1:
-            yield Finding(model.place, f"{_name(model)} has {len(fans)} sensors; stage_ros publishes the first one only")
+            yield Finding(
+                model.place, f"{_name(model)} has {len(fans)} sensors; stage_ros publishes the first one only"
+            )
         if model.update_interval > world.interval:
             yield Finding(
                 model.place,
@@ -144,7 +149,9 @@ def _intangible(world: World) -> Iterator[Finding]:
         if model.ranger_return < 0 and model.obstacle_return:
             yield Finding(model.place, f"{_name(model)} stops robots but lasers do not see it (ranger_return below 0)")
         if model.ranger_return >= 0 and not model.obstacle_return:
-            yield Finding(model.place, f"{_name(model)} is seen by lasers but robots drive through it (obstacle_return 0)")
+            yield Finding(
+                model.place, f"{_name(model)} is seen by lasers but robots drive through it (obstacle_return 0)"
+            )
 
 
 def _own_tree(world: World) -> Iterator[Finding]:
@@ -152,7 +159,7 @@ def _own_tree(world: World) -> Iterator[Finding]:
         if model.root != model.index and not isinstance(world.models[model.root].device, Position):
             yield Finding(
                 model.place,
-                f"{_name(model)} stands inside {_name(world.models[model.root])}: its lasers see nothing of that model, "
+                f"{_name(model)} stands inside {_name(world.models[model.root])}: its lasers see nothing of it, "
                 "nor does it bump into it",
             )
 
@@ -187,17 +194,24 @@ def contents(world: World) -> Iterator[str]:
     yield f"step {1000 * world.interval:g} ms, resolution {world.resolution:g} m, {len(world.segments)} wall segments"
     kinds = {kind: sum(model.type == kind for model in world.models) for kind in {m.type for m in world.models}}
     yield "models: " + ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
-    for model, position in _positions(world):
+    robots = list(_positions(world))
+    for model, position in robots[:_MOST_ROBOTS]:
         yield _robot(world, model, position)
         for other in world.models:
             if isinstance(other.device, Ranger) and other.parent == model.index:
-                for fan in other.device.fans[:3]:
-                    yield (
-                        f"  ranger: {fan.samples} beams over {math.degrees(fan.fov):g} deg, {fan.range_max:g} m, "
-                        f"{beam_height(world, other, fan):.2f} m high"
-                    )
-                if len(other.device.fans) > 3:
-                    yield f"  ... and {len(other.device.fans) - 3} more sensors of this ranger"
+                yield from _fans(world, other, other.device)
+    if len(robots) > _MOST_ROBOTS:
+        yield f"... and {len(robots) - _MOST_ROBOTS} more robots"
+
+
+def _fans(world: World, model: Model, ranger: Ranger) -> Iterator[str]:
+    alike = Counter(
+        f"{fan.samples} beam{'s' if fan.samples > 1 else ''} over {math.degrees(fan.fov):g} deg, {fan.range_max:g} m, "
+        f"{beam_height(world, model, fan):.2f} m high"
+        for fan in ranger.fans
+    )
+    for text, count in alike.items():
+        yield f"  ranger: {f'{count} x ' if count > 1 else ''}{text}"
 
 
 def _robot(world: World, model: Model, position: Position) -> str:

@@ -28,8 +28,9 @@ def check_world(arguments: list[str] | None = None) -> int:
         print(f"check-world: {error}", file=sys.stderr)
         return 2
     print("\n".join(contents(world)))
-    surprises = [*world.warnings, *map(str, findings(world))]
-    print("\n".join(["", f"{len(surprises)} surprises:", *surprises]) if surprises else "\nno surprises")
+    surprises = list(dict.fromkeys([*world.warnings, *map(str, findings(world))]))  # a macro's are the same each time
+    count = f"{len(surprises)} surprise{'s' if len(surprises) > 1 else ''}:" if surprises else "no surprises"
+    print("\n".join(["", count, *surprises]))
     return 1 if surprises else 0
 
 
@@ -44,6 +45,9 @@ def export_world(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--height", type=float, default=0.4, metavar="M", help="of the plane that the map cuts [m] (0.4, a laser's)"
     )
+    parser.add_argument(
+        "--png", action="store_true", help="the map as NAME.png, much smaller, which map_server reads too"
+    )
     options = parser.parse_args(arguments)
     try:
         if not 1e-3 <= options.resolution <= 10:
@@ -51,7 +55,9 @@ def export_world(arguments: list[str] | None = None) -> int:
         world = _load(options)
         options.output.mkdir(parents=True, exist_ok=True)
         path = options.output / options.world.stem
-        image, text = save_map(occupancy(world, options.resolution, options.height), path)
+        image, text = save_map(
+            occupancy(world, options.resolution, options.height), path, ".png" if options.png else ".pgm"
+        )
         drawing = path.with_name(path.name + ".svg")
         drawing.write_text(to_svg(world), encoding="utf-8")
     except (Error, OSError) as error:
@@ -64,7 +70,9 @@ def export_world(arguments: list[str] | None = None) -> int:
 def _add_world(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("world", type=Path, metavar="FILE", help="a Stage world, or a map_server YAML")
     parser.add_argument(
-        "--image-extents", action="store_true", help="bitmaps fill their size with their margins, not trimmed as in Stage"
+        "--image-extents",
+        action="store_true",
+        help="bitmaps fill their size with their margins, not trimmed as in Stage",
     )
     parser.add_argument("values", nargs="*", metavar="NAME=VALUE", help="values for the world's parameters")
 

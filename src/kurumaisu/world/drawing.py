@@ -12,7 +12,7 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Model, Polygon, Position
 from kurumaisu.world.world import World
 
-_MARGIN = 0.5  # [m] around the world
+_MARGIN = 0.05  # of the larger side, around the world
 _LARGE = 1200  # [px] of the longer side
 _NOSE = 0.35  # of a robot's size: the triangle that shows where it looks
 
@@ -20,7 +20,8 @@ _NOSE = 0.35  # of a robot's size: the triangle that shows where it looks
 def to_svg(world: World) -> str:
     """Return the world as an SVG document: models in their colours, robots with a nose, a scale bar and names."""
     x0, y0, x1, y1 = world.bounds
-    left, bottom, right, top = x0 - _MARGIN, y0 - _MARGIN, x1 + _MARGIN, y1 + _MARGIN
+    margin = _MARGIN * max(x1 - x0, y1 - y0)
+    left, bottom, right, top = x0 - margin, y0 - margin, x1 + margin, y1 + margin
     width, height = right - left, top - bottom
     scale = _LARGE / max(width, height)
     line = max(width, height) / 1500
@@ -31,7 +32,7 @@ def to_svg(world: World) -> str:
         f"<title>{escape(world.name)}</title>\n"
         f'<rect x="{left:.3f}" y="{-top:.3f}" width="{width:.3f}" height="{height:.3f}" fill="white"/>\n'
         f'<g transform="scale(1,-1)" stroke="black" stroke-width="{line:.4f}" stroke-linejoin="round">\n'
-        f"{shapes}\n</g>\n{_scale_bar(left, bottom, width)}\n</svg>\n"
+        f"{shapes}\n</g>\n{_scale_bar(left, bottom, margin)}\n</svg>\n"
     )
 
 
@@ -69,11 +70,12 @@ def _nose(model: Model) -> str:
     return f'<polygon points="{points}" fill="white"/>'
 
 
-def _scale_bar(left: float, bottom: float, width: float) -> str:
-    """Return a bar of 1, 2 or 5 times a power of ten [m], about a tenth of the width."""
-    power = 10.0 ** np.floor(np.log10(width / 10))
-    length = max(step * power for step in (1, 2, 5) if step * power <= width / 10)
-    x, y, thick = left + 0.3 * _MARGIN, -bottom - 0.3 * _MARGIN, width / 400
+def _scale_bar(left: float, bottom: float, margin: float) -> str:
+    """Return a bar of 1, 2 or 5 times a power of ten [m], in the lower left corner of the margin."""
+    longest = 2 * margin
+    power = 10.0 ** np.floor(np.log10(longest))
+    length = max(step * power for step in (1, 2, 5) if step * power <= longest)
+    x, y, thick = left + margin, -bottom - 0.3 * margin, margin / 15
     return (
         f'<rect x="{x:.3f}" y="{y - thick:.3f}" width="{length:.3f}" height="{thick:.3f}"/>\n'
         f'<text x="{x + length + 2 * thick:.3f}" y="{y:.3f}" font-size="{5 * thick:.3f}">{length:g} m</text>'

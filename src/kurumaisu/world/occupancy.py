@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from kurumaisu.errors import Error
 from kurumaisu.maps import Grid
 from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.world.layout import in_map, moves
+from kurumaisu.world.model import Shape
+from kurumaisu.world.parts import edges
+from kurumaisu.world.world import World
 
 _LINES = 4  # scan lines per cell and axis; walls along the axes are exact however thin they are
 _LARGEST = 10**8  # cells
+_MARGIN = 4  # cells around the world
 _ROUNDING = 1e-6  # [cells] a wall that ends at a cell's border does not enter the next cell
 
 
@@ -70,16 +75,18 @@ def occupancy(world: World, resolution: float, height: float) -> Grid:
         if moves(world, model) or model.ranger_return < 0:
             continue
         pose = world.poses[model.index]
-        outlines += [transform(outline, pose[[0, 1, 3]]) for outline in _solids(model.shape, height - float(pose[2]))]
-    if not outlines:
+        outlines += [in_map(solid, pose) for solid in _solids(model.shape, height - float(pose[2]))]
+    if not any(map(len, outlines)):
         raise Error(f"{world.path}: nothing is {height:g} m above the ground, so its map would be empty")
     return rasterise(outlines, world.bounds, resolution, _MARGIN)
 
 
 def _solids(shape: Shape, height: float) -> Iterator[FloatArray]:
-    """Yield the closed borders (m, 4) of a shape at a height [m] above its base: of each polygon, and of a bitmap."""
+    """Yield closed borders (m, 4) of which each is solid inside, at a height [m] above the base.
+
+    By even and odd, all borders together miss where two polygons overlap, so each polygon comes by itself as well.
+    """
+    yield shape.segments[(shape.heights[:, 0] <= height) & (height <= shape.heights[:, 1])]
     for polygon in shape.polygons:
         if polygon.heights[0] <= height <= polygon.heights[1]:
-            yield np.hstack([polygon.corners, np.roll(polygon.corners, -1, axis=0)])
-    sides = {tuple(np.sort(side.reshape(2, 2), axis=0).ravel()) for side in ()}  # placeholder
-    del sides
+            yield edges(polygon.corners)
