@@ -37,7 +37,7 @@ void requireFace(const Face& f, const char* what, std::size_t i) {
   require(!std::isnan(f.ranger_return), name + ": its ranger return is not a number");
 }
 
-void requireFan(const Fan& fan, std::size_t i) {
+void requireFan(const Beams& fan, std::size_t i) {
   const std::string name = "fan " + number(i);
   require(std::abs(fan.first) <= kFarthest, name + ": its first bearing must be finite");
   require(std::abs(fan.increment) <= kTurn, name + ": its increment must be within a turn");
@@ -93,7 +93,7 @@ void Arena::setPoses(const std::vector<int>& bodies, const Pose* poses) {
   for (std::size_t i = 0; i < bodies.size(); ++i) bodies_.place(bodies[i], poses[i]);
 }
 
-void Arena::scan(const std::vector<Viewpoint>& from, const std::vector<Fan>& fans, double* ranges,
+void Arena::scan(const std::vector<Viewpoint>& from, const std::vector<Beams>& fans, double* ranges,
                  double* returns) {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<const Layer*> layers;
@@ -108,7 +108,7 @@ void Arena::scan(const std::vector<Viewpoint>& from, const std::vector<Fan>& fan
     std::vector<Hit> hits;
     std::vector<Echo> echoes;
     for (std::size_t i = begin; i < end; ++i) {
-      const Fan& fan = fans[i];
+      const Beams& fan = fans[i];
       const Pose& pose = from[i].pose;
       hits.resize(fan.samples);
       echoes.resize(fan.samples);

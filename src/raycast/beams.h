@@ -11,7 +11,7 @@ namespace kurumaisu {
 constexpr double kTurn = 6.283185307179586476925;  // [rad]
 
 /// Beams that leave one place at even angles: beam i at first + i * increment from the sensor's heading.
-struct Fan {
+struct Beams {
   double first;         ///< bearing [rad]
   double increment;     ///< [rad], may be negative or 0
   std::size_t samples;  ///< beams
@@ -19,10 +19,10 @@ struct Fan {
 };
 
 /// Finds the beams of a fan that leave within an angle, in any turn.
-class Beams {
+class BeamFinder {
  public:
   /// heading [rad]: of the sensor in the map.
-  Beams(const Fan& fan, double heading)
+  BeamFinder(const Beams& fan, double heading)
       : samples_(fan.samples),
         step_(std::abs(fan.increment)),
         inverse_(1.0 / step_),
