@@ -17,6 +17,8 @@
 namespace py = pybind11;
 namespace k = kurumaisu;
 
+void bindCamera(py::module_& m);  // raycast/camera_bindings.cpp
+
 namespace {
 
 using k::Array;
@@ -134,4 +136,5 @@ PYBIND11_MODULE(_core, m) {
   bindModel(m);
   bindKalman(m);
   k::bindRaycast(m);
+  bindCamera(m);
 }

@@ -4,7 +4,10 @@
 from collections.abc import Sequence
 from typing import overload
 
-from kurumaisu.types import BoolArray, FloatArray, IntArray
+import numpy as np
+from numpy.typing import NDArray
+
+from kurumaisu.types import BoolArray, ByteArray, FloatArray, IntArray
 
 class Branch:
     def __init__(self, slope: float, intercept: float) -> None: ...
@@ -90,3 +93,29 @@ class Arena:
 class Quantised:
     def __init__(self, walls: FloatArray, resolution: float) -> None: ...
     def cast(self, poses: FloatArray, range_max: float) -> FloatArray: ...
+
+class Panels:
+    def __init__(self, walls: FloatArray, colors: ByteArray, prisms: IntArray, bodies: IntArray) -> None: ...
+    def __len__(self) -> int: ...
+
+class Camera:
+    def __init__(
+        self,
+        *,
+        width: int,
+        height: int,
+        fov_h: float,
+        fov_v: float,
+        near: float,
+        far: float,
+        tilt: float,
+    ) -> None: ...
+    def render(
+        self,
+        panels: Panels,
+        poses: FloatArray,
+        hidden: BoolArray,
+        eye: FloatArray,
+        ground: ByteArray,
+        sky: ByteArray,
+    ) -> tuple[ByteArray, NDArray[np.float32]]: ...

@@ -13,7 +13,7 @@ from kurumaisu.bench.turns import in_turn
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, shipped
 from kurumaisu.sim.settings import load_physics, with_effects
-from kurumaisu.sim.simulator import Command, Simulator
+from kurumaisu.sim.chair import ChairSimulator, Command
 from kurumaisu.world import Start, World
 
 _CIRCLE = (0.2, 0.5)  # v [m/s], w [rad/s]: a radius of 0.4 m
@@ -37,13 +37,13 @@ def simulated_time(model: Model, world: World, seconds: float, repeats: int) -> 
         table.row(name, seconds / cost, 1e3 * cost / seconds, str(scans[name]))
 
 
-def _on_circle(model: Model, world: World) -> Simulator:
-    return Simulator(
+def _on_circle(model: Model, world: World) -> ChairSimulator:
+    return ChairSimulator(
         model, replace(world, starts=(Start("circle", _START),)), load_physics(shipped("launch/sim_node.yaml"))
     )
 
 
-def _drive(simulator: Simulator, model: Model, seconds: float) -> int:
+def _drive(simulator: ChairSimulator, model: Model, seconds: float) -> int:
     """Drive the circle; return the number of scans. Raise Error if it is not free."""
     v, w = _CIRCLE
     command = Command(
