@@ -64,7 +64,9 @@ def test_the_rangers_origin_and_the_sensors_pose_move_the_beam(tmp_path: Path) -
 
 def test_own_tree_is_invisible_and_others_are_not(tmp_path: Path) -> None:
     mast = "model ( pose [0.15 0 0 0] size [0.05 0.05 1] )"
-    sim = simulator(tmp_path, ROOM + robot(mast + LASER.replace("ranger (", "ranger ( pose [0 0 0.2 0]")) + robot(mast, "2 0 0 180"))
+    sim = simulator(
+        tmp_path, ROOM + robot(mast + LASER.replace("ranger (", "ranger ( pose [0 0 0.2 0]")) + robot(mast, "2 0 0 180")
+    )
     assert sim.observe().scans[0].ranges[90] == pytest.approx(2 - 0.175)
 
 
