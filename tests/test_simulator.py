@@ -202,11 +202,11 @@ def test_who_stands_on_a_robot_goes_with_it_and_drives_on_its_own(tmp_path: Path
     np.testing.assert_allclose(last.poses[1, :2], np.add(carried, along), atol=1e-12)
     assert last.poses[1, 3] == pytest.approx(heading + 0.02)
     assert last.poses[1, 2] == pytest.approx(0.4)
-    sim.set_pose(0, [4.75, 0, 0, 0])
+    sim.set_pose(sim.robots[0], [4.75, 0, 0, 0])
     stuck = sim.step(np.array([[1.0, 0, 0], [0, 0, 0]]))
     assert stuck.stalled.tolist() == [True, False]
     mount = (last.poses[1] - last.poses[0])[:2] @ [[math.cos(0.1), -math.sin(0.1)], [math.sin(0.1), math.cos(0.1)]]
-    np.testing.assert_allclose(stuck.poses[1, :2], [4.75, 0] + mount, atol=1e-12)
+    np.testing.assert_allclose(stuck.poses[1, :2], np.add([4.75, 0], mount), atol=1e-12)
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,10 @@ _FARTHEST = 1e6  # [m, rad] a pose may be from the map's origin
 
 def checked_pose(pose: FloatArray | Sequence[float]) -> FloatArray:
     """Return a pose (4,) as an array. Raise Error unless it is four finite numbers within reach."""
-    array = np.asarray(pose, dtype=np.float64)
+    try:
+        array = np.array(pose, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise Error(f"pose: must be x, y, z [m], heading [rad]: {pose!r}") from error
     if array.shape != (4,) or not (np.abs(array) <= _FARTHEST).all():
         raise Error(f"pose: must be x, y, z [m], heading [rad], each within {_FARTHEST:g}: {array.tolist()}")
     return array

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu._core import Arena
+from kurumaisu.geometry import cos_sin
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
 
@@ -101,14 +102,14 @@ def build_arena(
 
 def relative(frame: FloatArray, pose: FloatArray) -> FloatArray:
     """Return a pose (..., 4) of the map as seen in a frame (..., 4) of the map."""
-    c, s = np.cos(frame[..., 3]), np.sin(frame[..., 3])
+    c, s = cos_sin(frame[..., 3])
     d = pose - frame
     return np.stack([c * d[..., 0] + s * d[..., 1], c * d[..., 1] - s * d[..., 0], d[..., 2], d[..., 3]], axis=-1)
 
 
 def attached(frame: FloatArray, pose: FloatArray) -> FloatArray:
     """Return in the map what is a pose (..., 4) in a frame (..., 4); the heading is not wrapped."""
-    c, s = np.cos(frame[..., 3]), np.sin(frame[..., 3])
+    c, s = cos_sin(frame[..., 3])
     x, y = pose[..., 0], pose[..., 1]
     return np.stack(
         [

@@ -96,6 +96,8 @@ class Simulator:
     def set_pose(self, model: str | int | Model, pose: FloatArray | Sequence[float]) -> None:
         """Put a model, with all that stands on it, to a pose (4,) in the map: x, y, z [m], heading [rad].
 
+        The model is given by its name, its number in models, or itself.
+
         A robot's odometry goes on as if nothing had happened. Raise Error for an unknown model.
         """
         self._have(moved(self._machinery, self._index(model), checked_pose(pose)))
