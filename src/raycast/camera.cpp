@@ -100,13 +100,13 @@ void Camera::setColumns(const std::vector<double>& azimuths) {
   }
 }
 
-void Camera::render(const std::vector<Panel>& panels, const std::vector<Stand>& stands,
-                    const std::vector<char>& hidden, const Stand& eye, const Background& background,
+void Camera::render(const std::vector<Panel>& panels, const std::vector<Pose>& poses,
+                    const std::vector<char>& hidden, const Pose& eye, const Background& background,
                     std::uint32_t* rgba, float* depth) {
   std::vector<double> cosines, sines;
-  for (const Stand& stand : stands) {
-    cosines.push_back(std::cos(stand.heading - eye.heading));
-    sines.push_back(std::sin(stand.heading - eye.heading));
+  for (const Pose& pose : poses) {
+    cosines.push_back(std::cos(pose.heading - eye.heading));
+    sines.push_back(std::sin(pose.heading - eye.heading));
   }
   const double c = std::cos(eye.heading);
   const double s = std::sin(eye.heading);
@@ -115,7 +115,7 @@ void Camera::render(const std::vector<Panel>& panels, const std::vector<Stand>& 
     const Panel& p = panels[i];
     const auto body = static_cast<std::size_t>(p.body);
     if (hidden[body]) continue;
-    const Stand& at = stands[body];
+    const Pose& at = poses[body];
     const double x = c * (at.x - eye.x) + s * (at.y - eye.y);
     const double y = -s * (at.x - eye.x) + c * (at.y - eye.y);
     const double cb = cosines[body];
