@@ -66,7 +66,8 @@ class Camera {
   void lookAhead();
   void lookDown();
   void setColumns(const std::vector<double>& azimuths);
-  void cover(Visible visible);
+  void cover(const Visible& visible);
+  void noteBehind(const Visible& visible, const Panel& panel);
   void addColumns(const Visible& visible, double from, double to);
   void findCrossings(const std::vector<Panel>& panels);
   void shade(const Background& background, std::uint32_t* rgba, float* depth);
@@ -78,6 +79,7 @@ class Camera {
   std::vector<double> dx_, dy_;
 
   std::vector<Visible> visible_;
+  std::vector<Crossing> around_;      ///< see ColumnPainter::paint
   std::vector<std::size_t> offsets_;  ///< of each column's crossings, and the total
   std::vector<std::size_t> fill_;
   std::vector<Crossing> crossings_;

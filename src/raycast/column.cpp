@@ -18,10 +18,11 @@ double slopeTo(double rise, double distance) {
 
 }  // namespace
 
-void ColumnPainter::paint(const Crossing* crossings, std::size_t n, double eye_height,
-                          const Background& background, std::vector<Span>& out) {
+void ColumnPainter::paint(const std::vector<Crossing>& around, const Crossing* crossings, std::size_t n,
+                          double eye_height, const Background& background, std::vector<Span>& out) {
   gaps_.assign(1, {-kInfinity, kInfinity});
   open_.clear();
+  for (const Crossing& wall : around) open_.push_back({wall, 0.0});
   seen_.clear();
   for (std::size_t i = 0; i < n && !gaps_.empty(); ++i) {
     const Crossing& c = crossings[i];
@@ -64,11 +65,7 @@ void ColumnPainter::passThrough(const Crossing& crossing) {
   }
   const auto same = [&](const Open& open) { return open.wall.prism == crossing.prism; };
   const auto found = std::find_if(open_.begin(), open_.end(), same);
-  if (found == open_.end()) {
-    lid(crossing, 0.0, crossing.distance);
-  } else {
-    open_.erase(found);
-  }
+  if (found != open_.end()) open_.erase(found);
 }
 
 /// Lets a surface be seen where nothing nearer covers it.

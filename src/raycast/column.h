@@ -40,10 +40,10 @@ class ColumnPainter {
  public:
   /// Appends to `out` the spans of one half-plane, from the highest to the lowest.
   ///
-  /// crossings: n of them, sorted by distance; eye_height: above the ground [m]. The lids (top and bottom faces)
-  /// of prisms are seen from above or below. A prism that the eye is over or under is taken to begin at the eye.
-  void paint(const Crossing* crossings, std::size_t n, double eye_height, const Background& background,
-             std::vector<Span>& out);
+  /// around: a wall of each prism that the eye is in, over or under; crossings: n of them, sorted by distance;
+  /// eye_height: above the ground [m]. The lids (top and bottom faces) of prisms are seen from above or below.
+  void paint(const std::vector<Crossing>& around, const Crossing* crossings, std::size_t n, double eye_height,
+             const Background& background, std::vector<Span>& out);
 
  private:
   struct Seen {
