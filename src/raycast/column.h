@@ -55,6 +55,7 @@ class ColumnPainter {
     double reached;  ///< up to this distance its lid has been drawn [m]
   };
 
+  void enter(const Crossing& wall);
   void lid(const Crossing& wall, double from, double to);
   void lidsUpTo(double distance);
   void passThrough(const Crossing& crossing);
@@ -62,7 +63,7 @@ class ColumnPainter {
 
   std::vector<std::pair<double, double>> gaps_;  ///< slopes not yet covered, ascending
   std::vector<std::pair<double, double>> rest_;
-  std::vector<Open> open_;
+  std::vector<Open> open_;  ///< the nearest in height first: its lid hides those of the others
   std::vector<Seen> seen_;
 };
 
