@@ -17,8 +17,6 @@
 namespace py = pybind11;
 namespace k = kurumaisu;
 
-void bindCamera(py::module_& m);  // raycast/camera_bindings.cpp
-
 namespace {
 
 using k::Array;
@@ -136,5 +134,5 @@ PYBIND11_MODULE(_core, m) {
   bindModel(m);
   bindKalman(m);
   k::bindRaycast(m);
-  bindCamera(m);
+  k::bindCamera(m);
 }

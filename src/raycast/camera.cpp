@@ -22,9 +22,9 @@ double turn(double x, double y) {
 }  // namespace
 
 void validate(const Optics& o) {
-  constexpr int kMost = 8192;
-  if (o.width < 1 || o.width > kMost || o.height < 1 || o.height > kMost)
-    throw std::invalid_argument("width and height must be 1 to 8192 pixels");
+  constexpr std::int64_t kMost = 10'000'000;
+  if (o.width < 1 || o.height < 1 || std::int64_t{o.width} * o.height > kMost)
+    throw std::invalid_argument("width and height must make 1 to 10 million pixels");
   if (!(o.fov_h > 0 && o.fov_h < kPi && o.fov_v > 0 && o.fov_v < kPi))
     throw std::invalid_argument("fields of view must be above 0 and below pi");
   if (!(o.near >= 0 && o.far > o.near && std::isfinite(o.far)))
@@ -100,28 +100,37 @@ void Camera::setColumns(const std::vector<double>& azimuths) {
   }
 }
 
-void Camera::render(const std::vector<Panel>& panels, const std::vector<Stand>& stands,
-                    const std::vector<char>& hidden, const Stand& eye, const Background& background,
+void Camera::render(const std::vector<Panel>& panels, const std::vector<Pose>& poses,
+                    const std::vector<char>& hidden, const Pose& eye, const Background& background,
                     std::uint32_t* rgba, float* depth) {
   std::vector<double> cosines, sines;
-  for (const Stand& stand : stands) {
-    cosines.push_back(std::cos(stand.heading - eye.heading));
-    sines.push_back(std::sin(stand.heading - eye.heading));
+  for (const Pose& pose : poses) {
+    cosines.push_back(std::cos(pose.heading - eye.heading));
+    sines.push_back(std::sin(pose.heading - eye.heading));
   }
   const double c = std::cos(eye.heading);
   const double s = std::sin(eye.heading);
   visible_.clear();
+  around_.clear();
   for (std::size_t i = 0; i < panels.size(); ++i) {
     const Panel& p = panels[i];
     const auto body = static_cast<std::size_t>(p.body);
     if (hidden[body]) continue;
-    const Stand& at = stands[body];
+    const Pose& at = poses[body];
     const double x = c * (at.x - eye.x) + s * (at.y - eye.y);
     const double y = -s * (at.x - eye.x) + c * (at.y - eye.y);
     const double cb = cosines[body];
     const double sb = sines[body];
-    cover({static_cast<std::int32_t>(i), 0, 0, x + cb * p.ax - sb * p.ay, y + sb * p.ax + cb * p.ay,
-           x + cb * p.bx - sb * p.by, y + sb * p.bx + cb * p.by, at.z - eye.z});
+    const Visible v{static_cast<std::int32_t>(i),
+                    0,
+                    0,
+                    x + cb * p.ax - sb * p.ay,
+                    y + sb * p.ax + cb * p.ay,
+                    x + cb * p.bx - sb * p.by,
+                    y + sb * p.bx + cb * p.by,
+                    at.z - eye.z};
+    noteBehind(v, p);
+    cover(v);
   }
   findCrossings(panels);
   spans_.clear();
@@ -131,13 +140,26 @@ void Camera::render(const std::vector<Panel>& panels, const std::vector<Stand>& 
     Crossing* to = crossings_.data() + offsets_[k + 1];
     std::stable_sort(from, to, [](const Crossing& a, const Crossing& b) { return a.distance < b.distance; });
     first_span_.push_back(spans_.size());
-    painter_.paint(from, static_cast<std::size_t>(to - from), eye.z, background, spans_);
+    painter_.paint(around_, from, static_cast<std::size_t>(to - from), eye.z, background, spans_);
   }
   shade(background, rgba, depth);
 }
 
+/// Finds the prisms around the eye: those whose outline crosses the half-line behind it an odd number of times.
+void Camera::noteBehind(const Visible& v, const Panel& p) {
+  if (p.prism < 0 || (v.ay < 0) == (v.by < 0)) return;
+  if (v.ax - v.ay * (v.bx - v.ax) / (v.by - v.ay) >= 0) return;
+  const auto same = [&](const Crossing& wall) { return wall.prism == p.prism; };
+  const auto found = std::find_if(around_.begin(), around_.end(), same);
+  if (found == around_.end()) {
+    around_.push_back({0.0, p.low + v.up, p.high + v.up, p.color, p.prism, true});
+  } else {
+    around_.erase(found);
+  }
+}
+
 /// Notes which columns a panel is seen in.
-void Camera::cover(Visible v) {
+void Camera::cover(const Visible& v) {
   if (std::min(v.ax, v.bx) > reach_ || std::max(v.ax, v.bx) < -reach_) return;
   if (std::min(v.ay, v.by) > reach_ || std::max(v.ay, v.by) < -reach_) return;
   const double a = turn(v.ax, v.ay);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "raycast/bodies.h"
 #include "raycast/column.h"
 
 namespace kurumaisu {
@@ -16,11 +17,6 @@ struct Panel {
   std::uint32_t color;  ///< four bytes: red, green, blue, alpha
   std::int32_t prism;   ///< closed outline, counter-clockwise, that it is part of; -1: none
   std::int32_t body;
-};
-
-/// x, y, z [m], heading [rad] in the map.
-struct Stand {
-  double x, y, z, heading;
 };
 
 /// What a camera is: pixels, fields of view [rad], depths [m], tilt [rad] downward.
@@ -45,9 +41,9 @@ class Camera {
   /// rgba: height * width * 4 bytes; depth: height * width, along the optical axis [m]: -inf nearer than `near`,
   /// +inf where nothing is nearer than `far`, which is painted as the sky. Rows from top to bottom.
   ///
-  /// stands: of each body; hidden: bodies not drawn. The heading of the eye is that of the optical axis.
-  void render(const std::vector<Panel>& panels, const std::vector<Stand>& stands,
-              const std::vector<char>& hidden, const Stand& eye, const Background& background,
+  /// poses: of each body; hidden: bodies not drawn. The heading of the eye is that of the optical axis.
+  void render(const std::vector<Panel>& panels, const std::vector<Pose>& poses,
+              const std::vector<char>& hidden, const Pose& eye, const Background& background,
               std::uint32_t* rgba, float* depth);
 
   const Optics& optics() const { return optics_; }
@@ -70,7 +66,8 @@ class Camera {
   void lookAhead();
   void lookDown();
   void setColumns(const std::vector<double>& azimuths);
-  void cover(Visible visible);
+  void cover(const Visible& visible);
+  void noteBehind(const Visible& visible, const Panel& panel);
   void addColumns(const Visible& visible, double from, double to);
   void findCrossings(const std::vector<Panel>& panels);
   void shade(const Background& background, std::uint32_t* rgba, float* depth);
@@ -82,6 +79,7 @@ class Camera {
   std::vector<double> dx_, dy_;
 
   std::vector<Visible> visible_;
+  std::vector<Crossing> around_;      ///< see ColumnPainter::paint
   std::vector<std::size_t> offsets_;  ///< of each column's crossings, and the total
   std::vector<std::size_t> fill_;
   std::vector<Crossing> crossings_;

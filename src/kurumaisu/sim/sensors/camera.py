@@ -69,6 +69,19 @@ def millimetres(picture: Picture, camera: Camera) -> NDArray[np.uint16]:
     return np.where(inside, values, 0).astype(np.uint16)
 
 
+def build(camera: Camera) -> _core.Camera:
+    """Return the tables of a camera. Raise ValueError naming a value that makes no camera."""
+    return _core.Camera(
+        width=camera.width,
+        height=camera.height,
+        fov_h=camera.fov_h,
+        fov_v=camera.fov_v,
+        near=camera.near,
+        far=camera.far,
+        tilt=camera.tilt,
+    )
+
+
 class Scenery:
     """What cameras see of a world: the walls of all models, each in the frame of its model.
 
@@ -100,15 +113,7 @@ class CameraSensor:
     def __init__(self, camera: Camera, ground: tuple[int, int, int] = GROUND, sky: tuple[int, int, int] = SKY) -> None:
         """Prepare for the camera's optics. Raise Error naming a value that makes no camera."""
         try:
-            self._camera = _core.Camera(
-                width=camera.width,
-                height=camera.height,
-                fov_h=camera.fov_h,
-                fov_v=camera.fov_v,
-                near=camera.near,
-                far=camera.far,
-                tilt=camera.tilt,
-            )
+            self._camera = build(camera)
         except ValueError as error:
             raise Error(f"camera: {error}: {camera}") from error
         self._ground = np.array([*ground, 255], dtype=np.uint8)
