@@ -1,18 +1,42 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The catalogue of effects: one mechanism per file, and ALL, the only list of them."""
 
-from kurumaisu.effects.base import Context, Effect, Follows, Motion, Parameter, Rate, Stage
+from collections import Counter
+from dataclasses import dataclass
+from typing import TypeVar
+
+from kurumaisu.effects.base import (
+    BaseEffect,
+    Context,
+    Effect,
+    Follows,
+    Motion,
+    Parameter,
+    Rate,
+    Reference,
+    ReferenceEffect,
+    Stage,
+    VoltageEffect,
+    Volts,
+)
+from kurumaisu.effects.curvature import CurvatureV, CurvatureW
+from kurumaisu.effects.dac_quantisation import DacQuantisation
+from kurumaisu.effects.dac_zero import DacZeroF, DacZeroS
 from kurumaisu.effects.dead_zone import DeadZoneV, DeadZoneW
 from kurumaisu.effects.delay import Delay
 from kurumaisu.effects.gain import GainV, GainW
 from kurumaisu.effects.lag import LagV, LagW
 from kurumaisu.effects.left_right_gain import LeftRightGain
+from kurumaisu.effects.mechanism import Mechanism
 from kurumaisu.effects.process_noise import ProcessNoise
+from kurumaisu.effects.reverse_gain import ReverseGain
+from kurumaisu.effects.steering_law import SteeringLaw
 from kurumaisu.effects.veer import Veer
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting
 
-ALL: tuple[type[Effect], ...] = (
+# What the critic looks for.
+CRITICISED: tuple[type[Effect], ...] = (
     GainV,
     GainW,
     LeftRightGain,
@@ -25,8 +49,33 @@ ALL: tuple[type[Effect], ...] = (
     ProcessNoise,
 )
 
+BASE: tuple[type[BaseEffect], ...] = (
+    *CRITICISED,
+    DacZeroF,
+    DacZeroS,
+    DacQuantisation,
+    ReverseGain,
+    CurvatureV,
+    CurvatureW,
+    SteeringLaw,
+)
 
-def by_id(name: str) -> type[Effect]:
+# What the simulator can run.
+ALL: tuple[type[Mechanism], ...] = (*BASE,)
+
+_M = TypeVar("_M", bound=Mechanism)
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The effects on the base, each kind in the order in which they act."""
+
+    volts: tuple[VoltageEffect, ...]
+    rates: tuple[Effect, ...]
+    reference: tuple[ReferenceEffect, ...]
+
+
+def by_id(name: str) -> type[Mechanism]:
     """Return the effect of an id. Raise Error when it is not in the catalogue."""
     for effect in ALL:
         if effect.id == name:
@@ -39,28 +88,46 @@ def fluctuation(sd_v: float, sd_w: float, tau: float) -> EffectSetting:
     return EffectSetting(ProcessNoise.id, {"sd_v": sd_v, "sd_w": sd_w, "tau": tau})
 
 
-def build(settings: tuple[EffectSetting, ...], context: Context) -> tuple[Effect, ...]:
-    """Return the effects of a model file in the order in which they act.
+def build(settings: tuple[EffectSetting, ...], context: Context) -> Chain:
+    """Return the effects on the base among those of a model file.
 
     Raise Error for an unknown id, an id given twice, or parameters that do not fit.
     """
-    ids = [setting.id for setting in settings]
-    for name in ids:
-        if ids.count(name) > 1:
-            raise Error(f"effects: {name!r} is given twice")
-    effects = [by_id(setting.id)(setting.parameters, context) for setting in settings]
-    return tuple(sorted(effects, key=lambda effect: effect.stage))
+    built = [effect(setting.parameters, context) for effect, setting in _chosen(BaseEffect, settings)]
+    built.sort(key=lambda effect: effect.stage)
+    return Chain(
+        tuple(effect for effect in built if isinstance(effect, VoltageEffect)),
+        tuple(effect for effect in built if isinstance(effect, Effect)),
+        tuple(effect for effect in built if isinstance(effect, ReferenceEffect)),
+    )
+
+
+def _chosen(family: type[_M], settings: tuple[EffectSetting, ...]) -> list[tuple[type[_M], EffectSetting]]:
+    """Return the effects of a family with their settings. Raise Error for any id unknown or given twice."""
+    twice = [name for name, count in Counter(setting.id for setting in settings).items() if count > 1]
+    if twice:
+        raise Error(f"effects: {twice[0]!r} is given twice")
+    found = [(by_id(setting.id), setting) for setting in settings]
+    return [(effect, setting) for effect, setting in found if issubclass(effect, family)]
 
 
 __all__ = [
     "ALL",
+    "BASE",
+    "CRITICISED",
+    "Chain",
     "Context",
     "Effect",
     "Follows",
+    "Mechanism",
     "Motion",
     "Parameter",
     "Rate",
+    "Reference",
+    "ReferenceEffect",
     "Stage",
+    "VoltageEffect",
+    "Volts",
     "build",
     "by_id",
     "fluctuation",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu._core import Scene
+from kurumaisu.effects import Reference, Volts
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
 from kurumaisu.sim.body import ChairBody
@@ -36,7 +37,8 @@ class Observation:
     """The truth after a step, and the scan that ended in it, if one did.
 
     time [s] since the reset; pose (3,) of base_link in the map, theta not wrapped; rates (3,) over the step:
-    forward, leftward [m/s], yaw [rad/s]; contact: an obstacle limited the motion.
+    forward, leftward [m/s], yaw [rad/s]; contact: an obstacle limited the motion; reference: what is measured of
+    time, pose and rates, with the effects that act on that.
     """
 
     time: float
@@ -44,6 +46,7 @@ class Observation:
     rates: FloatArray
     contact: bool
     scan: Scan | None
+    reference: Reference
 
 
 class Simulator:
@@ -68,22 +71,21 @@ class Simulator:
         self._scanner = Scanner(self._model.laser, self._scene, laser_rng)
         self._steps = 0
         self._body = self._new_body()
-        scan = self._scanner.observe(0.0, self._body.pose)
-        return Observation(0.0, self._body.pose, np.zeros(3), False, scan)
+        return self._observe(0.0, np.zeros(3), False)
 
     def step(self, command: Command) -> Observation:
         """Advance by one physics step with the command held."""
-        v, w = self._plant.from_voltages(
-            np.array([command.v_f]),
-            np.array([command.v_s]),
-            np.array([command.sign_v]),
-            np.array([command.sign_w]),
-        )
-        rates, contact = self._body.move(float(v[0]), float(w[0]))
+        motion = self._plant.from_voltages(_volts(command), float(self._body.pose[2]))
+        u = 0.0 if motion.u is None else float(motion.u[0])
+        rates, contact = self._body.move(float(motion.v[0]), float(motion.w[0]), u)
         self._steps += 1
         time = self._steps * self._physics.step
+        return self._observe(time, rates, contact)
+
+    def _observe(self, time: float, rates: FloatArray, contact: bool) -> Observation:
         pose = self._body.pose
-        return Observation(time, pose, rates, contact, self._scanner.observe(time, pose))
+        reference = self._plant.seen(Reference(np.array(time), pose, rates))
+        return Observation(time, pose, rates, contact, self._scanner.observe(time, pose), reference)
 
     def _new_body(self) -> ChairBody:
         return ChairBody(self._model.chassis, self._world.obstacles, self._physics, self._world.start)
@@ -97,3 +99,7 @@ class Simulator:
     def ambiguous_samples(self) -> int:
         """Steps since the reset whose voltages stood for two rates."""
         return self._plant.ambiguous_samples
+
+
+def _volts(command: Command) -> Volts:
+    return Volts(*(np.array([value]) for value in (command.v_f, command.v_s, command.sign_v, command.sign_w)))
