@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // kurumaisu._core: the code the chair runs, for the simulator and the critic. Vectorised over numpy arrays.
+#include "follow/bindings.h"
+
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -178,5 +180,6 @@ PYBIND11_MODULE(_core, m) {
   m.doc() = "Equations (1)-(4) of the paper, ray casting and whitening, in C++.";
   bindModel(m);
   bindKalman(m);
+  k::bindFollow(m);
   bindRaycast(m);
 }

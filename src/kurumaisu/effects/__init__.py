@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The catalogue of effects: one mechanism per file, and ALL, the only list of them."""
+"""The catalogue of effects: one mechanism per file, and ALL, the only list of them.
+
+Effects of one stage act in the order of the list, whatever a file's order.
+"""
 
 from collections import Counter
 from dataclasses import dataclass
 from typing import TypeVar
 
+from kurumaisu.effects.accel_limit import AccelLimit
+from kurumaisu.effects.backlash import Backlash
 from kurumaisu.effects.base import (
     BaseEffect,
     Context,
@@ -19,6 +24,10 @@ from kurumaisu.effects.base import (
     VoltageEffect,
     Volts,
 )
+from kurumaisu.effects.battery_sag import BatterySag
+from kurumaisu.effects.caster_reversal import CasterReversal
+from kurumaisu.effects.clock_scale import ClockScale
+from kurumaisu.effects.cross import CrossVToW, CrossWToV
 from kurumaisu.effects.curvature import CurvatureV, CurvatureW
 from kurumaisu.effects.dac_quantisation import DacQuantisation
 from kurumaisu.effects.dac_zero import DacZeroF, DacZeroS
@@ -26,11 +35,18 @@ from kurumaisu.effects.dead_zone import DeadZoneV, DeadZoneW
 from kurumaisu.effects.delay import Delay
 from kurumaisu.effects.gain import GainV, GainW
 from kurumaisu.effects.lag import LagV, LagW
+from kurumaisu.effects.lateral_slip import LateralSlip
 from kurumaisu.effects.left_right_gain import LeftRightGain
+from kurumaisu.effects.marker import MarkerX, MarkerY
 from kurumaisu.effects.mechanism import Mechanism
+from kurumaisu.effects.payload import Payload
 from kurumaisu.effects.process_noise import ProcessNoise
 from kurumaisu.effects.reverse_gain import ReverseGain
+from kurumaisu.effects.saturation import Saturation
+from kurumaisu.effects.sign import Sign
+from kurumaisu.effects.slope import Slope
 from kurumaisu.effects.steering_law import SteeringLaw
+from kurumaisu.effects.understeer import Understeer
 from kurumaisu.effects.veer import Veer
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting
@@ -54,10 +70,25 @@ BASE: tuple[type[BaseEffect], ...] = (
     DacZeroF,
     DacZeroS,
     DacQuantisation,
+    SteeringLaw,
+    Sign,
+    Backlash,
     ReverseGain,
     CurvatureV,
     CurvatureW,
-    SteeringLaw,
+    Saturation,
+    BatterySag,
+    CrossWToV,
+    CrossVToW,
+    AccelLimit,
+    Payload,
+    Understeer,
+    CasterReversal,
+    LateralSlip,
+    Slope,
+    MarkerX,
+    MarkerY,
+    ClockScale,
 )
 
 # What the simulator can run.
@@ -94,7 +125,7 @@ def build(settings: tuple[EffectSetting, ...], context: Context) -> Chain:
     Raise Error for an unknown id, an id given twice, or parameters that do not fit.
     """
     built = [effect(setting.parameters, context) for effect, setting in _chosen(BaseEffect, settings)]
-    built.sort(key=lambda effect: effect.stage)
+    built.sort(key=lambda effect: (effect.stage, BASE.index(type(effect))))
     return Chain(
         tuple(effect for effect in built if isinstance(effect, VoltageEffect)),
         tuple(effect for effect in built if isinstance(effect, Effect)),

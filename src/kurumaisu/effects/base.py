@@ -21,7 +21,7 @@ from kurumaisu.types import FloatArray
 
 
 class Stage(IntEnum):
-    """Where in the drive chain an effect acts; effects apply in this order, those of a stage as they are listed."""
+    """Where in the drive chain an effect acts; effects apply in this order, those of a stage in the catalogue's."""
 
     CONVERTER = 0  # D/A converter: what the motor controller is given
     CONTROLLER = 1  # what the motor controller makes of the voltages

@@ -13,7 +13,7 @@ class ProcessNoise(Effect):
     """Ornstein-Uhlenbeck noise on both rates; it starts at rest and acts only on a moving chair."""
 
     id = "base.process_noise"
-    stage = Stage.RESPONSE
+    stage = Stage.FLOOR
     parameters = (
         Parameter("sd_v", "m/s", null=0.0, scale=0.01, lower=0.0, upper=1.0),
         Parameter("sd_w", "rad/s", null=0.0, scale=0.02, lower=0.0, upper=2.0),
