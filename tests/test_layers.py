@@ -20,8 +20,8 @@ ROS_PYTHON = (
     r"|tf|tf2\w*|\w+_msgs|std_srvs|kurumaisu\.msg|kurumaisu\.srv)(\.|$)"
 )
 ROS_CPP = r"<(ros\w*|tf2?|tf2_\w+|xmlrpcpp|actionlib|nodelet|diagnostic_updater|\w+_msgs|std_srvs|kurumaisu)/"
-ABSTRACT = {"base", "mechanism"}
-MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - ABSTRACT
+ABSTRACT = {"base", "mechanism", "laser"}
+MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - ABSTRACT | {r"laser\.\w+"}
 CONCRETE = rf"kurumaisu\.effects\.({'|'.join([*MODULES, *(effect.__name__ for effect in effects.ALL)])})(\.|$)"
 IDS = {effect.id for effect in effects.ALL}
 

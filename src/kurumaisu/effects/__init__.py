@@ -5,8 +5,10 @@ Effects of one stage act in the order of the list, whatever a file's order.
 """
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeVar
+
+import numpy as np
 
 from kurumaisu.effects.accel_limit import AccelLimit
 from kurumaisu.effects.backlash import Backlash
@@ -35,10 +37,13 @@ from kurumaisu.effects.dead_zone import DeadZoneV, DeadZoneW
 from kurumaisu.effects.delay import Delay
 from kurumaisu.effects.gain import GainV, GainW
 from kurumaisu.effects.lag import LagV, LagW
+from kurumaisu.effects.laser import LASER, Beams, Echoes, LaserEffect
+from kurumaisu.effects.laser.chain import LaserChain, incidence, slanted
 from kurumaisu.effects.lateral_slip import LateralSlip
 from kurumaisu.effects.left_right_gain import LeftRightGain
+from kurumaisu.effects.map_error import MapError
 from kurumaisu.effects.marker import MarkerX, MarkerY
-from kurumaisu.effects.mechanism import Mechanism
+from kurumaisu.effects.mechanism import Mechanism, WorldEffect
 from kurumaisu.effects.payload import Payload
 from kurumaisu.effects.process_noise import ProcessNoise
 from kurumaisu.effects.reverse_gain import ReverseGain
@@ -91,10 +96,10 @@ BASE: tuple[type[BaseEffect], ...] = (
     ClockScale,
 )
 
-# What the simulator can run.
-ALL: tuple[type[Mechanism], ...] = (*BASE,)
+WORLD: tuple[type[WorldEffect], ...] = (MapError,)
 
-_M = TypeVar("_M", bound=Mechanism)
+# What the simulator can run.
+ALL: tuple[type[Mechanism], ...] = (*BASE, *LASER, *WORLD)
 
 
 @dataclass(frozen=True)
@@ -124,8 +129,8 @@ def build(settings: tuple[EffectSetting, ...], context: Context) -> Chain:
 
     Raise Error for an unknown id, an id given twice, or parameters that do not fit.
     """
-    built = [effect(setting.parameters, context) for effect, setting in _chosen(BaseEffect, settings)]
-    built.sort(key=lambda effect: (effect.stage, BASE.index(type(effect))))
+    built = [effect(values, context) for effect, values in _chosen(settings) if issubclass(effect, BaseEffect)]
+    built.sort(key=lambda effect: effect.stage)
     return Chain(
         tuple(effect for effect in built if isinstance(effect, VoltageEffect)),
         tuple(effect for effect in built if isinstance(effect, Effect)),
@@ -133,23 +138,45 @@ def build(settings: tuple[EffectSetting, ...], context: Context) -> Chain:
     )
 
 
-def _chosen(family: type[_M], settings: tuple[EffectSetting, ...]) -> list[tuple[type[_M], EffectSetting]]:
-    """Return the effects of a family with their settings. Raise Error for any id unknown or given twice."""
+def build_laser(settings: tuple[EffectSetting, ...], rng: np.random.Generator) -> LaserChain:
+    """Return the effects on a laser among those of a model file; raises as build does.
+
+    Each draws from a generator of its own, so that its noise does not depend on which others there are.
+    """
+    chosen = [(effect, values) for effect, values in _chosen(settings) if issubclass(effect, LaserEffect)]
+    seed = int(rng.integers(2**63))
+    built = [effect(values, np.random.default_rng([seed, LASER.index(effect)])) for effect, values in chosen]
+    return LaserChain(sorted(built, key=lambda effect: effect.stage))
+
+
+def build_world(settings: tuple[EffectSetting, ...], rng: np.random.Generator) -> tuple[WorldEffect, ...]:
+    """Return the effects on the world's walls among those of a model file; raises as build does."""
+    return tuple(effect(values, rng) for effect, values in _chosen(settings) if issubclass(effect, WorldEffect))
+
+
+def _chosen(settings: tuple[EffectSetting, ...]) -> list[tuple[type[Mechanism], Mapping[str, float]]]:
+    """Return effects and parameters in the catalogue's order. Raise Error for an id unknown or given twice."""
     twice = [name for name, count in Counter(setting.id for setting in settings).items() if count > 1]
     if twice:
         raise Error(f"effects: {twice[0]!r} is given twice")
-    found = [(by_id(setting.id), setting) for setting in settings]
-    return [(effect, setting) for effect, setting in found if issubclass(effect, family)]
+    found = [(by_id(setting.id), setting.parameters) for setting in settings]
+    return sorted(found, key=lambda pair: ALL.index(pair[0]))
 
 
 __all__ = [
     "ALL",
     "BASE",
     "CRITICISED",
+    "LASER",
+    "WORLD",
+    "Beams",
     "Chain",
     "Context",
+    "Echoes",
     "Effect",
     "Follows",
+    "LaserChain",
+    "LaserEffect",
     "Mechanism",
     "Motion",
     "Parameter",
@@ -159,7 +186,12 @@ __all__ = [
     "Stage",
     "VoltageEffect",
     "Volts",
+    "WorldEffect",
     "build",
+    "build_laser",
+    "build_world",
     "by_id",
     "fluctuation",
+    "incidence",
+    "slanted",
 ]

@@ -3,11 +3,15 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from kurumaisu.errors import Error
+from kurumaisu.types import FloatArray
 
 
 @dataclass(frozen=True)
@@ -50,3 +54,15 @@ class Mechanism:
                 limits = f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
                 raise Error(f"{self.id}: {parameter.name} must be {limits}: {value:g}")
         self.values = dict(values)
+
+
+class WorldEffect(Mechanism, ABC):
+    """An effect on the world's walls."""
+
+    def __init__(self, values: Mapping[str, float], rng: np.random.Generator) -> None:
+        super().__init__(values)
+        self.rng = rng
+
+    @abstractmethod
+    def apply(self, segments: FloatArray) -> FloatArray:
+        """Return walls (m, 4), x and y of both ends [m], as they are in truth."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu._core import Scene
 from kurumaisu.effects import Reference, Volts
 from kurumaisu.errors import Error
@@ -60,15 +61,17 @@ class Simulator:
         self._model = model
         self._physics = physics
         self._world = world
-        self._scene = Scene(world.segments)
+        self._build_walls(())
         if self._new_body().touches():
             raise Error(f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose")
 
     def reset(self, seed: int) -> Observation:
         """Put the chair back to its start, at rest, and start time and randomness anew."""
-        plant_rng, laser_rng = (np.random.default_rng(sequence) for sequence in np.random.SeedSequence(seed).spawn(2))
+        plant_rng, laser_rng, effects_rng, world_rng = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
         self._plant = Plant(self._model, self._physics.step, plant_rng)
-        self._scanner = Scanner(self._model.laser, self._scene, laser_rng)
+        self._build_walls(effects.build_world(self._model.effects, world_rng))
+        chain = effects.build_laser(self._model.effects, effects_rng)
+        self._scanner = Scanner(self._model.laser, self._scene, chain, laser_rng)
         self._steps = 0
         self._body = self._new_body()
         return self._observe(0.0, np.zeros(3), False)
@@ -87,8 +90,16 @@ class Simulator:
         reference = self._plant.seen(Reference(np.array(time), pose, rates))
         return Observation(time, pose, rates, contact, self._scanner.observe(time, pose), reference)
 
+    def _build_walls(self, errors: tuple[effects.WorldEffect, ...]) -> None:
+        """Build scene and obstacles, with effects on what the world file says."""
+        walls = np.concatenate([self._world.segments, self._world.obstacles])
+        for effect in errors:
+            walls = effect.apply(walls)  # both at once, as what is seen is mostly also solid
+        seen = len(self._world.segments)
+        self._scene, self._obstacles = Scene(walls[:seen]), walls[seen:]
+
     def _new_body(self) -> ChairBody:
-        return ChairBody(self._model.chassis, self._world.obstacles, self._physics, self._world.start)
+        return ChairBody(self._model.chassis, self._obstacles, self._physics, self._world.start)
 
     @property
     def step_time(self) -> float:
