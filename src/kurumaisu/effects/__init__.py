@@ -37,7 +37,7 @@ from kurumaisu.effects.dead_zone import DeadZoneV, DeadZoneW
 from kurumaisu.effects.delay import Delay
 from kurumaisu.effects.gain import GainV, GainW
 from kurumaisu.effects.lag import LagV, LagW
-from kurumaisu.effects.laser import LASER, Beams, Echoes, LaserEffect
+from kurumaisu.effects.laser import LASER, BeamEffect, Beams, Echoes, LaserEffect, ReadingEffect
 from kurumaisu.effects.laser.chain import LaserChain, incidence, slanted
 from kurumaisu.effects.lateral_slip import LateralSlip
 from kurumaisu.effects.left_right_gain import LeftRightGain
@@ -169,6 +169,7 @@ __all__ = [
     "CRITICISED",
     "LASER",
     "WORLD",
+    "BeamEffect",
     "Beams",
     "Chain",
     "Context",
@@ -181,6 +182,7 @@ __all__ = [
     "Motion",
     "Parameter",
     "Rate",
+    "ReadingEffect",
     "Reference",
     "ReferenceEffect",
     "Stage",

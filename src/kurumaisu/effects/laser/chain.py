@@ -58,7 +58,7 @@ def slanted(ranges: FloatArray, beams: Beams) -> FloatArray:
     """Return ranges (n,) [m] along beams to vertical walls that are so far on the level, or to the floor if nearer."""
     if not beams.elevations.any():
         return ranges
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):  # level, or nearly: no floor
         floor = np.where(beams.elevations < 0, beams.height / -np.sin(np.minimum(beams.elevations, 0.0)), np.inf)
     return np.minimum(ranges / np.cos(beams.elevations), floor)
 
