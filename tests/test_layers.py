@@ -55,10 +55,10 @@ PYTHON_RULES = [
 CPP_RULES = [
     Rule(r"(?!.*_node\.cpp|params\.h)", ROS_CPP, "ROS headers only in *_node.cpp and params.h"),
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
-    Rule(r"(?!.*bindings\.(cpp|h)$)", r"<pybind11/", "pybind11 only in bindings.cpp and bindings.h"),
+    Rule(r"(?!.*bindings\.(cpp|h))", r"<pybind11/", "pybind11 only in bindings"),
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
-    Rule(r"follow/", r'"(?!follow/)', "following rests on nothing"),
-    Rule(r"(kalman|raycast)/", r'"(?!model/|kalman/|raycast/)', "numerics rest on the equations at most"),
+    Rule(r"follow/", r'"(?!follow/|bindings\.h)', "following rests on nothing"),
+    Rule(r"(kalman|raycast)/", r'"(?!model/|kalman/|raycast/|bindings\.h)', "numerics rest on the equations at most"),
 ]
 
 

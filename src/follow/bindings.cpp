@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "follow/bindings.h"
-
-#include <pybind11/numpy.h>
+// kurumaisu._core: following. Vectorised over numpy arrays.
+#include "bindings.h"
 
 #include <algorithm>
 #include <stdexcept>
@@ -11,8 +10,6 @@
 namespace kurumaisu {
 namespace py = pybind11;
 namespace {
-
-using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// Each input through one step of a follower: outputs (n,) and the level reached.
 template <typename Step>

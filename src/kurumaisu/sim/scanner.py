@@ -3,16 +3,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu._core import Scene
 from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose, interpolate
 from kurumaisu.params import Laser
+from kurumaisu.sim.walls import Walls
 from kurumaisu.types import FloatArray
 
 
@@ -31,10 +30,10 @@ class Scan:
 class Scanner:
     """Takes a scan every scan_time from the poses of the chair."""
 
-    def __init__(self, laser: Laser, scene: Scene, chain: LaserChain, rng: np.random.Generator) -> None:
+    def __init__(self, laser: Laser, walls: Walls, chain: LaserChain, rng: np.random.Generator) -> None:
         """Start a scan at time 0; chain: the laser's effects. Raise Error for a fan that outlasts scan_time."""
         self._laser = laser
-        self._scene = scene
+        self._walls = walls
         self._chain = chain
         self._rng = rng
         self._mount = np.array([laser.mount.x, laser.mount.y, laser.mount.yaw])
@@ -79,7 +78,7 @@ class Scanner:
     def _readings(self, beams: Beams, poses: FloatArray) -> FloatArray:
         error = self._laser.error
         origins = compose(poses, beams.mount)
-        level = self._cast(origins, beams.bearings)
+        level = self._walls.cast(origins, beams.bearings)
         noise = self._rng.standard_normal(len(level))
         if self._chain.empty:
             return error.reading(level, noise)
@@ -88,8 +87,8 @@ class Scanner:
             stamp=beams.stamp,
             bearings=self._bearings,
             ranges=ranges,
-            incidence=incidence(self._cast, origins, beams.bearings, level),
-            returns=np.ones(len(ranges)),
+            incidence=incidence(self._walls.cast, origins, beams.bearings, level),
+            returns=self._walls.returns(origins, beams.bearings),
             mean=error.mean(ranges),
             sd=error.deviation(ranges),
             noise=noise,
@@ -97,9 +96,6 @@ class Scanner:
         )
         # What the law, without its noise, makes of the range that it means by a reading: rounding and gate are left.
         return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges)))
-
-    def _cast(self, origins: FloatArray, bearings: FloatArray) -> FloatArray:
-        return self._scene.cast(origins, bearings, math.inf)
 
     def _forget(self, before: float) -> None:
         """Drop what the next scan does not need: all but the last pose that is not after its start."""

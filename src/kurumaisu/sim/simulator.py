@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu._core import Scene
 from kurumaisu.effects import Reference, Volts
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
@@ -16,6 +15,7 @@ from kurumaisu.sim.body import ChairBody
 from kurumaisu.sim.plant import Plant
 from kurumaisu.sim.scanner import Scan, Scanner
 from kurumaisu.sim.settings import Physics
+from kurumaisu.sim.walls import Walls
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
 
@@ -71,7 +71,7 @@ class Simulator:
         self._plant = Plant(self._model, self._physics.step, plant_rng)
         self._build_walls(effects.build_world(self._model.effects, world_rng))
         chain = effects.build_laser(self._model.effects, effects_rng)
-        self._scanner = Scanner(self._model.laser, self._scene, chain, laser_rng)
+        self._scanner = Scanner(self._model.laser, self._walls, chain, laser_rng)
         self._steps = 0
         self._body = self._new_body()
         return self._observe(0.0, np.zeros(3), False)
@@ -91,12 +91,12 @@ class Simulator:
         return Observation(time, pose, rates, contact, self._scanner.observe(time, pose), reference)
 
     def _build_walls(self, errors: tuple[effects.WorldEffect, ...]) -> None:
-        """Build scene and obstacles, with effects on what the world file says."""
+        """Build what is seen and what is solid, with effects on what the world file says."""
         walls = np.concatenate([self._world.segments, self._world.obstacles])
         for effect in errors:
             walls = effect.apply(walls)  # both at once, as what is seen is mostly also solid
         seen = len(self._world.segments)
-        self._scene, self._obstacles = Scene(walls[:seen]), walls[seen:]
+        self._walls, self._obstacles = Walls(walls[:seen], self._world.returns), walls[seen:]
 
     def _new_body(self) -> ChairBody:
         return ChairBody(self._model.chassis, self._obstacles, self._physics, self._world.start)
