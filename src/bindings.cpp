@@ -133,6 +133,7 @@ PYBIND11_MODULE(_core, m) {
   m.doc() = "Equations (1)-(4) of the paper, ray casting and whitening, in C++.";
   bindModel(m);
   bindKalman(m);
+  k::bindFollow(m);
   k::bindRaycast(m);
   k::bindCamera(m);
 }
