@@ -12,7 +12,7 @@ from geometry_msgs.msg import Twist
 from kurumaisu.ros.stageros_plan import plan_world
 from kurumaisu.ros.stageros_publish import Publisher
 from kurumaisu.ros.stageros_settings import StagerosSettings
-from kurumaisu.sim import Options, Simulator
+from kurumaisu.sim import Simulator
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
 
@@ -26,7 +26,7 @@ class Session:
         """Advertise everything; the node must have been initialised."""
         self.paused = False
         self._settings = settings
-        self._simulator = Simulator(world, Options(semantics=settings.semantics))
+        self._simulator = Simulator(world, settings.options)
         self._step_ns = round(world.interval * _NS)
         self._number = 0  # of steps since the start; /clock is that many times the interval
         self._last_command = 0  # [ns]
