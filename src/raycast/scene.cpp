@@ -150,4 +150,12 @@ void Scene::cast(const Pose2D* poses, bool one_pose, const double* bearings, std
   }
 }
 
+void Scene::castFan(const Pose2D& origin, double first, double increment, std::size_t n, double max_range,
+                    Hit* hits) const {
+  for (std::size_t i = 0; i < n; ++i) {
+    const double bearing = first + static_cast<double>(i) * increment;
+    hits[i] = cast(origin.x, origin.y, origin.theta + bearing, max_range);
+  }
+}
+
 }  // namespace kurumaisu

@@ -37,6 +37,10 @@ class Scene {
   void cast(const Pose2D* poses, bool one_pose, const double* bearings, std::size_t n, double max_range,
             double* ranges) const;
 
+  /// What n beams of a fan meet: beam i leaves the origin at its theta + first + i * increment [rad].
+  void castFan(const Pose2D& origin, double first, double increment, std::size_t n, double max_range,
+               Hit* hits) const;
+
   std::size_t size() const { return segments_.size(); }
 
  private:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulator: voltages in, poses and scans out; one seed, one run."""
+"""The chair simulated: voltages in, poses and scans out; one seed, one run."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Observation:
     scan: Scan | None
 
 
-class Simulator:
+class ChairSimulator:
     """One chair in one world."""
 
     def __init__(self, model: Model, world: World, physics: Physics) -> None:
