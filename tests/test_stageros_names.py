@@ -11,6 +11,7 @@ import yaml
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.ros.stageros import parse
+from kurumaisu.ros.stageros_names import names_of
 from kurumaisu.ros.stageros_plan import plan_world
 from kurumaisu.ros.stageros_settings import read_settings
 from kurumaisu.world.model import Camera, Fan, Model, Place, Position, Ranger, Shape
@@ -48,9 +49,14 @@ def settings(**values):
     return read_settings(values, "/stageros")
 
 
+def plans_of(models, use_model_names=False, **values):
+    read = settings(**values)
+    return plan_world(models, names_of(models, read, use_model_names), read)
+
+
 def names(models, use_model_names=False, **values):
     """Return (odom topic, odom frame, scan topics, scan frames) of each robot."""
-    plans = plan_world(models, settings(**values), use_model_names)
+    plans = plans_of(models, use_model_names, **values)
     return [
         (p.names.topic("odom"), p.names.frame("odom"), [s.topic for s in p.scans], [s.frame for s in p.scans])
         for p in plans
@@ -95,11 +101,11 @@ def test_a_name_that_ros_does_not_take_is_refused_with_its_place():
 
 
 def test_cameras_are_numbered_as_lasers_are():
-    (one,) = plan_world(world((None, [CAMERA])), settings(), False)
+    (one,) = plans_of(world((None, [CAMERA])))
     assert [c.frame for c in one.cameras] == ["camera"]
-    first, second = plan_world(world((None, [CAMERA, ONE, CAMERA]), (None, [CAMERA])), settings(), False)
+    first, second = plans_of(world((None, [CAMERA, ONE, CAMERA]), (None, [CAMERA])))
     assert [c.frame for c in first.cameras] == ["/robot_0/camera_0", "/robot_0/camera_1"]
-    assert [c.index for c in (*first.cameras, *second.cameras)] == [0, 1, 2]
+    assert [c.number for c in (*first.cameras, *second.cameras)] == [0, 1, None]
 
 
 def test_devices_on_a_device_do_not_count():
@@ -110,13 +116,13 @@ def test_devices_on_a_device_do_not_count():
 
 def test_only_the_first_sensor_of_a_ranger_counts():
     ring = Ranger((fan(1), fan(1), fan(1)))
-    (plan,) = plan_world(world((None, [ring, ONE])), settings(), False)
+    (plan,) = plans_of(world((None, [ring, ONE])))
     assert [(s.topic, s.index) for s in plan.scans] == [("/base_scan_0", 0), ("/base_scan_1", 3)]
 
 
 def test_all_sensors_are_where_their_beams_start():
     ring = Ranger((fan(1), fan(1, (0.2, 0.0, 0.01, math.pi / 2))))
-    (plan,) = plan_world(world((None, [ring])), settings(sensors="all"), False)
+    (plan,) = plans_of(world((None, [ring])), sensors="all")
     assert [(s.topic, s.index) for s in plan.scans] == [("/base_scan_0", 0), ("/base_scan_1", 1)]
     along = math.radians(30)  # the ranger's origin is 0.5 m ahead of its pose, the sensor 0.2 m ahead of that
     place = (0.1 + 0.7 * math.cos(along), 0.2 + 0.7 * math.sin(along), 0.3 + 0.05 + 0.01 + 0.01, along + math.pi / 2)
@@ -124,18 +130,18 @@ def test_all_sensors_are_where_their_beams_start():
 
 
 def test_stage_ros_frame_leaves_out_origin_and_sensor():
-    (plan,) = plan_world(world((None, [Ranger((fan(5, (0.2, 0, 0, 0)),))])), settings(), False)
+    (plan,) = plans_of(world((None, [Ranger((fan(5, (0.2, 0, 0, 0)),))])))
     assert plan.scans[0].mount == pytest.approx((0.1, 0.2, 0.35, math.radians(30)))
 
 
 def test_a_ranger_without_sensor_has_a_frame_and_counts():
-    (plan,) = plan_world(world((None, [Ranger(()), ONE])), settings(), False)
+    (plan,) = plans_of(world((None, [Ranger(()), ONE])))
     assert [(s.topic, s.fan is None) for s in plan.scans] == [("/base_scan_0", True), ("/base_scan_1", False)]
 
 
 def test_sonars_are_apart_when_asked():
     models = world((None, [Ranger((fan(1), fan(1))), ONE]))
-    (plan,) = plan_world(models, settings(sensors="all", sonar_as_range=True), False)
+    (plan,) = plans_of(models, sensors="all", sonar_as_range=True)
     assert [(s.topic, s.frame, s.is_range) for s in plan.scans] == [
         ("base_scan", "base_laser_link", False),
         ("/base_sonar_0", "/base_sonar_link_0", True),
@@ -159,7 +165,8 @@ def test_shipped_settings_are_stage_ros():
     shipped_ones = settings()
     assert (shipped_ones.watchdog_timeout, shipped_ones.depth_canonical) == (0.2, True)
     assert set(shipped_ones.pose_variances) == {0.0}
-    assert not (shipped_ones.strip_leading_slash or shipped_ones.set_child_frame_id or shipped_ones.all_sensors)
+    switches = (shipped_ones.strip_leading_slash, shipped_ones.set_child_frame_id, shipped_ones.all_sensors)
+    assert not any(switches)
 
 
 def test_every_shipped_key_can_be_given():

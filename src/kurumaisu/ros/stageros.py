@@ -46,11 +46,12 @@ def main() -> int:
     rospy.init_node("stageros", disable_rostime=True)
     try:
         settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
-        world = load_world(arguments.world)
+        values = {name: str(value) for name, value in settings.parameters.items()}
+        world = load_world(arguments.world, image_extents=settings.image_extents, values=values)
         speed = _speed(world, settings, arguments.headless)
-        for warning in (*settings.unknown, *world.warnings):
-            rospy.logwarn(f"STAGEROS_IGNORED {warning}")
         session = Session(world, settings, arguments.use_model_names)
+        for warning in (*settings.unknown, *session.warnings):
+            rospy.logwarn(f"STAGEROS_WORLD {warning}")
     except Error as error:
         rospy.logfatal(str(error))
         return 1

@@ -58,6 +58,11 @@ def devices_of(models: Sequence[Model], robot: Model, kind: type[Ranger] | type[
     return [model for model in models if model.parent == robot.index and isinstance(model.device, kind)]
 
 
+def names_of_another(number: int, robot: Model, settings: StagerosSettings, use_model_names: bool) -> Names:
+    """Return the names of a robot that came later, the number-th from 0; the others keep theirs."""
+    return Names(_prefix(number, robot, use_model_names), settings.strip_leading_slash, settings.relative_topics)
+
+
 def _prefix(number: int, robot: Model, use_model_names: bool) -> str | None:
     if not use_model_names or not robot.name or ":" in robot.name:  # Stage's own names, of the unnamed, have a colon
         return f"robot_{number}"

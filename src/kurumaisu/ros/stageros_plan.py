@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu.geometry import compose
-from kurumaisu.ros.stageros_names import Names, devices_of, names_of, robots_of
+from kurumaisu.ros.stageros_names import Names, devices_of, robots_of
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Camera, Fan, Model, Ranger
@@ -32,14 +32,14 @@ class ScanPlan:
 
 @dataclass(frozen=True)
 class CameraPlan:
-    """A camera; mount (4,): x, y, z [m], heading [rad] in base_link; index: of the reading in Observation.cameras."""
+    """A camera; mount (4,): x, y, z [m], heading [rad] in base_link; number: among several, else None."""
 
+    model: Model
+    camera: Camera
     names: Names
     number: int | None
     frame: str
     mount: FloatArray
-    camera: Camera
-    index: int
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,8 @@ class RobotPlan:
     cameras: tuple[CameraPlan, ...]
 
 
-def plan_world(models: Sequence[Model], settings: StagerosSettings, use_model_names: bool) -> tuple[RobotPlan, ...]:
-    """Return the plans of all robots, in file order. Raise Error for names that cannot be."""
-    names = names_of(models, settings, use_model_names)
+def plan_world(models: Sequence[Model], names: Sequence[Names], settings: StagerosSettings) -> tuple[RobotPlan, ...]:
+    """Return the plans of all robots, in file order, each with its names."""
     return tuple(
         RobotPlan(
             row,
@@ -135,12 +134,10 @@ def _numbered(sensors: Sequence[_Sensor], names: Names, topic: str, frame: str, 
 
 def _cameras(models: Sequence[Model], robot: Model, names: Names, frame: str) -> tuple[CameraPlan, ...]:
     cameras = devices_of(models, robot, Camera)
-    everyone = [model.index for model in models if isinstance(model.device, Camera)]
+    top = np.array([0.0, 0.0, robot.size[2], 0.0])
     plans = []
-    for number, model in enumerate(cameras):
+    for i, model in enumerate(cameras):
         assert isinstance(model.device, Camera)
-        device = number if len(cameras) > 1 else None
-        mount = model.pose + np.array([0.0, 0.0, robot.size[2], 0.0])
-        index = everyone.index(model.index)
-        plans.append(CameraPlan(names, device, names.frame(frame, device), mount, model.device, index))
+        number = i if len(cameras) > 1 else None
+        plans.append(CameraPlan(model, model.device, names, number, names.frame(frame, number), model.pose + top))
     return tuple(plans)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from geometry_msgs.msg import Twist
@@ -14,12 +15,15 @@ from tf2_msgs.msg import TFMessage
 from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap
 from kurumaisu.ros.outlet import Outlet
+from kurumaisu.ros.stageros_camera import Cameras
+from kurumaisu.ros.stageros_names import Names
 from kurumaisu.ros.stageros_plan import RobotPlan
-from kurumaisu.ros.stageros_robot import DEPTH, RobotTopics, transform_of
+from kurumaisu.ros.stageros_robot import DEPTH, RobotTopics, Timing, transform_of
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.ros.wire import ClockWire, Stamp, TransformsWire, planar
-from kurumaisu.sim import Observation
+from kurumaisu.sim.observation import Observation
 from kurumaisu.types import FloatArray
+from kurumaisu.world.model import Model
 
 _TF_DEPTH = 100  # as of tf2_ros
 _ROUNDING = 1e-6  # steps; of a division
@@ -28,12 +32,18 @@ _ROUNDING = 1e-6  # steps; of a division
 class Transforms:
     """odom -> base_footprint -> base_link -> sensors of all robots, in one message on /tf."""
 
-    def __init__(self, plans: Sequence[RobotPlan], settings: StagerosSettings) -> None:
-        self._outlet = Outlet("/tf", TFMessage, _TF_DEPTH)
-        frames = settings.frames
+    def __init__(self, settings: StagerosSettings) -> None:
+        self.outlet = Outlet("/tf", TFMessage, _TF_DEPTH)
+        self._frames = settings.frames
+        self._odom: list[int] = []
+        self._wire = TransformsWire([])
+
+    def change(self, plans: Sequence[RobotPlan]) -> None:
+        """Take other robots from now on."""
         pairs: list[tuple[str, str]] = []
         mounts: list[tuple[int, list[float]]] = []
-        self._odom: list[int] = []
+        self._odom = []
+        frames = self._frames
         for plan in plans:
             odom, foot, base = map(plan.names.frame, (frames.odom, frames.base_footprint, frames.base_link))
             for scan in plan.scans:
@@ -48,35 +58,31 @@ class Transforms:
 
     def publish(self, odometry: Sequence[Sequence[float]], stamp: Stamp) -> None:
         """Send the transforms with each robot's odometry (7,)."""
-        if self._outlet.wanted and len(self._wire):
+        if self.outlet.wanted and self._odom:
             self._wire.stamp(stamp)
             for index, pose in zip(self._odom, odometry, strict=True):
                 self._wire.fill(index, pose)
-            self._outlet.send(self._wire.data)
-
-    def close(self) -> None:
-        """End the topic."""
-        self._outlet.close()
+            self.outlet.send(self._wire.data)
 
 
 class Publisher:
-    """The topics of a world; its robots are those of the plans."""
+    """The topics of a world."""
 
-    def __init__(
-        self,
-        plans: Sequence[RobotPlan],
-        settings: StagerosSettings,
-        interval: float,
-        command: Callable[[int, Twist], None],
-    ) -> None:
-        """Advertise everything; interval [s]: of the steps; command: called with a robot's row and its cmd_vel."""
-        self._every = _every(settings, interval)
+    def __init__(self, settings: StagerosSettings, interval: float, command: Callable[[Names, Twist], None]) -> None:
+        """Advertise; interval [s]: of the steps; command: called with the names of a robot and its cmd_vel."""
+        self._settings = settings
+        self._every = steps_between(settings, interval)
         self._interval = interval
-        self._transforms = Transforms(plans, settings) if settings.publish_tf else None
-        scan_interval = self._every["scan"] * interval
-        self._robots = [RobotTopics(plan, settings, scan_interval, _for_row(command, plan.row)) for plan in plans]
+        self._command = command
+        self._timing = Timing(0.0, 0.0)
+        if settings.scan_timing:
+            self._timing = Timing(self._every["scan"] * interval, settings.options.scan_sweep)
+        self._transforms = Transforms(settings) if settings.publish_tf else None
+        self._cameras = Cameras(settings, self._transforms.outlet if self._transforms else None)
+        self._robots: list[RobotTopics] = []
         self._clock, self._clock_wire = Outlet("/clock", Clock, DEPTH), ClockWire()
         self._before: FloatArray | None = None  # the true poses of the step before
+        self._rates: list[list[float]] = []
         self._kinds: dict[str, Callable[[Observation, Stamp], None]] = {
             "tf": self._publish_transforms,
             "scan": self._publish_scans,
@@ -85,22 +91,32 @@ class Publisher:
             "collision": self._publish_collisions,
             "clock": self._publish_clock,  # last: who hears a time has been sent all before it
         }
-        self._rates: list[list[float]] = []
 
-    def publish(self, observation: Observation, number: int, stamp: Stamp) -> None:
-        """Publish a step, the number-th."""
+    def change(self, models: Sequence[Model], plans: Sequence[RobotPlan]) -> None:
+        """Publish these models' robots from now on; those that stay, by their names, keep their topics."""
+        there = {robot.plan.names: robot for robot in self._robots}
+        self._robots = []
+        for plan in plans:
+            robot = there.pop(plan.names, None)
+            if robot is None:
+                robot = RobotTopics(plan, self._settings, self._timing, partial(self._command, plan.names))
+            robot.plan = plan
+            self._robots.append(robot)
+        for gone in there.values():
+            gone.close()
+        if self._transforms:
+            self._transforms.change(plans)
+        self._cameras.change(models, plans)
+        self._before = None
+
+    def publish(self, observation: Observation, poses: Callable[[], FloatArray], number: int, stamp: Stamp) -> None:
+        """Publish a step, the number-th; poses: tells the poses (m, 4) of all models."""
         self._rates = self._true_rates(observation.poses)
+        if number % self._every["image"] == 0 and self._cameras.wanted:
+            self._cameras.publish(poses(), stamp)
         for kind, publish in self._kinds.items():
             if number % self._every[kind] == 0:
                 publish(observation, stamp)
-
-    def close(self) -> None:
-        """End all topics."""
-        for robot in self._robots:
-            robot.close()
-        if self._transforms:
-            self._transforms.close()
-        self._clock.close()
 
     def _publish_transforms(self, observation: Observation, stamp: Stamp) -> None:
         if self._transforms:
@@ -109,7 +125,9 @@ class Publisher:
     def _publish_scans(self, observation: Observation, stamp: Stamp) -> None:
         for robot in self._robots:
             for index, topic in robot.scans:
-                topic.publish(observation.scans[index], stamp)
+                scan = observation.scans[index]
+                if scan.count:  # as in 1.8.0, nothing before the ranger has looked
+                    topic.publish(scan, stamp)
 
     def _publish_odometry(self, observation: Observation, stamp: Stamp) -> None:
         poses, velocities = planar(observation.odometry), observation.velocities.tolist()
@@ -143,7 +161,7 @@ class Publisher:
         return result
 
 
-def _every(settings: StagerosSettings, interval: float) -> dict[str, int]:
+def steps_between(settings: StagerosSettings, interval: float) -> dict[str, int]:
     """Return how many steps lie between two messages of a kind. Raise Error if that is no integer."""
     result = {}
     for kind, rate in dataclasses.asdict(settings.rates).items():
@@ -152,7 +170,3 @@ def _every(settings: StagerosSettings, interval: float) -> dict[str, int]:
             raise Error(f"rates: {kind}: must divide the world's {1 / interval:g} Hz: {rate:g}")
         result[kind] = round(steps)
     return result
-
-
-def _for_row(command: Callable[[int, Twist], None], row: int) -> Callable[[Twist], None]:
-    return lambda message: command(row, message)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import rospy
@@ -16,19 +17,28 @@ from kurumaisu.ros.outlet import Outlet
 from kurumaisu.ros.stageros_plan import RobotPlan, ScanPlan
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.ros.wire import BoolWire, LaserScanWire, OdometryWire, RangeWire, Stamp
-from kurumaisu.sim import Scan
+from kurumaisu.sim.observation import Scan
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Fan
 
 DEPTH = 10  # messages kept for a slow subscriber, on every topic, as in stage_ros
 
 
+@dataclass(frozen=True)
+class Timing:
+    """Seconds from scan to scan, and from a scan's first to its last beam; 0: not said."""
+
+    scan: float
+    sweep: float
+
+
 class ScanTopic:
     """A sensor as sensor_msgs/LaserScan."""
 
-    def __init__(self, plan: ScanPlan, fan: Fan, scan_time: float) -> None:
+    def __init__(self, plan: ScanPlan, fan: Fan, timing: Timing) -> None:
         self._outlet = Outlet(plan.topic, LaserScan, DEPTH)
-        self._wire = LaserScanWire(_fan_message(plan, fan, scan_time), fan.samples)
+        self._wire = LaserScanWire(_fan_message(plan, fan, timing), fan.samples)
+        self._miss = fan.range_max
 
     def publish(self, reading: Scan, stamp: Stamp) -> None:
         """Send a reading."""
@@ -36,6 +46,7 @@ class ScanTopic:
         if self._outlet.wanted:
             self._wire.stamp(seq, stamp)
             self._wire.ranges[:] = reading.ranges
+            self._wire.ranges[np.isinf(self._wire.ranges)] = self._miss
             self._wire.intensities[:] = reading.returns
             self._outlet.send(self._wire.data)
 
@@ -53,13 +64,14 @@ class RangeTopic:
         message.min_range, message.max_range = fan.range_min, fan.range_max
         message.header.frame_id = plan.frame
         self._wire = RangeWire(message)
+        self._miss = fan.range_max
 
     def publish(self, reading: Scan, stamp: Stamp) -> None:
         """Send a reading."""
         seq = self._outlet.next_number()
         if self._outlet.wanted:
             self._wire.stamp(seq, stamp)
-            self._wire.fill(reading.ranges[0])
+            self._wire.fill(min(float(reading.ranges[0]), self._miss))
             self._outlet.send(self._wire.data)
 
     def close(self) -> None:
@@ -109,40 +121,51 @@ class RobotTopics:
     """Everything of one robot but cameras; command is called with its Twist messages."""
 
     def __init__(
-        self, plan: RobotPlan, settings: StagerosSettings, scan_interval: float, command: Callable[[Twist], None]
+        self, plan: RobotPlan, settings: StagerosSettings, timing: Timing, command: Callable[[Twist], None]
     ) -> None:
         names, frames = plan.names, settings.frames
         child = names.frame(frames.base_footprint) if settings.set_child_frame_id else ""
         odom, truth = names.frame(frames.odom), names.frame(frames.ground_truth)
-        self.plan = plan
         variances = settings.pose_variances, settings.twist_variances
         self.odometry = OdometryTopic(names.topic("odom"), OdometryWire(odom, child, *variances))
         zeros = (0.0,) * 6  # the truth has no error
         self.truth = OdometryTopic(names.topic("base_pose_ground_truth"), OdometryWire(truth, child, zeros, zeros))
         self.collision = CollisionTopic(names.topic("collision")) if settings.publish_collision else None
-        scan_time = scan_interval if settings.scan_timing else 0.0
-        self.scans = [
-            (scan.index, RangeTopic(scan, scan.fan) if scan.is_range else ScanTopic(scan, scan.fan, scan_time))
+        self._scans = [
+            RangeTopic(scan, scan.fan) if scan.is_range else ScanTopic(scan, scan.fan, timing)
             for scan in plan.scans
             if scan.fan is not None
         ]
+        self.plan = plan
         self._commands = rospy.Subscriber(names.topic("cmd_vel"), Twist, command, queue_size=10)
+
+    @property
+    def plan(self) -> RobotPlan:
+        """Where the robot is in the observation; it changes when another one goes."""
+        return self._plan
+
+    @plan.setter
+    def plan(self, plan: RobotPlan) -> None:
+        self._plan = plan
+        indices = [scan.index for scan in plan.scans if scan.fan is not None]
+        self.scans = list(zip(indices, self._scans, strict=True))
 
     def close(self) -> None:
         """End all topics."""
         self._commands.unregister()
-        for topic in (self.odometry, self.truth, self.collision, *(scan for _, scan in self.scans)):
+        for topic in (self.odometry, self.truth, self.collision, *self._scans):
             if topic is not None:
                 topic.close()
 
 
-def _fan_message(plan: ScanPlan, fan: Fan, scan_time: float) -> LaserScan:
+def _fan_message(plan: ScanPlan, fan: Fan, timing: Timing) -> LaserScan:
     message = LaserScan()
     message.header.frame_id = plan.frame
     message.angle_min, message.angle_max = -fan.fov / 2, fan.fov / 2
     # 1.8.0 divides by zero for a single beam
     message.angle_increment = fan.fov / (fan.samples - 1) if fan.samples > 1 else 0.0
-    message.scan_time = scan_time
+    message.scan_time = timing.scan
+    message.time_increment = timing.sweep / (fan.samples - 1) if fan.samples > 1 else 0.0
     message.range_min, message.range_max = fan.range_min, fan.range_max
     return message
 

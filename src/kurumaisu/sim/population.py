@@ -80,9 +80,7 @@ class Population:
         shift = {-1: -1} | {int(old): new for new, old in enumerate(stay)}
         kept = [self.models[i] for i in stay]
         return Population(
-            models=tuple(
-                replace(m, index=shift[m.index], parent=shift[m.parent], root=shift[m.root]) for m in kept
-            ),
+            models=tuple(replace(m, index=shift[m.index], parent=shift[m.parent], root=shift[m.root]) for m in kept),
             poses=self.poses[stay],
             keys=self.keys[stay],
             born=self.born[stay],
