@@ -18,7 +18,7 @@ class RangerFan:
     """One fan of a ranger: its model, its number among the ranger's fans, and the robot it is on, -1: on none.
 
     body: its number in Bodies, -1: the map's frame. mount (4,): x, y, z [m] of the beams' plane and heading [rad] of
-    the fan's middle in the body's frame; bearings (samples,) [rad] about that heading, from -fov/2 to fov/2 as in Stage.
+    the fan's middle in the body's frame; bearings (samples,) [rad] about that heading, from -fov/2 to fov/2.
     """
 
     model: Model

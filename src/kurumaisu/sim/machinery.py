@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 
 from kurumaisu.sim import fans
-from kurumaisu.sim.drive import Drive
+from kurumaisu.sim.drive import Drive, Rows
 from kurumaisu.sim.motion import Motion, StageMotion
 from kurumaisu.sim.odometry import Localization
 from kurumaisu.sim.options import Options
@@ -28,19 +28,19 @@ class Machinery:
         models = population.models
         self.population = population
         self.interval = interval
-        self._options = options
+        self.options = options
         self.exact = options.semantics == "physical"
         self.bodies = sort(models, [is_robot(model) for model in models])
         self.arena, self.numbers, self.walls = build_arena(models, population.poses, self.bodies, options.threads)
         self.robot_rows = np.array([i for i, head in enumerate(self.bodies.heads) if is_robot(models[head])], np.int64)
         self.robots = tuple(models[self.bodies.heads[row]] for row in self.robot_rows)
+        self._everybody_drives = len(self.robot_rows) == len(self.bodies)
         self.fans = fans.find(models, population.poses, self.bodies, self.robot_rows.tolist())
         self.motion: Motion = StageMotion(self.arena, self.numbers, self.bodies)
         self.frames = np.zeros((len(self.bodies) + 1, 4))  # of the bodies, and of the map at the end
         self.before = self.frames.copy()  # those one step ago
         self.stalled = np.zeros(len(self.bodies), dtype=np.bool_)
         self.place(population.poses[self.bodies.heads])
-        self._everybody_drives = len(self.robot_rows) == len(self.bodies)
         self._velocities = np.zeros((len(self.bodies), 3))
         self.begin()
 
@@ -51,21 +51,28 @@ class Machinery:
         born = self.population.born
         periods = self._periods([model.update_interval for model in self.robots], always=self.exact)
         self.rhythm = Rhythm(periods, born[[model.index for model in self.robots]].astype(np.int64))
-        self.drive = Drive(devices, periods * self.interval, self._options.limit_acceleration)
-        self.localization = Localization(devices, starts, self._options.odometry_walk, self.exact)
+        self.drive = Drive(devices, periods * self.interval, self.options.limit_acceleration)
+        self.localization = Localization(devices, starts, self.interval, self.options.odometry_walk, self.exact)
         looks = self._periods([fan.model.update_interval for fan in self.fans], always=False)
         births = born[[fan.model.index for fan in self.fans]].astype(np.int64)
-        sweep = self._options.scan_sweep / self.interval
+        sweep = self.options.scan_sweep / self.interval
         self.rangers = Rangers(self.arena, self.fans, np.stack([looks, births], axis=-1), sweep)
+
+    @property
+    def robot_keys(self) -> IntArray:
+        """What the robots (n,) are known by for life."""
+        keys: IntArray = self.population.keys[self.bodies.heads[self.robot_rows]]
+        return keys
 
     @property
     def robot_poses(self) -> FloatArray:
         """Poses (n, 4) of the robots, a copy."""
-        return self.frames[self.robot_rows] if not self._all_robots else self.frames[:-1].copy()
+        return self.frames[:-1].copy() if self._everybody_drives else self.frames[self.robot_rows]
 
     @property
-    def _all_robots(self) -> bool:
-        return len(self.robot_rows) == len(self.bodies)
+    def robots_stalled(self) -> BoolArray:
+        """Which robots (n,) were stopped in their last move, a copy."""
+        return self.stalled.copy() if self._everybody_drives else self.stalled[self.robot_rows]
 
     def place(self, poses: FloatArray) -> None:
         """Put all bodies at poses (b, 4)."""
@@ -73,6 +80,22 @@ class Machinery:
         self.frames[:-1] = poses
         self.before[:-1] = poses
         self.stalled[:] = False
+
+    def put(self, rows: IntArray, poses: FloatArray) -> None:
+        """Put some bodies at poses (k, 4), at rest; the others go on as they were."""
+        known = self.motion.state()
+        self.frames[rows], self.before[rows] = poses, poses
+        self.stalled[rows] = False
+        self.motion.place(self.frames[:-1])
+        placed = self.motion.state()
+        for name, values in known.items():
+            values[rows] = placed[name][rows]
+        self.motion.restore(known)
+
+    def locate(self, due: Rows, rng: np.random.Generator) -> None:
+        """Update the odometry of the robots that are due."""
+        poses = self.frames if self._everybody_drives else self.frames[self.robot_rows]
+        self.localization.update(due, poses[: len(self.robots)], self.drive.velocities, rng)
 
     def move(self) -> None:
         """Move all bodies as the drives want."""

@@ -10,7 +10,7 @@ import numpy as np
 from kurumaisu.geometry import between, compose, wrap
 from kurumaisu.sim.drive import Rows
 from kurumaisu.sim.options import OdometryWalk
-from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Position
 
 _PLANAR = [0, 1, 3]
@@ -26,8 +26,14 @@ class Localization:
     Stage moves robots along the heading before it.
     """
 
-    def __init__(self, robots: Sequence[Position], starts: FloatArray, walk: OdometryWalk, exact: bool) -> None:
-        """Start robots that are at poses (n, 4); exact: integrate arcs, and gps is in the map from the start."""
+    def __init__(
+        self, robots: Sequence[Position], starts: FloatArray, interval: float, walk: OdometryWalk, exact: bool
+    ) -> None:
+        """Start robots that are at poses (n, 4); interval [s] of a step.
+
+        exact: integrate arcs, and gps is in the map from the start.
+        """
+        self._interval = interval
         self._advance = advance_on_arc if exact else advance
         origins = starts[:, _PLANAR].copy()
         for i, robot in enumerate(robots):
@@ -46,13 +52,14 @@ class Localization:
         self.all_gps = bool(not self._odom.any())
         self._walk = walk
 
-    def draw_errors(self, rng: np.random.Generator) -> None:
-        """Draw the shares of error of those whose world file gives none."""
+    def draw_errors(self, rng: np.random.Generator, whose: BoolArray | None = None) -> None:
+        """Draw the shares of error of those (n,) whose world file gives none."""
         drawn = rng.uniform(-_DEFAULT_ERROR / 2, _DEFAULT_ERROR / 2, (len(self._given), 3))
-        np.copyto(self.shares, drawn, where=~self._given[:, np.newaxis])
+        chosen = ~self._given if whose is None else ~self._given & whose
+        np.copyto(self.shares, drawn, where=chosen[:, np.newaxis])
 
-    def update(self, due: Rows, poses: FloatArray, wanted: FloatArray, rng: np.random.Generator) -> None:
-        """Update those due; poses (n, 4) are true; wanted (n, 3): what one step of it would be without obstacles.
+    def update(self, due: Rows, poses: FloatArray, velocities: FloatArray, rng: np.random.Generator) -> None:
+        """Update those due; poses (n, 4) are true; velocities (n, 3) wanted [m/s, rad/s].
 
         A robot that is updated every few steps still integrates only one, as in Stage.
         """
@@ -65,7 +72,7 @@ class Localization:
         gps, odom = np.flatnonzero(is_due & ~self._odom), np.flatnonzero(is_due & self._odom)
         self.estimates[gps] = poses[gps][:, _PLANAR]
         if len(odom):
-            self._integrate(odom, wanted[odom], rng)
+            self._integrate(odom, velocities[odom] * self._interval, rng)
 
     def _integrate(self, rows: IntArray, wanted: FloatArray, rng: np.random.Generator) -> None:
         step = wanted * (1.0 + self.shares[rows])

@@ -52,7 +52,10 @@ def is_movable(model: Model) -> bool:
 
 def sort(models: Sequence[Model], moves: Sequence[bool]) -> Bodies:
     """Group models by bodies; moves (models,): has a pose of its own to move."""
-    heads, body_of, carrier, level = [], [], [], []
+    heads: list[int] = []
+    body_of: list[int] = []
+    carrier: list[int] = []
+    level: list[int] = []
     for model, own in zip(models, moves, strict=True):
         below = body_of[model.parent] if model.parent >= 0 else -1
         if own:

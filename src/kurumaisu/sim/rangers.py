@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,9 +51,19 @@ class Rangers:
         )
         self._scans = Scans(new, self._places)
 
-    def keep(self, scans: Scans) -> None:
-        """Have these scans as the newest ones; all fans' of the same world."""
-        self._scans = Scans(scans.sweeps, self._places)
+    def take_over(self, old: Scans, same: Sequence[tuple[int, int]]) -> None:
+        """Have the old scans of fans that are the same: pairs of their places, here and there."""
+        sweeps = [replace(s, ranges=s.ranges.copy(), returns=s.returns.copy()) for s in self._scans.sweeps]
+        for here, there in same:
+            number, start, stop = self._places[here]
+            scan, sweep = old[there], sweeps[number]
+            sweep.ranges[start:stop], sweep.returns[start:stop] = scan.ranges, scan.returns
+            sweeps[number] = replace(sweep, time=scan.time, count=scan.count)
+        self._scans = Scans(tuple(sweeps), self._places)
+
+    def keep(self, sweeps: tuple[Sweep, ...]) -> None:
+        """Have these as the newest scans, of the same cohorts."""
+        self._scans = Scans(sweeps, self._places)
 
 
 class _Cohort:
