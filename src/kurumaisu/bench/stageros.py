@@ -104,9 +104,9 @@ def _measure(command: list[str], world: Path, robots: int, seconds: float, envir
     """Run a node with a listener on every topic."""
     prefixes = [f"/robot_{i}/" for i in range(robots)] if robots > 1 else ["/"]
     topics = ["/clock", "/tf", *(prefix + topic for prefix in prefixes for topic in (*_TOPICS, "cmd_vel"))]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     # flat out, 0.2 s of simulated time go by before a command is heard
-    node = subprocess.Popen([*command, "_base_watchdog_timeout:=0", "-g", str(world)], env=environment, **quiet)
+    line = [*command, "_base_watchdog_timeout:=0", "-g", str(world)]
+    node = subprocess.Popen(line, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         with subprocess.Popen(
             [_listener(), str(seconds), *topics], env=environment, stdout=subprocess.PIPE, text=True

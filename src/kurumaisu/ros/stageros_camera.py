@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image
 
 from kurumaisu.ros.outlet import Outlet
@@ -111,11 +113,11 @@ class CameraTopics:
         for outlet in (self._image, self._depth, self._info):
             outlet.close()
 
-    def _depths(self, picture: Picture) -> np.ndarray:
+    def _depths(self, picture: Picture) -> NDArray[Any]:
         return picture.depth if self._canonical else millimetres(picture, self._plan.camera)
 
 
-def _send(outlet: Outlet, wire: ImageWire, pixels: np.ndarray, stamp: Stamp) -> None:
+def _send(outlet: Outlet, wire: ImageWire, pixels: NDArray[Any], stamp: Stamp) -> None:
     wire.stamp(outlet.next_number(), stamp)
     wire.pixels[:] = np.ascontiguousarray(pixels).view(np.uint8).ravel()
     outlet.send(wire.data)
