@@ -130,9 +130,9 @@ def test_bool(value):
 
 
 def test_planar_poses_turn_about_z():
-    (first, second) = wire.planar(np.array([[1.0, 2.0, 0.0], [3.0, 4.0, math.pi / 2]]))
-    assert first == [1, 2, 0, 0, 0, 0, 1]
-    assert second == pytest.approx([3, 4, 0, 0, 0, math.sqrt(0.5), math.sqrt(0.5)])
+    (first, second) = wire.planar([[1.0, 2.0, 0.0], [3.0, 4.0, math.pi / 2]])
+    assert first == (1, 2, 0, 0, 0, 0, 1)
+    assert second == pytest.approx((3, 4, 0, 0, 0, math.sqrt(0.5), math.sqrt(0.5)))
 
 
 def test_seq_wraps():

@@ -4,16 +4,15 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
-import numpy as np
 from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
 from kurumaisu.errors import Error
-from kurumaisu.geometry import wrap
 from kurumaisu.ros.outlet import Outlet
 from kurumaisu.ros.stageros_camera import Cameras
 from kurumaisu.ros.stageros_names import Names
@@ -81,8 +80,8 @@ class Publisher:
         self._cameras = Cameras(settings, self._transforms.outlet if self._transforms else None)
         self._robots: list[RobotTopics] = []
         self._clock, self._clock_wire = Outlet("/clock", Clock, DEPTH), ClockWire()
-        self._before: FloatArray | None = None  # the true poses of the step before
-        self._rates: list[list[float]] = []
+        self._poses: list[list[float]] = []  # the true ones of this step
+        self._before = self._poses  # and of the step before
         self._kinds: dict[str, Callable[[Observation, Stamp], None]] = {
             "tf": self._publish_transforms,
             "scan": self._publish_scans,
@@ -107,11 +106,13 @@ class Publisher:
         if self._transforms:
             self._transforms.change(plans)
         self._cameras.change(models, plans)
-        self._before = None
+        self._poses = []
 
     def publish(self, observation: Observation, poses: Callable[[], FloatArray], number: int, stamp: Stamp) -> None:
         """Publish a step, the number-th; poses: tells the poses (m, 4) of all models."""
-        self._rates = self._true_rates(observation.poses)
+        self._before, self._poses = self._poses, observation.poses.tolist()
+        if not self._before:
+            self._before = self._poses  # the first message says zero, as in 1.8.0
         if number % self._every["image"] == 0 and self._cameras.wanted:
             self._cameras.publish(poses(), stamp)
         for kind, publish in self._kinds.items():
@@ -120,7 +121,7 @@ class Publisher:
 
     def _publish_transforms(self, observation: Observation, stamp: Stamp) -> None:
         if self._transforms:
-            self._transforms.publish(planar(observation.odometry), stamp)
+            self._transforms.publish(planar(observation.odometry.tolist()), stamp)
 
     def _publish_scans(self, observation: Observation, stamp: Stamp) -> None:
         for robot in self._robots:
@@ -130,13 +131,13 @@ class Publisher:
                     topic.publish(scan, stamp)
 
     def _publish_odometry(self, observation: Observation, stamp: Stamp) -> None:
-        poses, velocities = planar(observation.odometry), observation.velocities.tolist()
+        poses, velocities = planar(observation.odometry.tolist()), observation.velocities.tolist()
         for robot, pose, (v, sideways, w) in zip(self._robots, poses, velocities, strict=True):
             robot.odometry.publish(pose, (v, sideways, 0.0, 0.0, 0.0, w), stamp)
 
     def _publish_truth(self, observation: Observation, stamp: Stamp) -> None:
-        poses = planar(observation.poses[:, [0, 1, 3]])
-        for robot, pose, rates in zip(self._robots, poses, self._rates, strict=True):
+        poses = planar([(x, y, heading) for x, y, _, heading in self._poses])
+        for robot, pose, rates in zip(self._robots, poses, self._rates(), strict=True):
             robot.truth.publish(pose, rates, stamp)
 
     def _publish_collisions(self, observation: Observation, _stamp: Stamp) -> None:
@@ -149,16 +150,13 @@ class Publisher:
             self._clock_wire.stamp(stamp)
             self._clock.send(self._clock_wire.data)
 
-    def _true_rates(self, poses: FloatArray) -> list[list[float]]:
+    def _rates(self) -> list[tuple[float, ...]]:
         """Return the change of the true poses since the step before, in the world's axes, as twists (6,)."""
-        twists = np.zeros((len(poses), 6))
-        if self._before is not None:
-            change = poses - self._before
-            twists[:, :3] = change[:, :3] / self._interval
-            twists[:, 5] = wrap(change[:, 3]) / self._interval
-        self._before = poses.copy()
-        result: list[list[float]] = twists.tolist()
-        return result
+        dt = self._interval
+        return [
+            ((x - x0) / dt, (y - y0) / dt, (z - z0) / dt, 0.0, 0.0, math.remainder(heading - heading0, math.tau) / dt)
+            for (x, y, z, heading), (x0, y0, z0, heading0) in zip(self._poses, self._before, strict=True)
+        ]
 
 
 def steps_between(settings: StagerosSettings, interval: float) -> dict[str, int]:

@@ -39,20 +39,27 @@ class ScanTopic:
         self._outlet = Outlet(plan.topic, LaserScan, DEPTH)
         self._wire = LaserScanWire(_fan_message(plan, fan, timing), fan.samples)
         self._miss = fan.range_max
+        self._is_noisy = bool(fan.noise.any())
 
     def publish(self, reading: Scan, stamp: Stamp) -> None:
         """Send a reading."""
         seq = self._outlet.next_number()
         if self._outlet.wanted:
             self._wire.stamp(seq, stamp)
-            self._wire.ranges[:] = reading.ranges
-            self._wire.ranges[np.isinf(self._wire.ranges)] = self._miss
+            self._write(reading.ranges)
             self._wire.intensities[:] = reading.returns
             self._outlet.send(self._wire.data)
 
     def close(self) -> None:
         """End the topic."""
         self._outlet.close()
+
+    def _write(self, ranges: FloatArray) -> None:
+        """Write ranges, a miss as range_max; noise may lift others above it, as in Stage."""
+        if self._is_noisy:
+            self._wire.ranges[:] = np.where(np.isinf(ranges), self._miss, ranges)
+        else:
+            np.minimum(ranges, self._miss, out=self._wire.ranges, casting="same_kind")
 
 
 class RangeTopic:
