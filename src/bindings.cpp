@@ -7,6 +7,7 @@
 
 #include <stdexcept>
 
+#include "contact/bindings.h"
 #include "kalman/whiten.h"
 #include "model/laser_error.h"
 #include "model/unicycle.h"
@@ -179,4 +180,5 @@ PYBIND11_MODULE(_core, m) {
   bindModel(m);
   bindKalman(m);
   bindRaycast(m);
+  k::bindContact(m);
 }
