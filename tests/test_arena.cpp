@@ -126,6 +126,17 @@ TEST(Pool, DoesEverythingOnce) {
   }
 }
 
+// Whoever takes a part while the others are already done with theirs must still find the work.
+TEST(Pool, FewPartsManyTimes) {
+  k::Pool pool(3);
+  std::atomic<std::size_t> done{0};
+  constexpr std::size_t kRounds = 20000;
+  for (std::size_t round = 0; round < kRounds; ++round) {
+    pool.run(3, [&](std::size_t begin, std::size_t end) { done += end - begin; });
+  }
+  EXPECT_EQ(done, 3 * kRounds);
+}
+
 TEST(Pool, WorksInAForkedProcess) {
   k::Pool pool(3);
   std::atomic<int> done{0};
