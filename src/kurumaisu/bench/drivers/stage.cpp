@@ -2,7 +2,8 @@
 // Drives libstage 4.3 for the benchmarks: compiled by them, on demand, against a Stage that is built elsewhere.
 //
 //   stage scan WORLD POSES RANGES   the first position model at each pose of the file POSES (x, y [m], heading [rad];
-//                                   doubles), all its rangers' beams into the file RANGES: range, intensity (doubles)
+//                                   doubles), its rangers' beams into the file RANGES: range [m], number of the
+//                                   model met in depth-first order of the world file (doubles)
 //   stage run WORLD SECONDS V W     all position models at v [m/s], w [rad/s] for so many simulated seconds
 //   stage poses WORLD SECONDS V W   the same, then their poses
 //
@@ -54,7 +55,19 @@ std::vector<double> readDoubles(const char* path) {
   return values;
 }
 
+/// Has rangers report which model they meet in place of its intensity.
+void number(Stg::World& world) {
+  double i = 0;
+  for (Stg::Model* model : all<Stg::Model>(world)) {
+    if (model == world.GetGround()) continue;  // is in no world file
+    if (model->vis.ranger_return >= 0) model->vis.ranger_return = i;
+    ++i;
+  }
+  std::cout << "models " << i << "\n";
+}
+
 void scan(Stg::World& world, const char* poses_path, const char* ranges_path) {
+  number(world);
   Stg::Model* robot = all<Stg::ModelPosition>(world).at(0);
   const auto rangers = all<Stg::ModelRanger>(*robot);
   const std::vector<double> poses = readDoubles(poses_path);
