@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,15 +45,7 @@ def table(places: Sequence[Map], stage: Stage | None, folder: Path, seconds: flo
         place = places[min(row.place, len(places) - 1)]
         world = scene(row, place, folder)
         time = max(1.0, row.seconds * seconds)
-        actions: dict[str, Callable[[], Run]] = {"ours": lambda world=world, time=time: run(world, time)}
-        if stage:
-            actions["Stage"] = lambda world=world, time=time: stage.run(world, time, *SPEED)
-        runs = {name: [] for name in actions}
-        for _ in range(repeats):
-            for name, action in actions.items():
-                runs[name].append(action())
-        mine = medians(runs["ours"])
-        theirs = medians(runs["Stage"]) if stage else None
+        mine, theirs = in_turns(stage, world, time, repeats)
         out.row(
             f"{row.robots} x {row.fan.beams} beams, {place.name}",
             *(1e3 * mine.cpu / time, 1e3 * theirs.cpu / time if theirs else "-"),
@@ -66,6 +58,16 @@ def scene(row: Row, place: Map, folder: Path) -> Path:
     """Write the world of a row; return its path."""
     poses = free_poses(walls(place, folder), row.robots, np.random.default_rng(3))
     return write_world(folder / f"{place.name}-{row.robots}.world", place, row.fan, poses)
+
+
+def in_turns(stage: Stage | None, world: Path, seconds: float, repeats: int) -> tuple[Run, Run | None]:
+    """Return what a world costs in ours and in Stage, medians of runs that take turns."""
+    ours, theirs = [], []
+    for _ in range(repeats):
+        ours.append(run(world, seconds))
+        if stage:
+            theirs.append(stage.run(world, seconds, *SPEED))
+    return medians(ours), medians(theirs) if theirs else None
 
 
 def medians(runs: Sequence[Run]) -> Run:
