@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from kurumaisu.bench import __main__, base, sim
+from kurumaisu.bench import __main__, base, chair, rays, robots, sim, ways
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
@@ -35,40 +35,46 @@ def test_base_fails_beyond_its_limits(monkeypatch, worst, dearest, status):
 def test_sim(capsys):
     assert __main__.main(["sim", "--repeats", "1", "--poses", "2", "--seconds", "1"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    costs = {
-        name: next(line.split() for line in lines if line.startswith(name)) for name in ("Scene", "pymunk", "numpy")
-    }
-    assert all(float(cells[-4]) > 0 for cells in costs.values())  # rays per second
-    assert all(float(costs[name][-1]) < 1e-12 for name in ("pymunk", "numpy"))  # metres
-    floors = [line.split() for line in lines if line.startswith(("even ", "uneven "))]
-    assert [cells[-1] for cells in floors] == ["10", "10"]  # the eleventh begins at 1 s
-    assert all(float(cells[1]) > 0 for cells in floors)
+
+    def cells(name):
+        return next(line[28:].split() for line in lines if line.startswith(name))
+
+    names = ("Scene.cast_fan", "Scene.cast, a ray", "pymunk", "numpy")
+    assert all(float(cells(name)[0]) > 0 for name in names)  # rays per second
+    assert all(float(cells(name)[-1]) < 1e-9 for name in names[1:])  # metres
+    floors = [cells(name) for name in ("even ", "uneven ")]
+    assert [row[-1] for row in floors] == ["10", "10"]  # the eleventh begins at 1 s
+    assert all(float(row[0]) > 0 for row in floors)
+    worlds = [cells(f"{robots} x ") for robots in (1, 100, 1000)]
+    assert all(float(row[0]) > 0 and row[1] == "-" for row in worlds)
 
 
 def test_sim_fails_beyond_its_limit(monkeypatch):
-    monkeypatch.setattr(sim, "_rays", lambda *_: 1e-6)
-    monkeypatch.setattr(sim, "_simulated_time", lambda *_: None)
+    monkeypatch.setattr(ways, "compare", lambda *_: 1e-6)
+    monkeypatch.setattr(chair, "simulated_time", lambda *_: None)
+    for part in (rays, robots):
+        monkeypatch.setattr(part, "table", lambda *_: None)
     assert sim.main([]) == 1
 
 
 def test_sim_wants_a_free_circle(monkeypatch):
-    monkeypatch.setattr(sim, "_START", np.array([1.0, 1.0, 0.0]))
+    monkeypatch.setattr(chair, "_START", np.array([1.0, 1.0, 0.0]))
     with pytest.raises(Error, match="contact at"):
         sim.main(["--repeats", "1", "--poses", "1", "--seconds", "20"])
 
 
-def test_sim_knows_free_from_solid():
+def test_ways_know_free_from_solid():
     world = load_world(shipped("worlds/building.world"))
-    poses = sim.free_poses(world, 500, np.random.default_rng(2))
+    poses = ways.free_poses(world, 500, np.random.default_rng(2))
     assert poses.shape == (500, 3)
     shaft = (abs(poses[:, 0] - 8.45) < 1.75) & (abs(poses[:, 1] - 3.0) < 1.2)
     assert not shaft.any()
     assert ((poses[:, :2] > 0.1) & (poses[:, :2] < (11.9, 8.9))).all()  # between the outer walls
 
 
-def test_sim_brute_force_at_known_distances():
+def test_ways_brute_force_at_known_distances():
     walls = np.array([[3.0, -1.0, 3.0, 1.0], [5.0, -9.0, 5.0, 9.0], [-1.0, -1.0, 1.0, -1.0]])
-    ranges = sim.brute_force(walls, np.zeros(3), np.array([0.0, math.atan2(2, 5), -math.pi / 2, math.pi / 2]))
+    ranges = ways.brute_force(walls, np.zeros(3), np.array([0.0, math.atan2(2, 5), -math.pi / 2, math.pi / 2]))
     np.testing.assert_allclose(ranges, [3.0, math.hypot(2, 5), 1.0, math.inf], rtol=1e-12)
 
 

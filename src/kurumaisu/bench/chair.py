@@ -12,8 +12,8 @@ from kurumaisu.bench.table import Table
 from kurumaisu.bench.turns import in_turn
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, shipped
-from kurumaisu.sim.settings import load_physics, with_effects
 from kurumaisu.sim.chair import ChairSimulator, Command
+from kurumaisu.sim.settings import load_physics, with_effects
 from kurumaisu.world import Start, World
 
 _CIRCLE = (0.2, 0.5)  # v [m/s], w [rad/s]: a radius of 0.4 m

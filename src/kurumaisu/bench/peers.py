@@ -24,6 +24,7 @@ class Run:
     cpu: float
     memory: float
     poses: FloatArray
+    models: int = 0  # as the driver counts them; 0: not asked
 
 
 def read_run(text: str) -> Run:
@@ -33,11 +34,13 @@ def read_run(text: str) -> Run:
     for words in (line.split() for line in text.splitlines()):
         if len(words) == 5 and words[0] == "pose":
             poses.append([float(word) for word in words[1:]])
-        elif len(words) == 2 and words[0] in ("load", "cpu", "memory"):
+        elif len(words) == 2 and words[0] in ("load", "cpu", "memory", "models"):
             values[words[0]] = float(words[1])
-    if len(values) != 3:
+    if not {"load", "cpu", "memory"} <= values.keys():
         raise Error(f"a driver printed no load, cpu or memory: {text[-500:]!r}")
-    return Run(values["load"], values["cpu"], values["memory"], np.array(poses).reshape(-1, 4))
+    return Run(
+        values["load"], values["cpu"], values["memory"], np.array(poses).reshape(-1, 4), round(values.get("models", 0))
+    )
 
 
 class Stage:
@@ -61,11 +64,15 @@ class Stage:
             raise Error(f"{' '.join(command)}: returned {done.returncode}: {done.stderr[-1000:]}")
         return done.stdout
 
-    def scan(self, world: Path, poses: FloatArray) -> tuple[FloatArray, FloatArray, Run]:
-        """Return ranges [m] and intensities (n, beams) of the first robot at poses (n, 3), and what it cost."""
+    def scan(self, world: Path, poses: FloatArray, shift: float = 0.0) -> tuple[FloatArray, FloatArray, Run]:
+        """Scan from the first robot at poses (n, 3), everything being moved by a shift [m] along x and y.
+
+        Return ranges [m] and numbers of the models met, 0 also for none, (n, beams), and what it cost.
+        """
         given, taken = self._folder / "poses", self._folder / "ranges"
         np.ascontiguousarray(poses, dtype=np.float64).tofile(given)
-        text = self._run(str(self._program), "scan", str(world), str(given), str(taken), environment=self._environment)
+        command = (str(self._program), "scan", str(world), str(given), str(taken), f"{shift!r}")
+        text = self._run(*command, environment=self._environment)
         readings = np.fromfile(taken).reshape(len(poses), -1, 2)
         return readings[..., 0], readings[..., 1], read_run(text)
 

@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ def table(places: Sequence[Map], stage: Stage | None, folder: Path, poses: int, 
     for place in places:
         world = walls(place, folder)
         free = free_poses(world, poses, np.random.default_rng(1), room=0.0)
-        built = np.median([_cpu(lambda: Scene(world.segments)) for _ in range(repeats)])
+        built = np.median([_cpu(partial(Scene, world.segments)) for _ in range(repeats)])
         for fan in (URG, replace(URG, range_max=_UNLIMITED)):
             path = write_world(folder / f"{place.name}.world", place, fan, free[:1])
             fans, each, other, apart = _measure(Scene(world.segments), fan, free, stage, path, repeats)

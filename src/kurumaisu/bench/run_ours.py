@@ -34,4 +34,5 @@ def main(world: Path, seconds: float, v: float, w: float, semantics: str, thread
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), *map(float, sys.argv[2:5]), sys.argv[5], int(sys.argv[6]))
+    _seconds, _v, _w = (float(word) for word in sys.argv[2:5])
+    main(Path(sys.argv[1]), _seconds, _v, _w, sys.argv[5], int(sys.argv[6]))

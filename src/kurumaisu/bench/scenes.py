@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu._core import Scene
+from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World, load_world
 
 _ROBOT = 0.1  # edge of a robot [m]
+_TRIES = 200  # for each free pose
 _ROOM = 0.3  # [m] between a robot's centre and the nearest wall
 
 
@@ -77,17 +79,23 @@ def walls(place: Map, folder: Path) -> World:
     return load_world(write_world(folder / f"{place.name}-walls.world", place, URG, np.empty((0, 3))))
 
 
-def free_poses(world: World, count: int, rng: np.random.Generator, room: float = _ROOM) -> FloatArray:
-    """Return random poses (count, 3), outside all solids and with so much room [m] around them."""
+def free_poses(
+    world: World, count: int, rng: np.random.Generator, room: float = _ROOM, beyond: float = 0.0
+) -> FloatArray:
+    """Return random poses (count, 3), at most so far [m] beyond the walls, in no solid, with so much room [m]."""
     scene = Scene(world.segments)
     x0, y0, x1, y1 = world.bounds
     free: list[FloatArray] = []
-    while len(free) < count:
-        pose = rng.uniform([x0, y0, -math.pi], [x1, y1, math.pi])
+    for _ in range(_TRIES * count):
+        if len(free) == count:
+            break
+        pose = rng.uniform([x0 - beyond, y0 - beyond, -math.pi], [x1 + beyond, y1 + beyond, math.pi])
         around, _ = scene.cast_fan(pose, 0.0, math.tau / 36, 36, math.inf)
         if around.min() > room and not inside(world.segments, pose):
             free.append(pose)
-    return np.array(free)
+    else:
+        raise Error(f"{world.path}: has hardly a pose with {room:g} m around it that is in no solid")
+    return np.array(free).reshape(-1, 3)
 
 
 def inside(segments: FloatArray, pose: FloatArray) -> bool:

@@ -28,8 +28,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         places = maps(options.stage_tree) if options.stage_tree else (shipped_map(),)
         rays.table(places, stage, folder, options.poses, options.repeats)
         robots.table(places, stage, folder, options.seconds, options.repeats)
-        if options.plots:
-            robots.plots(places, stage, folder, options.plots)
     if not options.stage_tree:
         print("\nno --stage-tree: the worlds are this package's own, not the cave and the hospital")
     print(f"\nlargest difference of ranges {difference:.1e} m, at most {_EXACT:.0e} m")

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Drives libstage 4.3 for the benchmarks: compiled by them, on demand, against a Stage that is built elsewhere.
 //
-//   stage scan WORLD POSES RANGES   the first position model at each pose of the file POSES (x, y [m], heading [rad];
-//                                   doubles), all its rangers' beams into the file RANGES: range, intensity (doubles)
+//   stage scan WORLD POSES RANGES SHIFT
+//                                   with all models SHIFT [m] farther along x and y (Stage rounds towards 0), the first position model at each pose of the file POSES (x, y [m], heading [rad];
+//                                   doubles), its rangers' beams into the file RANGES: range [m], number of the
+//                                   model met in depth-first order of the world file (doubles)
 //   stage run WORLD SECONDS V W     all position models at v [m/s], w [rad/s] for so many simulated seconds
 //   stage poses WORLD SECONDS V W   the same, then their poses
 //
@@ -54,15 +56,31 @@ std::vector<double> readDoubles(const char* path) {
   return values;
 }
 
-void scan(Stg::World& world, const char* poses_path, const char* ranges_path) {
+/// Has rangers report which model they meet in place of its intensity.
+void number(Stg::World& world) {
+  double i = 0;
+  for (Stg::Model* model : all<Stg::Model>(world)) {
+    if (model == world.GetGround()) continue;  // is in no world file
+    if (model->vis.ranger_return >= 0) model->vis.ranger_return = i;
+    ++i;
+  }
+  std::cout << "models " << i << "\n";
+}
+
+void scan(Stg::World& world, const char* poses_path, const char* ranges_path, double shift) {
+  number(world);
   Stg::Model* robot = all<Stg::ModelPosition>(world).at(0);
   const auto rangers = all<Stg::ModelRanger>(*robot);
   const std::vector<double> poses = readDoubles(poses_path);
+  for (Stg::Model* model : world.GetChildren()) {
+    const Stg::Pose p = model->GetPose();
+    if (shift != 0) model->SetPose(Stg::Pose(p.x + shift, p.y + shift, p.z, p.a));
+  }
   std::vector<double> readings;
   double cpu = 0;
   for (std::size_t i = 0; i + 2 < poses.size(); i += 3) {
     const Stg::Pose old = robot->GetGlobalPose();
-    robot->SetGlobalPose(Stg::Pose(poses[i], poses[i + 1], old.z, poses[i + 2]));
+    robot->SetGlobalPose(Stg::Pose(poses[i] + shift, poses[i + 1] + shift, old.z, poses[i + 2]));
     for (Stg::ModelRanger* ranger : rangers) {
       for (auto& sensor : ranger->GetSensorsMutable()) {
         const double start = cpuSeconds();
@@ -102,8 +120,8 @@ void run(Stg::World& world, double seconds, double v, double w, bool print_poses
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 5) {
-    std::cerr << "usage: stage scan WORLD POSES RANGES | stage run|poses WORLD SECONDS V W\n";
+  if (argc != 6) {
+    std::cerr << "usage: stage scan WORLD POSES RANGES SHIFT | stage run|poses WORLD SECONDS V W\n";
     return 2;
   }
   const std::string task = argv[1];
@@ -113,11 +131,9 @@ int main(int argc, char** argv) {
   if (!world.Load(argv[2])) return 1;
   std::cout << "load " << cpuSeconds() - start << "\n";
   if (task == "scan") {
-    scan(world, argv[3], argv[4]);
-  } else if (argc == 6) {
-    run(world, std::atof(argv[3]), std::atof(argv[4]), std::atof(argv[5]), task == "poses");
+    scan(world, argv[3], argv[4], std::atof(argv[5]));
   } else {
-    return 2;
+    run(world, std::atof(argv[3]), std::atof(argv[4]), std::atof(argv[5]), task == "poses");
   }
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
