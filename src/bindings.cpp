@@ -9,6 +9,7 @@
 
 #include <stdexcept>
 
+#include "contact/bindings.h"
 #include "kalman/whiten.h"
 #include "model/laser_error.h"
 #include "model/unicycle.h"
@@ -137,4 +138,5 @@ PYBIND11_MODULE(_core, m) {
   bindKalman(m);
   k::bindRaycast(m);
   bindCamera(m);
+  k::bindContact(m);
 }

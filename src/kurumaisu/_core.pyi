@@ -115,3 +115,23 @@ class Camera:
         ground: ByteArray,
         sky: ByteArray,
     ) -> tuple[ByteArray, NDArray[np.float32]]: ...
+
+def arcs(poses: FloatArray, twists: FloatArray, time: float) -> FloatArray: ...
+
+class Clearance:
+    def __init__(self, walls: FloatArray, trees: IntArray) -> None: ...
+    def add_body(self, edges: FloatArray, tree: int) -> int: ...
+    def free_times(
+        self, bodies: IntArray, poses: FloatArray, twists: FloatArray, limit: float, distance: float
+    ) -> tuple[FloatArray, IntArray]: ...
+    def first_touch(
+        self,
+        bodies: IntArray,
+        poses: FloatArray,
+        velocities: FloatArray,
+        *,
+        known: float,
+        distance: float,
+        limit: float,
+    ) -> float: ...
+    def near(self, bodies: IntArray, poses: FloatArray, reach: float) -> list[int]: ...
