@@ -46,11 +46,6 @@ def is_robot(model: Model) -> bool:
     return isinstance(model.device, Position)
 
 
-def is_movable(model: Model) -> bool:
-    """Return whether forces can move it: robots, what has a mass, what hangs on a hinge."""
-    return is_robot(model) or model.mass > 0 or model.hinge is not None
-
-
 def sort(models: Sequence[Model], moves: Sequence[bool]) -> Bodies:
     """Group models by bodies; moves (models,): has a pose of its own to move."""
     heads: list[int] = []

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kurumaisu.errors import Error
+from kurumaisu.params import shipped
 from kurumaisu.sim import snapshot, state
 from kurumaisu.sim.drive import without_nonsense
 from kurumaisu.sim.fans import RangerFan
@@ -18,6 +19,7 @@ from kurumaisu.sim.machinery import Machinery
 from kurumaisu.sim.observation import Observation
 from kurumaisu.sim.options import Options
 from kurumaisu.sim.population import Population
+from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
 from kurumaisu.world.model import Model
@@ -35,7 +37,8 @@ class Simulator:
         self._world = world
         self._options = options
         self._late = options.timing == "consistent" or options.semantics == "physical"
-        self._home = Machinery(Population.first(world.models, world.poses), options, world.interval)
+        dynamics = load_dynamics(shipped("launch/physical.yaml")) if options.semantics == "physical" else None
+        self._home = Machinery(Population.first(world.models, world.poses), options, world.interval, dynamics)
         self._fingerprint = state.digest((world.models, world.poses, world.interval, replace(options, threads=1)))
         self.reset(0)
         self.warnings = (*world.warnings, *self._stuck())
@@ -122,7 +125,7 @@ class Simulator:
             raise Error(f"state: is of another world than {self._world.path}, or of other options")
         machinery = self._home
         if known["population"] is not None:
-            machinery = Machinery(known["population"], self._options, self._world.interval)
+            machinery = Machinery(known["population"], self._options, self._world.interval, self._home.dynamics)
             machinery.begin()
         self._machinery = machinery
         self._step, self._dropped = known["step"], known["dropped"]
