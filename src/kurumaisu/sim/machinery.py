@@ -9,9 +9,7 @@ from typing import cast
 import numpy as np
 
 from kurumaisu.sim import fans
-from kurumaisu.sim.bodies import movable
 from kurumaisu.sim.drive import Drive, Rows
-from kurumaisu.sim.following import Followed
 from kurumaisu.sim.motion import Motion, StageMotion
 from kurumaisu.sim.odometry import Localization
 from kurumaisu.sim.options import Options
@@ -67,6 +65,8 @@ class Machinery:
     def _make_motion(self) -> Motion:
         if self.dynamics is None:
             return StageMotion(self.arena, self.numbers, self.bodies)
+        from kurumaisu.sim.following import Followed  # loads pymunk, which Stage's semantics need not pay for
+
         start = self.population
         return Followed(self.arena, self.numbers, start.models, start.poses, self.dynamics)
 
@@ -139,5 +139,7 @@ def _moving(models: Sequence[Model], physical: bool) -> list[bool]:
     """Return which models (m,) have poses of their own to move."""
     if not physical:
         return [is_robot(model) for model in models]
+    from kurumaisu.sim.bodies import movable
+
     moving = set(movable(models))
     return [model.index in moving for model in models]
