@@ -87,15 +87,15 @@ class FanView {
   }
 
   void seeFace(const Face& face, const Segment& line) const {
-    const double a = std::atan2(line.ay - from_.y, line.ax - from_.x);
-    const double b = std::atan2(line.by - from_.y, line.bx - from_.x);
+    const double a = roughDirection(line.ax - from_.x, line.ay - from_.y);
+    const double b = roughDirection(line.bx - from_.x, line.by - from_.y);
     const double span = std::remainder(b - a, kTurn);
     // From the face itself its ends are opposite or nowhere, and rounding decides on which side of it beams are.
-    constexpr double kNearly = 1e-6;  // [rad]
+    constexpr double kNearly = 1e-4;  // [rad] more than two directions may be wrong
     const bool on_it =
         std::abs(span) > kTurn / 2 - kNearly || isHere(line.ax, line.ay) || isHere(line.bx, line.by);
     const double middle = std::remainder(a + span / 2, kTurn);
-    finder_.within(middle, on_it ? kTurn : std::abs(span) / 2, [&](std::size_t i) {
+    finder_.within(middle, on_it ? kTurn : std::abs(span) / 2 + kRough, [&](std::size_t i) {
       keepNearer(rangeTo(rayOf(i), line), face.ranger_return, fan_.range_max, echoes_[i]);
     });
   }
