@@ -170,12 +170,21 @@ def test_a_lintel_a_gap_and_a_floating_slab() -> None:
     np.testing.assert_allclose(below.depth[bottom, 32], 0.5 / up[bottom], rtol=1e-5)
 
 
-def test_the_sheets_of_a_bitmap_have_no_lids() -> None:
-    sheets = np.hstack([c_ := rectangle(1.0, 1.0), np.roll(c_, -1, axis=0)])
-    models = [make_model(0, segments=sheets, heights=(0.0, 0.5), color=BLUE)]
+def test_the_occupied_parts_of_a_bitmap_are_solid() -> None:
+    """A courtyard: segments in no order, as runs of pixels come. One sees its top, and the ground within."""
+    rings = [np.hstack([c_ := rectangle(a, a), np.roll(c_, -1, axis=0)]) for a in (3.0, 1.0)]
+    segments = np.concatenate([rings[0], rings[1][:, [2, 3, 0, 1]]])[[3, 0, 6, 5, 1, 7, 4, 2]]
+    yard = [make_model(0, segments=segments, heights=(0.0, 0.5), color=BLUE)]
     camera = replace(CAMERA, tilt=math.pi / 2)
-    picture = take(models, np.array([[0.0, 0, 0, 0]]), np.array([0.001, 0.002, 1.5, 0.0]), camera)
-    np.testing.assert_allclose(picture.depth[24, 32], 1.5, rtol=1e-4)
+    for x, y in ((0.001, 0.002), (1.0, 0.003)):
+        picture = take(yard, np.zeros((1, 4)), np.array([x, y, 3.0, 0.0]), camera)
+        pixels = [(row, column) for row in range(0, 48, 5) for column in range(0, 64, 7)]
+        rays = pixel_rays(camera, 0.0)
+        for row, column in pixels:
+            at = np.abs(np.array([x, y]) + 2.5 * rays[row, column, :2])
+            if np.abs(at.max() - np.array([0.5, 1.5])).min() > 0.25:  # the walls themselves are seen beside the lids
+                top = 0.5 < at.max() < 1.5
+                assert picture.depth[row, column] == pytest.approx(2.5 if top else 3.0, rel=1e-3), (row, column, at)
 
 
 def test_outlines_may_run_either_way() -> None:

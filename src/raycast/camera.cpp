@@ -72,7 +72,7 @@ void Camera::noteBehind(const Visible& v, const Panel& p) {
   const auto same = [&](const Crossing& wall) { return wall.prism == p.prism; };
   const auto found = std::find_if(around_.begin(), around_.end(), same);
   if (found == around_.end()) {
-    around_.push_back({0.0, p.low + v.up, p.high + v.up, p.color, p.prism, true});
+    around_.push_back({0.0, p.low + v.up, p.high + v.up, p.color, p.prism});
   } else {
     around_.erase(found);
   }
@@ -122,9 +122,8 @@ void Camera::findCrossings(const std::vector<Panel>& panels) {
     for (auto k = static_cast<std::size_t>(v.first); k < static_cast<std::size_t>(v.last); ++k) {
       const Sights::Column& column = sights_.columns[k];
       const double across = column.dx * ey - column.dy * ex;
-      // The inside is to the left of a counter-clockwise outline.
-      crossings_[fill_[k]++] = {
-          std::fmax(moment / across, 0.0), p.low + v.up, p.high + v.up, p.color, p.prism, across < 0};
+      crossings_[fill_[k]++] = {std::fmax(moment / across, 0.0), p.low + v.up, p.high + v.up, p.color,
+                                p.prism};
     }
   }
 }

@@ -16,7 +16,7 @@ struct Panel {
   double ax, ay, bx, by;
   double low, high;
   std::uint32_t color;  ///< four bytes: red, green, blue, alpha
-  std::int32_t prism;   ///< closed outline, counter-clockwise, that it is part of; -1: none
+  std::int32_t prism;   ///< closed outlines that it is part of; -1: none
   std::int32_t body;
 };
 
