@@ -102,6 +102,9 @@ class Scenery:
         )
         self._roots: IntArray = np.array([model.root for model in models], dtype=np.int64)
 
+    def __deepcopy__(self, memo: object) -> Scenery:
+        return self  # it never changes
+
     def hidden_from(self, root: int) -> BoolArray:
         """Return which models (n,) a camera in the tree of a top-level model does not see: its own."""
         return np.asarray(self._roots == root)
@@ -118,6 +121,9 @@ class CameraSensor:
             raise Error(f"camera: {error}: {camera}") from error
         self._ground = np.array([*ground, 255], dtype=np.uint8)
         self._sky = np.array([*sky, 255], dtype=np.uint8)
+
+    def __deepcopy__(self, memo: object) -> CameraSensor:
+        return self  # it has no state that a picture depends on
 
     def take(self, scenery: Scenery, poses: FloatArray, eye: FloatArray, root: int) -> Picture:
         """Return the picture from an eye (4,) on the tree of the model `root`, all models being at poses (n, 4)."""
