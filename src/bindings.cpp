@@ -18,8 +18,6 @@
 namespace py = pybind11;
 namespace k = kurumaisu;
 
-void bindCamera(py::module_& m);  // raycast/camera_bindings.cpp
-
 namespace {
 
 using k::Array;
@@ -137,6 +135,6 @@ PYBIND11_MODULE(_core, m) {
   bindModel(m);
   bindKalman(m);
   k::bindRaycast(m);
-  bindCamera(m);
+  k::bindCamera(m);
   k::bindContact(m);
 }

@@ -45,10 +45,15 @@ bool meet(const Segment& p, const Segment& q) {
   return !besides(p, q) && !besides(q, p);
 }
 
-bool facesMeet(const Bodies::Body& one, const Bodies::Body& other) {
+bool reaches(const Segment& line, const Bodies::Circle& circle) {
+  return !apart(line.ax, line.bx, circle.x - circle.radius, circle.x + circle.radius) &&
+         !apart(line.ay, line.by, circle.y - circle.radius, circle.y + circle.radius);
+}
+
+bool facesMeet(const Bodies::Body& one, const Bodies::Body& other, const Bodies::Circle& around_other) {
   for (std::size_t i = 0; i < one.faces.size(); ++i) {
     const Face& a = one.faces[i];
-    if (!a.solid) continue;
+    if (!a.solid || !reaches(one.placed[i], around_other)) continue;
     for (std::size_t j = 0; j < other.faces.size(); ++j) {
       const Face& b = other.faces[j];
       if (!b.solid || one.pose.z + a.z_low > other.pose.z + b.z_high ||
@@ -66,7 +71,7 @@ bool touchesBody(const Bodies& bodies, int body) {
   bool found = false;
   bodies.near(circle.x, circle.y, circle.radius, [&](int other) {
     if (found || other == body || related(circle.tree, bodies.circle(other).tree)) return;
-    found = facesMeet(bodies[body], bodies[other]);
+    found = facesMeet(bodies[body], bodies[other], bodies.circle(other));
   });
   return found;
 }

@@ -55,8 +55,8 @@ double roughDirection(double dx, double dy) {
 /// The view of bodies through one fan.
 class FanView {
  public:
-  FanView(const Viewpoint& from, const Fan& fan, Echo* echoes)
-      : from_(from.pose), fan_(fan), beams_(fan, from.pose.heading), echoes_(echoes) {}
+  FanView(const Viewpoint& from, const Beams& fan, Echo* echoes)
+      : from_(from.pose), fan_(fan), finder_(fan, from.pose.heading), echoes_(echoes) {}
 
   void see(const Bodies::Body& body, const Bodies::Circle& circle) const {
     const double dx = circle.x - from_.x;
@@ -80,22 +80,22 @@ class FanView {
         if (visible(body.faces[i], body.pose.z, from_.z)) seeFace(body.faces[i], body.placed[i]);
       return;
     }
-    beams_.within(middle, half, [&](std::size_t i) {
+    finder_.within(middle, half, [&](std::size_t i) {
       if (echoes_[i].range < nearest) return;  // something stands before the whole body
       testRay(body, rayOf(i), from_.z, fan_.range_max, echoes_[i]);
     });
   }
 
   void seeFace(const Face& face, const Segment& line) const {
-    const double a = std::atan2(line.ay - from_.y, line.ax - from_.x);
-    const double b = std::atan2(line.by - from_.y, line.bx - from_.x);
+    const double a = roughDirection(line.ax - from_.x, line.ay - from_.y);
+    const double b = roughDirection(line.bx - from_.x, line.by - from_.y);
     const double span = std::remainder(b - a, kTurn);
     // From the face itself its ends are opposite or nowhere, and rounding decides on which side of it beams are.
-    constexpr double kNearly = 1e-6;  // [rad]
+    constexpr double kNearly = 1e-4;  // [rad] more than two directions may be wrong
     const bool on_it =
         std::abs(span) > kTurn / 2 - kNearly || isHere(line.ax, line.ay) || isHere(line.bx, line.by);
     const double middle = std::remainder(a + span / 2, kTurn);
-    beams_.within(middle, on_it ? kTurn : std::abs(span) / 2, [&](std::size_t i) {
+    finder_.within(middle, on_it ? kTurn : std::abs(span) / 2 + kRough, [&](std::size_t i) {
       keepNearer(rangeTo(rayOf(i), line), face.ranger_return, fan_.range_max, echoes_[i]);
     });
   }
@@ -110,8 +110,8 @@ class FanView {
   }
 
   const Pose& from_;
-  const Fan& fan_;
-  Beams beams_;
+  const Beams& fan_;
+  BeamFinder finder_;
   Echo* echoes_;
 };
 
@@ -128,7 +128,7 @@ void seeAlong(const Bodies& bodies, int number, const Viewpoint& from, double ra
 
 }  // namespace
 
-void seeBodies(const Bodies& bodies, const Viewpoint& from, const Fan& fan, Echo* echoes) {
+void seeBodies(const Bodies& bodies, const Viewpoint& from, const Beams& fan, Echo* echoes) {
   if (fan.samples == 0) return;
   const FanView view(from, fan, echoes);
   bodies.near(from.pose.x, from.pose.y, fan.range_max, [&](int number) {
