@@ -30,8 +30,10 @@ _NEAR = 0.05  # [m] walls that are looked up beyond what the bodies can reach
 
 @dataclass
 class Moving:
-    """Bodies on their way, all (k, ...): poses of the centres, velocities (x, y, turn) in the map, commands in the
-    body's frame; hindered: the last velocities were not the commanded ones.
+    """Bodies on their way, all (k, ...).
+
+    poses of the centres; velocities (x, y, turn) in the map; commands in the body's frame; hindered: the last
+    velocities were not the commanded ones.
     """
 
     poses: FloatArray
