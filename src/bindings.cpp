@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // kurumaisu._core: the code the chair runs, for the simulator and the critic. Vectorised over numpy arrays.
+#include "bindings.h"
+
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -12,14 +14,13 @@
 #include "model/laser_error.h"
 #include "model/unicycle.h"
 #include "model/voltage_law.h"
-#include "raycast/scene.h"
 
 namespace py = pybind11;
 namespace k = kurumaisu;
 
 namespace {
 
-using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using k::Array;
 
 void requireSameSize(const Array& a, const Array& b, const char* what) {
   if (a.ndim() != 1 || b.ndim() != 1 || a.size() != b.size()) {
@@ -127,58 +128,13 @@ void bindKalman(py::module_& m) {
       "(n,).");
 }
 
-std::vector<k::Segment> segmentsOf(const Array& array) {
-  if (array.ndim() != 2 || array.shape(1) != 4)
-    throw std::invalid_argument("segments must have shape (m, 4)");
-  std::vector<k::Segment> segments;
-  segments.reserve(static_cast<std::size_t>(array.shape(0)));
-  const auto rows = array.unchecked<2>();
-  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
-    segments.push_back({rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3)});
-  }
-  return segments;
-}
-
-Array castBeams(const k::Scene& scene, const Array& poses, const Array& bearings, double max_range) {
-  const bool one_pose = poses.ndim() == 1;
-  if (bearings.ndim() != 1) throw std::invalid_argument("bearings must have shape (n,)");
-  if (poses.ndim() > 2 || poses.ndim() < 1 || poses.shape(poses.ndim() - 1) != 3 ||
-      (!one_pose && poses.shape(0) != bearings.size())) {
-    throw std::invalid_argument("poses must have shape (3,), or (n, 3) with one row per bearing");
-  }
-  if (!(max_range >= 0)) throw std::invalid_argument("max_range must not be negative");
-  std::vector<k::Pose2D> origins;
-  for (py::ssize_t i = 0; i < poses.size(); i += 3) {
-    origins.push_back({poses.data()[i], poses.data()[i + 1], poses.data()[i + 2]});
-  }
-  Array out(bearings.size());
-  double* ranges = out.mutable_data();
-  {
-    const py::gil_scoped_release release;
-    scene.cast(origins.data(), one_pose, bearings.data(), static_cast<std::size_t>(bearings.size()),
-               max_range, ranges);
-  }
-  return out;
-}
-
-void bindRaycast(py::module_& m) {
-  py::class_<k::Scene>(m, "Scene", "Immutable line segments that answer rays exactly.")
-      .def(py::init([](const Array& segments) { return k::Scene(segmentsOf(segments)); }),
-           py::arg("segments"),
-           "From segments (m, 4): x, y of both ends [m]. Raises ValueError for one that is not finite.")
-      .def("__len__", &k::Scene::size)
-      .def("cast", &castBeams, py::arg("poses"), py::arg("bearings"), py::arg("max_range"),
-           "Ranges (n,) [m] of beams that leave poses (n, 3), or one pose (3,), at bearings (n,) [rad]; +inf "
-           "beyond\n"
-           "max_range [m]. Poses are of the laser, in the map frame.");
-}
-
 }  // namespace
 
 PYBIND11_MODULE(_core, m) {
   m.doc() = "Equations (1)-(4) of the paper, ray casting and whitening, in C++.";
   bindModel(m);
   bindKalman(m);
-  bindRaycast(m);
+  k::bindRaycast(m);
+  k::bindCamera(m);
   k::bindContact(m);
 }

@@ -54,9 +54,9 @@ PYTHON_RULES = [
 CPP_RULES = [
     Rule(r"(?!.*_node\.cpp|params\.h)", ROS_CPP, "ROS headers only in *_node.cpp and params.h"),
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
-    Rule(r"(?!.*bindings\.cpp)", r"<pybind11/", "pybind11 only in bindings.cpp"),
+    Rule(r"(?!.*bindings\.(cpp|h))", r"<pybind11/", "pybind11 only in bindings"),
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
-    Rule(r"(kalman|raycast)/", r'"(?!model/|kalman/|raycast/)', "numerics rest on the equations at most"),
+    Rule(r"(kalman|raycast)/", r'"(?!model/|kalman/|raycast/|bindings\.h)', "numerics rest on the equations at most"),
 ]
 
 

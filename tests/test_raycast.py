@@ -80,6 +80,37 @@ def test_flat_wall_at_known_distance() -> None:
     np.testing.assert_allclose(cast, 1 / np.cos(ahead), rtol=1e-12)
 
 
+@pytest.mark.parametrize("max_range", [5.6, math.inf])
+def test_a_fan_is_its_beams(max_range: float) -> None:
+    world = load_world(shipped("worlds/building.world"))
+    scene = Scene(world.segments)
+    x0, y0, x1, y1 = world.bounds
+    rng = np.random.default_rng(6)
+    for pose in rng.uniform([x0, y0, -np.pi], [x1, y1, np.pi], (50, 3)):
+        first, increment, samples = rng.uniform(-3, 3), rng.uniform(-0.1, 0.1), int(rng.integers(1, 700))
+        bearings = first + increment * np.arange(samples)
+        ranges, segments = scene.cast_fan(pose, first, increment, samples, max_range)
+        np.testing.assert_allclose(ranges, scene.cast(pose, bearings, max_range), rtol=1e-12, atol=1e-12)
+        assert ((segments == -1) == np.isinf(ranges)).all()
+        for i in np.flatnonzero(segments >= 0):
+            alone = Scene(world.segments[segments[i] : segments[i] + 1])
+            assert math.isclose(alone.cast(pose, bearings[i : i + 1], math.inf)[0], ranges[i], abs_tol=1e-9)
+
+
+def test_a_fan_of_nothing() -> None:
+    ranges, segments = Scene(ROOM).cast_fan(np.array([3.0, 2.5, 0.0]), 0.0, 0.1, 0, 1.0)
+    assert ranges.shape == segments.shape == (0,)
+    ranges, segments = Scene(ROOM).cast_fan(np.array([3.0, math.nan, 0.0]), 0.0, 0.1, 3, 1.0)
+    assert np.isinf(ranges).all()
+    assert (segments == -1).all()
+
+
+@pytest.mark.parametrize("max_range", [-1.0, math.nan])
+def test_a_bad_fan(max_range: float) -> None:
+    with pytest.raises(ValueError, match="max_range"):
+        Scene(ROOM).cast_fan(np.zeros(3), 0.0, 0.1, 3, max_range)
+
+
 def test_every_beam_from_its_own_pose() -> None:
     poses = np.stack([np.linspace(1, 4, 50), np.full(50, 2.0), np.linspace(0, 0.3, 50)], axis=-1)
     cast = Scene(ROOM).cast(poses, -poses[:, 2], math.inf)

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Types of the C++ module (src/bindings.cpp); its docstrings are there."""
+"""Types of the C++ module (src/bindings.cpp, src/raycast/*bindings.cpp); its docstrings are there."""
 
 from collections.abc import Sequence
 from typing import overload
 
-from kurumaisu.types import BoolArray, FloatArray, IntArray
+import numpy as np
+from numpy.typing import NDArray
+
+from kurumaisu.types import BoolArray, ByteArray, FloatArray, IntArray
 
 class Branch:
     def __init__(self, slope: float, intercept: float) -> None: ...
@@ -71,6 +74,51 @@ class Scene:
     def __init__(self, segments: FloatArray) -> None: ...
     def __len__(self) -> int: ...
     def cast(self, poses: FloatArray, bearings: FloatArray, max_range: float) -> FloatArray: ...
+    def cast_fan(
+        self, origin: FloatArray | Sequence[float], first: float, increment: float, samples: int, max_range: float
+    ) -> tuple[FloatArray, IntArray]: ...
+
+class Arena:
+    def __init__(
+        self, walls: FloatArray, returns: FloatArray, solid: BoolArray, tree: IntArray, threads: int
+    ) -> None: ...
+    def add_body(self, outline: FloatArray, returns: FloatArray, solid: BoolArray, tree: int) -> int: ...
+    def remove_body(self, body: int) -> None: ...
+    def set_poses(self, bodies: IntArray, poses: FloatArray) -> None: ...
+    def scan(self, origins: FloatArray, trees: IntArray, fans: FloatArray) -> tuple[FloatArray, FloatArray]: ...
+    def cast(self, origins: FloatArray, trees: IntArray, range_max: float) -> tuple[FloatArray, FloatArray]: ...
+    def touches(self, bodies: IntArray) -> BoolArray: ...
+    def move(self, bodies: IntArray, poses: FloatArray, groups: IntArray | None = ...) -> BoolArray: ...
+
+class Quantised:
+    def __init__(self, walls: FloatArray, resolution: float) -> None: ...
+    def cast(self, poses: FloatArray, range_max: float) -> FloatArray: ...
+
+class Panels:
+    def __init__(self, walls: FloatArray, colors: ByteArray, prisms: IntArray, bodies: IntArray) -> None: ...
+    def __len__(self) -> int: ...
+
+class Camera:
+    def __init__(
+        self,
+        *,
+        width: int,
+        height: int,
+        fov_h: float,
+        fov_v: float,
+        near: float,
+        far: float,
+        tilt: float,
+    ) -> None: ...
+    def render(
+        self,
+        panels: Panels,
+        poses: FloatArray,
+        hidden: BoolArray,
+        eye: FloatArray,
+        ground: ByteArray,
+        sky: ByteArray,
+    ) -> tuple[ByteArray, NDArray[np.float32]]: ...
 
 def arcs(poses: FloatArray, twists: FloatArray, time: float) -> FloatArray: ...
 

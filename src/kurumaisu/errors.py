@@ -6,6 +6,9 @@ class Error(Exception):
     """Bad input: the message names the file, line, topic or key, and the value."""
 
 
+EXCERPT = "\n  | "  # begins a line of the file that a message is about, which follows the message
+
+
 def one_line(error: BaseException) -> str:
-    """Return an error's message on one line, for a terminal."""
-    return " ".join(str(error).split())
+    """Return an error's message on one line, for a log: without the excerpt of the file."""
+    return " ".join(str(error).split(EXCERPT)[0].split())

@@ -1,106 +1,150 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Outlines of Stage models: blocks, bitmaps and boxes as line segments in the frame of the body."""
+"""Outlines of Stage models: blocks, bitmaps and boxes, trimmed and stretched to the model's size as Stage does."""
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Hashable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
-from kurumaisu.types import BoolArray, FloatArray
-from kurumaisu.world.syntax import Entity, Property
+from kurumaisu.errors import Error
+from kurumaisu.types import FloatArray
+from kurumaisu.world.bitmaps import Bitmap, read_bitmap
+from kurumaisu.world.colors import Color
+from kurumaisu.world.files import find
+from kurumaisu.world.model import Polygon, Shape
+from kurumaisu.world.parts import EPSILON, Parts, Prism, rectangle, with_boundary
+from kurumaisu.world.values import Values
 
-_BOUNDARY = 0.01  # thickness of a boundary's walls [m], as in Stage
-_DARKEST_FREE = 128  # first channel of a pixel that is not a wall, as in Stage
-
-
-def outline(entity: Entity, size: FloatArray, folder: Path) -> FloatArray:
-    """Return the segments (m, 4) of a model, centred, its bounding box being size (2,) [m].
-
-    As in Stage: all blocks together, or the occupied pixels of a bitmap (relative to the folder), fill the
-    size; a model with neither, and without a boundary, is a box; blocks displace the boundary.
-    Raise Error with file, line and column.
-    """
-    blocks = [child for child in entity.children if child.type == "block"]
-    if blocks:
-        return _fit(np.concatenate([_polygon(_points(block)) for block in blocks]), size, entity)
-    parts = []
-    if "bitmap" in entity.properties:
-        parts.append(_fit(_pixel_outline(_occupied(entity.properties["bitmap"], folder)), size, entity))
-    if "boundary" in entity.properties and entity.properties["boundary"].numbers(1, 1)[0]:
-        parts += [_box(size), _box(size - 2 * _BOUNDARY)]
-    return np.concatenate(parts) if parts else _box(size)
+_NOTEWORTHY = 0.01  # by how much a bitmap's scale changes before a warning says so
+_MOST_POINTS = 10_000  # of a block
+_SHAPING = ("bitmap", "boundary", "noblocks", "paddle_size", "paddle_state")  # properties, beside size and origin
+_NO_BODY = ("ranger", "fiducial", "blobfinder")  # unless the file gives them one
 
 
-def transform(segments: FloatArray, pose: FloatArray) -> FloatArray:
-    """Return map segments for segments (m, 4) in the frame of a pose (3,)."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    turn = np.array([[c, s], [-s, c]])
-    return np.asarray(segments.reshape(-1, 2) @ turn + pose[:2]).reshape(-1, 4)
+@dataclass
+class Shaper:
+    """Makes the shapes of a world's models; top: its first file, which bitmaps are relative to."""
+
+    top: Path
+    image_extents: bool
+    bitmaps: dict[Path, Bitmap] = field(default_factory=dict)
+    shapes: dict[Hashable, tuple[Shape, FloatArray]] = field(default_factory=dict)
+
+    def shape(self, values: Values, size: FloatArray, origin: FloatArray, color: Color) -> tuple[Shape, FloatArray]:
+        """Return a model's shape and size (3,), which is another one for a map with its own resolution.
+
+        Raise Error with the place.
+        """
+        given = values.entity.properties
+        said = [(name, t.text, t.source.path) for name in _SHAPING if name in given for t in given[name].values]
+        blocks = [id(child) for child in values.entity.children if child.type == "block"]
+        alike = (values.entity.type, size.tobytes(), origin.tobytes(), *said, *blocks)
+        if alike not in self.shapes:
+            self.shapes[alike] = self._shape(values, size, origin, color)
+        shape, size = self.shapes[alike]
+        if not shape.polygons or shape.polygons[0].color == color:
+            return shape, size
+        polygons = tuple(Polygon(polygon.corners, polygon.heights, color) for polygon in shape.polygons)
+        return Shape(shape.segments, shape.heights, polygons), size
+
+    def _shape(self, values: Values, size: FloatArray, origin: FloatArray, color: Color) -> tuple[Shape, FloatArray]:
+        parts = self._body(values, size)
+        if values.has("bitmap"):
+            parts, size = self._bitmap(values, size)
+        blocks = [child for child in values.entity.children if child.type == "block"]
+        if blocks and not values.has("bitmap"):
+            parts = Parts()  # the first block displaces the default body, and the boundary with it
+        elif values.whole("boundary", 0):
+            parts = with_boundary(parts, size)
+        parts.prisms += [_block(Values(block, values.units, values.notes)) for block in blocks]
+        if not parts.empty and not parts.fixed and ((bounds := parts.bounds())[1] - bounds[0])[:2].min() < EPSILON:
+            values.notes.add(values.entity.name, f"the body of {values.entity.name.text} has no area")
+        return parts.fit(size).shape(origin, color), size
+
+    def _body(self, values: Values, size: FloatArray) -> Parts:
+        """Return what a model consists of if its file says nothing: most types are a box."""
+        parts = Parts()
+        if values.entity.type == "gripper":
+            parts.prisms += _gripper(values)
+        elif values.entity.type not in _NO_BODY and not values.whole("boundary", 0):
+            parts.prisms.append(Prism(rectangle(0, 0, 1, 1), np.array([0.0, 1.0])))
+        return Parts() if values.whole("noblocks", 0) else parts.fit(size)
+
+    def _bitmap(self, values: Values, size: FloatArray) -> tuple[Parts, FloatArray]:
+        """Return the walls of a bitmap and the model's size (3,)."""
+        name = values.entity.properties["bitmap"].values[0] if values.text("bitmap", "") else None
+        if name is None:
+            raise values.error("bitmap", "bitmap needs the name of an image")
+        bitmap = self._read(values, find(name, self.top, search_path=False))
+        if self.image_extents and bitmap.resolution is not None:
+            return _map_parts(bitmap, size[2]), np.array([*bitmap.extent, size[2]])
+        parts = Parts()
+        parts.add(bitmap.runs, 1.0)
+        if parts.empty:
+            values.notes.add(name, f"{bitmap.path}: has no wall pixels")
+        elif self.image_extents:
+            parts.box = np.array([[0, 0, 0], [bitmap.width, bitmap.height, 1]], dtype=np.float64)
+        else:
+            _note_stretch(values, bitmap, name.string)
+        return parts.fit(size), size
+
+    def _read(self, values: Values, path: Path) -> Bitmap:
+        if path not in self.bitmaps:
+            try:
+                self.bitmaps[path] = read_bitmap(path)
+            except Error as error:
+                raise values.error("bitmap", str(error)) from error
+        return self.bitmaps[path]
 
 
-def _polygon(points: FloatArray) -> FloatArray:
-    return np.hstack([points, np.roll(points, -1, axis=0)])
+def _map_parts(bitmap: Bitmap, height: float) -> Parts:
+    """Return the walls of a map at its own coordinates."""
+    x, y, heading = bitmap.origin
+    c, s = np.cos(heading), np.sin(heading)
+    points = bitmap.runs.reshape(-1, 2) * (bitmap.resolution or 1.0) @ np.array([[c, s], [-s, c]]) + [x, y]
+    parts = Parts(fixed=True)
+    parts.add(np.asarray(points).reshape(-1, 4), height)
+    return parts
 
 
-def _box(size: FloatArray) -> FloatArray:
-    return _polygon(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size / 2)
+def _note_stretch(values: Values, bitmap: Bitmap, name: str) -> None:
+    """Say so if the margins that Stage trims change the scale."""
+    points = bitmap.runs.reshape(-1, 2)
+    factors = np.array([bitmap.width, bitmap.height]) / (points.max(axis=0) - points.min(axis=0))
+    if factors.max() > 1 + _NOTEWORTHY:
+        text = (
+            f"{name}: its walls without its margins fill the size, as in Stage: {factors[0]:.3f} times as wide and "
+            f"{factors[1]:.3f} times as high as in the whole image (image_extents takes that instead)"
+        )
+        values.notes.add(values.entity.properties["bitmap"].name, text)
 
 
-def _points(block: Entity) -> FloatArray:
-    if "points" not in block.properties:
-        raise block.name.error("block needs points")
-    count = block.properties["points"].numbers(1, 1)[0]
-    if count != int(count) or count < 3:
-        raise block.properties["points"].name.error(f"points must be a whole number of at least 3, not {count:g}")
-    points = []
-    for i in range(int(count)):
-        if f"point[{i}]" not in block.properties:
-            raise block.name.error(f"block needs point[{i}]")
-        points.append(block.properties[f"point[{i}]"].numbers(2, 2))
-    return np.array(points)
+def _block(values: Values) -> Prism:
+    count = values.whole("points", 0)
+    if not 2 <= count <= _MOST_POINTS:
+        raise values.error("points", f"points must be 2 to {_MOST_POINTS}, not {count}")
+    for i in range(count):
+        if not values.has(f"point[{i}]"):
+            values.notes.add(values.entity.name, f"block has no point[{i}]: it is read as [0 0], as Stage does")
+    corners = np.array([values.several(f"point[{i}]", "ll", (0.0, 0.0)) for i in range(count)])
+    x, y = corners.T
+    if (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() < 0:
+        corners = corners[::-1]  # counter-clockwise, as in Stage
+    heights = np.array(values.several("z", "ll", (0.0, 0.0)))
+    if heights[0] > heights[1]:
+        raise values.error("z", f"z must be [MIN MAX], not {heights[0]:g}, {heights[1]:g}")
+    if not values.has("z"):
+        values.notes.add(values.entity.name, "block has no z: it is as flat as the floor, as in Stage", "flat block")
+    return Prism(np.ascontiguousarray(corners), heights)
 
 
-def _fit(segments: FloatArray, size: FloatArray, entity: Entity) -> FloatArray:
-    points = segments.reshape(-1, 2)
-    low, high = points.min(axis=0), points.max(axis=0)
-    if (high <= low).any():
-        raise entity.name.error(f"the shape of {entity.name.text} has no area")
-    return np.asarray((points - (low + high) / 2) * (size / (high - low))).reshape(-1, 4)
-
-
-def _occupied(bitmap: Property, folder: Path) -> BoolArray:
-    """Return which pixels are walls, row 0 at the bottom."""
-    path = folder / bitmap.text()
-    try:
-        with Image.open(path) as image:
-            pixels = np.asarray(image.convert("RGB"))[::-1, :, 0]
-    except (OSError, ValueError) as error:
-        raise bitmap.name.error(f"{path}: is not a readable bitmap ({error})") from error
-    occupied = np.asarray(pixels < _DARKEST_FREE)
-    if not occupied.any():
-        raise bitmap.name.error(f"{path}: has no wall pixels (first channel below {_DARKEST_FREE})")
-    return occupied
-
-
-def _pixel_outline(occupied: BoolArray) -> FloatArray:
-    """Return the borders between wall and free pixels, in pixels, straight runs joined."""
-    flat = _runs(occupied)
-    upright = _runs(occupied.T)
-    return np.concatenate([flat, upright[:, [1, 0, 3, 2]]])
-
-
-def _runs(occupied: BoolArray) -> FloatArray:
-    """Return the borders that run along rows: x0, y, x1, y."""
-    padded = np.pad(occupied, 1).astype(np.int8)
-    step = np.diff(padded, axis=0)  # +1 at the lower border of a wall, -1 at its upper border
-    # A run ends where the step changes along the row; borders of opposite sense are never joined.
-    segments = []
-    for y in np.flatnonzero(step.any(axis=1)):
-        edges = np.flatnonzero(np.diff(step[y]))
-        for start, stop in pairwise(edges.tolist()):
-            if step[y, start + 1]:
-                segments.append((start, y, stop, y))
-    return np.array(segments, dtype=np.float64).reshape(-1, 4)
+def _gripper(values: Values) -> list[Prism]:
+    """Return the body and the two paddles, in shares of the size (libstage/model_gripper.cc)."""
+    x, y, z = values.several("paddle_size", "lll", (0.66, 0.1, 0.4))
+    shift = 0.0 if values.text("paddle_state", "open") != "closed" else 0.5 - y
+    paddles = ((1 - x, shift, 1, shift + y), (1 - x, 1 - shift - y, 1, 1 - shift))
+    body = Prism(rectangle(0, 0, 1 - x, 1), np.array([0.0, 1.0]))
+    return [body, *(Prism(rectangle(*paddle), np.array([0.0, z])) for paddle in paddles)]

@@ -1,48 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Entities and properties of a Stage world file: define, include, nesting and tuples."""
+"""Entities and properties of a Stage world file: define, nesting and tuples, as libstage/worldfile.cc reads them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from kurumaisu.errors import Error
-from kurumaisu.world.tokens import Kind, Token, number, tokenize
+from kurumaisu.world.files import Reader
+from kurumaisu.world.notes import Notes
+from kurumaisu.world.tokens import Kind, Source, Token
 
-Value = float | str
+_DEEPEST = 100  # levels of entities in entities, and of macros of macros
+_MOST_STEPS = 2_000_000  # properties and entities read; the largest world of Stage's own comes to some ten thousand
 
-_DEEPEST = 64  # nested includes and macros; more is a loop
+_VALUES = (Kind.NUMBER, Kind.STRING)
 
 
 @dataclass(frozen=True)
 class Property:
-    """A property's values and its name's place in the file."""
+    """A property's name and values as they stand in the file."""
 
     name: Token
-    values: tuple[Value, ...]
-
-    def numbers(self, least: int, most: int) -> tuple[float, ...]:
-        """Return so many numbers. Raise Error at anything else."""
-        count = f"{least}" if least == most else f"{least} to {most}"
-        if not least <= len(self.values) <= most:
-            raise self.name.error(f"{self.name.text} needs {count} numbers, not {len(self.values)}")
-        return tuple(self._number(value) for value in self.values)
-
-    def _number(self, value: Value) -> float:
-        if isinstance(value, str):
-            raise self.name.error(f"{self.name.text} needs a number, not {value!r}")
-        return value
-
-    def text(self) -> str:
-        """Return one string. Raise Error at anything else."""
-        if len(self.values) != 1 or not isinstance(self.values[0], str):
-            raise self.name.error(f"{self.name.text} needs a string")
-        return self.values[0]
+    values: tuple[Token, ...]
 
 
 @dataclass
 class Entity:
-    """An entity: its type (macros resolved), the word that made it, properties and children in file order."""
+    """An entity: its type (macros resolved), the word that made it, properties and children in file order.
+
+    All instances of a macro have its children in common.
+    """
 
     type: str
     name: Token
@@ -50,144 +38,144 @@ class Entity:
     children: list[Entity] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Macro:
     base: Token
-    body: list[Token]
+    start: int  # of its body among the tokens: behind the opening bracket
+    template: Entity | None = None  # what it comes to
+    known: int = 0  # how many macros were known when the template was made: a later one may change it
 
 
-def parse(path: Path) -> Entity:
-    """Return the world entity of a file. Raise Error with file, line and column for what does not parse."""
-    top = Token(Kind.WORD, "world", path, 1, 1)
-    world = Entity("world", top)
-    _Parser(path).body(_Tokens(read_tokens(path, top)), world, Kind.END, depth=0)
-    return world
-
-
-def read_tokens(path: Path, place: Token) -> list[Token]:
-    """Return the tokens of a file that is asked for at a place."""
-    try:
-        return tokenize(path.read_bytes().decode(), path)
-    except OSError as error:
-        where = f"{path}: " if place.file == path else f"{place.file}:{place.line}:{place.column}: {path}: "
-        raise Error(f"{where}{error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise Error(f"{path}: is not UTF-8 text") from error
-
-
-class _Tokens:
-    """A list of tokens with a place in it."""
-
-    def __init__(self, tokens: list[Token]) -> None:
-        self._tokens = tokens
-        self._at = 0
-
-    def peek(self) -> Token:
-        return self._tokens[self._at]
-
-    def take(self) -> Token:
-        token = self.peek()
-        if token.kind is not Kind.END:
-            self._at += 1
-        return token
-
-    def expect(self, kind: Kind, after: str) -> Token:
-        token = self.take()
-        if token.kind is not kind:
-            raise token.error(f"{after} needs {kind.value}, not {token}")
-        return token
-
-    def skip_line_ends(self) -> None:
-        while self.peek().kind is Kind.LINE_END:
-            self.take()
-
-    def enclosed(self, opening: Token) -> list[Token]:
-        """Take all up to the parenthesis that closes the one just taken; the result ends in CLOSE."""
-        body = []
-        depth = 1
-        while depth:
-            token = self.take()
-            if token.kind is Kind.END:
-                raise opening.error("'(' is never closed")
-            depth += (token.kind is Kind.OPEN) - (token.kind is Kind.CLOSE)
-            body.append(token)
-        return body
+def parse(top: Path, values: Mapping[str, str], notes: Notes) -> Entity:
+    """Return the world entity of a file, parameters filled in. Raise Error with the place of what does not parse."""
+    return _Parser(Reader(top, values, notes).read(), top).world()
 
 
 class _Parser:
-    """Macros known so far, and the rules."""
+    """All tokens, and the macros known so far. Methods take and return places among the tokens."""
 
-    def __init__(self, top: Path) -> None:
-        self._folder = top.parent  # includes are relative to the first file, as in Stage
+    def __init__(self, tokens: list[Token], top: Path) -> None:
+        self._tokens = tokens
         self._macros: dict[str, _Macro] = {}
+        self._steps = 0
+        self._world = Entity("world", Token(Kind.WORD, "world", Source(top, tokens[-1].source.text), 0))
 
-    def body(self, tokens: _Tokens, entity: Entity, end: Kind, depth: int) -> None:
-        """Read properties and children into the entity, up to the end: CLOSE, or END for that of a file."""
-        if depth > _DEEPEST:
-            raise entity.name.error(f"more than {_DEEPEST} levels of includes, macros and entities")
-        while True:
-            tokens.skip_line_ends()
-            token = tokens.take()
-            if token.kind is end:
-                return
-            if token.kind is Kind.END:
-                raise entity.name.error(f"the '(' of {entity.name.text} is never closed")
-            if token.kind is not Kind.WORD:
+    def world(self) -> Entity:
+        at, tokens = 0, self._tokens
+        while (token := tokens[at]).kind is not Kind.END:
+            if token.kind is Kind.LINE_END:
+                at += 1
+            elif token.kind is not Kind.WORD:
                 raise token.error(f"expected a property or an entity, not {token}")
-            if token.text == "define":
-                self._define(tokens, token, entity)
-            elif token.text == "include":
-                name = tokens.expect(Kind.STRING, "include")
-                included = _Tokens(read_tokens(self._folder / name.text[1:-1], name))
-                self.body(included, entity, Kind.END, depth + 1)
+            elif token.text == "define":
+                at = self._define(at)
             else:
-                self._property_or_child(tokens, token, entity, depth)
+                at = self._word(self._world, at, depth=0)
+        return self._world
 
-    def _define(self, tokens: _Tokens, define: Token, entity: Entity) -> None:
-        if entity.type != "world":
-            raise define.error("define is allowed at the top level only")
-        name = tokens.expect(Kind.WORD, "define")
-        base = tokens.expect(Kind.WORD, "define")
-        tokens.skip_line_ends()
-        body = tokens.enclosed(tokens.expect(Kind.OPEN, "define"))
-        self._macros.setdefault(name.text, _Macro(base, body))  # the first definition wins, as in Stage
+    def _define(self, at: int) -> int:
+        define, parts = self._tokens[at], []
+        for kind in (Kind.WORD, Kind.WORD, Kind.OPEN):
+            at = self._after_line_ends(at + 1)
+            if self._tokens[at].kind is not kind:
+                raise self._tokens[at].error(f"define needs a name, a type and '(', not {self._tokens[at]}")
+            parts.append(self._tokens[at])
+        name, base, _ = parts
+        if name.text not in self._macros:  # the first definition wins, as in Stage
+            self._macros[name.text] = _Macro(base, at + 1)
+        return self._closing(at, define) + 1
 
-    def _property_or_child(self, tokens: _Tokens, word: Token, entity: Entity, depth: int) -> None:
-        if tokens.peek().kind in (Kind.OPEN, Kind.LINE_END):
-            tokens.skip_line_ends()
-            if tokens.take().kind is not Kind.OPEN:
-                raise word.error(f"{word.text} needs a value on its line, or '('")
-            child = Entity(word.text, word)
-            entity.children.append(child)
-            self._instance(child, depth + 1)
-            self.body(tokens, child, Kind.CLOSE, depth + 1)
-            return
-        entity.properties[word.text] = Property(word, self._values(tokens, word))
+    def _closing(self, opening: int, define: Token) -> int:
+        depth = 0
+        for at in range(opening, len(self._tokens)):
+            kind = self._tokens[at].kind
+            depth += (kind is Kind.OPEN) - (kind is Kind.CLOSE)
+            if depth == 0:
+                return at
+        raise self._tokens[opening].error(f"the '(' of {define.text} is never closed")
 
-    def _instance(self, entity: Entity, depth: int) -> None:
-        """Read the macro that the entity's type names, if it is one, into the entity: base first."""
-        macro = self._macros.get(entity.type)
-        if macro is None:
-            return
+    def _count(self, word: Token, steps: int) -> None:
+        """Count what is read. Raise Error if macros of macros come to too much."""
+        self._steps += steps
+        if self._steps > _MOST_STEPS:
+            raise word.error(f"the macros come to more than {_MOST_STEPS} properties and entities")
+
+    def _instance(self, base: Entity, word: Token) -> Entity:
+        """Return a copy of what a macro comes to, to read more into."""
+        self._count(word, len(base.properties) + len(base.children))
+        return Entity(base.type, word, dict(base.properties), list(base.children))
+
+    def _after_line_ends(self, at: int) -> int:
+        while self._tokens[at].kind is Kind.LINE_END:
+            at += 1
+        return at
+
+    def _word(self, entity: Entity, at: int, depth: int) -> int:
+        """Read a property or a child of an entity."""
+        self._count(entity.name, 1)
+        word, following = self._tokens[at], self._after_line_ends(at + 1)
+        kind = self._tokens[following].kind
+        if kind is Kind.OPEN:
+            return self._child(entity, word, following + 1, depth + 1)
+        if word.text == "define" and kind is Kind.WORD:
+            raise word.error("define is allowed at the top level only")
+        if kind in _VALUES and following == at + 1:
+            entity.properties[word.text] = Property(word, (self._tokens[following],))
+            return following + 1
+        if kind is Kind.OPEN_TUPLE and following == at + 1:
+            return self._tuple(entity, word, following + 1)
+        raise self._no_value(word, self._tokens[at + 1])
+
+    def _no_value(self, word: Token, found: Token) -> Exception:
+        before = word.source.text[word.at - 1 : word.at]
+        if before.isdigit() and word.text[0] in "eE":
+            return word.error(f"numbers have no exponent in Stage's language: {before}{word.text}")
+        return word.error(f"{word.text} needs a value on its line, or '(', not {found}")
+
+    def _child(self, parent: Entity, word: Token, at: int, depth: int) -> int:
+        """Read an entity whose opening bracket is just behind."""
         if depth > _DEEPEST:
-            raise macro.base.error(f"macro {entity.type} never ends")
-        entity.type = macro.base.text
-        self._instance(entity, depth + 1)
-        self.body(_Tokens(macro.body), entity, Kind.CLOSE, depth + 1)
+            raise word.error(f"more than {_DEEPEST} levels of entities")
+        macro = self._macros.get(word.text)
+        child = self._instance(self._template(macro, word, depth), word) if macro else Entity(word.text, word)
+        parent.children.append(child)
+        return self._body(child, at, depth)
 
-    def _values(self, tokens: _Tokens, name: Token) -> tuple[Value, ...]:
-        token = tokens.take()
-        if token.kind is not Kind.OPEN_TUPLE:
-            return (self._value(token, name),)
-        values: list[Value] = []
-        while tokens.peek().kind is not Kind.CLOSE_TUPLE:
-            values.append(self._value(tokens.take(), name))
-        tokens.take()
-        return tuple(values)
+    def _body(self, entity: Entity, at: int, depth: int) -> int:
+        tokens = self._tokens
+        while True:
+            kind = tokens[at].kind
+            if kind is Kind.LINE_END:
+                at += 1
+            elif kind is Kind.WORD:
+                at = self._word(entity, at, depth)
+            elif kind is Kind.CLOSE:
+                return at + 1
+            elif kind is Kind.END:
+                raise entity.name.error(f"the '(' of {entity.name.text} is never closed")
+            else:
+                raise tokens[at].error(f"expected a property or an entity, not {tokens[at]}")
 
-    def _value(self, token: Token, name: Token) -> Value:
-        if token.kind is Kind.NUMBER:
-            return number(token)
-        if token.kind is Kind.STRING:
-            return token.text[1:-1]
-        raise token.error(f"{name.text} needs a number or a string on its line, not {token}")
+    def _template(self, macro: _Macro, word: Token, depth: int) -> Entity:
+        """Return what a macro comes to, read once for all its instances."""
+        if depth > _DEEPEST:
+            raise macro.base.error(f"macro {word.text} never ends")
+        if macro.template is None or macro.known != len(self._macros):
+            known = self._macros.get(macro.base.text)
+            name = macro.base
+            template = (
+                self._instance(self._template(known, word, depth + 1), name) if known else Entity(name.text, name)
+            )
+            self._body(template, macro.start, depth)
+            macro.template, macro.known = template, len(self._macros)
+        return macro.template
+
+    def _tuple(self, entity: Entity, name: Token, at: int) -> int:
+        values: list[Token] = []
+        while (token := self._tokens[at]).kind in _VALUES:
+            values.append(token)
+            at += 1
+        if token.kind not in (Kind.CLOSE_TUPLE, Kind.END):  # Stage too takes the end of the file for a bracket
+            raise token.error(f"{name.text} needs a number or a string on its line, not {token}")
+        entity.properties[name.text] = Property(name, tuple(values))
+        return at + (token.kind is Kind.CLOSE_TUPLE)

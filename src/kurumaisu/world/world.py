@@ -1,20 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The world as the simulator and the critic need it: walls and start poses."""
+"""A world file as a whole."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from kurumaisu.errors import Error
-from kurumaisu.geometry import compose
 from kurumaisu.types import FloatArray
-from kurumaisu.world import known, shapes
-from kurumaisu.world.syntax import Entity, parse
+from kurumaisu.world import catalogue
+from kurumaisu.world.bitmaps import is_map
+from kurumaisu.world.model import Model
+from kurumaisu.world.notes import Notes
+from kurumaisu.world.shapes import Shaper
+from kurumaisu.world.syntax import Entity, Property, parse
+from kurumaisu.world.tokens import Kind, Source, Token
+from kurumaisu.world.tree import Builder, global_poses
+from kurumaisu.world.values import Units, Values
 
-_DEFAULT_SIZE = (0.4, 0.4)  # [m] of a model whose file gives none, as in Stage
+_RESOLUTION = 0.02  # [m], as in Stage
+_INTERVAL = 100.0  # [ms], as in Stage
+_FINEST = 1e-5  # [m]
+_SHORTEST = 1e-3  # [ms]
+_WALL_HEIGHT = 2.5  # [m] of a map's walls if nothing says how high they are: that of a room
+_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+_ANGLES = {"degrees": np.pi / 180, "radians": 1.0}
 
 
 @dataclass(frozen=True)
@@ -29,17 +42,26 @@ class Start:
 class World:
     """What a world file says.
 
-    segments: (m, 4), x and y of both ends of all that a laser sees [m]; obstacles: (n, 4), all that a chair
-    bumps into; starts: in file order; bounds: smallest x, smallest y, largest x, largest y [m];
+    models: in depth-first file order; poses: (n, 4), their global start poses x, y, z [m], heading [rad];
+    resolution: edge of Stage's cells [m]; interval: of a step [s]; quit_time [s], 0: never; speedup: of the clock,
+    0 or less: as fast as possible.
+    For a chair alone: segments: (m, 4), x and y of both ends of all that a laser sees [m]; obstacles: (n, 4), all
+    that a chair bumps into, at any height, in both without the position models; starts: those, in file order;
+    bounds: smallest x, smallest y, largest x, largest y [m] of the walls.
     warnings: what the file says and this reader does not heed, in words.
     """
 
     name: str
     path: Path
+    models: tuple[Model, ...]
+    poses: FloatArray
+    resolution: float
+    interval: float
+    quit_time: float
+    speedup: float
     segments: FloatArray
     obstacles: FloatArray
     starts: tuple[Start, ...]
-    bounds: tuple[float, float, float, float]
     warnings: tuple[str, ...]
 
     @property
@@ -49,72 +71,108 @@ class World:
             raise Error(f"{self.path}: has no position model, so the chair has no start pose")
         return self.starts[0].pose
 
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Smallest x, smallest y, largest x, largest y [m] of the walls. Raise Error if there are none."""
+        both = np.concatenate([self.segments, self.obstacles]).reshape(-1, 2)
+        if not len(both):
+            raise Error(f"{self.path}: has no walls")
+        (x0, y0), (x1, y1) = both.min(axis=0).tolist(), both.max(axis=0).tolist()
+        return x0, y0, x1, y1
 
-def load_world(path: Path) -> World:
-    """Read a Stage world file. Raise Error naming file, line and column."""
-    top = parse(path)
-    warnings = known.check(top)
-    collector = _Collector(path.parent)
-    for child in top.children:
-        collector.add(child, np.zeros(3))
-    segments = np.concatenate([np.empty((0, 4)), *collector.seen])
-    obstacles = np.concatenate([np.empty((0, 4)), *collector.solid])
-    both = np.concatenate([segments, obstacles]).reshape(-1, 2)
-    if not len(both):
-        raise Error(f"{path}: has no walls")
+
+def load_world(path: Path, *, image_extents: bool = False, values: Mapping[str, str] | None = None) -> World:
+    """Read a Stage world file, or the YAML file of a ROS map as a world of its walls.
+
+    image_extents: a bitmap's size is that of the whole image, not of its walls as in Stage, and a ROS map is at its
+    own place and scale; values: of the parameters `${name}` in the file.
+    Raise Error naming file, line and column.
+    """
+    notes = Notes()
+    if is_map(path):
+        if values:
+            raise Error(f"{path}: a map has no parameters, as {next(iter(values))}")
+        top, image_extents = _map_alone(path), True
+    else:
+        top = parse(path, values or {}, notes)
+    catalogue.check(top, notes)
+    said = Values(top, _units(top, notes), notes)
+    models = Builder(said.units, notes, Shaper(path, image_extents)).build(top)
+    return _world(path, models, said)
+
+
+def _map_alone(path: Path) -> Entity:
+    """Return a world of one model that has a map for its bitmap."""
+    source = Source(path, "")
+
+    def given(name: str, kind: Kind, *texts: str) -> Property:
+        return Property(Token(Kind.WORD, name, source, 0), tuple(Token(kind, text, source, 0) for text in texts))
+
+    model = Entity("model", Token(Kind.WORD, "model", source, 0))
+    for name, kind, texts in (
+        ("name", Kind.STRING, (f'"{path.stem}"',)),
+        ("bitmap", Kind.STRING, (f'"{path.name}"',)),
+        ("size", Kind.NUMBER, ("1", "1", f"{_WALL_HEIGHT}")),
+    ):
+        model.properties[name] = given(name, kind, *texts)
+    return Entity("world", Token(Kind.WORD, "world", source, 0), children=[model])
+
+
+def _units(top: Entity, notes: Notes) -> Units:
+    said = Values(top, Units(), notes)
+    if said.whole("test", 0):
+        raise said.error("test", "this is a test file, which Stage refuses to run")
+    chosen = []
+    for name, units in (("unit_length", _LENGTHS), ("unit_angle", _ANGLES)):
+        word = said.text(name, next(iter(units)))
+        if word not in units:
+            notes.add(top.properties[name].name, f"{name} must be one of {', '.join(units)}, not {word!r}")
+        chosen.append(units.get(word, next(iter(units.values()))))
+    return Units(*chosen)
+
+
+def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
+    resolution = said.number("resolution", _RESOLUTION)
+    if resolution < _FINEST:
+        raise said.error("resolution", f"resolution must be at least {_FINEST:g} m, not {resolution:g}")
+    interval = said.number("interval_sim", _INTERVAL)
+    if interval < _SHORTEST:
+        raise said.error("interval_sim", f"interval_sim must be at least {_SHORTEST:g} ms, not {interval:g}")
+    quit_time = said.number("quit_time", 0.0)
+    if quit_time < 0:
+        raise said.error("quit_time", f"quit_time must not be below 0, not {quit_time:g}")
+    poses = global_poses(models)
+    walls = [model for model in models if not _on_position(model, models)]
+    starts = (model for model in models if model.type == "position")
     return World(
-        name=top.properties["name"].text() if "name" in top.properties else path.stem,
+        name=said.text("name", path.stem),
         path=path,
-        segments=segments,
-        obstacles=obstacles,
-        starts=tuple(collector.starts),
-        bounds=(*both.min(axis=0).tolist(), *both.max(axis=0).tolist()),
-        warnings=warnings,
+        models=models,
+        poses=poses,
+        resolution=resolution,
+        interval=interval / 1000,
+        quit_time=quit_time,
+        speedup=said.number("speedup", 1.0),
+        segments=_outlines([model for model in walls if model.ranger_return >= 0], poses),
+        obstacles=_outlines([model for model in walls if model.obstacle_return], poses),
+        starts=tuple(Start(m.name or "chair", poses[m.index, [0, 1, 3]]) for m in starts),
+        warnings=tuple(said.notes.texts),
     )
 
 
-@dataclass
-class _Collector:
-    """Walks the models and keeps what they are made of."""
-
-    folder: Path  # of the world file; bitmaps are relative to it, as in Stage
-    seen: list[FloatArray] = field(default_factory=list)
-    solid: list[FloatArray] = field(default_factory=list)
-    starts: list[Start] = field(default_factory=list)
-
-    def add(self, entity: Entity, parent: FloatArray) -> None:
-        """Add a model and its children; parent: pose (3,) that its own is relative to."""
-        if entity.type not in known.BODIES:
-            return
-        pose = compose(parent, _pose(entity, "pose"))
-        if entity.type == "position":  # the chair's body and laser are in the model file
-            name = entity.properties["name"].text() if "name" in entity.properties else "chair"
-            self.starts.append(Start(name, pose))
-            return
-        self._add_body(entity, compose(pose, _pose(entity, "origin")))
-        for child in entity.children:
-            self.add(child, pose)
-
-    def _add_body(self, entity: Entity, pose: FloatArray) -> None:
-        size = np.array(_DEFAULT_SIZE)
-        if "size" in entity.properties:
-            size = np.array(entity.properties["size"].numbers(2, 3)[:2])
-            if (size <= 0).any():
-                raise entity.properties["size"].name.error("size must be positive")
-        segments = shapes.transform(shapes.outline(entity, size, self.folder), pose)
-        if _number(entity, "ranger_return", 1.0) >= 0:
-            self.seen.append(segments)
-        if _number(entity, "obstacle_return", 1.0):
-            self.solid.append(segments)
+def _on_position(model: Model, models: tuple[Model, ...]) -> bool:
+    """Return whether a model is a position or stands on one."""
+    while model.type != "position" and model.parent >= 0:
+        model = models[model.parent]
+    return model.type == "position"
 
 
-def _number(entity: Entity, name: str, absent: float) -> float:
-    return entity.properties[name].numbers(1, 1)[0] if name in entity.properties else absent
-
-
-def _pose(entity: Entity, name: str) -> FloatArray:
-    """Return x, y [m] and heading [rad] of a property [x y z degrees]; all 0 if absent, as in Stage."""
-    if name not in entity.properties:
-        return np.zeros(3)
-    x, y, _, degrees = entity.properties[name].numbers(4, 4)
-    return np.array([x, y, np.deg2rad(degrees)])
+def _outlines(models: list[Model], poses: FloatArray) -> FloatArray:
+    """Return the outlines (m, 4) of models in the map."""
+    parts = [np.empty((0, 4))]
+    for model in models:
+        x, y, _, heading = poses[model.index]
+        c, s = np.cos(heading), np.sin(heading)
+        points = model.shape.segments.reshape(-1, 2) @ np.array([[c, s], [-s, c]]) + [x, y]
+        parts.append(points.reshape(-1, 4))
+    return np.concatenate(parts)

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the parts of the module kurumaisu._core share.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+namespace kurumaisu {
+
+using Array = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
+
+void bindRaycast(pybind11::module_& m);
+void bindArena(pybind11::module_& m);
+void bindCamera(pybind11::module_& m);
+
+}  // namespace kurumaisu

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The files a world is made of: where they are looked for, their text, includes and parameters."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from kurumaisu.errors import Error
+from kurumaisu.world.notes import Notes
+from kurumaisu.world.tokens import Kind, Source, Token, skip_line, tokenize
+
+_MOST_BYTES = 2**26  # of one file
+_MOST_TOKENS = 1_000_000  # of a world with its includes; Stage's largest has 40 000
+_DEEPEST = 64  # nested includes; more is a loop
+
+# A parameter `${name}` or `${name=default}` outside of comments; Stage's own language has no `$`.
+_PARAMETER = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)(?:=([^}\r\n]*))?\}")
+_BRACES = re.compile(r"\$\{[^}\r\n]*\}?")
+_COMMENT_OR_PARAMETER = re.compile(rf'#[^\r\n]*|"[^"\r\n]*"|{_BRACES.pattern}')
+
+
+def find(name: Token, top: Path, search_path: bool) -> Path:
+    """Return the path of a file that a string token names.
+
+    As in Stage it is relative to the folder of the top-level file, and an include's last part is looked for in the
+    folders of STAGEPATH; beyond Stage, it may also be beside the file that names it.
+    """
+    wanted = Path(name.string)
+    places = [top.parent / wanted, name.source.path.parent / wanted]
+    if search_path:
+        places += [Path(folder) / wanted.name for folder in os.environ.get("STAGEPATH", "").split(":") if folder]
+    return next((place for place in places if _is_file(place)), places[0])
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name too long, or with a null byte
+        return False
+
+
+@dataclass
+class Reader:
+    """Reads a world's files, filling in parameters and includes."""
+
+    top: Path
+    values: Mapping[str, str]
+    notes: Notes
+    used: set[str] = field(default_factory=set)
+    tokens: list[Token] = field(default_factory=list)
+
+    def read(self) -> list[Token]:
+        """Return the tokens of all files in the order Stage sees them, the last being END."""
+        source = self._source(self.top, None)
+        self._splice(source, depth=0)
+        self.tokens.append(Token(Kind.END, "", source, len(source.text)))
+        unused = sorted(set(self.values) - self.used)
+        if unused:
+            raise Error(f"{self.top}: has no parameter ${{{unused[0]}}}, for which a value was given")
+        return self.tokens
+
+    def _splice(self, source: Source, depth: int) -> None:
+        """Append the tokens of a source without its END."""
+        tokens, append = tokenize(source), self.tokens.append
+        while (token := next(tokens)).kind is not Kind.END:
+            if token.kind is Kind.WORD and token.text == "include":
+                tokens = tokenize(source, self._include(token, next(tokens), depth))
+                continue
+            append(token)
+            if len(self.tokens) > _MOST_TOKENS:
+                raise token.error(f"more than {_MOST_TOKENS} words, numbers and brackets")
+
+    def _include(self, include: Token, name: Token, depth: int) -> int:
+        """Splice an included file and return where its line ends: as in Stage, the rest of the line is not read."""
+        if name.kind is not Kind.STRING:
+            raise name.error(f"include needs a string, not {name}")
+        if depth == _DEEPEST:
+            raise include.error(f"more than {_DEEPEST} levels of includes")
+        self.tokens.append(Token(Kind.LINE_END, "\n", include.source, include.at))
+        self._splice(self._source(find(name, self.top, search_path=True), name), depth + 1)
+        text, end = include.source.text, skip_line(include.source, name.at)
+        rest = text[name.at + len(name.text) : end].split("#")[0].strip()
+        if rest:
+            self.notes.add(include, f"what follows on the line of an include is not read, as in Stage: {rest}")
+        return end
+
+    def _source(self, path: Path, asked: Token | None) -> Source:
+        """Return the text of a file with its parameters filled in."""
+        try:
+            with path.open("rb") as file:
+                data = file.read(_MOST_BYTES + 1)
+        except (OSError, ValueError) as error:
+            reason = f"{path}: {getattr(error, 'strerror', None) or error}"
+            raise asked.error(reason) if asked else Error(reason) from error
+        if len(data) > _MOST_BYTES:
+            raise Error(f"{path}: is larger than {_MOST_BYTES} bytes")
+        source = Source(path, data.decode(errors="surrogateescape"))
+        return self._fill_in(source) if "${" in source.text else source
+
+    def _fill_in(self, source: Source) -> Source:
+        def replace(match: re.Match[str]) -> str:
+            if match[0].startswith("#"):
+                return match[0]
+            if match[0].startswith('"'):
+                return _BRACES.sub(lambda inner: self._value(source, match.start() + inner.start(), inner[0]), match[0])
+            return self._value(source, match.start(), match[0])
+
+        return Source(source.path, _COMMENT_OR_PARAMETER.sub(replace, source.text))
+
+    def _value(self, source: Source, at: int, text: str) -> str:
+        """Return the value of a parameter written as text."""
+        match = _PARAMETER.fullmatch(text)
+        if match is None:
+            raise source.error(at, f"a parameter is written as ${{name}} or ${{name=default}}, not as {text}")
+        name, default = match.groups()
+        self.used.add(name)
+        value = self.values.get(name, default)
+        if value is None:
+            raise source.error(at, f"the parameter {name} has no value here: give {name}=VALUE")
+        if re.search(r"[\r\n]", value):
+            raise source.error(at, f"the value of the parameter {name} has more than one line")
+        return value

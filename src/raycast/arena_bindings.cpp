@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// kurumaisu._core.Arena. Arrays are checked here for shape and kind, and by the arena for what they say.
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bindings.h"
+#include "raycast/arena.h"
+
+namespace kurumaisu {
+namespace py = pybind11;
+namespace {
+
+using Bools = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+
+/// Rows of an array (n, columns), n as asked for or -1: any.
+const double* rowsOf(const Array& array, py::ssize_t n, py::ssize_t columns, const std::string& name) {
+  if (array.ndim() == 2 && array.shape(1) == columns && (n < 0 || array.shape(0) == n)) return array.data();
+  const std::string rows = n < 0 ? "n" : std::to_string(n);
+  throw std::invalid_argument(name + " must have shape (" + rows + ", " + std::to_string(columns) + ")");
+}
+
+template <typename A>
+void requireLength(const A& array, py::ssize_t n, const char* name) {
+  if (array.ndim() == 1 && (n < 0 || array.size() == n)) return;
+  throw std::invalid_argument(std::string(name) + " must have shape (" + (n < 0 ? "n" : std::to_string(n)) +
+                              ",)");
+}
+
+int asInt(std::int64_t value, const char* name) {
+  if (value >= std::numeric_limits<int>::min() && value <= std::numeric_limits<int>::max())
+    return static_cast<int>(value);
+  throw std::invalid_argument(std::string(name) + ": " + std::to_string(value) + " is no number of anything");
+}
+
+/// Integers (n,); an array of another kind would be rounded by a cast.
+std::vector<int> integers(const py::array& array, py::ssize_t n, const char* name) {
+  requireLength(array, n, name);
+  const char kind = array.dtype().kind();
+  if (kind != 'i' && kind != 'u' && array.size() > 0)
+    throw std::invalid_argument(std::string(name) + " must be integers");
+  const py::array_t<std::int64_t, py::array::c_style | py::array::forcecast> values(array);
+  std::vector<int> out;
+  out.reserve(static_cast<std::size_t>(values.size()));
+  for (py::ssize_t i = 0; i < values.size(); ++i) out.push_back(asInt(values.data()[i], name));
+  return out;
+}
+
+std::vector<Face> facesOf(const Array& outline, const Array& returns, const Bools& solid, const char* name) {
+  const double* row = rowsOf(outline, -1, 6, name);
+  const py::ssize_t n = outline.shape(0);
+  requireLength(returns, n, "returns");
+  requireLength(solid, n, "solid");
+  std::vector<Face> faces;
+  faces.reserve(static_cast<std::size_t>(n));
+  for (py::ssize_t i = 0; i < n; ++i, row += 6) {
+    faces.push_back({{row[0], row[1], row[2], row[3]}, row[4], row[5], returns.data()[i], solid.data()[i]});
+  }
+  return faces;
+}
+
+std::vector<Pose> posesOf(const Array& array, py::ssize_t n, const char* name) {
+  const double* row = rowsOf(array, n, 4, name);
+  std::vector<Pose> poses;
+  poses.reserve(static_cast<std::size_t>(array.shape(0)));
+  for (py::ssize_t i = 0; i < array.shape(0); ++i, row += 4)
+    poses.push_back({row[0], row[1], row[2], row[3]});
+  return poses;
+}
+
+std::vector<Viewpoint> viewpointsOf(const Array& origins, const py::array& trees) {
+  const std::vector<Pose> poses = posesOf(origins, -1, "origins");
+  const std::vector<int> own = integers(trees, origins.shape(0), "trees");
+  std::vector<Viewpoint> from;
+  from.reserve(poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) from.push_back({poses[i], own[i]});
+  return from;
+}
+
+std::vector<Beams> fansOf(const Array& array, py::ssize_t n) {
+  const double* row = rowsOf(array, n, 4, "fans");
+  std::vector<Beams> fans;
+  fans.reserve(static_cast<std::size_t>(n));
+  for (py::ssize_t i = 0; i < n; ++i, row += 4) {
+    if (!(row[2] >= 0 && row[2] < 1e9 && row[2] == std::floor(row[2]))) {
+      throw std::invalid_argument("fan " + std::to_string(i) +
+                                  ": samples must be a whole number from 0, not " + std::to_string(row[2]));
+    }
+    fans.push_back({row[0], row[1], static_cast<std::size_t>(row[2]), row[3]});
+  }
+  return fans;
+}
+
+std::unique_ptr<Arena> makeArena(const Array& walls, const Array& returns, const Bools& solid,
+                                 const py::array& tree, int threads) {
+  const std::vector<Face> faces = facesOf(walls, returns, solid, "walls");
+  const std::vector<int> trees = integers(tree, walls.shape(0), "tree");
+  std::vector<Wall> all;
+  all.reserve(faces.size());
+  for (std::size_t i = 0; i < faces.size(); ++i) all.push_back({faces[i], trees[i]});
+  return std::make_unique<Arena>(std::move(all), threads);
+}
+
+py::tuple scan(Arena& arena, const Array& origins, const py::array& trees, const Array& fans) {
+  const std::vector<Viewpoint> from = viewpointsOf(origins, trees);
+  const std::vector<Beams> all = fansOf(fans, origins.shape(0));
+  std::size_t total = 0;
+  for (const Beams& fan : all) total += fan.samples;
+  Array ranges(static_cast<py::ssize_t>(total));
+  Array returns(static_cast<py::ssize_t>(total));
+  double* range = ranges.mutable_data();
+  double* value = returns.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    arena.scan(from, all, range, value);
+  }
+  return py::make_tuple(ranges, returns);
+}
+
+py::tuple cast(Arena& arena, const Array& origins, const py::array& trees, double range_max) {
+  const std::vector<Viewpoint> from = viewpointsOf(origins, trees);
+  Array ranges(origins.shape(0));
+  Array returns(origins.shape(0));
+  double* range = ranges.mutable_data();
+  double* value = returns.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    arena.cast(from, range_max, range, value);
+  }
+  return py::make_tuple(ranges, returns);
+}
+
+void setPoses(Arena& arena, const py::array& bodies, const Array& poses) {
+  const std::vector<int> which = integers(bodies, -1, "bodies");
+  const std::vector<Pose> where = posesOf(poses, bodies.size(), "poses");
+  const py::gil_scoped_release release;
+  arena.setPoses(which, where.data());
+}
+
+Bools touches(Arena& arena, const py::array& bodies) {
+  const std::vector<int> which = integers(bodies, -1, "bodies");
+  Bools out(bodies.size());
+  bool* touching = out.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    arena.touches(which, touching);
+  }
+  return out;
+}
+
+Bools move(Arena& arena, const py::array& bodies, const Array& poses, const py::object& groups) {
+  const std::vector<int> which = integers(bodies, -1, "bodies");
+  const std::vector<Pose> where = posesOf(poses, bodies.size(), "poses");
+  std::vector<int> together;
+  if (!groups.is_none()) together = integers(py::array(groups), bodies.size(), "groups");
+  Bools out(bodies.size());
+  bool* stalled = out.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    arena.move(which, where.data(), together, stalled);
+  }
+  return out;
+}
+
+}  // namespace
+
+void bindArena(py::module_& m) {
+  py::class_<Arena>(
+      m, "Arena",
+      "Walls that stay and bodies that move, for many sensors. Results are the same for any number "
+      "of threads.\n"
+      "Raises ValueError naming what is wrong; nothing has changed then.")
+      .def(py::init(&makeArena), py::arg("walls"), py::arg("returns"), py::arg("solid"), py::arg("tree"),
+           py::arg("threads"),
+           "From walls (m, 6): x, y of both ends, lowest and highest z [m]; returns (m,): ranger return, "
+           "below 0 "
+           "invisible;\n"
+           "solid (m,); tree (m,): number of the top-level model, negative: of none.")
+      .def(
+          "add_body",
+          [](Arena& arena, const Array& outline, const Array& returns, const Bools& solid,
+             std::int64_t tree) {
+            return arena.add(facesOf(outline, returns, solid, "outline"), asInt(tree, "tree"));
+          },
+          py::arg("outline"), py::arg("returns"), py::arg("solid"), py::arg("tree"),
+          "Number of a new rigid body in the map's origin; outline (k, 6) in its frame, else like walls.")
+      .def(
+          "remove_body", [](Arena& arena, std::int64_t body) { arena.remove(asInt(body, "body")); },
+          py::arg("body"), "Take a body away; its number stays unused.")
+      .def("set_poses", &setPoses, py::arg("bodies"), py::arg("poses"),
+           "Put bodies (b,) to poses (b, 4): x, y, z [m], heading [rad] of their frames in the map.")
+      .def(
+          "scan", &scan, py::arg("origins"), py::arg("trees"), py::arg("fans"),
+          "Ranges [m] and ranger returns, (sum of samples,) each, of fans (s, 4): first bearing, increment "
+          "[rad], samples,\n"
+          "range_max [m], from origins (s, 4): x, y, z [m], heading [rad], blind for their own trees (s,). A "
+          "miss is +inf and 0.")
+      .def("cast", &cast, py::arg("origins"), py::arg("trees"), py::arg("range_max"),
+           "Ranges [m] and ranger returns (n,) of single rays from origins (n, 4): x, y, z [m], direction "
+           "[rad].")
+      .def("touches", &touches, py::arg("bodies"),
+           "Whether solid outlines of bodies (b,) touch solid outlines of other trees at common heights, or "
+           "the "
+           "ground.")
+      .def("move", &move, py::arg("bodies"), py::arg("poses"), py::arg("groups") = py::none(),
+           "Move bodies (b,) in this order to poses (b, 4), each as a whole or not at all; return which "
+           "stalled "
+           "(b,).\n"
+           "Outlines are hollow and only the end of the way counts, as in Stage. groups (b,): neighbours of "
+           "the "
+           "same number\n"
+           "go together or not at all.");
+}
+
+}  // namespace kurumaisu

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// kurumaisu._core: ray casting. Vectorised over numpy arrays.
+#include "bindings.h"
+
+#include <pybind11/stl.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <vector>
+
+#include "raycast/quantised.h"
+#include "raycast/scene.h"
+
+namespace kurumaisu {
+namespace py = pybind11;
+namespace {
+
+std::vector<Segment> segmentsOf(const Array& array) {
+  if (array.ndim() != 2 || array.shape(1) != 4)
+    throw std::invalid_argument("segments must have shape (m, 4)");
+  std::vector<Segment> segments;
+  segments.reserve(static_cast<std::size_t>(array.shape(0)));
+  const auto rows = array.unchecked<2>();
+  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
+    segments.push_back({rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3)});
+  }
+  return segments;
+}
+
+Array castBeams(const Scene& scene, const Array& poses, const Array& bearings, double max_range) {
+  const bool one_pose = poses.ndim() == 1;
+  if (bearings.ndim() != 1) throw std::invalid_argument("bearings must have shape (n,)");
+  if (poses.ndim() > 2 || poses.ndim() < 1 || poses.shape(poses.ndim() - 1) != 3 ||
+      (!one_pose && poses.shape(0) != bearings.size())) {
+    throw std::invalid_argument("poses must have shape (3,), or (n, 3) with one row per bearing");
+  }
+  if (!(max_range >= 0)) throw std::invalid_argument("max_range must not be negative");
+  std::vector<Pose2D> origins;
+  for (py::ssize_t i = 0; i < poses.size(); i += 3) {
+    origins.push_back({poses.data()[i], poses.data()[i + 1], poses.data()[i + 2]});
+  }
+  Array out(bearings.size());
+  double* ranges = out.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    scene.cast(origins.data(), one_pose, bearings.data(), static_cast<std::size_t>(bearings.size()),
+               max_range, ranges);
+  }
+  return out;
+}
+
+py::tuple castFan(const Scene& scene, const std::array<double, 3>& origin, double first, double increment,
+                  std::size_t samples, double max_range) {
+  if (!(max_range >= 0)) throw std::invalid_argument("max_range must not be negative");
+  std::vector<Hit> hits(samples);
+  {
+    const py::gil_scoped_release release;
+    scene.castFan({origin[0], origin[1], origin[2]}, first, increment, samples, max_range, hits.data());
+  }
+  Array ranges(static_cast<py::ssize_t>(samples));
+  py::array_t<std::int64_t> segments(static_cast<py::ssize_t>(samples));
+  double* range = ranges.mutable_data();
+  std::int64_t* segment = segments.mutable_data();
+  for (const Hit& hit : hits) {
+    *range++ = hit.range;
+    *segment++ = hit.segment;
+  }
+  return py::make_tuple(ranges, segments);
+}
+
+Array castQuantised(const Quantised& cells, const Array& poses, double range_max) {
+  if (poses.ndim() != 2 || poses.shape(1) != 3) throw std::invalid_argument("poses must have shape (n, 3)");
+  Array out(poses.shape(0));
+  const double* pose = poses.data();
+  double* range = out.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    for (py::ssize_t i = 0; i < poses.shape(0); ++i, pose += 3)
+      range[i] = cells.cast(pose[0], pose[1], pose[2], range_max);
+  }
+  return out;
+}
+
+}  // namespace
+
+void bindRaycast(py::module_& m) {
+  py::class_<Scene>(m, "Scene", "Immutable line segments that answer rays exactly.")
+      .def(py::init([](const Array& segments) { return Scene(segmentsOf(segments)); }), py::arg("segments"),
+           "From segments (m, 4): x, y of both ends [m]. Raises ValueError for one that is not finite.")
+      .def("__len__", &Scene::size)
+      .def("cast", &castBeams, py::arg("poses"), py::arg("bearings"), py::arg("max_range"),
+           "Ranges (n,) [m] of beams that leave poses (n, 3), or one pose (3,), at bearings (n,) [rad]; +inf "
+           "beyond\n"
+           "max_range [m]. Poses are of the laser, in the map frame.")
+      .def("cast_fan", &castFan, py::arg("origin"), py::arg("first"), py::arg("increment"),
+           py::arg("samples"), py::arg("max_range"),
+           "Ranges (samples,) [m] and indices (samples,) of the segments met; +inf and -1: nothing within "
+           "max_range\n"
+           "[m]. Beam i leaves the origin (3,) at bearing first + i * increment [rad].");
+  py::class_<Quantised>(m, "Quantised", "Walls drawn into cells, and rays that walk over them, as in Stage.")
+      .def(py::init([](const Array& walls, double resolution) {
+             return Quantised(segmentsOf(walls), resolution);
+           }),
+           py::arg("walls"), py::arg("resolution"),
+           "From walls (m, 4): x, y of both ends [m]; resolution: edge of a cell [m].")
+      .def(
+          "cast", &castQuantised, py::arg("poses"), py::arg("range_max"),
+          "Ranges (n,) [m] of rays from poses (n, 3) along their headings; a miss is range_max [m] exactly.");
+  bindArena(m);
+}
+
+}  // namespace kurumaisu
