@@ -13,6 +13,7 @@ from sensing import make_model, rectangle
 from kurumaisu.errors import Error
 from kurumaisu.sim.sensors import camera as c
 from kurumaisu.types import FloatArray
+from kurumaisu.world.bitmaps import outline
 from kurumaisu.world.model import Camera, Model
 
 CAMERA = Camera(width=64, height=48, fov_h=1.2, fov_v=0.9, near=0.1, far=20.0, pan=0.0, tilt=0.0)
@@ -170,12 +171,40 @@ def test_a_lintel_a_gap_and_a_floating_slab() -> None:
     np.testing.assert_allclose(below.depth[bottom, 32], 0.5 / up[bottom], rtol=1e-5)
 
 
-def test_the_sheets_of_a_bitmap_have_no_lids() -> None:
-    sheets = np.hstack([c_ := rectangle(1.0, 1.0), np.roll(c_, -1, axis=0)])
-    models = [make_model(0, segments=sheets, heights=(0.0, 0.5), color=BLUE)]
+def test_the_occupied_parts_of_a_bitmap_are_solid() -> None:
+    """A courtyard: segments in no order, as runs of pixels come. One sees its top, and the ground within."""
+    rings = [np.hstack([c_ := rectangle(a, a), np.roll(c_, -1, axis=0)]) for a in (3.0, 1.0)]
+    segments = np.concatenate([rings[0], rings[1][:, [2, 3, 0, 1]]])[[3, 0, 6, 5, 1, 7, 4, 2]]
+    yard = [make_model(0, segments=segments, heights=(0.0, 0.5), color=BLUE)]
     camera = replace(CAMERA, tilt=math.pi / 2)
-    picture = take(models, np.array([[0.0, 0, 0, 0]]), np.array([0.001, 0.002, 1.5, 0.0]), camera)
-    np.testing.assert_allclose(picture.depth[24, 32], 1.5, rtol=1e-4)
+    for x, y in ((0.001, 0.002), (1.0, 0.003)):
+        picture = take(yard, np.zeros((1, 4)), np.array([x, y, 3.0, 0.0]), camera)
+        pixels = [(row, column) for row in range(0, 48, 5) for column in range(0, 64, 7)]
+        rays = pixel_rays(camera, 0.0)
+        for row, column in pixels:
+            at = np.abs(np.array([x, y]) + 2.5 * rays[row, column, :2])
+            if np.abs(at.max() - np.array([0.5, 1.5])).min() > 0.25:  # the walls themselves are seen beside the lids
+                top = 0.5 < at.max() < 1.5
+                assert picture.depth[row, column] == pytest.approx(2.5 if top else 3.0, rel=1e-3), (row, column, at)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_any_bitmap_seen_from_above_is_the_bitmap(seed: int) -> None:
+    """Runs of pixels that end, bend and cross wherever they like; flat walls, so that only lids are seen."""
+    rng = np.random.default_rng(seed)
+    occupied = rng.random((16, 16)) < 0.5
+    models = [make_model(0, segments=outline(occupied), heights=(0.0, 1e-3), color=BLUE)]
+    camera = Camera(width=120, height=120, fov_h=1.5, fov_v=1.5, near=0.1, far=50.0, pan=0.0, tilt=math.pi / 2)
+    eye = np.array([*rng.uniform(6, 10, 2), 5.0, rng.uniform(-3, 3)])
+    picture = take(models, np.zeros((1, 4)), eye, camera)
+    x, y = np.moveaxis(eye[:2] + (eye[2] - 1e-3) * pixel_rays(camera, eye[3])[..., :2], -1, 0)
+    edge = np.minimum(np.abs(x - np.round(x)), np.abs(y - np.round(y))) < 0.03
+    within = (x > 0) & (x < 16) & (y > 0) & (y < 16)
+    row, column = np.clip(y, 0, 15.5).astype(int), np.clip(x, 0, 15.5).astype(int)
+    expected = within & occupied[row, column]
+    blue = (picture.rgba == [0, 0, 255, 255]).all(axis=-1)
+    assert expected[~edge].mean() > 0.1
+    np.testing.assert_array_equal(blue[~edge], expected[~edge])
 
 
 def test_outlines_may_run_either_way() -> None:

@@ -16,19 +16,62 @@ double sinc(double x) { return std::abs(x) < 1e-4 ? 1 - x * x / 6 : std::sin(x) 
 
 double norm(const Point& p) { return std::hypot(p.x, p.y); }
 
+/// A point that moves with a body.
+struct Carried {
+  Point at;
+  Point velocity;  // [m/s]
+};
+
+Carried carry(const Mover& mover, const Pose& pose, const Point& point) {
+  const Point at = toMap(pose, point);
+  const double turned = mover.frame == Frame::body ? pose.heading : 0;
+  const double c = std::cos(turned);
+  const double s = std::sin(turned);
+  const auto [x, y, turn] = mover.twist;
+  return {at, {c * x - s * y - turn * (at.y - pose.y), s * x + c * y + turn * (at.x - pose.x)}};
+}
+
+/// Upper bound [m/s^2] of the acceleration of a point so far from the origin [m].
+double acceleration(const Mover& mover, double distance) {
+  const double turn = std::abs(mover.twist.turn);
+  return turn *
+         (turn * distance + (mover.frame == Frame::body ? std::hypot(mover.twist.x, mover.twist.y) : 0));
+}
+
+/// Lower bound of the time until a gap is closed: at a speed now, which rises by so much acceleration at most.
+double timeToClose(double gap, double speed, double acceleration) {
+  const double root = std::sqrt(speed * speed + 2 * acceleration * gap);
+  if (speed + root > 0) return 2 * gap / (speed + root);
+  return INFINITY;
+}
+
+struct Gap {
+  double distance;  // [m] from a corner to the nearest point of an edge
+  double closing;   // [m/s] upper bound for all of the edge, along the line between these two
+};
+
+Gap gapOf(const Carried& corner, const Carried& a, const Carried& b) {
+  const Point near = nearest(corner.at, a.at, b.at);
+  const Point between{corner.at.x - near.x, corner.at.y - near.y};
+  const double d = norm(between);
+  if (d <= 0) return {0, 0};
+  const auto along = [&](const Point& v) { return (v.x * between.x + v.y * between.y) / d; };
+  return {d, std::max(along(a.velocity), along(b.velocity)) - along(corner.velocity)};
+}
+
 /// First time at which a corner of one body comes near an edge of another.
 double cornerTouch(const Mover& a, const Point& corner, const Mover& b, const Edge& edge, const Touch& touch,
                    double limit) {
-  const double speed = a.speed(norm(corner)) + b.speed(std::max(norm(edge.a), norm(edge.b)));
+  const double rise = acceleration(a, norm(corner)) + acceleration(b, std::max(norm(edge.a), norm(edge.b)));
   double time = 0;
   for (int i = 0; i < kMaxAdvances; ++i) {
     const Pose pose_b = b.at(time);
-    const double d = distance(toMap(a.at(time), corner), toMap(pose_b, edge.a), toMap(pose_b, edge.b));
-    if (i == 0 && d <= touch.known) return limit;
-    const double gap = d - touch.distance;
-    if (gap <= kArrived * touch.distance) return time;
-    if (gap >= speed * (limit - time)) return limit;
-    time += gap / speed;
+    const Gap gap = gapOf(carry(a, a.at(time), corner), carry(b, pose_b, edge.a), carry(b, pose_b, edge.b));
+    if (i == 0 && gap.distance <= touch.known) return limit;
+    const double left = gap.distance - touch.distance;
+    if (left <= kArrived * touch.distance && gap.closing > 0) return time;
+    time += timeToClose(std::max(left, kArrived * touch.distance), gap.closing, rise);
+    if (time >= limit) return limit;
   }
   return time;
 }
@@ -67,13 +110,13 @@ Point toMap(const Pose& pose, const Point& point) {
   return {pose.x + c * point.x - s * point.y, pose.y + s * point.x + c * point.y};
 }
 
-double distance(const Point& point, const Point& a, const Point& b) {
+Point nearest(const Point& point, const Point& a, const Point& b) {
   const Point along{b.x - a.x, b.y - a.y};
   const Point from{point.x - a.x, point.y - a.y};
   const double square = along.x * along.x + along.y * along.y;
   const double share =
       square > 0 ? std::clamp((from.x * along.x + from.y * along.y) / square, 0.0, 1.0) : 0.0;
-  return std::hypot(from.x - share * along.x, from.y - share * along.y);
+  return {a.x + share * along.x, a.y + share * along.y};
 }
 
 bool sameHeight(const Edge& a, double z_a, const Edge& b, double z_b) {

@@ -65,11 +65,12 @@ struct Touch {
 };
 
 Point toMap(const Pose& pose, const Point& point);
-double distance(const Point& point, const Point& a, const Point& b);
+/// The point of a line segment that is nearest to a point.
+Point nearest(const Point& point, const Point& a, const Point& b);
 bool sameHeight(const Edge& a, double z_a, const Edge& b, double z_b);
 
 /// First time [s] at which an edge of a body comes near an edge of another, or limit.
-/// Corners are followed by conservative advancement: no step is longer than the gap over the closing speed.
+/// Corners are followed by conservative advancement (Mirtich 1996): no advance is longer than closing the gap takes.
 double firstTouch(const Mover& a, const Mover& b, const Touch& touch, double limit);
 
 }  // namespace kurumaisu::contact

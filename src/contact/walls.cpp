@@ -67,7 +67,8 @@ std::vector<int> Walls::near(const Circle& circle) const {
       const std::size_t c = cell(column, row);
       for (std::size_t i = starts_[c]; i < starts_[c + 1]; ++i) {
         const Edge& edge = (*this)[members_[i]].edge;
-        if (distance(circle.centre, edge.a, edge.b) <= circle.radius) found.push_back(members_[i]);
+        const Point point = nearest(circle.centre, edge.a, edge.b);
+        if (std::hypot(point.x - x, point.y - y) <= circle.radius) found.push_back(members_[i]);
       }
     }
   }

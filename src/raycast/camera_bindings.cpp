@@ -91,7 +91,7 @@ void bindCamera(py::module_& m) {
       .def(py::init(&makePanels), py::arg("walls"), py::arg("colors"), py::arg("prisms"), py::arg("bodies"),
            "From walls (m, 6): x, y of both ends, lowest and highest z [m]; colors (m, 4) of bytes; prisms "
            "(m,):\n"
-           "the closed counter-clockwise outline a wall is part of, -1 for none; bodies (m,). Raises "
+           "the closed outlines a wall is part of, -1 for none; bodies (m,). Raises "
            "ValueError.")
       .def("__len__", [](const Panels& panels) { return panels.panels.size(); });
 

@@ -71,15 +71,16 @@ void ColumnPainter::lidsUpTo(double distance) {
   }
 }
 
+/// Every other crossing of a closed outline leads out of it again.
 void ColumnPainter::passThrough(const Crossing& crossing) {
   if (crossing.prism < 0) return;
-  if (crossing.entering) {
-    enter(crossing);
-    return;
-  }
   const auto same = [&](const Open& open) { return open.wall.prism == crossing.prism; };
   const auto found = std::find_if(open_.begin(), open_.end(), same);
-  if (found != open_.end()) open_.erase(found);
+  if (found == open_.end()) {
+    enter(crossing);
+  } else {
+    open_.erase(found);
+  }
 }
 
 /// Lets a surface be seen where nothing nearer covers it.

@@ -14,8 +14,7 @@ struct Crossing {
   double distance;      ///< horizontal, from the eye [m]
   double low, high;     ///< of the wall
   std::uint32_t color;  ///< four bytes: red, green, blue, alpha
-  std::int32_t prism;   ///< the closed outline that the wall is part of; -1: of none, so that it has no lids
-  bool entering;        ///< the line of sight enters the prism here (else it leaves it)
+  std::int32_t prism;   ///< the closed outlines that the wall is part of; -1: of none, so that it has no lids
 };
 
 /// Part of the view of one surface. Slopes: rise per horizontal distance, up positive.

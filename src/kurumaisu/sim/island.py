@@ -30,8 +30,10 @@ _NEAR = 0.05  # [m] walls that are looked up beyond what the bodies can reach
 
 @dataclass
 class Moving:
-    """Bodies on their way, all (k, ...): poses of the centres, velocities (x, y, turn) in the map, commands in the
-    body's frame; hindered: the last velocities were not the commanded ones.
+    """Bodies on their way, all (k, ...).
+
+    poses of the centres; velocities (x, y, turn) in the map; commands in the body's frame; hindered: the last
+    velocities were not the commanded ones.
     """
 
     poses: FloatArray
@@ -61,6 +63,7 @@ class Island:
         self._driven = np.array([r.driven for r in self._rigids])
         self._masses = np.array([[r.mass, r.mass, r.moment] for r in self._rigids])
         self._walls: set[int] = set()
+        self._floor = pymunk.Body(body_type=pymunk.Body.STATIC)
         self._motors: list[pymunk.Body] = []
         self._grips: list[tuple[pymunk.Constraint, float]] = []  # with their largest force [N] or torque [N m]
         self._limited_for = 0.0  # [s] the substep that these are set for
@@ -116,11 +119,11 @@ class Island:
         self._limit_grips(step)
         targets = chords(moving.poses[:, 3], moving.commands, step)
         start = np.where((self._driven & ~moving.hindered)[:, None], targets, moving.velocities)
-        state = np.zeros((len(start) + len(self._motors), 9))
+        state = np.zeros((len(start) + len(self._motors) + 1, 9))
         bodies = state[: len(start)]
         bodies[:, :3] = moving.poses[:, [0, 1, 3]]
         bodies[:, 6:] = self._masses * start / self._longest
-        state[len(start) :, 3:6] = targets[self._driven]
+        state[len(start) : -1, 3:6] = targets[self._driven]
         self._write(state)
         self._space.step(self._longest)
         result = self._read()[: len(start)]
@@ -138,10 +141,10 @@ class Island:
     def _read(self) -> FloatArray:
         buffer = Buffer()
         get_space_bodies(self._space, _STATE, buffer)
-        return np.frombuffer(buffer.float_buf(), dtype=np.float64).reshape(-1, 9)
+        return np.array(np.frombuffer(buffer.float_buf(), dtype=np.float64)).reshape(-1, 9)  # the buffer dies here
 
     def _add_bodies(self, poses: FloatArray) -> None:
-        """Add bodies first and motors after them: in this order pymunk reads and writes them."""
+        """Add bodies, then motors, then the floor: in this order pymunk reads and writes them."""
         for row, rigid in enumerate(self._rigids):
             body = pymunk.Body(rigid.mass, rigid.moment)
             body.position, body.angle = tuple(poses[row, :2]), float(poses[row, 3])
@@ -151,12 +154,10 @@ class Island:
                 shape.filter = pymunk.ShapeFilter(rigid.tree + 1, layers, layers)
                 shape.friction = self._friction
                 self._space.add(shape)
-            floor = self._space.static_body
             if rigid.driven:
-                floor = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-                self._motors.append(floor)
-            self._add_grip(floor, body, rigid)
-        self._space.add(*self._motors)
+                self._motors.append(pymunk.Body(body_type=pymunk.Body.KINEMATIC))
+            self._add_grip(self._motors[-1] if rigid.driven else self._floor, body, rigid)
+        self._space.add(*self._motors, self._floor)
 
     def _add_grip(self, floor: pymunk.Body, body: pymunk.Body, rigid: Rigid) -> None:
         """Let the floor, or a motor that moves as commanded, drag a body with limited force."""
@@ -179,7 +180,7 @@ class Island:
             if number not in self._walls:
                 self._walls.add(number)
                 wall = self._ground.walls[number]
-                shape = _shape(self._space.static_body, wall[:4].reshape(2, 2), self._skin)
+                shape = _shape(self._floor, wall[:4].reshape(2, 2), self._skin)
                 layers = self._layers.of(wall[4], wall[5])
                 shape.filter = pymunk.ShapeFilter(int(self._ground.trees[number]) + 1, layers, layers)
                 shape.friction = self._friction

@@ -33,7 +33,7 @@ class Motion(Protocol):
         """
 
     def state(self) -> dict[str, StateArray]:
-        """Return all that the next moves depend on, by name, arrays (b, ...): copies; `poses` is one of them."""
+        """Return all that the next moves depend on, by name, arrays (b, ...), copies."""
 
     def restore(self, state: dict[str, StateArray]) -> None:
         """Go back to a state; its arrays have a row for each body."""

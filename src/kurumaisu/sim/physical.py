@@ -59,6 +59,25 @@ class PhysicalMotion:
         self._poses = poses
         return _shifted(poses, -self._centres), stalled
 
+    @property
+    def poses(self) -> FloatArray:
+        """Poses (b, 4) now."""
+        return _shifted(self._poses, -self._centres)
+
+    def state(self) -> dict[str, FloatArray | BoolArray]:
+        """Return copies of all that the next moves depend on, by name, a row for each body."""
+        return {
+            "centres": self._poses.copy(),
+            "velocities": self._velocities.copy(),
+            "hindered": self._hindered.copy(),
+        }
+
+    def restore(self, state: dict[str, FloatArray | BoolArray]) -> None:
+        """Go back to a state of the same bodies."""
+        self._poses = np.array(state["centres"], dtype=np.float64)
+        self._velocities = np.array(state["velocities"], dtype=np.float64)
+        self._hindered = np.array(state["hindered"], dtype=np.bool_)
+
     def _meetings(self, commands: FloatArray, dt: float) -> tuple[FloatArray, IntArray]:
         """Return times (b,) [s] until each body touches something, and pairs (p, 2) that could meet within dt."""
         solid = np.flatnonzero(self._solid)
