@@ -167,6 +167,5 @@ def test_all_effects_at_once(tmp_path):
 def test_bad_effects_are_refused(tmp_path, text, message):
     file = tmp_path / "effects.yaml"
     file.write_text(f"effects: [{text}]")
-    it = Simulator(with_effects(MODEL, file), load_world(shipped("worlds/room.world")), PHYSICS)
     with pytest.raises(Error, match=message):
-        it.reset(1)
+        Simulator(with_effects(MODEL, file), load_world(shipped("worlds/room.world")), PHYSICS)
