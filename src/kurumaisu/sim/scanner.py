@@ -87,7 +87,7 @@ class Scanner:
             stamp=beams.stamp,
             bearings=self._bearings,
             ranges=ranges,
-            incidence=incidence(self._walls.cast, origins, beams.bearings, level),
+            incidence=self._incidence(origins, beams, level),
             returns=self._walls.returns(origins, beams.bearings),
             mean=error.mean(ranges),
             sd=error.deviation(ranges),
@@ -96,6 +96,11 @@ class Scanner:
         )
         # What the law, without its noise, makes of the range that it means by a reading: rounding and gate are left.
         return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges)))
+
+    def _incidence(self, origins: FloatArray, beams: Beams, ranges: FloatArray) -> FloatArray:
+        if not self._chain.oblique:
+            return np.zeros(len(ranges))
+        return incidence(self._walls.cast, origins, beams.bearings, ranges)
 
     def _forget(self, before: float) -> None:
         """Drop what the next scan does not need: all but the last pose that is not after its start."""
