@@ -9,6 +9,7 @@
 
 #include <stdexcept>
 
+#include "contact/bindings.h"
 #include "kalman/whiten.h"
 #include "model/laser_error.h"
 #include "model/unicycle.h"
@@ -16,6 +17,8 @@
 
 namespace py = pybind11;
 namespace k = kurumaisu;
+
+void bindCamera(py::module_& m);  // raycast/camera_bindings.cpp
 
 namespace {
 
@@ -135,4 +138,6 @@ PYBIND11_MODULE(_core, m) {
   bindKalman(m);
   k::bindFollow(m);
   k::bindRaycast(m);
+  bindCamera(m);
+  k::bindContact(m);
 }

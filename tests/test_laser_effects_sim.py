@@ -11,8 +11,8 @@ import yaml
 from kurumaisu import effects
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, load_model, shipped
+from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
 from kurumaisu.sim.settings import load_physics, with_effects
-from kurumaisu.sim.simulator import NEUTRAL, Command, Simulator
 from kurumaisu.world import load_world
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -29,18 +29,18 @@ def exact() -> Model:
     return replace(MODEL, laser=replace(LASER, error=law))
 
 
-def simulator(folder: Path, model: Model, listed: dict, wall: str = "") -> Simulator:
+def simulator(folder: Path, model: Model, listed: dict, wall: str = "") -> ChairSimulator:
     """A wall at x = 8; the chair starts at the origin and heads for it."""
     world, file = folder / "wall.world", folder / "effects.yaml"
     world.write_text(f"model ( pose [9 0 0 0] size [2 999 1] {wall} )\nposition ( pose [0 0 0 0] )")
     items = [{"id": name, "parameters": {**NULLS[name], **values}} for name, values in listed.items()]
     file.write_text(yaml.safe_dump({"effects": items}))
-    it = Simulator(with_effects(model, file), load_world(world), PHYSICS)
+    it = ChairSimulator(with_effects(model, file), load_world(world), PHYSICS)
     it.reset(5)
     return it
 
 
-def scans(it: Simulator, command: Command, seconds: float):
+def scans(it: ChairSimulator, command: Command, seconds: float):
     observations = [it.step(command) for _ in range(round(seconds / it.step_time))]
     return [o.scan for o in observations if o.scan is not None]
 
@@ -120,7 +120,7 @@ def run(folder: Path, listed: dict) -> list[np.ndarray]:
     )
     items = [{"id": name, "parameters": dict(values)} for name, values in listed.items()]
     file.write_text(yaml.safe_dump({"effects": items}))
-    it = Simulator(with_effects(MODEL, file), load_world(world), PHYSICS)
+    it = ChairSimulator(with_effects(MODEL, file), load_world(world), PHYSICS)
     observations = [it.reset(9)]
     for v, w in [(0.7, 0.3), (-0.3, -0.2)]:
         observations += [it.step(moving(v, w)) for _ in range(75)]
@@ -168,4 +168,4 @@ def test_bad_effects_are_refused(tmp_path, text, message):
     file = tmp_path / "effects.yaml"
     file.write_text(f"effects: [{text}]")
     with pytest.raises(Error, match=message):
-        Simulator(with_effects(MODEL, file), load_world(shipped("worlds/room.world")), PHYSICS)
+        ChairSimulator(with_effects(MODEL, file), load_world(shipped("worlds/room.world")), PHYSICS)

@@ -4,7 +4,10 @@
 from collections.abc import Sequence
 from typing import overload
 
-from kurumaisu.types import BoolArray, FloatArray, IntArray
+import numpy as np
+from numpy.typing import NDArray
+
+from kurumaisu.types import BoolArray, ByteArray, FloatArray, IntArray
 
 class Branch:
     def __init__(self, slope: float, intercept: float) -> None: ...
@@ -92,3 +95,49 @@ class Arena:
 class Quantised:
     def __init__(self, walls: FloatArray, resolution: float) -> None: ...
     def cast(self, poses: FloatArray, range_max: float) -> FloatArray: ...
+
+class Panels:
+    def __init__(self, walls: FloatArray, colors: ByteArray, prisms: IntArray, bodies: IntArray) -> None: ...
+    def __len__(self) -> int: ...
+
+class Camera:
+    def __init__(
+        self,
+        *,
+        width: int,
+        height: int,
+        fov_h: float,
+        fov_v: float,
+        near: float,
+        far: float,
+        tilt: float,
+    ) -> None: ...
+    def render(
+        self,
+        panels: Panels,
+        poses: FloatArray,
+        hidden: BoolArray,
+        eye: FloatArray,
+        ground: ByteArray,
+        sky: ByteArray,
+    ) -> tuple[ByteArray, NDArray[np.float32]]: ...
+
+def arcs(poses: FloatArray, twists: FloatArray, time: float) -> FloatArray: ...
+
+class Clearance:
+    def __init__(self, walls: FloatArray, trees: IntArray) -> None: ...
+    def add_body(self, edges: FloatArray, tree: int) -> int: ...
+    def free_times(
+        self, bodies: IntArray, poses: FloatArray, twists: FloatArray, limit: float, distance: float
+    ) -> tuple[FloatArray, IntArray]: ...
+    def first_touch(
+        self,
+        bodies: IntArray,
+        poses: FloatArray,
+        velocities: FloatArray,
+        *,
+        known: float,
+        distance: float,
+        limit: float,
+    ) -> float: ...
+    def near(self, bodies: IntArray, poses: FloatArray, reach: float) -> list[int]: ...

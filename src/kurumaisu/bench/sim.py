@@ -16,9 +16,9 @@ from kurumaisu._core import Scene
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, load_model, shipped
+from kurumaisu.sim.chair import ChairSimulator, Command
 from kurumaisu.sim.pymunk_rays import PymunkRays
 from kurumaisu.sim.settings import load_physics, with_effects
-from kurumaisu.sim.simulator import Command, Simulator
 from kurumaisu.types import BoolArray, FloatArray
 from kurumaisu.world import Start, World, load_world
 
@@ -128,13 +128,13 @@ def _simulated_time(model: Model, world: World, seconds: float, repeats: int) ->
         table.row(name, seconds / cost, 1e3 * cost / seconds, str(scans[name]))
 
 
-def _on_circle(model: Model, world: World) -> Simulator:
-    return Simulator(
+def _on_circle(model: Model, world: World) -> ChairSimulator:
+    return ChairSimulator(
         model, replace(world, starts=(Start("circle", _START),)), load_physics(shipped("launch/sim_node.yaml"))
     )
 
 
-def _drive(simulator: Simulator, model: Model, seconds: float) -> int:
+def _drive(simulator: ChairSimulator, model: Model, seconds: float) -> int:
     """Drive the circle; return the number of scans. Raise Error if it is not free."""
     v, w = _CIRCLE
     command = Command(

@@ -19,8 +19,8 @@ from kurumaisu.msg import Voltages
 from kurumaisu.ros import messages
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.sim_settings import SimSettings, read_settings
+from kurumaisu.sim.chair import ChairSimulator, Observation
 from kurumaisu.sim.holder import VoltageHolder
-from kurumaisu.sim.simulator import Observation, Simulator
 
 _NS = 1_000_000_000
 
@@ -31,7 +31,7 @@ class SimNode:
     def __init__(self, settings: SimSettings) -> None:
         """Advertise everything; the node must have been initialised."""
         self._settings = settings
-        self._simulator = Simulator(settings.model, settings.world, settings.physics)
+        self._simulator = ChairSimulator(settings.model, settings.world, settings.physics)
         self._epoch = round(settings.start_time * _NS)  # /clock at the simulator's time 0; reset moves it on
         self._now = self._epoch
         self._steps = 0

@@ -107,7 +107,8 @@ def _chair(chassis: Chassis, friction: float) -> tuple[pymunk.Body, pymunk.Poly]
 
 
 def _advance(pose: FloatArray, rates: tuple[float, float, float], step: float) -> FloatArray:
+    """Return where forward, leftward speed and yaw rate lead in a step; nearly always nothing slips."""
     v, u, w = (np.array([rate]) for rate in rates)
-    if not rates[1]:
-        return _core.integrate(v, w, np.array([step]), pose.tolist())[1]
-    return path(Motion(step, v, w, u), pose)[1]
+    if rates[1]:
+        return np.asarray(path(Motion(step, v, w, u), pose)[1])
+    return np.asarray(_core.integrate(v, w, np.array([step]), pose.tolist())[1])
