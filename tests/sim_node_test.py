@@ -62,6 +62,14 @@ class BadConfiguration:
         finally:
             path.unlink()
 
+    def test_bad_effects_file(self):
+        path = Path(self.id() + ".yaml").absolute()
+        path.write_text("effects: [{id: laser.offset, parameters: {offset: 9.0}}]")
+        try:
+            self.refused("laser.offset: offset must be -0.5 to 0.5 m: 9", effects=str(path))
+        finally:
+            path.unlink()
+
     def test_unknown_key(self):
         self.refused("spede: is not a known key", spede=1.0)
 

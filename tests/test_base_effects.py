@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from kurumaisu import effects
+from kurumaisu import _core, effects
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
 from kurumaisu.sim.plant import Plant, path
@@ -123,6 +123,20 @@ def test_ramp_against_the_differential_equation():
     np.testing.assert_allclose(out.v, np.diff(solution.y[1]) / DT, atol=1e-5)
     np.testing.assert_array_equal(out.w, target)
     assert np.abs(np.diff(out.v)).max() <= DT / slowness + 1e-12
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: _core.ramp(V, -1.0, DT, 0.0), "slowness must not be negative"),
+        (lambda: _core.ramp(V, 1.0, 0.0, 0.0), "dt must be positive"),
+        (lambda: _core.play(V, -0.1, 0.0), "half must not be negative"),
+        (lambda: _core.play(np.zeros((2, 2)), 0.1, 0.0), r"inputs must have shape \(n,\)"),
+    ],
+)
+def test_followers_refuse_nonsense(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
 
 
 def test_payload_is_a_gain_and_a_lag_of_both():

@@ -2,6 +2,7 @@
 """Effects against differential equations solved by scipy, and their promise: chunks do not matter."""
 
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from scipy.integrate import solve_ivp
 
 from kurumaisu import effects
 from kurumaisu._core import AxisInverse
+from kurumaisu.effects import __main__ as table
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
+from kurumaisu.sim.settings import with_effects
 
 DT = 0.01
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -161,3 +164,17 @@ def test_effects_act_in_the_order_of_the_drive_chain():
 def test_bad_settings_are_refused_by_name(pairs, message):
     with pytest.raises(Error, match=message):
         build(*pairs)
+
+
+def test_the_catalogue_in_docs_is_that_of_the_classes():
+    page = Path(__file__).resolve().parents[1] / "docs/effects.md"
+    assert page.read_text(encoding="utf-8") == table.text()
+
+
+def test_shipped_files_of_effects_are_accepted():
+    files = [path for path in shipped("launch/md100.yaml").parent.glob("*.yaml") if "\neffects:" in path.read_text()]
+    assert {"real_laser.yaml", "uneven_floor.yaml"} < {path.name for path in files}
+    for path in files:
+        listed = with_effects(MODEL, path).effects if path.name != "md100.yaml" else MODEL.effects
+        effects.build(listed, context())
+        effects.build_laser(listed, np.random.default_rng(0))

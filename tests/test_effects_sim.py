@@ -8,8 +8,8 @@ import pytest
 
 from kurumaisu import effects
 from kurumaisu.params import load_model, shipped
-from kurumaisu.sim.settings import load_physics, with_effects
 from kurumaisu.sim.chair import ChairSimulator, Command
+from kurumaisu.sim.settings import load_physics, with_effects
 from kurumaisu.world import load_world
 
 MODEL = load_model(shipped("launch/md100.yaml"))

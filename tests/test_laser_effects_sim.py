@@ -11,8 +11,8 @@ import yaml
 from kurumaisu import effects
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, load_model, shipped
-from kurumaisu.sim.settings import load_physics, with_effects
 from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
+from kurumaisu.sim.settings import load_physics, with_effects
 from kurumaisu.world import load_world
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -167,6 +167,5 @@ def test_all_effects_at_once(tmp_path):
 def test_bad_effects_are_refused(tmp_path, text, message):
     file = tmp_path / "effects.yaml"
     file.write_text(f"effects: [{text}]")
-    it = ChairSimulator(with_effects(MODEL, file), load_world(shipped("worlds/room.world")), PHYSICS)
     with pytest.raises(Error, match=message):
-        it.reset(1)
+        ChairSimulator(with_effects(MODEL, file), load_world(shipped("worlds/room.world")), PHYSICS)

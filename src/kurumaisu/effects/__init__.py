@@ -124,6 +124,12 @@ def fluctuation(sd_v: float, sd_w: float, tau: float) -> EffectSetting:
     return EffectSetting(ProcessNoise.id, {"sd_v": sd_v, "sd_w": sd_w, "tau": tau})
 
 
+def check(settings: tuple[EffectSetting, ...]) -> None:
+    """Raise Error for an unknown id, an id given twice, or parameters that do not fit, of a model file."""
+    for effect, values in _chosen(settings):
+        effect.check(values)
+
+
 def build(settings: tuple[EffectSetting, ...], context: Context) -> Chain:
     """Return the effects on the base among those of a model file.
 
@@ -193,6 +199,7 @@ __all__ = [
     "build_laser",
     "build_world",
     "by_id",
+    "check",
     "fluctuation",
     "incidence",
     "slanted",

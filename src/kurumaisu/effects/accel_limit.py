@@ -19,7 +19,7 @@ class AccelLimit(Effect):
     )
     sentence = "the rates are ramped: large changes take longer than small ones"
     formula = "|dv'/dt| ≤ 1 / slowness_v, |dw'/dt| ≤ 1 / slowness_w, towards v, w"
-    source = "ramps of wheelchairs' motor controllers; 0.3-1.5 m/s²"
+    source = "assumed: motor controllers ramp; 0.3-1.5 m/s²"
     shows_in = Rate.V
     follows = Follows.V_CHANGE
 

@@ -16,7 +16,7 @@ class BatterySag(Effect):
     parameters = (Parameter("sag", "1/s", null=0.0, scale=1.0e-3, lower=-0.01, upper=0.1),)
     sentence = "the chair gets slower in the course of a drive, as from a battery that runs down"
     formula = "v, w · max(0, 1 − sag · t)"
-    source = "battery voltage under load; 5-15 % in a recording"
+    source = "assumed: battery voltage; 5-15 % in a recording"
     shows_in = Rate.V
     follows = Follows.V
 

@@ -15,7 +15,7 @@ class ClockScale(ReferenceEffect):
     parameters = (Parameter("scale", "1", null=0.0, scale=1.0e-3, lower=-0.2, upper=0.2),)
     sentence = "the reference's clock and that of the commands run at different speeds"
     formula = "t · (1 + scale), rates / (1 + scale)"
-    source = "two computers without a common clock; 0.01-0.5 %"
+    source = "assumed: computers without a common clock; 0.01-0.5 %"
 
     def apply(self, reference: Reference) -> Reference:
         """Stretch the times."""

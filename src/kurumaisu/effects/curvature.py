@@ -22,7 +22,7 @@ class CurvatureV(Effect):
     parameters = (Parameter("curvature", "s/m", null=0.0, scale=0.05, lower=-1.0, upper=1.0),)
     sentence = "the law of the forward speed is bent: fast driving gains less than slow driving"
     formula = "v · max(0, 1 − curvature · |v|)"
-    source = "expo of joystick inputs; ±0.1 s/m"
+    source = "assumed: expo of joystick inputs; ±0.1 s/m"
     shows_in = Rate.V
     follows = Follows.V
 
@@ -39,7 +39,7 @@ class CurvatureW(Effect):
     parameters = (Parameter("curvature", "s/rad", null=0.0, scale=0.05, lower=-1.0, upper=1.0),)
     sentence = "the law of the yaw rate is bent: fast turns gain less than slow turns"
     formula = "w · max(0, 1 − curvature · |w|)"
-    source = "expo of joystick inputs; ±0.1 s/rad"
+    source = "assumed: expo of joystick inputs; ±0.1 s/rad"
     shows_in = Rate.W
     follows = Follows.W
 

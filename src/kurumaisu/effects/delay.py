@@ -17,7 +17,7 @@ class Delay(Effect):
     parameters = (Parameter("delay", "s", null=0.0, scale=0.05, lower=0.0, upper=1.0),)
     sentence = "the motion follows the command after a pure delay"
     formula = "v, w of t − delay"
-    source = "buses and motor controllers; 20-300 ms"
+    source = "assumed: buses and motor controllers; 20-300 ms"
     shows_in = Rate.V
     follows = Follows.V_CHANGE
 

@@ -26,7 +26,7 @@ class LagV(_Lag):
     parameters = _TAU
     sentence = "the forward speed follows its command with a first-order lag"
     formula = "tau · dv'/dt = v − v'"
-    source = "electric wheelchairs' step responses; 50-500 ms"
+    source = "Wang 2009: settling times of a wheelchair on four floors; 50-500 ms"
     shows_in = Rate.V
     follows = Follows.V_CHANGE
 
@@ -43,7 +43,7 @@ class LagW(_Lag):
     parameters = _TAU
     sentence = "the yaw rate follows its command with a first-order lag"
     formula = "tau · dw'/dt = w − w'"
-    source = "electric wheelchairs' step responses; 50-500 ms"
+    source = "Wang 2009: settling times of a wheelchair on four floors; 50-500 ms"
     shows_in = Rate.W
     follows = Follows.W_CHANGE
 

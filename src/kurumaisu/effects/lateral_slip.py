@@ -14,7 +14,7 @@ class LateralSlip(Effect):
     parameters = (Parameter("c", "s", null=0.0, scale=0.02, lower=-0.5, upper=0.5),)
     sentence = "the chair drifts outwards in bends"
     formula = "u − c · v · w"
-    source = "slip of tyres under side force; 0.01-0.05 s"
+    source = "assumed: slip of tyres under side force; 0.01-0.05 s"
     shows_in = Rate.V
     follows = Follows.W
 

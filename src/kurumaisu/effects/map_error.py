@@ -17,7 +17,7 @@ class MapError(WorldEffect):
     )
     sentence = "walls are not quite where the map has them"
     formula = "corner · (1 + scale) + n, n drawn once per corner with sd in x and in y"
-    source = "maps and worlds made by hand; walls off by 2-10 mm, askew by 0.1-0.5°"
+    source = "assumed: maps and worlds made by hand; walls off by 2-10 mm, askew by 0.1-0.5°"
     random = True
 
     def apply(self, segments: FloatArray) -> FloatArray:

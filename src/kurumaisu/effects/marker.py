@@ -23,7 +23,7 @@ class MarkerX(ReferenceEffect):
     parameters = (Parameter("x", "m", null=0.0, scale=0.03, lower=-2.0, upper=2.0),)
     sentence = "the reference measures a point in front of or behind base_link"
     formula = "pose ⊕ (x, 0, 0): u + x · w"
-    source = "how a marker is fixed; 10-50 mm"
+    source = "geometry; 10-50 mm"
 
     def apply(self, reference: Reference) -> Reference:
         """Shift forward."""
@@ -37,7 +37,7 @@ class MarkerY(ReferenceEffect):
     parameters = (Parameter("y", "m", null=0.0, scale=0.03, lower=-2.0, upper=2.0),)
     sentence = "the reference measures a point beside base_link"
     formula = "pose ⊕ (0, y, 0): v − y · w"
-    source = "how a marker is fixed; 10-50 mm"
+    source = "geometry; 10-50 mm"
 
     def apply(self, reference: Reference) -> Reference:
         """Shift to the left."""

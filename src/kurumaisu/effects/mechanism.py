@@ -45,15 +45,20 @@ class Mechanism:
 
     def __init__(self, values: Mapping[str, float]) -> None:
         """Take a value for each parameter. Raise Error for one that is missing, unknown or out of its bounds."""
-        names = [parameter.name for parameter in self.parameters]
+        self.check(values)
+        self.values = dict(values)
+
+    @classmethod
+    def check(cls, values: Mapping[str, float]) -> None:
+        """Raise Error for a parameter that is missing, unknown or out of its bounds."""
+        names = [parameter.name for parameter in cls.parameters]
         if sorted(values) != sorted(names):
-            raise Error(f"{self.id}: needs the parameters {', '.join(names)}; got {', '.join(values) or 'none'}")
-        for parameter in self.parameters:
+            raise Error(f"{cls.id}: needs the parameters {', '.join(names)}; got {', '.join(values) or 'none'}")
+        for parameter in cls.parameters:
             value = values[parameter.name]
             if not parameter.lower <= value <= parameter.upper:
                 limits = f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
-                raise Error(f"{self.id}: {parameter.name} must be {limits}: {value:g}")
-        self.values = dict(values)
+                raise Error(f"{cls.id}: {parameter.name} must be {limits}: {value:g}")
 
 
 class WorldEffect(Mechanism, ABC):

@@ -19,7 +19,7 @@ class Payload(Effect):
     )
     sentence = "the chair is slower and more sluggish in both axes alike, as under a load"
     formula = "tau · dv'/dt = (1 − droop) · v − v', and w alike"
-    source = "mass and rolling resistance; 5 %, 0.1 s for a bag or a lighter person"
+    source = "assumed: mass and rolling resistance; 5 %, 0.1 s for a bag or a lighter person"
     shows_in = Rate.V
     follows = Follows.V
 

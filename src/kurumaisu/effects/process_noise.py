@@ -21,7 +21,7 @@ class ProcessNoise(Effect):
     )
     sentence = "the rates fluctuate about their command"
     formula = "v + n_v, w + n_w while moving; n: Ornstein-Uhlenbeck, sd, tau"
-    source = "floor, tyres, casters; 10 mm/s, 20 mrad/s, 0.3 s"
+    source = "assumed: floor, tyres, casters; 10 mm/s, 20 mrad/s, 0.3 s"
     shows_in = Rate.W
     follows = Follows.W
     random = True

@@ -24,7 +24,7 @@ class Saturation(Effect):
     )
     sentence = "the chair is slower than commanded above a certain rate"
     formula = "|v| ≤ 1 / inverse_v, |w| ≤ 1 / inverse_w"
-    source = "the MD-100's speed knob; 0.5-1.5 m/s"
+    source = "paper: the MD-100's speed knob; 0.5-1.5 m/s"
     shows_in = Rate.V
     follows = Follows.V
 

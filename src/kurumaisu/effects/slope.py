@@ -19,7 +19,7 @@ class Slope(Effect):
     )
     sentence = "the chair is slower in one direction than in the opposite one, as on a slope"
     formula = "v − climb_x · cos(θ) − climb_y · sin(θ) while moving; θ: heading in the map"
-    source = "gravity on inclines; 10-40 mm/s"
+    source = "a wheelchair's model with gravity on inclines, 2016; 10-40 mm/s"
     shows_in = Rate.V
     follows = Follows.V
 

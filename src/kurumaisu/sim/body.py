@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pymunk
 
+from kurumaisu import _core
 from kurumaisu.effects import Motion
 from kurumaisu.geometry import between
 from kurumaisu.params import Chassis
@@ -56,8 +57,7 @@ class ChairBody:
         """
         step = self._physics.step
         before = self._pose
-        slip = np.array([u]) if u else None
-        self._pose = path(Motion(step, np.array([v]), np.array([w]), slip), before)[1]
+        self._pose = _advance(before, (v, u, w), step)
         self._follow_pose()
         if not self.touches():
             return np.array([v, u, w]), False
@@ -104,3 +104,11 @@ def _chair(chassis: Chassis, friction: float) -> tuple[pymunk.Body, pymunk.Poly]
     footprint = pymunk.Poly(body, corners)
     footprint.friction = friction
     return body, footprint
+
+
+def _advance(pose: FloatArray, rates: tuple[float, float, float], step: float) -> FloatArray:
+    """Return where forward, leftward speed and yaw rate lead in a step; nearly always nothing slips."""
+    v, u, w = (np.array([rate]) for rate in rates)
+    if rates[1]:
+        return np.asarray(path(Motion(step, v, w, u), pose)[1])
+    return np.asarray(_core.integrate(v, w, np.array([step]), pose.tolist())[1])

@@ -56,11 +56,13 @@ class ChairSimulator:
     def __init__(self, model: Model, world: World, physics: Physics) -> None:
         """Build the world; the effects that act are the model's. Call reset before step.
 
-        Raise Error if the world has no start pose or the chair does not fit there.
+        Raise Error for effects that are unknown or whose parameters do not fit, and if the world has no start pose or
+        the chair does not fit there.
         """
         self._model = model
         self._physics = physics
         self._world = world
+        effects.check(model.effects)
         self._build_walls(())
         if self._new_body().touches():
             raise Error(f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose")

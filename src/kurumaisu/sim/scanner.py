@@ -47,7 +47,7 @@ class Scanner:
         self._count = 0  # of scans taken
         self._times: list[float] = []
         self._poses: list[FloatArray] = []
-        self._beams = self._aimed()
+        self._aim()
 
     def observe(self, time: float, pose: FloatArray) -> Scan | None:
         """Note where the chair is, times increasing [s]; return the scan that is complete, if any.
@@ -56,24 +56,26 @@ class Scanner:
         """
         self._times.append(time)
         self._poses.append(pose)
-        beams = self._beams
         rounding = 1e-9  # [s] of multiples of the step
-        if time < max(beams.times.max(), beams.stamp + self._delays[-1]) - rounding:
+        if time < self._complete - rounding:
             return None
+        beams = self._beams
         times, poses = np.array(self._times), np.array(self._poses)
         at_stamp = interpolate(times, poses, np.array([beams.stamp]))[0]
         scan = Scan(beams.stamp, at_stamp, self._readings(beams, interpolate(times, poses, beams.times)))
         self._count += 1
-        self._beams = self._aimed()
+        self._aim()
         self._forget(min(self._beams.stamp, self._beams.times.min()))
         return scan
 
-    def _aimed(self) -> Beams:
-        """Return the beams of the next scan."""
+    def _aim(self) -> None:
+        """Prepare the beams of the next scan."""
         stamp = self._count * self._laser.scan_time
         level = np.zeros(self._laser.beams)
         height = self._laser.mount.z
-        return self._chain.aim(Beams(stamp, stamp + self._delays, self._mount, height, self._bearings, level))
+        said = stamp + self._delays
+        self._beams = self._chain.aim(Beams(stamp, said, self._mount, height, self._bearings, level))
+        self._complete = max(said[-1], self._beams.times.max())
 
     def _readings(self, beams: Beams, poses: FloatArray) -> FloatArray:
         error = self._laser.error
@@ -87,7 +89,7 @@ class Scanner:
             stamp=beams.stamp,
             bearings=self._bearings,
             ranges=ranges,
-            incidence=incidence(self._walls.cast, origins, beams.bearings, level),
+            incidence=self._incidence(origins, beams, level),
             returns=self._walls.returns(origins, beams.bearings),
             mean=error.mean(ranges),
             sd=error.deviation(ranges),
@@ -96,6 +98,11 @@ class Scanner:
         )
         # What the law, without its noise, makes of the range that it means by a reading: rounding and gate are left.
         return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges)))
+
+    def _incidence(self, origins: FloatArray, beams: Beams, ranges: FloatArray) -> FloatArray:
+        if not self._chain.oblique:
+            return np.zeros(len(ranges))
+        return incidence(self._walls.cast, origins, beams.bearings, ranges)
 
     def _forget(self, before: float) -> None:
         """Drop what the next scan does not need: all but the last pose that is not after its start."""

@@ -49,9 +49,10 @@ class Beams:
 class Echoes:
     """What the beams of a scan met, and what becomes of it on the way to a reading; all arrays are (n,).
 
-    stamp [s]; bearings [rad] as the message gives them; ranges [m], true; incidence [rad], 0 along the wall's normal;
-    returns [1]: reflectance, 1 being the surface that the laser's law was measured on; mean, sd [m] of a reading;
-    noise [1]: standard deviates; readings [m]: made of the three after the stage NOISE, the means until then.
+    stamp [s]; bearings [rad] as the message gives them; ranges [m], true; incidence [rad], 0 along the wall's normal,
+    and where no effect of the chain is oblique; returns [1]: reflectance, 1 being the surface that the laser's law was
+    measured on; mean, sd [m] of a reading; noise [1]: standard deviates; readings [m]: made of the three after the
+    stage NOISE, until then they mean nothing.
     A beam that met nothing has a range of +inf in the stages OUTLIER and GRID, and of 0 before them.
     """
 
@@ -88,6 +89,8 @@ class BeamEffect(LaserEffect, ABC):
 
 class ReadingEffect(LaserEffect, ABC):
     """An effect on the readings of a scan, with the state that the scans before have left."""
+
+    oblique: ClassVar[bool] = False  # it needs the incidence, which costs more rays
 
     @abstractmethod
     def apply(self, echoes: Echoes) -> Echoes:

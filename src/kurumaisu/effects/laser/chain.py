@@ -23,6 +23,7 @@ class LaserChain:
         self.empty = not effects
         self._beams = [effect for effect in effects if isinstance(effect, BeamEffect)]
         readings = [effect for effect in effects if isinstance(effect, ReadingEffect)]
+        self.oblique = any(effect.oblique for effect in readings)
         self._before = [effect for effect in readings if effect.stage <= LaserStage.NOISE]
         self._after = [effect for effect in readings if effect.stage > LaserStage.NOISE]
 

@@ -20,7 +20,7 @@ class CommonMode(ReadingEffect):
     )
     sentence = "all ranges of a scan are off together"
     formula = "µ + s_k, s_k = rho · s_(k−1) + √(1 − rho²) · sd · n"
-    source = "prototypes: what a critic must know before all else; 0.1-1 mm, rho 0-0.99"
+    source = "assumed; 0.1-1 mm, rho 0-0.99"
     random = True
 
     _unit: float | None = None  # of the last scan, in sd

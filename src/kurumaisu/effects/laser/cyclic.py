@@ -16,12 +16,12 @@ class Cyclic(ReadingEffect):
     stage = LaserStage.BIAS
     parameters = (
         Parameter("amplitude", "m", null=0.0, scale=0.003, lower=-0.1, upper=0.1),
-        Parameter("wavelength", "m", null=3.22, scale=0.4, lower=0.1, upper=20.0),
+        Parameter("wavelength", "m", null=3.0, scale=1.0, lower=0.1, upper=20.0),
         Parameter("phase", "rad", null=0.0, scale=1.0, lower=-6.3, upper=6.3),
     )
     sentence = "the error of the ranges repeats with the range, as of a phase-shift laser"
     formula = "µ + amplitude · sin(2π r / wavelength + phase)"
-    source = "Kawata 2005: amplitude-modulated light; 1-10 mm over half the modulation's wavelength, 3.22 or 2.82 m"
+    source = "Kawata 2005: the phase of amplitude-modulated light; 1-10 mm"
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by the sine."""

@@ -14,6 +14,7 @@ class Dropout(ReadingEffect):
 
     id = "laser.dropout"
     stage = LaserStage.OUTLIER
+    oblique = True
     parameters = (
         Parameter("probability", "1", null=0.0, scale=0.05, lower=0.0, upper=1.0),
         Parameter("per_metre", "1/m", null=0.0, scale=0.02, lower=0.0, upper=1.0),

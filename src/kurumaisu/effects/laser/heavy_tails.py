@@ -17,7 +17,7 @@ class HeavyTails(ReadingEffect):
     parameters = (Parameter("inverse_nu", "1", null=0.0, scale=0.2, lower=0.0, upper=0.45),)
     sentence = "large errors of the ranges are more frequent than of normal noise"
     formula = "z · √((1 − 2 / ν) · ν / χ²_ν), ν = 1 / inverse_nu"
-    source = "outliers of any laser; ν 3-10"
+    source = "assumed; ν 3-10"
     random = True
 
     def apply(self, echoes: Echoes) -> Echoes:

@@ -22,6 +22,7 @@ class IncidenceBias(ReadingEffect):
 
     id = "laser.incidence_bias"
     stage = LaserStage.BIAS
+    oblique = True
     parameters = (Parameter("k", "m", null=0.0, scale=0.003, lower=-0.1, upper=0.1),)
     sentence = "walls that are met obliquely read too long or too short"
     formula = "µ + k · (1 / cos a − 1), a up to 80°"
@@ -37,6 +38,7 @@ class IncidenceNoise(ReadingEffect):
 
     id = "laser.incidence_noise"
     stage = LaserStage.SPREAD
+    oblique = True
     parameters = (Parameter("gain", "1", null=0.0, scale=0.5, lower=0.0, upper=10.0),)
     sentence = "walls that are met obliquely read more noisily"
     formula = "σ · (1 + gain · (1 / cos a − 1)), a up to 80°"

@@ -17,7 +17,7 @@ class Quantisation(ReadingEffect):
     parameters = (Parameter("step", "m", null=0.0, scale=0.01, lower=0.0, upper=1.0),)
     sentence = "ranges come in coarser steps than modelled"
     formula = "step · round(reading / step)"
-    source = "data sheet: 1 mm; 10 mm of other lasers"
+    source = "data sheet: 1 mm"
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Round the readings."""

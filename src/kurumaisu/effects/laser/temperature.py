@@ -20,7 +20,7 @@ class Temperature(ReadingEffect):
     )
     sentence = "ranges follow the temperature"
     formula = "µ + coefficient · swing · sin(2π t / period)"
-    source = "0.1-1 mm/K, recalled from the literature"
+    source = "assumed; 0.1-1 mm/K"
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by the temperature of now."""
