@@ -23,8 +23,8 @@ from std_srvs.srv import (
 )
 
 from kurumaisu.errors import Error
-from kurumaisu.ros.messages import yaw_of
 from kurumaisu.ros.requests import Requests
+from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.ros.stageros_session import Session
 from kurumaisu.srv import (
     Delete,
