@@ -159,11 +159,15 @@ class Case(unittest.TestCase):
         return topic.last.header.stamp.to_sec()
 
     def drive(self, topic, v, w=0.0):
-        """Send one command, and wait until it has come."""
-        publisher = rospy.Publisher(topic, Twist, queue_size=1)
-        wait_for(lambda: publisher.get_num_connections(), f"a listener on {topic}")
+        """Send one command."""
         message = Twist()
         message.linear.x, message.angular.z = v, w
+        self.send(topic, message)
+
+    def send(self, topic, message):
+        """Send one message, and wait until it has come."""
+        publisher = rospy.Publisher(topic, type(message), queue_size=1)
+        wait_for(lambda: publisher.get_num_connections(), f"a listener on {topic}")
         publisher.publish(message)
         time.sleep(0.1)  # nothing tells that a command has arrived while nothing moves
         publisher.unregister()
@@ -206,7 +210,9 @@ class OneRobot(Case):
             "/tf": "tf2_msgs/TFMessage",
             "/rosout": "rosgraph_msgs/Log",
         }
-        assert [topic for topic, nodes in subscribers if "/stageros" in nodes] == ["/cmd_vel"]
+        assert sorted(topic for topic, nodes in subscribers if "/stageros" in nodes) == [
+            *("/cmd_pose", "/cmd_pose_stamped", "/cmd_vel")
+        ]
         assert ["/reset_positions", ["/stageros"]] in services
         assert rospy.get_param("/use_sim_time") is True
 
@@ -309,6 +315,17 @@ class OneRobot(Case):
         self.drive("cmd_vel", math.nan)
         self.step()
         assert self.odom.last.twist.twist.linear.x == 1.0
+
+    def test_cmd_pose_carries_the_robot(self):
+        pose = geometry_msgs.msg.Pose(geometry_msgs.msg.Point(-1, 2, 0), quaternion_of(1.0))
+        self.send("cmd_pose", pose)
+        self.step()
+        assert place(self.truth.last) == (-1, 2, 1)
+        stamped = geometry_msgs.msg.PoseStamped(pose=pose)
+        stamped.pose.position.x = -2
+        self.send("cmd_pose_stamped", stamped)
+        self.step()
+        assert place(self.truth.last) == (-2, 2, 1)
 
     def test_reset_positions(self):
         self.step()
