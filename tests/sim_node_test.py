@@ -19,7 +19,7 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
 
 from kurumaisu.params import load_model
-from kurumaisu.ros.messages import yaw_of
+from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.ros.testing import Topic, wait_for
 
 STEP = rospy.Duration(0, 10_000_000)

@@ -23,7 +23,10 @@ WORLDS = sorted((SHARE / "worlds").glob("*.world"))
 SOURCE_TREE_TOOLS = {"bench", "demo", "run", "setup", "test"}  # they build or need the source tree
 
 # The strict readers of private parameters, by node type. Nodes in C++ read theirs when they start: rostests.
-READERS = {"sim_node": "kurumaisu.ros.sim_settings:read_settings"}
+READERS = {
+    "sim_node": "kurumaisu.ros.sim_settings:read_settings",
+    "stageros": "kurumaisu.ros.stageros_settings:read_settings",
+}
 
 
 def name(path):

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,8 +44,9 @@ def main() -> int:
     if arguments is None:
         print(_USAGE)
         return 255
+    stopped = _signals()
     # rostime stays off: with /use_sim_time rospy would read back every /clock that we send
-    rospy.init_node("stageros", disable_rostime=True)
+    rospy.init_node("stageros", disable_rostime=True, disable_signals=True)
     try:
         settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
         values = {name: str(value) for name, value in settings.parameters.items()}
@@ -58,8 +61,17 @@ def main() -> int:
     rospy.set_param("/use_sim_time", True)
     requests = Requests()
     Services(session, requests)
-    _run(session, requests, Pacer(speed), world)
+    _run(session, requests, Pacer(speed), world, stopped)
+    rospy.signal_shutdown("the simulation has ended")
     return 0
+
+
+def _signals() -> threading.Event:
+    """Return what SIGINT and SIGTERM set: rospy's own handler hangs when it comes while a topic is registered."""
+    stopped = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda _number, _frame: stopped.set())
+    return stopped
 
 
 def _speed(world: World, settings: StagerosSettings, headless: bool) -> float:
@@ -72,9 +84,9 @@ def _speed(world: World, settings: StagerosSettings, headless: bool) -> float:
     return max(world.speedup, 0.0)
 
 
-def _run(session: Session, requests: Requests, pacer: Pacer, world: World) -> None:
-    """Simulate until ROS shuts down or the world's quit_time has come."""
-    while not rospy.is_shutdown():
+def _run(session: Session, requests: Requests, pacer: Pacer, world: World, stopped: threading.Event) -> None:
+    """Simulate until it is stopped, ROS shuts down, or the world's quit_time has come."""
+    while not (stopped.is_set() or rospy.is_shutdown()):
         if requests:
             requests.serve()
         if session.paused:

@@ -41,14 +41,19 @@ class Cameras:
 
     def change(self, models: Sequence[Model], plans: Sequence[RobotPlan]) -> None:
         """Take other models and robots from now on."""
-        for topics in self._topics:
-            topics.close()
         self._models = models
         self._scenery = None  # made when the first one looks
-        base = self._settings.frames.base_link
-        self._topics = [
-            CameraTopics(camera, plan.names.frame(base), self._settings) for plan in plans for camera in plan.cameras
-        ]
+        there = {topics.plan.frame: topics for topics in self._topics}
+        self._topics = []
+        for robot in plans:
+            for plan in robot.cameras:
+                topics = there.pop(plan.frame, None)
+                if topics is None:
+                    topics = CameraTopics(plan, robot.names.frame(self._settings.frames.base_link), self._settings)
+                topics.plan = plan
+                self._topics.append(topics)
+        for gone in there.values():
+            gone.close()
 
     @property
     def wanted(self) -> bool:
@@ -72,7 +77,7 @@ class CameraTopics:
     def __init__(self, plan: CameraPlan, base: str, settings: StagerosSettings) -> None:
         """Advertise; base: the frame that the camera stands on."""
         names, number, camera = plan.names, plan.number, plan.camera
-        self._plan = plan
+        self.plan = plan  # its model's number changes when another one goes
         self._canonical = settings.depth_canonical
         self._as_stage = settings.options.semantics == "stage"
         self._sensor = CameraSensor(camera)
@@ -95,8 +100,8 @@ class CameraTopics:
 
     def publish(self, scenery: Scenery, poses: FloatArray, stamp: Stamp) -> None:
         """Take a picture and send what is looked at."""
-        model = self._plan.model
-        camera, pose = self._plan.camera, poses[model.index]
+        model = self.plan.model
+        camera, pose = self.plan.camera, poses[model.index]
         eye = stage_eye(camera, poses[model.parent], pose) if self._as_stage else mounted_eye(camera, pose)
         picture = self._sensor.take(scenery, poses, eye, model.root)
         if self._image.wanted:
@@ -114,7 +119,7 @@ class CameraTopics:
             outlet.close()
 
     def _depths(self, picture: Picture) -> NDArray[Any]:
-        return picture.depth if self._canonical else millimetres(picture, self._plan.camera)
+        return picture.depth if self._canonical else millimetres(picture, self.plan.camera)
 
 
 def _send(outlet: Outlet, wire: ImageWire, pixels: NDArray[Any], stamp: Stamp) -> None:

@@ -6,9 +6,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
 
-from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
@@ -17,7 +15,7 @@ from kurumaisu.ros.outlet import Outlet
 from kurumaisu.ros.stageros_camera import Cameras
 from kurumaisu.ros.stageros_names import Names
 from kurumaisu.ros.stageros_plan import RobotPlan
-from kurumaisu.ros.stageros_robot import DEPTH, RobotTopics, Timing, transform_of
+from kurumaisu.ros.stageros_robot import DEPTH, Ears, RobotTopics, Timing, transform_of
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.ros.wire import ClockWire, Stamp, TransformsWire, planar
 from kurumaisu.sim.observation import Observation
@@ -67,12 +65,12 @@ class Transforms:
 class Publisher:
     """The topics of a world."""
 
-    def __init__(self, settings: StagerosSettings, interval: float, command: Callable[[Names, Twist], None]) -> None:
-        """Advertise; interval [s]: of the steps; command: called with the names of a robot and its cmd_vel."""
+    def __init__(self, settings: StagerosSettings, interval: float, ears: Callable[[Names], Ears]) -> None:
+        """Advertise; interval [s]: of the steps; ears: what listens to the commands for a robot of these names."""
         self._settings = settings
         self._every = steps_between(settings, interval)
         self._interval = interval
-        self._command = command
+        self._ears = ears
         self._timing = Timing(0.0, 0.0)
         if settings.scan_timing:
             self._timing = Timing(self._every["scan"] * interval, settings.options.scan_sweep)
@@ -98,7 +96,7 @@ class Publisher:
         for plan in plans:
             robot = there.pop(plan.names, None)
             if robot is None:
-                robot = RobotTopics(plan, self._settings, self._timing, partial(self._command, plan.names))
+                robot = RobotTopics(plan, self._settings, self._timing, self._ears(plan.names))
             robot.plan = plan
             self._robots.append(robot)
         for gone in there.values():

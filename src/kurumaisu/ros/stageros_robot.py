@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Pose, PoseStamped, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan, Range
 from std_msgs.msg import Bool
@@ -30,6 +30,14 @@ class Timing:
 
     scan: float
     sweep: float
+
+
+@dataclass(frozen=True)
+class Ears:
+    """What is called with a robot's cmd_vel and its cmd_pose."""
+
+    twist: Callable[[Twist], None]
+    pose: Callable[[Pose], None]
 
 
 class ScanTopic:
@@ -125,11 +133,9 @@ class CollisionTopic:
 
 
 class RobotTopics:
-    """Everything of one robot but cameras; command is called with its Twist messages."""
+    """Everything of one robot but cameras."""
 
-    def __init__(
-        self, plan: RobotPlan, settings: StagerosSettings, timing: Timing, command: Callable[[Twist], None]
-    ) -> None:
+    def __init__(self, plan: RobotPlan, settings: StagerosSettings, timing: Timing, hear: Ears) -> None:
         names, frames = plan.names, settings.frames
         child = names.frame(frames.base_footprint) if settings.set_child_frame_id else ""
         odom, truth = names.frame(frames.odom), names.frame(frames.ground_truth)
@@ -144,7 +150,11 @@ class RobotTopics:
             if scan.fan is not None
         ]
         self.plan = plan
-        self._commands = rospy.Subscriber(names.topic("cmd_vel"), Twist, command, queue_size=10)
+        self._commands = [
+            rospy.Subscriber(names.topic("cmd_vel"), Twist, hear.twist, queue_size=10),
+            rospy.Subscriber(names.topic("cmd_pose"), Pose, hear.pose, queue_size=10),
+            rospy.Subscriber(names.topic("cmd_pose_stamped"), PoseStamped, lambda m: hear.pose(m.pose), queue_size=10),
+        ]
 
     @property
     def plan(self) -> RobotPlan:
@@ -159,7 +169,8 @@ class RobotTopics:
 
     def close(self) -> None:
         """End all topics."""
-        self._commands.unregister()
+        for subscriber in self._commands:
+            subscriber.unregister()
         for topic in (self.odometry, self.truth, self.collision, *self._scans):
             if topic is not None:
                 topic.close()

@@ -7,9 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rospy
-from geometry_msgs.msg import Pose
 from std_srvs.srv import (
     Empty,
     EmptyRequest,
@@ -23,8 +21,8 @@ from std_srvs.srv import (
 )
 
 from kurumaisu.errors import Error
-from kurumaisu.ros.messages import yaw_of
 from kurumaisu.ros.requests import Requests
+from kurumaisu.ros.rotation import pose_of
 from kurumaisu.ros.stageros_session import Session
 from kurumaisu.srv import (
     Delete,
@@ -38,7 +36,6 @@ from kurumaisu.srv import (
     StateFile,
     StateFileRequest,
 )
-from kurumaisu.types import FloatArray
 
 
 class Services:
@@ -107,12 +104,3 @@ class Services:
         except Error as error:
             return False, str(error)
         return True, f"at {self._session.time:.3f} s"
-
-
-def pose_of(pose: Pose) -> FloatArray:
-    """Return x, y, z [m], heading [rad] of a pose. Raise Error unless it is finite and turns about z."""
-    values = np.array([pose.position.x, pose.position.y, pose.position.z, yaw_of(pose.orientation)])
-    turn = pose.orientation
-    if not np.isfinite(values).all() or turn.z**2 + turn.w**2 == 0:
-        raise Error(f"pose: must be finite and have an orientation, about z: {' '.join(str(pose).split())}")
-    return values

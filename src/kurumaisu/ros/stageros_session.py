@@ -6,16 +6,19 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Pose, Twist
 
 from kurumaisu.errors import Error
+from kurumaisu.ros.rotation import pose_of
 from kurumaisu.ros.stageros_names import Names, names_of, names_of_another
 from kurumaisu.ros.stageros_plan import plan_world
 from kurumaisu.ros.stageros_publish import Publisher
+from kurumaisu.ros.stageros_robot import Ears
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.sim.simulator import Simulator
 from kurumaisu.types import FloatArray
@@ -27,7 +30,7 @@ _Command = tuple[float, float, float]
 
 
 class Session:
-    """Steps a world and publishes every step; all but hear must be called by one thread."""
+    """Steps a world and publishes every step; all but hear and carry must be called by one thread."""
 
     def __init__(self, world: World, settings: StagerosSettings, use_model_names: bool) -> None:
         """Advertise everything; the node must have been initialised."""
@@ -41,9 +44,10 @@ class Session:
         self._number = 0  # of steps since the start; /clock is that many times the interval
         self._last_command = 0  # [ns]
         self._heard: deque[tuple[Names, _Command]] = deque()
+        self._carried: deque[tuple[Names, FloatArray]] = deque()
         self._home = names_of(world.models, settings, use_model_names)
         self._numbered = len(self._home)  # robots that there have ever been
-        self._publisher = Publisher(settings, world.interval, self.hear)
+        self._publisher = Publisher(settings, world.interval, self._ears)
         self._take(self._home)
 
     @property
@@ -58,11 +62,7 @@ class Session:
 
     def step(self) -> None:
         """Simulate one interval of the world and publish it."""
-        while self._heard:
-            names, command = self._heard.popleft()
-            if names in self._rows:
-                self._commands[self._rows[names]] = command
-            self._last_command = self._number * self._step_ns
+        self._obey()
         observation = self._simulator.step(self._commands)
         self._number += 1
         now = self._number * self._step_ns
@@ -70,6 +70,28 @@ class Session:
         if timeout > 0 and now - self._last_command >= timeout * _NS:
             self._commands[:] = 0.0  # of all robots: any command for any robot keeps all going, as in 1.8.0
         self._publisher.publish(observation, self._model_poses, self._number, divmod(now, _NS))
+
+    def _ears(self, names: Names) -> Ears:
+        return Ears(partial(self.hear, names), partial(self.carry, names))
+
+    def _obey(self) -> None:
+        """Heed what has been heard since the last step."""
+        while self._heard:
+            names, command = self._heard.popleft()
+            if names in self._rows:
+                self._commands[self._rows[names]] = command
+            self._last_command = self._number * self._step_ns
+        while self._carried:
+            names, pose = self._carried.popleft()
+            if names in self._rows:
+                self._simulator.set_pose(self._simulator.robots[self._rows[names]], pose)
+
+    def carry(self, names: Names, pose: Pose) -> None:
+        """Put a robot to a pose, from any thread, before the next step."""
+        try:
+            self._carried.append((names, pose_of(pose)))
+        except Error as error:
+            rospy.logwarn_throttle(5.0, f"STAGEROS_POSE_BAD {names.topic('cmd_pose')}: dropped: {error}")
 
     def hear(self, names: Names, message: Twist) -> None:
         """Take a robot's command, from any thread; the next step heeds it."""
