@@ -46,14 +46,14 @@ class Parts:
     @property
     def empty(self) -> bool:
         """Whether there is no body."""
-        return not self.prisms and not sum(map(len, self.segments))
+        return not any(len(part) for part in (*self.segments, *(prism.corners for prism in self.prisms)))
 
     def bounds(self) -> FloatArray:
         """Return the lowest and highest x, y, z (2, 3)."""
         points = np.concatenate([*(s.reshape(-1, 2) for s in self.segments), *(p.corners for p in self.prisms)])
-        heights = np.concatenate([*(h.ravel() for h in self.heights), *(p.heights for p in self.prisms)])
-        low = np.array([*points.min(axis=0), heights.min()])
-        high = np.array([*points.max(axis=0), heights.max()])
+        heights = np.concatenate([*self.heights, *(p.heights[None] for p in self.prisms)])
+        low = np.array([*points.min(axis=0), heights[:, 0].min()])
+        high = np.array([*points.max(axis=0), heights[:, 1].max()])
         if self.box is not None:
             low, high = np.minimum(low, self.box[0]), np.maximum(high, self.box[1])
         return np.array([low, high])
@@ -82,14 +82,16 @@ class Parts:
         turn = np.array([[c, s], [-s, c]])
         segments = [np.empty((0, 2)), *(s.reshape(-1, 2) for s in self.segments)]
         heights = [np.empty((0, 2)), *self.heights]
-        for prism in self.prisms:
+        # What is upside down is hit by no ray, as in Stage.
+        prisms = [p for p in self.prisms if len(p.corners) > 1 and p.heights[0] <= p.heights[1]]
+        for prism in prisms:
             if prism.drawn:
                 segments.append(edges(prism.corners).reshape(-1, 2))
                 heights.append(np.tile(prism.heights, (len(prism.corners), 1)))
         return Shape(
             segments=np.asarray(np.concatenate(segments) @ turn + origin[:2]).reshape(-1, 4),
             heights=np.concatenate(heights) + origin[2],
-            polygons=tuple(Polygon(p.corners @ turn + origin[:2], p.heights + origin[2], color) for p in self.prisms),
+            polygons=tuple(Polygon(p.corners @ turn + origin[:2], p.heights + origin[2], color) for p in prisms),
         )
 
 

@@ -124,18 +124,20 @@ def _note_stretch(values: Values, bitmap: Bitmap, name: str) -> None:
 
 def _block(values: Values) -> Prism:
     count = values.whole("points", 0)
-    if not 2 <= count <= _MOST_POINTS:
-        raise values.error("points", f"points must be 2 to {_MOST_POINTS}, not {count}")
+    if not 0 <= count <= _MOST_POINTS:
+        raise values.error("points", f"points must be 0 to {_MOST_POINTS}, not {count}")
+    if count < 3:
+        values.notes.add(values.entity.name, f"a block of {count} points has no area")
     for i in range(count):
         if not values.has(f"point[{i}]"):
             values.notes.add(values.entity.name, f"block has no point[{i}]: it is read as [0 0], as Stage does")
-    corners = np.array([values.several(f"point[{i}]", "ll", (0.0, 0.0)) for i in range(count)])
+    corners = np.array([values.several(f"point[{i}]", "ll", (0.0, 0.0)) for i in range(count)]).reshape(-1, 2)
     x, y = corners.T
     if (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() < 0:
         corners = corners[::-1]  # counter-clockwise, as in Stage
     heights = np.array(values.several("z", "ll", (0.0, 0.0)))
     if heights[0] > heights[1]:
-        raise values.error("z", f"z must be [MIN MAX], not {heights[0]:g}, {heights[1]:g}")
+        values.notes.add(values.entity.properties["z"].name, f"z should be [MIN MAX]: {heights[0]:g}, {heights[1]:g}")
     if not values.has("z"):
         values.notes.add(values.entity.name, "block has no z: it is as flat as the floor, as in Stage", "flat block")
     return Prism(np.ascontiguousarray(corners), heights)

@@ -48,14 +48,15 @@ class _Macro:
 
 def parse(top: Path, values: Mapping[str, str], notes: Notes) -> Entity:
     """Return the world entity of a file, parameters filled in. Raise Error with the place of what does not parse."""
-    return _Parser(Reader(top, values, notes).read(), top).world()
+    return _Parser(Reader(top, values, notes).read(), top, notes).world()
 
 
 class _Parser:
     """All tokens, and the macros known so far. Methods take and return places among the tokens."""
 
-    def __init__(self, tokens: list[Token], top: Path) -> None:
+    def __init__(self, tokens: list[Token], top: Path, notes: Notes) -> None:
         self._tokens = tokens
+        self._notes = notes
         self._macros: dict[str, _Macro] = {}
         self._steps = 0
         self._world = Entity("world", Token(Kind.WORD, "world", Source(top, tokens[-1].source.text), 0))
@@ -151,10 +152,24 @@ class _Parser:
                 at = self._word(entity, at, depth)
             elif kind is Kind.CLOSE:
                 return at + 1
+            elif kind is Kind.OPEN:
+                entity, at = self._second_bracket(entity, tokens[at]), at + 1
             elif kind is Kind.END:
                 raise entity.name.error(f"the '(' of {entity.name.text} is never closed")
             else:
                 raise tokens[at].error(f"expected a property or an entity, not {tokens[at]}")
+
+    def _second_bracket(self, entity: Entity, bracket: Token) -> Entity:
+        """Return the entity that a '(' without a name before it begins: as in Stage, another one of the same type.
+
+        It ends at the same ')', and there is none if the type is a macro.
+        """
+        self._notes.add(bracket, "a '(' without a name: is this meant?")
+        self._count(bracket, 1)
+        if entity.name.text in self._macros:
+            return entity
+        entity.children.append(Entity(entity.name.text, entity.name))
+        return entity.children[-1]
 
     def _template(self, macro: _Macro, word: Token, depth: int) -> Entity:
         """Return what a macro comes to, read once for all its instances."""

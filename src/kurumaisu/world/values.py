@@ -15,6 +15,7 @@ from kurumaisu.world.tokens import Kind, Token
 
 _LARGEST = 2.0**31  # of a number: what C's int holds
 _PREFIX = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")  # what C's atof takes of a string
+_WHOLE = re.compile(r"\s*[+-]?\d+")
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,13 @@ class Values:
         return self.number(name, default / self.units.angle) * self.units.angle
 
     def whole(self, name: str, default: int) -> int:
-        """Return a whole number, what follows the point being dropped."""
-        return int(self.number(name, default))
+        """Return a whole number: what stands before the first character that is no digit, as C's atoi takes it."""
+        given = self.entity.properties.get(name)
+        if given is None:
+            return default
+        token = self._first(given)
+        value, match = self._number(given, token), _WHOLE.match(token.string)
+        return int(value) if token.kind is Kind.NUMBER else int(match[0]) if match else 0
 
     def text(self, name: str, default: str) -> str:
         """Return a string."""

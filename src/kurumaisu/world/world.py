@@ -101,8 +101,8 @@ def load_world(path: Path, *, image_extents: bool = False, values: Mapping[str, 
         top, image_extents = _map_alone(path), True
     else:
         top = parse(path, values or {}, notes)
-    catalogue.check(top, notes)
     said = Values(top, _units(top, notes), notes)
+    catalogue.check(top, notes)
     models = Builder(said.units, notes, Shaper(path, image_extents)).build(top)
     return _world(path, models, said)
 
