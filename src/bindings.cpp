@@ -9,6 +9,7 @@
 
 #include <stdexcept>
 
+#include "contact/bindings.h"
 #include "kalman/whiten.h"
 #include "model/laser_error.h"
 #include "model/unicycle.h"
@@ -133,6 +134,8 @@ PYBIND11_MODULE(_core, m) {
   m.doc() = "Equations (1)-(4) of the paper, ray casting and whitening, in C++.";
   bindModel(m);
   bindKalman(m);
+  k::bindContact(m);
+  k::bindFollow(m);
   k::bindRaycast(m);
   k::bindCamera(m);
 }

@@ -14,9 +14,9 @@ from kurumaisu.critic import cli
 from kurumaisu.critic.recording import Run, Series
 from kurumaisu.critic.write_csv import write_csv_run
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
+from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
 from kurumaisu.sim.joystick import joystick
 from kurumaisu.sim.settings import load_physics, with_effects
-from kurumaisu.sim.simulator import NEUTRAL, Command, Simulator
 from kurumaisu.world import load_world
 
 _DRIVES, _SECONDS = 3, 45.0
@@ -38,7 +38,7 @@ def run(folder: Path, seed: int) -> None:
 
 def draw(rng: np.random.Generator) -> EffectSetting:
     """Return one effect of the catalogue, of a size that matters."""
-    candidates = [effect for effect in effects.ALL if not effect.random]
+    candidates = [effect for effect in effects.CRITICISED if not effect.random]
     effect = candidates[rng.integers(len(candidates))]
     values = {}
     for parameter in effect.parameters:
@@ -52,7 +52,7 @@ def record(folder: Path, secret: EffectSetting, rng: np.random.Generator) -> Non
     model = with_effects(load_model(shipped("launch/md100.yaml")), shipped("launch/uneven_floor.yaml"))
     model = replace(model, effects=(*model.effects, secret))
     physics = load_physics(shipped("launch/sim_node.yaml"))
-    simulator = Simulator(model, load_world(shipped("worlds/hall.world")), physics)
+    simulator = ChairSimulator(model, load_world(shipped("worlds/hall.world")), physics)
     for i in range(_DRIVES):
         print(f"  driving {i + 1} of {_DRIVES} ...", flush=True)
         write_csv_run(folder / f"drive_{i + 1}", _drive(f"drive_{i + 1}", simulator, model, rng))
@@ -60,7 +60,7 @@ def record(folder: Path, secret: EffectSetting, rng: np.random.Generator) -> Non
     (folder / "meta.yaml").write_text(yaml.safe_dump(meta), encoding="utf-8")
 
 
-def _drive(name: str, simulator: Simulator, model: Model, rng: np.random.Generator) -> Run:
+def _drive(name: str, simulator: ChairSimulator, model: Model, rng: np.random.Generator) -> Run:
     commands = joystick(_SECONDS, rng)
     commands[:, 0] = simulator.step_time * np.round(commands[:, 0] / simulator.step_time)  # when the D/A changes
     voltages = np.column_stack([model.translation.volts(commands[:, 1]), model.steering.volts(commands[:, 2])])

@@ -12,7 +12,7 @@ from sensor_msgs.msg import LaserScan
 
 from kurumaisu.msg import Voltages
 from kurumaisu.params import Laser
-from kurumaisu.sim.simulator import Command
+from kurumaisu.sim.chair import Command
 from kurumaisu.types import FloatArray
 
 

@@ -19,8 +19,8 @@ from kurumaisu.msg import Voltages
 from kurumaisu.ros import messages
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.sim_settings import SimSettings, read_settings
+from kurumaisu.sim.chair import ChairSimulator, Observation
 from kurumaisu.sim.holder import VoltageHolder
-from kurumaisu.sim.simulator import Observation, Simulator
 
 _NS = 1_000_000_000
 
@@ -31,7 +31,7 @@ class SimNode:
     def __init__(self, settings: SimSettings) -> None:
         """Advertise everything; the node must have been initialised."""
         self._settings = settings
-        self._simulator = Simulator(settings.model, settings.world, settings.physics)
+        self._simulator = ChairSimulator(settings.model, settings.world, settings.physics)
         self._epoch = round(settings.start_time * _NS)  # /clock at the simulator's time 0; reset moves it on
         self._now = self._epoch
         self._steps = 0
@@ -123,8 +123,10 @@ class SimNode:
             first_beam = messages.stamp_of(self._epoch + round(observation.scan.time * _NS))
             self._scan.publish(messages.laser_scan(first_beam, settings.model.laser, observation.scan.ranges))
         if self._steps % settings.ground_truth_every == 0:
+            seen = observation.reference
+            measured = messages.stamp_of(self._epoch + round(float(seen.times) * _NS))
             self._truth.publish(
-                messages.odometry(stamp, settings.map_frame, settings.base_frame, observation.pose, observation.rates)
+                messages.odometry(measured, settings.map_frame, settings.base_frame, seen.poses, seen.rates)
             )
         if self._steps % settings.clock_every == 0:
             self._clock.publish(Clock(stamp))

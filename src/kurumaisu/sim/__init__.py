@@ -1,2 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The simulator, without ROS."""
+
+from kurumaisu.sim.observation import Observation, Scan
+from kurumaisu.sim.options import Options, load_options
+from kurumaisu.sim.simulator import Simulator
+
+__all__ = ["Observation", "Options", "Scan", "Simulator", "load_options"]

@@ -7,7 +7,7 @@ import math
 from collections import deque
 
 from kurumaisu.errors import Error
-from kurumaisu.sim.simulator import NEUTRAL, Command
+from kurumaisu.sim.chair import NEUTRAL, Command
 
 
 class VoltageHolder:

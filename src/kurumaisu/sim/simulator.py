@@ -1,99 +1,206 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulator: voltages in, poses and scans out; one seed, one run."""
+"""The simulator of a world file: N robots as arrays, one step at a time, one seed, one run."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from kurumaisu._core import Scene
 from kurumaisu.errors import Error
-from kurumaisu.params import Model
-from kurumaisu.sim.body import ChairBody
-from kurumaisu.sim.plant import Plant
-from kurumaisu.sim.scanner import Scan, Scanner
-from kurumaisu.sim.settings import Physics
+from kurumaisu.sim import snapshot, state
+from kurumaisu.sim.drive import without_nonsense
+from kurumaisu.sim.fans import RangerFan
+from kurumaisu.sim.life import checked_pose, moved, rebuilt, same_fans, with_newcomers
+from kurumaisu.sim.machinery import Machinery
+from kurumaisu.sim.observation import Observation
+from kurumaisu.sim.options import Options
+from kurumaisu.sim.population import Population
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
-
-
-@dataclass(frozen=True)
-class Command:
-    """What the D/A puts out: voltages [V], and the signs of the rates they stand for, NaN where unknown."""
-
-    v_f: float
-    v_s: float
-    sign_v: float
-    sign_w: float
-
-
-NEUTRAL = Command(0.0, 0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Observation:
-    """The truth after a step, and the scan that ended in it, if one did.
-
-    time [s] since the reset; pose (3,) of base_link in the map, theta not wrapped; rates (3,) over the step:
-    forward, leftward [m/s], yaw [rad/s]; contact: an obstacle limited the motion.
-    """
-
-    time: float
-    pose: FloatArray
-    rates: FloatArray
-    contact: bool
-    scan: Scan | None
+from kurumaisu.world.model import Model
 
 
 class Simulator:
-    """One chair in one world."""
+    """All robots of one world; several simulators do not know of each other."""
 
-    def __init__(self, model: Model, world: World, physics: Physics) -> None:
-        """Build the world; the effects that act are the model's. Call reset before step.
-
-        Raise Error if the world has no start pose or the chair does not fit there.
-        """
-        self._model = model
-        self._physics = physics
+    def __init__(self, world: World, options: Options) -> None:
+        """Build the world and reset it with seed 0. Raise Error for options that do not fit the world."""
+        if options.scan_sweep > world.interval:
+            raise Error(
+                f"scan_sweep: {options.scan_sweep:g} s is more than a step of {world.path}: {world.interval:g} s"
+            )
         self._world = world
-        self._scene = Scene(world.segments)
-        if self._new_body().touches():
-            raise Error(f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose")
+        self._options = options
+        self._late = options.timing == "consistent" or options.semantics == "physical"
+        self._home = Machinery(Population.first(world.models, world.poses), options, world.interval)
+        self._fingerprint = state.digest((world.models, world.poses, world.interval, replace(options, threads=1)))
+        self.reset(0)
+        self.warnings = (*world.warnings, *self._stuck())
 
     def reset(self, seed: int) -> Observation:
-        """Put the chair back to its start, at rest, and start time and randomness anew."""
-        plant_rng, laser_rng = (np.random.default_rng(sequence) for sequence in np.random.SeedSequence(seed).spawn(2))
-        self._plant = Plant(self._model, self._physics.step, plant_rng)
-        self._scanner = Scanner(self._model.laser, self._scene, laser_rng)
-        self._steps = 0
-        self._body = self._new_body()
-        scan = self._scanner.observe(0.0, self._body.pose)
-        return Observation(0.0, self._body.pose, np.zeros(3), False, scan)
+        """Go back to the world file's start, time 0, and start randomness anew."""
+        self._machinery = self._home
+        home = self._home
+        self._odometry_rng, self._ranger_rng = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
+        self._step = 0
+        self._dropped = 0
+        home.place(home.population.poses[home.bodies.heads])
+        home.begin()
+        home.localization.draw_errors(self._odometry_rng)
+        home.rangers.start(0.0, home.frames, self._ranger_rng)
+        return self.observe()
 
-    def step(self, command: Command) -> Observation:
-        """Advance by one physics step with the command held."""
-        v, w = self._plant.from_voltages(
-            np.array([command.v_f]),
-            np.array([command.v_s]),
-            np.array([command.sign_v]),
-            np.array([command.sign_w]),
+    def step(self, commands: FloatArray) -> Observation:
+        """Advance by one interval of the world.
+
+        commands (n, 3): forward, leftward [m/s], turn [rad/s], or of a car the steering angle [rad]. Those with a
+        number that is not finite count as zero and are counted. Raise Error for another shape.
+        """
+        machinery = self._machinery
+        commands = self._heard(commands)
+        self._step += 1
+        due = machinery.rhythm.due(self._step)
+        if due is not None:
+            machinery.drive.update(commands, due)
+        if self._late:
+            machinery.move()
+        if due is not None:
+            machinery.locate(due, self._odometry_rng)
+        way = (machinery.before, machinery.frames)
+        machinery.rangers.update(self._step, self.time, way, self._ranger_rng)
+        if not self._late:
+            machinery.move()
+        return self.observe()
+
+    def observe(self) -> Observation:
+        """Return what the last step has, and what was changed since by hand; nothing is measured anew."""
+        machinery = self._machinery
+        return Observation(
+            time=self.time,
+            poses=machinery.robot_poses,
+            odometry=machinery.localization.estimates.copy(),
+            velocities=machinery.drive.velocities.copy(),
+            stalled=machinery.robots_stalled,
+            scans=machinery.rangers.scans,
+            dropped=self._dropped,
         )
-        rates, contact = self._body.move(float(v[0]), float(w[0]))
-        self._steps += 1
-        time = self._steps * self._physics.step
-        pose = self._body.pose
-        return Observation(time, pose, rates, contact, self._scanner.observe(time, pose))
 
-    def _new_body(self) -> ChairBody:
-        return ChairBody(self._model.chassis, self._world.obstacles, self._physics, self._world.start)
+    def reset_positions(self) -> None:
+        """Put all that moves back to where it began; as in Stage, time, odometry and commands go on."""
+        machinery = self._machinery
+        machinery.place(machinery.population.poses[machinery.bodies.heads])
+
+    def set_pose(self, model: str | int | Model, pose: FloatArray | Sequence[float]) -> None:
+        """Put a model, with all that stands on it, to a pose (4,) in the map: x, y, z [m], heading [rad].
+
+        The model is given by its name, its number in models, or itself.
+
+        A robot's odometry goes on as if nothing had happened. Raise Error for an unknown model.
+        """
+        self._have(moved(self._machinery, self._index(model), checked_pose(pose)))
+
+    def spawn(self, models: Sequence[Model], pose: FloatArray | Sequence[float]) -> None:
+        """Add a model with all that stands on it, parents first, the first one at a pose (4,) in the map."""
+        population = with_newcomers(self._machinery.population, models, checked_pose(pose), self._step)
+        self._have(rebuilt(self._machinery, population))
+
+    def delete(self, model: str | int | Model) -> None:
+        """Remove a model with all that stands on it. Raise Error for an unknown one."""
+        self._have(rebuilt(self._machinery, self._machinery.population.without(self._index(model))))
+
+    def save(self) -> bytes:
+        """Return the whole state, from which load continues bit for bit."""
+        return state.pack(self._state())
+
+    def load(self, saved: bytes) -> Observation:
+        """Continue from a state that a simulator of the same world and options saved. Raise Error for another one."""
+        known = state.unpack(saved)
+        if known["world"] != self._fingerprint:
+            raise Error(f"state: is of another world than {self._world.path}, or of other options")
+        machinery = self._home
+        if known["population"] is not None:
+            machinery = Machinery(known["population"], self._options, self._world.interval)
+            machinery.begin()
+        self._machinery = machinery
+        self._step, self._dropped = known["step"], known["dropped"]
+        self._odometry_rng.bit_generator.state, self._ranger_rng.bit_generator.state = known["random"]
+        snapshot.restore(machinery, known["machinery"])
+        return self.observe()
+
+    def state_hash(self) -> str:
+        """Return a digest of the whole state, randomness included."""
+        return state.digest(self._state())
 
     @property
-    def step_time(self) -> float:
+    def time(self) -> float:
+        """Simulated time [s] since the reset."""
+        return self._step * self._world.interval
+
+    @property
+    def interval(self) -> float:
         """Length of a step [s]."""
-        return self._physics.step
+        return self._world.interval
 
     @property
-    def ambiguous_samples(self) -> int:
-        """Steps since the reset whose voltages stood for two rates."""
-        return self._plant.ambiguous_samples
+    def robots(self) -> tuple[Model, ...]:
+        """Models of the robots, in the order of commands and observations."""
+        return self._machinery.robots
+
+    @property
+    def rangers(self) -> tuple[RangerFan, ...]:
+        """All fans of all rangers, in the order of an observation's scans."""
+        return self._machinery.fans
+
+    @property
+    def models(self) -> tuple[Model, ...]:
+        """All models that there are now."""
+        return self._machinery.population.models
+
+    @property
+    def model_poses(self) -> FloatArray:
+        """Poses (m, 4) of all models in the map now."""
+        return self._machinery.model_poses()
+
+    def _state(self) -> dict[str, Any]:
+        machinery = self._machinery
+        return {
+            "world": self._fingerprint,
+            "population": None if machinery is self._home else machinery.population,
+            "step": self._step,
+            "dropped": self._dropped,
+            "random": (self._odometry_rng.bit_generator.state, self._ranger_rng.bit_generator.state),
+            "machinery": snapshot.take(machinery),
+        }
+
+    def _heard(self, commands: FloatArray) -> FloatArray:
+        """Return commands that are numbers."""
+        commands = np.asarray(commands, dtype=np.float64)
+        if commands.shape != self._machinery.drive.velocities.shape:
+            raise Error(f"commands: must have shape ({len(self.robots)}, 3), not {commands.shape}")
+        commands, dropped = without_nonsense(commands)
+        self._dropped += dropped
+        return commands
+
+    def _index(self, model: str | int | Model) -> int:
+        return self._machinery.population.index(model)
+
+    def _have(self, machinery: Machinery) -> None:
+        """Go on with machinery that is new, or the old one changed."""
+        old, self._machinery = self._machinery, machinery
+        if machinery is not old:
+            fresh = np.isin(machinery.robot_keys, old.robot_keys, invert=True)
+            machinery.localization.draw_errors(self._odometry_rng, fresh)
+            machinery.rangers.start(self.time, machinery.frames, self._ranger_rng)
+            machinery.rangers.take_over(old.rangers.scans, same_fans(machinery, old))
+
+    def _stuck(self) -> list[str]:
+        """Say which robots cannot move from where they begin."""
+        machinery = self._machinery
+        return [
+            f"{robot.place}: {robot.name or robot.type} touches something where it begins; it stalls until it is free"
+            for robot, touches in zip(machinery.robots, machinery.touching(), strict=True)
+            if touches
+        ]

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How bodies move: the protocol, and Stage's motion, which takes a whole step or none of it."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from kurumaisu._core import Arena
+from kurumaisu.sim.partition import Bodies, attached, relative
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+StateArray = FloatArray | BoolArray
+_TURN = 2 * math.pi  # [rad]
+
+
+class Motion(Protocol):
+    """Moves all bodies of a world, robots or not, in the order of Bodies, and tells the Arena of it.
+
+    The simulator makes a new Motion whenever bodies come or go or a wall is moved.
+    """
+
+    def place(self, poses: FloatArray) -> None:
+        """Put all bodies at poses (b, 4) of x, y, z [m], heading [rad], at rest and not stalled."""
+
+    def move(self, velocities: FloatArray, dt: float) -> tuple[FloatArray, BoolArray]:
+        """Move for dt [s] with wanted velocities (b, 3): forward, leftward [m/s], turn [rad/s]; 0 where nobody drives.
+
+        Return poses (b, 4) and whether each was stopped by something (b,). The arrays may be the Motion's own: the
+        caller copies what it keeps.
+        """
+
+    def state(self) -> dict[str, StateArray]:
+        """Return all that the next moves depend on, by name, arrays (b, ...): copies; `poses` is one of them."""
+
+    def restore(self, state: dict[str, StateArray]) -> None:
+        """Go back to a state; its arrays have a row for each body."""
+
+
+class StageMotion:
+    """Stage's: along the old heading, all or nothing; a body at rest keeps what was said of its last move."""
+
+    def __init__(self, arena: Arena, numbers: IntArray, bodies: Bodies) -> None:
+        """Move the bodies that the arena knows by numbers (b,)."""
+        count = len(bodies)
+        self._arena = arena
+        self._numbers = numbers
+        self._poses = np.zeros((count, 4))
+        self._stalled = np.zeros(count, dtype=np.bool_)
+        self._new = np.zeros((count, 4))
+        self._steps, self._across = np.zeros((count, 3)), np.zeros((count, 2))
+        self._headings, self._cos, self._sin, self._turns = (np.zeros((count, 1)) for _ in range(4))
+        carriers = set(bodies.carrier.tolist())
+        self._riders = [_riders(bodies, body) if body in carriers else [] for body in range(count)]
+        self._carries = np.array([len(riders) > 0 for riders in self._riders], dtype=np.bool_)
+        self._apart = not self._carries.any()
+
+    def place(self, poses: FloatArray) -> None:
+        """Put all bodies at poses (b, 4), not stalled."""
+        self._poses[:] = poses
+        self._stalled[:] = False
+        self._arena.set_poses(self._numbers, self._poses)
+
+    def move(self, velocities: FloatArray, dt: float) -> tuple[FloatArray, BoolArray]:
+        """Move each body whose velocity is not zero, in order, those that carry others first; see Motion."""
+        moving = velocities.any(axis=1)
+        if moving.any():
+            self._euler(velocities, dt)
+            if not self._apart:
+                for body in np.flatnonzero(moving & self._carries):
+                    self._settle_stack(int(body))
+                    self._euler(velocities, dt)  # of those that were carried
+                moving &= ~self._carries
+            self._settle(slice(None) if moving.all() else np.flatnonzero(moving))
+        return self._poses, self._stalled
+
+    def state(self) -> dict[str, StateArray]:
+        """Return poses and stalls."""
+        return {"poses": self._poses.copy(), "stalled": self._stalled.copy()}
+
+    def restore(self, state: dict[str, StateArray]) -> None:
+        """Go back to a state."""
+        self.place(np.asarray(state["poses"], dtype=np.float64))
+        self._stalled[:] = state["stalled"]
+
+    def _euler(self, velocities: FloatArray, dt: float) -> None:
+        """Leave in self._new where each body would go."""
+        steps, across, new = self._steps, self._across, self._new
+        np.multiply(velocities, dt, out=steps)
+        np.negative(steps[:, 1], out=across[:, 0])  # steps turned by a quarter
+        across[:, 1] = steps[:, 0]
+        self._headings[:] = self._poses[:, 3:]  # in one piece: see geometry.cos_sin
+        np.cos(self._headings, out=self._cos)
+        np.sin(self._headings, out=self._sin)
+        new[:] = self._poses
+        new[:, 3] += steps[:, 2]
+        along = steps[:, :2]
+        np.multiply(along, self._cos, out=along)
+        np.multiply(across, self._sin, out=across)
+        np.add(along, across, out=along)
+        new[:, :2] += along
+        np.multiply(new[:, 3:], 1 / _TURN, out=self._turns)
+        np.rint(self._turns, out=self._turns)
+        np.multiply(self._turns, _TURN, out=self._turns)
+        new[:, 3:] -= self._turns
+
+    def _settle(self, which: slice | IntArray) -> None:
+        """Let bodies take their steps, each on its own."""
+        stalled = self._arena.move(self._numbers[which], self._new[which])
+        self._stalled[which] = stalled
+        if isinstance(which, slice):
+            np.copyto(self._poses, self._new, where=~stalled[:, np.newaxis])
+        else:
+            free = which[~stalled]
+            self._poses[free] = self._new[free]
+
+    def _settle_stack(self, body: int) -> None:
+        """Let a body take its step with all that stand on it, or none of them."""
+        old = self._poses[body]
+        together = np.array([body, *self._riders[body]])
+        new = attached(self._new[body], relative(old, self._poses[together]))
+        stalled = bool(self._arena.move(self._numbers[together], new, np.zeros(len(together), dtype=np.int64))[0])
+        self._stalled[body] = stalled
+        if not stalled:
+            self._poses[together] = new
+
+
+def _riders(bodies: Bodies, body: int) -> list[int]:
+    """Return the bodies that stand on one, at whatever height."""
+    riders: list[int] = []
+    for other, below in enumerate(bodies.carrier.tolist()):
+        if below == body or below in riders:
+            riders.append(other)
+    return riders

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All rangers of a world: where their beams leave from, and when; one call of the ray caster for all that are due."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu._core import Arena
+from kurumaisu.sim.fans import RangerFan, spread
+from kurumaisu.sim.observation import Scans, Sweep
+from kurumaisu.sim.partition import attached
+from kurumaisu.sim.sensors.ranger_noise import RangerNoise
+from kurumaisu.types import FloatArray, IntArray
+
+_TURN = 2 * np.pi
+
+
+class Rangers:
+    """Takes the scans of all fans; those of one period and birth are a cohort."""
+
+    def __init__(self, arena: Arena, fans: Sequence[RangerFan], rhythm: IntArray, sweep: float) -> None:
+        """Measure with fans whose rhythm (f, 2) is their period and birth [steps]; sweep: share of a step."""
+        self._cohorts: list[_Cohort] = []
+        self._places: list[tuple[int, int, int]] = [(0, 0, 0)] * len(fans)
+        for number, (every, birth) in enumerate(sorted(set(map(tuple, rhythm.tolist())))):
+            members = [i for i in range(len(fans)) if rhythm[i].tolist() == [every, birth]]
+            self._cohorts.append(_Cohort(arena, [fans[i] for i in members], (every, birth % every), sweep))
+            ends = np.cumsum([fans[i].fan.samples for i in members]).tolist()
+            for i, start, stop in zip(members, [0, *ends], ends, strict=False):
+                self._places[i] = (number, start, stop)
+        self._scans = Scans((), self._places)
+
+    @property
+    def scans(self) -> Scans:
+        """The newest scan of each fan."""
+        return self._scans
+
+    def start(self, time: float, frames: FloatArray, rng: np.random.Generator) -> None:
+        """Look once with all fans, before their first update, from frames (b + 1, 4): bodies and the map."""
+        self._scans = Scans(tuple(c.measure(time, 0, frames, frames, rng) for c in self._cohorts), self._places)
+
+    def update(self, step: int, time: float, way: tuple[FloatArray, FloatArray], rng: np.random.Generator) -> None:
+        """Measure with those due in a step, counted from 1, on the way between frames (b + 1, 4)."""
+        old = self._scans.sweeps
+        new = tuple(
+            c.measure(time, o.count + 1, *way, rng) if step % c.every == c.phase else o
+            for c, o in zip(self._cohorts, old, strict=True)
+        )
+        self._scans = Scans(new, self._places)
+
+    def take_over(self, old: Scans, same: Sequence[tuple[int, int]]) -> None:
+        """Have the old scans of fans that are the same: pairs of their places, here and there."""
+        sweeps = [replace(s, ranges=s.ranges.copy(), returns=s.returns.copy()) for s in self._scans.sweeps]
+        for here, there in same:
+            number, start, stop = self._places[here]
+            scan, sweep = old[there], sweeps[number]
+            sweep.ranges[start:stop], sweep.returns[start:stop] = scan.ranges, scan.returns
+            sweeps[number] = replace(sweep, time=scan.time, count=scan.count)
+        self._scans = Scans(tuple(sweeps), self._places)
+
+    def keep(self, sweeps: tuple[Sweep, ...]) -> None:
+        """Have these as the newest scans, of the same cohorts."""
+        self._scans = Scans(sweeps, self._places)
+
+
+class _Cohort:
+    """Fans that are always due together."""
+
+    def __init__(self, arena: Arena, fans: Sequence[RangerFan], rhythm: tuple[int, int], sweep: float) -> None:
+        self.every, self.phase = rhythm
+        self._arena = arena
+        self._body = np.array([fan.body for fan in fans], dtype=np.int64)
+        self._trees = np.array([fan.model.root for fan in fans], dtype=np.int64)
+        self._mounts = np.array([fan.mount for fan in fans]).reshape(-1, 4)
+        self._fans = np.array([[*spread(f.fan), f.fan.samples, f.fan.range_max] for f in fans]).reshape(-1, 4)
+        self._noise = RangerNoise([fan.fan for fan in fans])
+        self._ahead = np.ascontiguousarray(self._mounts[:, :2])
+        self._aside = np.stack([-self._ahead[:, 1], self._ahead[:, 0]], axis=-1)  # turned by a quarter
+        self._origins = np.empty((len(fans), 4))
+        self._part = np.empty((len(fans), 2))
+        self._headings, self._cos, self._sin = (np.empty((len(fans), 1)) for _ in range(3))
+        self._beams = _Beams(fans, sweep) if sweep or self._noise.on_bearings else None
+
+    def measure(self, time: float, count: int, before: FloatArray, now: FloatArray, rng: np.random.Generator) -> Sweep:
+        if self._beams is None:
+            ranges, returns = self._arena.scan(self._place(now), self._trees, self._fans)
+        else:
+            ranges, returns = self._cast(self._beams, before, now, rng)
+        if self._noise.on_ranges:
+            ranges = self._noise.readings(ranges, rng)
+        return Sweep(ranges, returns, time, count)
+
+    def _place(self, frames: FloatArray) -> FloatArray:
+        """Return where the fans are (f, 4)."""
+        origins = self._origins
+        np.take(frames, self._body, axis=0, out=origins, mode="wrap")  # with a buffer, numpy wants a mode
+        self._headings[:] = origins[:, 3:]  # in one piece: see geometry.cos_sin
+        np.cos(self._headings, out=self._cos)
+        np.sin(self._headings, out=self._sin)
+        np.multiply(self._ahead, self._cos, out=self._part)
+        origins[:, :2] += self._part
+        np.multiply(self._aside, self._sin, out=self._part)
+        origins[:, :2] += self._part
+        origins[:, 2:] += self._mounts[:, 2:]
+        return origins
+
+    def _cast(
+        self, beams: _Beams, before: FloatArray, now: FloatArray, rng: np.random.Generator
+    ) -> tuple[FloatArray, FloatArray]:
+        """Cast every beam on its own, from where its robot is when it fires."""
+        bodies = self._body[beams.fan]
+        way = now - before
+        way[:, 3] -= _TURN * np.rint(way[:, 3] / _TURN)
+        frames = now[bodies] - (1.0 - beams.moment)[:, np.newaxis] * way[bodies]
+        origins = attached(frames, self._mounts[beams.fan])
+        origins[:, 3] += beams.bearings
+        if self._noise.on_bearings:
+            origins[:, 3] += self._noise.bearings(rng)
+        ranges, returns = self._arena.cast(origins, self._trees[beams.fan], float(beams.range_max.max(initial=1.0)))
+        beyond = ranges > beams.range_max
+        ranges[beyond], returns[beyond] = np.inf, 0.0
+        return ranges, returns
+
+
+class _Beams:
+    """All beams of some fans: fan (n,), bearing (n,) [rad], range_max (n,) [m], moment (n,) of firing in the step."""
+
+    def __init__(self, fans: Sequence[RangerFan], sweep: float) -> None:
+        samples = [fan.fan.samples for fan in fans]
+        self.fan = np.repeat(np.arange(len(fans)), samples)
+        self.bearings = np.concatenate([np.empty(0), *(fan.bearings for fan in fans)])
+        self.range_max = np.repeat(np.array([fan.fan.range_max for fan in fans], dtype=np.float64), samples)
+        shares = [np.arange(n) / max(n - 1, 1) for n in samples]
+        self.moment = 1.0 - sweep * (1.0 - np.concatenate([np.empty(0), *shares]))
