@@ -9,6 +9,7 @@
 
 #include <stdexcept>
 
+#include "contact/bindings.h"
 #include "kalman/whiten.h"
 #include "model/laser_error.h"
 #include "model/unicycle.h"
@@ -16,8 +17,6 @@
 
 namespace py = pybind11;
 namespace k = kurumaisu;
-
-void bindCamera(py::module_& m);  // raycast/camera_bindings.cpp
 
 namespace {
 
@@ -136,5 +135,6 @@ PYBIND11_MODULE(_core, m) {
   bindModel(m);
   bindKalman(m);
   k::bindRaycast(m);
-  bindCamera(m);
+  k::bindCamera(m);
+  k::bindContact(m);
 }

@@ -141,6 +141,64 @@ TEST(Scene, AgreesWithBruteForce) {
   }
 }
 
+namespace {
+
+/// Crossing sticks, closed boxes (some within others, some smaller than the gap between two beams) and a fence of pixels.
+std::vector<k::Segment> clutter(std::mt19937& rng, int sticks, int boxes, int pixels) {
+  std::uniform_real_distribution<double> place(-5, 5);
+  std::uniform_real_distribution<double> length(-1, 1);
+  std::vector<k::Segment> segments = {{-6, -6, 6, -6}, {6, -6, 6, 6}, {6, 6, -6, 6}, {-6, 6, -6, -6}};
+  for (int i = 0; i < sticks; ++i) {
+    const double x = place(rng);
+    const double y = place(rng);
+    segments.push_back({x, y, x + length(rng), y + length(rng)});
+  }
+  const auto add_box = [&](double x, double y, double w, double h) {
+    for (const auto& s : box(w, h)) segments.push_back({x + s.ax, y + s.ay, x + s.bx, y + s.by});
+  };
+  for (int i = 0; i < boxes; ++i) {
+    const double size = std::pow(10.0, length(rng) - 1);
+    add_box(place(rng), place(rng), size, size);
+  }
+  for (int i = 0; i < pixels; ++i)
+    add_box(std::floor(place(rng)) / 8, std::floor(8 * place(rng)) / 8, 0.125, 0.125);
+  return segments;
+}
+
+}  // namespace
+
+// The beams between two probes are computed, not cast: nothing may hide there.
+TEST(Scene, AFanIsItsBeams) {
+  std::mt19937 rng(3);
+  std::uniform_real_distribution<double> place(-7, 7);
+  std::uniform_real_distribution<double> turn(-4, 4);
+  const int counts[][3] = {{0, 0, 0},  {1, 3, 0},   {40, 0, 0},   {0, 60, 0},
+                           {0, 0, 80}, {5, 30, 30}, {400, 200, 0}};
+  for (int trial = 0; trial < 70; ++trial) {
+    const auto& count = counts[trial % 7];
+    const k::Scene scene(clutter(rng, count[0], count[1], count[2]));
+    for (int fan = 0; fan < 30; ++fan) {
+      const k::Pose2D origin{place(rng), place(rng), turn(rng)};
+      const double first = turn(rng);
+      const double increment = fan % 5 ? 0.002 * turn(rng) : 6.283185307179586 / 360;
+      const std::size_t n = fan % 5 ? 700 : 361;
+      const double max_range = fan % 2 ? kInf : 4.0;
+      std::vector<k::Hit> hits(n);
+      scene.castFan(origin, first, increment, n, max_range, hits.data());
+      for (std::size_t i = 0; i < n; ++i) {
+        const double angle = origin.theta + (first + static_cast<double>(i) * increment);
+        const k::Hit alone = scene.cast(origin.x, origin.y, angle, max_range);
+        ASSERT_EQ(hits[i].segment, alone.segment) << trial << " " << fan << " " << i;
+        if (alone.segment < 0) {
+          ASSERT_EQ(hits[i].range, kInf);
+        } else {
+          ASSERT_NEAR(hits[i].range, alone.range, 1e-12 * (1 + alone.range));
+        }
+      }
+    }
+  }
+}
+
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   return RUN_ALL_TESTS();

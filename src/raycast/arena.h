@@ -7,9 +7,9 @@
 #include <mutex>
 #include <vector>
 
+#include "raycast/beams.h"
 #include "raycast/bodies.h"
 #include "raycast/contact.h"
-#include "raycast/fan.h"
 #include "raycast/layers.h"
 #include "raycast/pool.h"
 #include "raycast/sight.h"
@@ -29,7 +29,7 @@ class Arena {
   void setPoses(const std::vector<int>& bodies, const Pose* poses);
 
   /// Beams of each fan in turn, as one sequence: the nearest visible thing, or +inf and 0.
-  void scan(const std::vector<Viewpoint>& from, const std::vector<Fan>& fans, double* ranges,
+  void scan(const std::vector<Viewpoint>& from, const std::vector<Beams>& fans, double* ranges,
             double* returns);
 
   /// One ray from each place, along its heading.

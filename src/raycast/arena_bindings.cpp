@@ -83,9 +83,9 @@ std::vector<Viewpoint> viewpointsOf(const Array& origins, const py::array& trees
   return from;
 }
 
-std::vector<Fan> fansOf(const Array& array, py::ssize_t n) {
+std::vector<Beams> fansOf(const Array& array, py::ssize_t n) {
   const double* row = rowsOf(array, n, 4, "fans");
-  std::vector<Fan> fans;
+  std::vector<Beams> fans;
   fans.reserve(static_cast<std::size_t>(n));
   for (py::ssize_t i = 0; i < n; ++i, row += 4) {
     if (!(row[2] >= 0 && row[2] < 1e9 && row[2] == std::floor(row[2]))) {
@@ -109,9 +109,9 @@ std::unique_ptr<Arena> makeArena(const Array& walls, const Array& returns, const
 
 py::tuple scan(Arena& arena, const Array& origins, const py::array& trees, const Array& fans) {
   const std::vector<Viewpoint> from = viewpointsOf(origins, trees);
-  const std::vector<Fan> all = fansOf(fans, origins.shape(0));
+  const std::vector<Beams> all = fansOf(fans, origins.shape(0));
   std::size_t total = 0;
-  for (const Fan& fan : all) total += fan.samples;
+  for (const Beams& fan : all) total += fan.samples;
   Array ranges(static_cast<py::ssize_t>(total));
   Array returns(static_cast<py::ssize_t>(total));
   double* range = ranges.mutable_data();

@@ -1,65 +1,49 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The beams of a planar scanner, and which of them leave within an angle.
+// Many beams from one place: most of them meet the wall that their neighbour meets.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "model/unicycle.h"
+#include "raycast/ray.h"
+#include "raycast/scene.h"
+#include "raycast/witnesses.h"
 
 namespace kurumaisu {
 
-constexpr double kTurn = 6.283185307179586476925;  // [rad]
-
-/// Beams that leave one place at even angles: beam i at first + i * increment from the sensor's heading.
-struct Fan {
-  double first;         ///< bearing [rad]
-  double increment;     ///< [rad], may be negative or 0
-  std::size_t samples;  ///< beams
-  double range_max;     ///< [m]
-};
-
-/// Finds the beams of a fan that leave within an angle, in any turn.
-class Beams {
+/// Casts a few beams, and computes those between two of them from the wall that both meet.
+///
+/// The answer is that of a cast for each beam, but for rounding: see findWitnesses for why nothing hides between.
+class Fan {
  public:
-  /// heading [rad]: of the sensor in the map.
-  Beams(const Fan& fan, double heading)
-      : samples_(fan.samples),
-        step_(std::abs(fan.increment)),
-        inverse_(1.0 / step_),
-        sign_(fan.increment > 0 ? 1.0 : -1.0),
-        start_(std::remainder(heading + fan.first, kTurn)),
-        last_(static_cast<double>(samples_) - 1),
-        slack_(1e-12 * (1000 + std::abs(heading) + std::abs(fan.first))) {}
-
-  /// Calls visit(i) for the beams whose direction in the map is within `half` [rad] of `middle`.
+  /// Beam i points along the origin's theta + i * increment [rad], which is not 0; n is at least 1.
   ///
-  /// middle: from -pi to pi. A few beams beside them may be visited too; with 0 as increment all are.
-  template <typename Visit>
-  void within(double middle, double half, const Visit& visit) const {
-    const double width = half + slack_;
-    if (step_ == 0 || !(2 * width < kTurn)) {
-      for (std::size_t i = 0; i < samples_; ++i) visit(i);
-      return;
-    }
-    // Angle from the first beam in the order of the beams, the smallest that some beam can have.
-    double at = sign_ * (middle - start_);
-    while (at + width < 0) at += kTurn;
-    while (at + width >= kTurn) at -= kTurn;
-    for (; at - width <= last_ * step_; at += kTurn) {
-      const double from = std::max((at - width) * inverse_, 0.0);
-      const double to = std::min((at + width) * inverse_, last_);
-      auto i = static_cast<std::size_t>(from);
-      if (static_cast<double>(i) < from) ++i;
-      for (; static_cast<double>(i) <= to; ++i) visit(i);
-    }
-  }
+  /// The whole fan must be less than a turn by at least two increments.
+  Fan(const Scene& scene, const Pose2D& origin, double increment, std::size_t n);
+
+  void cast(double max_range, Hit* hits);
 
  private:
-  std::size_t samples_;
-  double step_, inverse_, sign_;
-  double start_;  ///< direction of the first beam in the map, from -pi to pi
-  double last_;   ///< number of the last beam
-  double slack_;  ///< [rad] far above rounding
+  void turn();
+  void place(const std::vector<Point>& witnesses);
+  Ray ray(std::size_t i) const { return {origin_.x, origin_.y, dx_[i], dy_[i]}; }
+  void probe(std::size_t i);
+  void solve(std::size_t i, std::size_t k);
+  bool joined(std::size_t i, std::size_t k) const;
+  void fill(std::size_t i, std::size_t k);
+  std::size_t split(std::size_t i, std::size_t k) const;
+  double beamsToEnd(std::size_t i, double sense) const;
+
+  const Scene& scene_;
+  Pose2D origin_;
+  double increment_;
+  std::size_t n_;
+  std::vector<double> dx_, dy_;         // of each beam
+  std::vector<double> ranges_;          // [m]
+  std::vector<std::int32_t> segments_;  // that each beam meets
+  std::vector<float> nearest_;  // squared distance [m^2] of the nearest witness between beams i - 1 and i
 };
 
 }  // namespace kurumaisu

@@ -4,10 +4,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "model/unicycle.h"
 #include "raycast/grid.h"
+#include "raycast/ray.h"
+#include "raycast/witnesses.h"
 
 namespace kurumaisu {
 
@@ -31,6 +34,8 @@ class Scene {
   /// max_range may be +inf. A ray that is not finite meets nothing.
   Hit cast(double x, double y, double angle, double max_range) const;
 
+  Hit cast(const Ray& ray, double max_range) const;
+
   /// Ranges [m] of n beams: beam i leaves pose i (or pose 0 if there is only one) at its theta + bearings[i].
   ///
   /// Beams with poses of their own see the world as a laser does that moves during its scan.
@@ -41,11 +46,17 @@ class Scene {
   void castFan(const Pose2D& origin, double first, double increment, std::size_t n, double max_range,
                Hit* hits) const;
 
+  const Segment& segment(std::int32_t index) const { return segments_[static_cast<std::size_t>(index)]; }
+
+  /// See findWitnesses; throws std::bad_optional_access if there are too many.
+  const std::vector<Point>& witnesses() const { return witnesses_.value(); }
+
   std::size_t size() const { return segments_.size(); }
 
  private:
   std::vector<Segment> segments_;
   Grid grid_;
+  std::optional<std::vector<Point>> witnesses_;
 };
 
 }  // namespace kurumaisu

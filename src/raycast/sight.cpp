@@ -20,10 +20,8 @@ bool visible(const Face& face, double body_z, double z) {
   return face.ranger_return >= 0 && z >= body_z + face.z_low && z <= body_z + face.z_high;
 }
 
-bool mayBeSeen(const Bodies& bodies, int number, const Viewpoint& from) {
-  const Bodies::Body& body = bodies[number];
-  return !related(bodies.circle(number).tree, from.tree) && from.pose.z >= body.pose.z + body.z_low &&
-         from.pose.z <= body.pose.z + body.z_high;
+bool mayBeSeen(const Bodies::Cylinder& around, const Viewpoint& from) {
+  return from.pose.z >= around.z_low && from.pose.z <= around.z_high && !related(around.tree, from.tree);
 }
 
 void testRay(const Bodies::Body& body, const Ray& ray, double z, double range_max, Echo& echo) {
@@ -55,18 +53,18 @@ double roughDirection(double dx, double dy) {
 /// The view of bodies through one fan.
 class FanView {
  public:
-  FanView(const Viewpoint& from, const Fan& fan, Echo* echoes)
-      : from_(from.pose), fan_(fan), beams_(fan, from.pose.heading), echoes_(echoes) {}
+  FanView(const Viewpoint& from, const Beams& fan, Echo* echoes)
+      : from_(from.pose), fan_(fan), finder_(fan, from.pose.heading), echoes_(echoes) {}
 
-  void see(const Bodies::Body& body, const Bodies::Circle& circle) const {
-    const double dx = circle.x - from_.x;
-    const double dy = circle.y - from_.y;
+  void see(const Bodies::Body& body, const Bodies::Cylinder& around) const {
+    const double dx = around.x - from_.x;
+    const double dy = around.y - from_.y;
     const double distance = std::sqrt(dx * dx + dy * dy);
-    if (distance <= circle.radius) {
+    if (distance <= around.radius) {
       seeWhole(body, 0, kTurn, 0);
     } else {
-      seeWhole(body, roughDirection(dx, dy), atLeastArcsine(circle.radius / distance) + kRough,
-               distance - circle.radius);
+      seeWhole(body, roughDirection(dx, dy), atLeastArcsine(around.radius / distance) + kRough,
+               distance - around.radius);
     }
   }
 
@@ -80,22 +78,22 @@ class FanView {
         if (visible(body.faces[i], body.pose.z, from_.z)) seeFace(body.faces[i], body.placed[i]);
       return;
     }
-    beams_.within(middle, half, [&](std::size_t i) {
+    finder_.within(middle, half, [&](std::size_t i) {
       if (echoes_[i].range < nearest) return;  // something stands before the whole body
       testRay(body, rayOf(i), from_.z, fan_.range_max, echoes_[i]);
     });
   }
 
   void seeFace(const Face& face, const Segment& line) const {
-    const double a = std::atan2(line.ay - from_.y, line.ax - from_.x);
-    const double b = std::atan2(line.by - from_.y, line.bx - from_.x);
+    const double a = roughDirection(line.ax - from_.x, line.ay - from_.y);
+    const double b = roughDirection(line.bx - from_.x, line.by - from_.y);
     const double span = std::remainder(b - a, kTurn);
     // From the face itself its ends are opposite or nowhere, and rounding decides on which side of it beams are.
-    constexpr double kNearly = 1e-6;  // [rad]
+    constexpr double kNearly = 1e-4;  // [rad] more than two directions may be wrong
     const bool on_it =
         std::abs(span) > kTurn / 2 - kNearly || isHere(line.ax, line.ay) || isHere(line.bx, line.by);
     const double middle = std::remainder(a + span / 2, kTurn);
-    beams_.within(middle, on_it ? kTurn : std::abs(span) / 2, [&](std::size_t i) {
+    finder_.within(middle, on_it ? kTurn : std::abs(span) / 2 + kRough, [&](std::size_t i) {
       keepNearer(rangeTo(rayOf(i), line), face.ranger_return, fan_.range_max, echoes_[i]);
     });
   }
@@ -110,29 +108,30 @@ class FanView {
   }
 
   const Pose& from_;
-  const Fan& fan_;
-  Beams beams_;
+  const Beams& fan_;
+  BeamFinder finder_;
   Echo* echoes_;
 };
 
 void seeAlong(const Bodies& bodies, int number, const Viewpoint& from, double range_max, Echo& echo,
               const Ray& ray) {
-  const Bodies::Circle& circle = bodies.circle(number);
-  const double dx = circle.x - ray.x;
-  const double dy = circle.y - ray.y;
+  const Bodies::Cylinder& around = bodies.cylinder(number);
+  const double dx = around.x - ray.x;
+  const double dy = around.y - ray.y;
   const double aside = ray.dx * dy - ray.dy * dx;
   const double ahead = ray.dx * dx + ray.dy * dy;
-  if (std::abs(aside) > circle.radius || ahead < -circle.radius || ahead > echo.range + circle.radius) return;
-  if (mayBeSeen(bodies, number, from)) testRay(bodies[number], ray, from.pose.z, range_max, echo);
+  if (std::abs(aside) > around.radius || ahead < -around.radius || ahead > echo.range + around.radius) return;
+  if (mayBeSeen(around, from)) testRay(bodies[number], ray, from.pose.z, range_max, echo);
 }
 
 }  // namespace
 
-void seeBodies(const Bodies& bodies, const Viewpoint& from, const Fan& fan, Echo* echoes) {
+void seeBodies(const Bodies& bodies, const Viewpoint& from, const Beams& fan, Echo* echoes) {
   if (fan.samples == 0) return;
   const FanView view(from, fan, echoes);
   bodies.near(from.pose.x, from.pose.y, fan.range_max, [&](int number) {
-    if (mayBeSeen(bodies, number, from)) view.see(bodies[number], bodies.circle(number));
+    const Bodies::Cylinder& around = bodies.cylinder(number);
+    if (mayBeSeen(around, from)) view.see(bodies[number], around);
   });
 }
 

@@ -4,8 +4,8 @@
 
 #include <cstddef>
 
+#include "raycast/beams.h"
 #include "raycast/bodies.h"
-#include "raycast/fan.h"
 #include "raycast/ray.h"
 
 namespace kurumaisu {
@@ -23,7 +23,7 @@ struct Echo {
 };
 
 /// Puts the bodies in the way of a fan's beams; echoes (samples): what the beams meet without them.
-void seeBodies(const Bodies& bodies, const Viewpoint& from, const Fan& fan, Echo* echoes);
+void seeBodies(const Bodies& bodies, const Viewpoint& from, const Beams& fan, Echo* echoes);
 
 /// Puts the bodies in the way of single rays along the headings; echoes (n): what they meet without them.
 void seeBodies(const Bodies& bodies, const Viewpoint* from, std::size_t n, double range_max, Echo* echoes);

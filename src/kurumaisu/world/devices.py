@@ -125,6 +125,9 @@ def _gripper(values: Values) -> Gripper:
     size = np.array(values.several("paddle_size", "lll", (0.66, 0.1, 0.4)))
     if (size <= 0).any() or (size > (1, 0.5, 1)).any():
         raise values.error("paddle_size", "paddle_size must be shares of the gripper's size: up to 1, 0.5 and 1")
+    state = values.entity.properties.get("paddle_state")
+    if state and len(state.values) < 2:
+        raise state.name.error("paddle_state needs 2 strings: open or closed, up or down")
     return Gripper(size, values.text("paddle_state", "open") != "closed", values.whole("autosnatch", 0) != 0)
 
 

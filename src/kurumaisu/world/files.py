@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from kurumaisu.errors import Error
+from kurumaisu.world.notes import Notes
 from kurumaisu.world.tokens import Kind, Source, Token, skip_line, tokenize
 
 _MOST_BYTES = 2**26  # of one file
@@ -48,6 +49,7 @@ class Reader:
 
     top: Path
     values: Mapping[str, str]
+    notes: Notes
     used: set[str] = field(default_factory=set)
     tokens: list[Token] = field(default_factory=list)
 
@@ -80,7 +82,11 @@ class Reader:
             raise include.error(f"more than {_DEEPEST} levels of includes")
         self.tokens.append(Token(Kind.LINE_END, "\n", include.source, include.at))
         self._splice(self._source(find(name, self.top, search_path=True), name), depth + 1)
-        return skip_line(include.source, name.at)
+        text, end = include.source.text, skip_line(include.source, name.at)
+        rest = text[name.at + len(name.text) : end].split("#")[0].strip()
+        if rest:
+            self.notes.add(include, f"what follows on the line of an include is not read, as in Stage: {rest}")
+        return end
 
     def _source(self, path: Path, asked: Token | None) -> Source:
         """Return the text of a file with its parameters filled in."""

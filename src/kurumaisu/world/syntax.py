@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from kurumaisu.world.files import Reader
+from kurumaisu.world.notes import Notes
 from kurumaisu.world.tokens import Kind, Source, Token
 
 _DEEPEST = 100  # levels of entities in entities, and of macros of macros
-_MOST_STEPS = 2_000_000  # properties and entities read, once for each macro and instance
+_MOST_STEPS = 2_000_000  # properties and entities read; the largest world of Stage's own comes to some ten thousand
 
 _VALUES = (Kind.NUMBER, Kind.STRING)
 
@@ -45,9 +46,9 @@ class _Macro:
     known: int = 0  # how many macros were known when the template was made: a later one may change it
 
 
-def parse(top: Path, values: Mapping[str, str]) -> Entity:
+def parse(top: Path, values: Mapping[str, str], notes: Notes) -> Entity:
     """Return the world entity of a file, parameters filled in. Raise Error with the place of what does not parse."""
-    return _Parser(Reader(top, values).read(), top).world()
+    return _Parser(Reader(top, values, notes).read(), top).world()
 
 
 class _Parser:
@@ -93,6 +94,17 @@ class _Parser:
                 return at
         raise self._tokens[opening].error(f"the '(' of {define.text} is never closed")
 
+    def _count(self, word: Token, steps: int) -> None:
+        """Count what is read. Raise Error if macros of macros come to too much."""
+        self._steps += steps
+        if self._steps > _MOST_STEPS:
+            raise word.error(f"the macros come to more than {_MOST_STEPS} properties and entities")
+
+    def _instance(self, base: Entity, word: Token) -> Entity:
+        """Return a copy of what a macro comes to, to read more into."""
+        self._count(word, len(base.properties) + len(base.children))
+        return Entity(base.type, word, dict(base.properties), list(base.children))
+
     def _after_line_ends(self, at: int) -> int:
         while self._tokens[at].kind is Kind.LINE_END:
             at += 1
@@ -100,9 +112,7 @@ class _Parser:
 
     def _word(self, entity: Entity, at: int, depth: int) -> int:
         """Read a property or a child of an entity."""
-        self._steps += 1
-        if self._steps > _MOST_STEPS:
-            raise entity.name.error("the macros come to too much")
+        self._count(entity.name, 1)
         word, following = self._tokens[at], self._after_line_ends(at + 1)
         kind = self._tokens[following].kind
         if kind is Kind.OPEN:
@@ -127,11 +137,7 @@ class _Parser:
         if depth > _DEEPEST:
             raise word.error(f"more than {_DEEPEST} levels of entities")
         macro = self._macros.get(word.text)
-        if macro is None:
-            child = Entity(word.text, word)
-        else:
-            base = self._template(macro, word, depth)
-            child = Entity(base.type, word, dict(base.properties), list(base.children))
+        child = self._instance(self._template(macro, word, depth), word) if macro else Entity(word.text, word)
         parent.children.append(child)
         return self._body(child, at, depth)
 
@@ -156,11 +162,10 @@ class _Parser:
             raise macro.base.error(f"macro {word.text} never ends")
         if macro.template is None or macro.known != len(self._macros):
             known = self._macros.get(macro.base.text)
-            if known is None:
-                template = Entity(macro.base.text, macro.base)
-            else:
-                base = self._template(known, word, depth + 1)
-                template = Entity(base.type, macro.base, dict(base.properties), list(base.children))
+            name = macro.base
+            template = (
+                self._instance(self._template(known, word, depth + 1), name) if known else Entity(name.text, name)
+            )
             self._body(template, macro.start, depth)
             macro.template, macro.known = template, len(self._macros)
         return macro.template

@@ -14,11 +14,12 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world import catalogue
 from kurumaisu.world.bitmaps import is_map
 from kurumaisu.world.model import Model
+from kurumaisu.world.notes import Notes
 from kurumaisu.world.shapes import Shaper
 from kurumaisu.world.syntax import Entity, Property, parse
 from kurumaisu.world.tokens import Kind, Source, Token
 from kurumaisu.world.tree import Builder, global_poses
-from kurumaisu.world.values import Notes, Units, Values
+from kurumaisu.world.values import Units, Values
 
 _RESOLUTION = 0.02  # [m], as in Stage
 _INTERVAL = 100.0  # [ms], as in Stage
@@ -93,7 +94,7 @@ def load_world(path: Path, *, image_extents: bool = False, values: Mapping[str, 
             raise Error(f"{path}: a map has no parameters, as {next(iter(values))}")
         top, image_extents = _map_alone(path), True
     else:
-        top = parse(path, values or {})
+        top = parse(path, values or {}, notes)
     catalogue.check(top, notes)
     said = Values(top, _units(top, notes), notes)
     models = Builder(said.units, notes, Shaper(path, image_extents)).build(top)
