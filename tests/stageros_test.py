@@ -90,8 +90,11 @@ class Stageros:
 
     def wait(self) -> tuple[int, str]:
         """Return exit code and what it said."""
-        said, _ = self.process.communicate(timeout=20)
-        self._folder.cleanup()
+        try:
+            said, _ = self.process.communicate(timeout=20)
+        finally:
+            self.process.kill()  # one that hangs must not go on after the test
+            self._folder.cleanup()
         return self.process.returncode, said
 
     def stop(self) -> tuple[int, str]:
