@@ -11,8 +11,9 @@ import pymunk
 from pymunk.batch import BodyFields, Buffer, get_space_bodies, set_space_bodies
 
 from kurumaisu._core import Clearance
-from kurumaisu.sim.bodies import Ground, Rigid
+from kurumaisu.sim.joints import Hinges, constraints
 from kurumaisu.sim.layers import Layers
+from kurumaisu.sim.rigid import Ground, Rigid
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -60,6 +61,7 @@ class Island:
         self._friction = dynamics.contacts.friction
         self._substeps = dynamics.contacts.contact_substeps
         self._rigids = [rigids[n] for n in numbers.tolist()]
+        self._hinges = Hinges([r.pivot for r in self._rigids])
         self._driven = np.array([r.driven for r in self._rigids])
         self._masses = np.array([[r.mass, r.mass, r.moment] for r in self._rigids])
         self._walls: set[int] = set()
@@ -98,14 +100,16 @@ class Island:
         step = longest
         for _ in range(2):  # what touches earlier shortens the substep, and with it the impulses of motors and floor
             velocities, hindered, poses = self._solve(moving, step)
+            limit = self._hinges.time(poses, velocities, step)
             touch = self._clearance.first_touch(
-                self._numbers, poses, velocities, known=2 * self._skin, distance=1.5 * self._skin, limit=step
+                self._numbers, poses, velocities, known=2 * self._skin, distance=1.5 * self._skin, limit=limit
             )
             if touch >= step:
                 break
             step = touch
         moving.poses = poses
         moving.poses[:, [0, 1, 3]] += velocities * step
+        self._hinges.project(moving.poses, velocities)
         moving.velocities, moving.hindered = velocities, hindered
         return step
 
@@ -168,6 +172,8 @@ class Island:
             joint.max_bias = 0.0  # it drags, and never pulls back
             self._grips.append((joint, most))
             self._space.add(joint)
+        if rigid.pivot is not None:
+            self._space.add(*constraints(floor, body, rigid.pivot))
 
     def _limit_grips(self, step: float) -> None:
         if step != self._limited_for:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kurumaisu.sim.bodies import Rigid
+from kurumaisu.sim.rigid import Rigid
 from kurumaisu.types import FloatArray
 
 _BITS = 32  # of a pymunk category

@@ -10,8 +10,9 @@ import numpy as np
 from kurumaisu._core import Clearance, arcs
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose
-from kurumaisu.sim.bodies import Ground, Rigid
 from kurumaisu.sim.island import Island, Moving
+from kurumaisu.sim.joints import settled
+from kurumaisu.sim.rigid import Ground, Rigid
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -34,7 +35,7 @@ class PhysicalMotion:
     def place(self, poses: FloatArray) -> None:
         """Put all bodies at poses (b, 4) of x, y, z [m], heading [rad], at rest. Raise Error if one is not finite."""
         _require_finite("pose", poses, (len(self._rigids), 4))
-        self._poses = _shifted(poses, self._centres)
+        self._poses = settled(_shifted(poses, self._centres), [r.pivot for r in self._rigids])
         self._velocities = np.zeros((len(poses), 3))
         self._hindered = np.zeros(len(poses), dtype=np.bool_)
 

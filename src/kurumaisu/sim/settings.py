@@ -57,13 +57,14 @@ class Dynamics:
     """What bodies do when they touch, and what the floor does to them; [-] but for density [kg/m^3].
 
     wheel_friction: of a robot's wheels, which limits the force of its motors; floor_friction: of other movable bodies;
-    density: of robots whose file gives no mass.
+    density: of robots and doors whose file gives no mass; hinge_torque [N m]: friction of a hinge.
     """
 
     contacts: Physics
     wheel_friction: float
     floor_friction: float
     density: float
+    hinge_torque: float
     slip: bool
 
 
@@ -75,6 +76,7 @@ def load_dynamics(path: Path) -> Dynamics:
         wheel_friction=top.number("wheel_friction", above=0),
         floor_friction=top.number("floor_friction", at_least=0),
         density=top.number("density", above=0),
+        hinge_torque=top.number("hinge_torque", at_least=0),
         slip=top.text("slip", ("on", "off")) == "on",
     )
     top.end()
