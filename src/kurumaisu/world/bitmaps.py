@@ -95,13 +95,12 @@ def _pixels(path: Path, every_channel: bool) -> Pixels:
     """Return the first channel, or the mean of the colours, of all pixels (height, width), row 0 at the top."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our own limit is just below
-            image = Image.open(path)
-        with image:
-            if image.width * image.height > _MOST_PIXELS:
-                raise Error(f"{path}: has {image.width} x {image.height} pixels, more than {_MOST_PIXELS}")
-            pixels: Pixels = _channel(image, every_channel)
-            return pixels
+            warnings.simplefilter("ignore")  # of large images, for which there is our own limit, and of damaged ones
+            with Image.open(path) as image:
+                if image.width * image.height > _MOST_PIXELS:
+                    raise Error(f"{path}: has {image.width} x {image.height} pixels, more than {_MOST_PIXELS}")
+                pixels: Pixels = _channel(image, every_channel)
+                return pixels
     except Error:
         raise
     except Exception as error:  # decoders of foreign files raise whatever they come across

@@ -113,8 +113,8 @@ def _fiducial(values: Values) -> Fiducial:
 
 def _bumper(values: Values) -> Bumper:
     count = values.whole("bcount", 0)
-    if not 0 <= count <= _MOST_STRIPS or (values.has("bcount") and count == 0):
-        raise values.error("bcount", f"bcount must be 1 to {_MOST_STRIPS}, not {count}")
+    if not 0 <= count <= _MOST_STRIPS:
+        raise values.error("bcount", f"bcount must be 0 to {_MOST_STRIPS}, not {count}")
     common = values.length("blength", 0.0)
     poses = [values.several(f"bpose[{i}]", "llla", (0.0,) * 4) for i in range(count)]
     lengths = [values.length(f"blength[{i}]", common) for i in range(count)]

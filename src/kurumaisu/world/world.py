@@ -144,9 +144,6 @@ def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
     interval = said.number("interval_sim", _INTERVAL)
     if interval < _SHORTEST:
         raise said.error("interval_sim", f"interval_sim must be at least {_SHORTEST:g} ms, not {interval:g}")
-    quit_time = said.number("quit_time", 0.0)
-    if quit_time < 0:
-        raise said.error("quit_time", f"quit_time must not be below 0, not {quit_time:g}")
     poses = global_poses(models)
     walls = [model for model in models if not _on_position(model, models)]
     starts = (model for model in models if model.type == "position")
@@ -157,7 +154,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
         poses=poses,
         resolution=resolution,
         interval=interval / 1000,
-        quit_time=quit_time,
+        quit_time=max(said.number("quit_time", 0.0), 0.0),
         speedup=said.number("speedup", 1.0),
         segments=_outlines([model for model in walls if model.ranger_return >= 0], poses),
         obstacles=_outlines([model for model in walls if model.obstacle_return], poses),
