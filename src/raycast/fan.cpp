@@ -127,7 +127,9 @@ double Fan::beamsToEnd(std::size_t i, double sense) const {
   const Ends e = endsOf(ray(i), scene_.segment(segments_[i]));
   const double sign = increment_ > 0 ? sense : -sense;
   const bool a = e.side_a * sign > e.side_b * sign;
-  const double angle = a ? std::atan2(e.side_a, e.along_a) : std::atan2(e.side_b, e.along_b);
+  const double side = a ? e.side_a : e.side_b;
+  const double along = a ? e.along_a : e.along_b;
+  const double angle = roughAngle(static_cast<float>(along), static_cast<float>(side));
   return std::max(0.0, std::floor(sense * angle / increment_));
 }
 
