@@ -9,6 +9,7 @@
 
 #include <stdexcept>
 
+#include "contact/bindings.h"
 #include "kalman/whiten.h"
 #include "model/laser_error.h"
 #include "model/unicycle.h"
@@ -16,8 +17,6 @@
 
 namespace py = pybind11;
 namespace k = kurumaisu;
-
-void bindCamera(py::module_& m);  // raycast/camera_bindings.cpp
 
 namespace {
 
@@ -135,6 +134,8 @@ PYBIND11_MODULE(_core, m) {
   m.doc() = "Equations (1)-(4) of the paper, ray casting and whitening, in C++.";
   bindModel(m);
   bindKalman(m);
+  k::bindContact(m);
+  k::bindFollow(m);
   k::bindRaycast(m);
-  bindCamera(m);
+  k::bindCamera(m);
 }

@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from kurumaisu import geometry
-from kurumaisu.ros.messages import yaw_of
+from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.ros.testing import Commander, Topic, wait_for
 
 

@@ -13,7 +13,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from kurumaisu import geometry, slam_score
 from kurumaisu.maps import Grid
 from kurumaisu.params import shipped
-from kurumaisu.ros.messages import yaw_of
+from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.ros.testing import Commander, Topic, wait_for
 from kurumaisu.world import load_world
 

@@ -19,7 +19,7 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
 
 from kurumaisu.params import load_model
-from kurumaisu.ros.messages import yaw_of
+from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.ros.testing import Topic, wait_for
 
 STEP = rospy.Duration(0, 10_000_000)
@@ -59,6 +59,14 @@ class BadConfiguration:
         path.write_text("model\n(\n  size [1, 1]\n)\n")
         try:
             self.refused(f"{path}:3:10: ',' is not allowed", world=str(path))
+        finally:
+            path.unlink()
+
+    def test_bad_effects_file(self):
+        path = Path(self.id() + ".yaml").absolute()
+        path.write_text("effects: [{id: laser.offset, parameters: {offset: 9.0}}]")
+        try:
+            self.refused("laser.offset: offset must be -0.5 to 0.5 m: 9", effects=str(path))
         finally:
             path.unlink()
 

@@ -81,7 +81,7 @@ TEST(Bodies, NearFindsWhatASearchOfAllFinds) {
       std::multiset<int> found;
       bodies.near(x, y, reach, [&](int body) { found.insert(body); });
       for (int i = 0; i < 300; ++i) {
-        const auto& c = bodies.circle(i);
+        const auto& c = bodies.cylinder(i);
         const bool close = bodies[i].present && std::hypot(c.x - x, c.y - y) <= reach + c.radius;
         EXPECT_EQ(found.count(i), close ? 1U : 0U);
       }
@@ -89,13 +89,13 @@ TEST(Bodies, NearFindsWhatASearchOfAllFinds) {
   }
 }
 
-TEST(Bodies, CircleHoldsTheOutline) {
+TEST(Bodies, CylinderHoldsTheOutline) {
   k::Bodies bodies;
   const int body = bodies.add({{{1, 2, 4, 2}, 0, 1, 1, true}, {{4, 2, 4, 6}, 0, 1, 1, true}}, 0);
   bodies.place(body, {10, 20, 0, k::kTurn / 4});
-  EXPECT_NEAR(bodies.circle(body).x, 10 - 4, 1e-12);
-  EXPECT_NEAR(bodies.circle(body).y, 20 + 2.5, 1e-12);
-  EXPECT_NEAR(bodies.circle(body).radius, 2.5, 1e-7);
+  EXPECT_NEAR(bodies.cylinder(body).x, 10 - 4, 1e-12);
+  EXPECT_NEAR(bodies.cylinder(body).y, 20 + 2.5, 1e-12);
+  EXPECT_NEAR(bodies.cylinder(body).radius, 2.5, 1e-7);
   EXPECT_NEAR(bodies[body].placed[1].bx, 10 - 6, 1e-12);
   EXPECT_NEAR(bodies[body].placed[1].by, 20 + 4, 1e-12);
 }
@@ -124,6 +124,17 @@ TEST(Pool, DoesEverythingOnce) {
       for (const auto& times : done) EXPECT_EQ(times, 1);
     }
   }
+}
+
+// Whoever takes a part while the others are already done with theirs must still find the work.
+TEST(Pool, FewPartsManyTimes) {
+  k::Pool pool(3);
+  std::atomic<std::size_t> done{0};
+  constexpr std::size_t kRounds = 20000;
+  for (std::size_t round = 0; round < kRounds; ++round) {
+    pool.run(3, [&](std::size_t begin, std::size_t end) { done += end - begin; });
+  }
+  EXPECT_EQ(done, 3 * kRounds);
 }
 
 TEST(Pool, WorksInAForkedProcess) {

@@ -20,7 +20,8 @@ ROS_PYTHON = (
     r"|tf|tf2\w*|\w+_msgs|std_srvs|kurumaisu\.msg|kurumaisu\.srv)(\.|$)"
 )
 ROS_CPP = r"<(ros\w*|tf2?|tf2_\w+|xmlrpcpp|actionlib|nodelet|diagnostic_updater|\w+_msgs|std_srvs|kurumaisu)/"
-MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - {"base"}
+ABSTRACT = {"base", "mechanism", "laser"}
+MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - ABSTRACT | {r"laser\.\w+"}
 CONCRETE = rf"kurumaisu\.effects\.({'|'.join([*MODULES, *(effect.__name__ for effect in effects.ALL)])})(\.|$)"
 IDS = {effect.id for effect in effects.ALL}
 
@@ -56,6 +57,7 @@ CPP_RULES = [
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
     Rule(r"(?!.*bindings\.(cpp|h))", r"<pybind11/", "pybind11 only in bindings"),
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
+    Rule(r"follow/", r'"(?!follow/|bindings\.h)', "following rests on nothing"),
     Rule(r"(kalman|raycast)/", r'"(?!model/|kalman/|raycast/|bindings\.h)', "numerics rest on the equations at most"),
 ]
 

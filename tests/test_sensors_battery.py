@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -22,6 +22,7 @@ def speeds(*rows: tuple[float, float, float]) -> FloatArray:
     return np.array(rows)
 
 
+@settings(deadline=None)
 @given(v=st.floats(-2, 2), w=st.floats(-2, 2), before=st.floats(-2, 2), charge=st.floats(0.05, 1))
 def test_voltage_times_current_is_the_power_asked_for(v: float, w: float, before: float, charge: float) -> None:
     start, end, dt = speeds((before, 0, 0)), speeds((v, 0, w)), 0.5

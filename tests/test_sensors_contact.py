@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sensing import BruteRays, make_model, rectangle
 
 from kurumaisu.geometry import wrap
-from kurumaisu.sim.sensors.bumper import BumperSensor
+from kurumaisu.sim.sensors.bumper import BumperSensor, BumperSettings
 from kurumaisu.sim.sensors.fiducial import FiducialFinder, Sightings
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Bumper, Fiducial, Model
@@ -40,11 +40,11 @@ def wall(ax: float, ay: float, bx: float, by: float) -> BruteRays:
     ],
 )
 def test_a_strip_feels_what_crosses_its_line(walls: BruteRays, expected: list[bool]) -> None:
-    assert BumperSensor(STRIPS, 0.0).read(walls, HERE, ME).tolist() == [expected]
+    assert BumperSensor(BumperSettings(STRIPS, 0.0)).read(walls, HERE, ME).tolist() == [expected]
 
 
 def test_a_strip_with_travel_feels_ahead() -> None:
-    sensor = BumperSensor(STRIPS, 0.02)
+    sensor = BumperSensor(BumperSettings(STRIPS, 0.02))
     assert sensor.read(wall(0.315, -1, 0.315, 1), HERE, ME).tolist() == [[True, False, False]]
     assert sensor.read(wall(0.325, -1, 0.325, 1), HERE, ME).tolist() == [[False, False, False]]
     assert sensor.read(wall(0.31, 0.005, 0.31, -0.005), HERE, ME).tolist() == [[True, False, False]]  # on its middle
@@ -53,7 +53,7 @@ def test_a_strip_with_travel_feels_ahead() -> None:
 def test_bumpers_of_turned_robots_do_not_feel_their_own_tree() -> None:
     walls = BruteRays(np.array([[0.9, 2.2, 1.1, 2.4, 0, 1.0]]), trees=np.array([1]))
     poses = np.array([[1.0, 2.0, 0, math.pi / 2]] * 2)
-    assert BumperSensor(STRIPS, 0.0).read(walls, poses, np.array([0, 1])).tolist() == [
+    assert BumperSensor(BumperSettings(STRIPS, 0.0)).read(walls, poses, np.array([0, 1])).tolist() == [
         [True, False, False],
         [False, False, False],
     ]
@@ -61,15 +61,15 @@ def test_bumpers_of_turned_robots_do_not_feel_their_own_tree() -> None:
 
 def test_no_strips() -> None:
     none = Bumper(np.empty((0, 4)), np.empty(0))
-    assert BumperSensor(none, 0.0).read(wall(0, 0, 1, 1), HERE, ME).shape == (1, 0)
+    assert BumperSensor(BumperSettings(none, 0.0)).read(wall(0, 0, 1, 1), HERE, ME).shape == (1, 0)
 
 
 @given(x=st.floats(-1, 1), y=st.floats(-1, 1), heading=st.floats(-4, 4), ends=st.tuples(*[st.floats(-1, 1)] * 4))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_any_segment_against_signed_areas(x: float, y: float, heading: float, ends: tuple[float, ...]) -> None:
     """Two segments cross if the ends of each are on different sides of the other."""
     pose = np.array([[x, y, 0.0, heading]])
-    felt = BumperSensor(STRIPS, 0.0).read(wall(*ends), pose, ME)[0]
+    felt = BumperSensor(BumperSettings(STRIPS, 0.0)).read(wall(*ends), pose, ME)[0]
     c, s = math.cos(heading), math.sin(heading)
     a, b = np.array(ends[:2]), np.array(ends[2:])
     for strip, length, answer in zip(STRIPS.poses, STRIPS.lengths, felt, strict=True):
@@ -151,7 +151,7 @@ targets = st.lists(st.tuples(coordinate, coordinate, st.floats(-3, 3), st.intege
 
 
 @given(targets=targets, heading=st.floats(-4, 4))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_field_of_boxes_by_the_rules_one_by_one(
     targets: list[tuple[float, float, float, int]], heading: float
 ) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2, kstest
 
@@ -27,15 +27,15 @@ def allan_variances(readings: FloatArray, clusters: list[int]) -> list[FloatArra
     return out
 
 
-def long_run(settings: InertialErrorSettings, n: int, axes: int, dt: float, seed: int) -> FloatArray:
+def long_run(terms: InertialErrorSettings, n: int, axes: int, dt: float, seed: int) -> FloatArray:
     rng = np.random.default_rng(seed)
-    error = InertialError(settings, (axes,), rng)
+    error = InertialError(terms, (axes,), rng)
     zero = np.zeros(axes)
     return np.array([error.apply(zero, dt, rng) for _ in range(n)])
 
 
 @pytest.mark.parametrize(
-    "settings",
+    "terms",
     [
         replace(NONE, noise_density=0.02),
         replace(NONE, random_walk=0.01),
@@ -44,10 +44,10 @@ def long_run(settings: InertialErrorSettings, n: int, axes: int, dt: float, seed
     ],
     ids=["white", "walk", "markov", "all"],
 )
-def test_allan_variance_is_ieee_952s(settings: InertialErrorSettings) -> None:
+def test_allan_variance_is_ieee_952s(terms: InertialErrorSettings) -> None:
     dt, axes = 0.02, 1000
-    found = allan_variances(long_run(settings, 3000, axes, dt, 1), clusters := [10, 30, 100, 300, 1000])
-    expected = settings.allan_variance(dt * np.array(clusters))
+    found = allan_variances(long_run(terms, 3000, axes, dt, 1), clusters := [10, 30, 100, 300, 1000])
+    expected = terms.allan_variance(dt * np.array(clusters))
     for by_axis, value, size in zip(found, expected, clusters, strict=True):
         error = by_axis.std() / math.sqrt(axes)
         coarse = 0.3 * value / size**2 + (2e-2 * value / size)  # the formula is for steps much below the time
@@ -63,9 +63,9 @@ def test_white_noise_by_chi_square() -> None:
 
 
 def test_markov_bias_is_stationary_and_forgets_at_its_rate() -> None:
-    settings = replace(NONE, instability=0.05, correlation_time=0.5)
+    terms = replace(NONE, instability=0.05, correlation_time=0.5)
     rng = np.random.default_rng(3)
-    error = InertialError(settings, (40_000,), rng)
+    error = InertialError(terms, (40_000,), rng)
     first = error.bias
     for _ in range(7):
         error.apply(first * 0, 0.1, rng)
@@ -77,11 +77,11 @@ def test_markov_bias_is_stationary_and_forgets_at_its_rate() -> None:
 
 def test_steps_may_be_of_any_length() -> None:
     """One long step and many short ones leave a bias of the same variance."""
-    settings = replace(NONE, random_walk=0.1, instability=0.2, correlation_time=0.7)
+    terms = replace(NONE, random_walk=0.1, instability=0.2, correlation_time=0.7)
     spread = []
     for steps in (1, 50):
         rng = np.random.default_rng(4)
-        error = InertialError(settings, (40_000,), rng)
+        error = InertialError(terms, (40_000,), rng)
         for _ in range(steps):
             error.apply(np.zeros(40_000), 1.0 / steps, rng)
         spread.append(error.bias.var())
@@ -96,14 +96,15 @@ def test_scale_limit_and_power_up_bias() -> None:
 
 
 def ideal(mount: tuple[float, float, float], velocities: FloatArray, heading: str = "none") -> Imu:
-    settings = ImuSettings(mount, NONE, NONE, heading)
-    return Imu(settings, velocities, np.full(len(velocities), 0.4), np.random.default_rng(6))
+    terms = ImuSettings(mount, NONE, NONE, heading)
+    return Imu(terms, velocities, np.full(len(velocities), 0.4), np.random.default_rng(6))
 
 
 rates = st.floats(-2, 2)
 mounts = st.tuples(rates, rates, st.floats(-3, 3))
 
 
+@settings(deadline=None)
 @given(mount=mounts, v=st.tuples(rates, rates, rates), slope=st.tuples(rates, rates, rates))
 def test_force_is_the_second_derivative_of_the_path_of_the_unit(
     mount: tuple[float, float, float], v: tuple[float, float, float], slope: tuple[float, float, float]

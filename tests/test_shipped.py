@@ -23,7 +23,10 @@ WORLDS = sorted((SHARE / "worlds").glob("*.world"))
 SOURCE_TREE_TOOLS = {"bench", "demo", "run", "setup", "test"}  # they build or need the source tree
 
 # The strict readers of private parameters, by node type. Nodes in C++ read theirs when they start: rostests.
-READERS = {"sim_node": "kurumaisu.ros.sim_settings:read_settings"}
+READERS = {
+    "sim_node": "kurumaisu.ros.sim_settings:read_settings",
+    "stageros": "kurumaisu.ros.stageros_settings:read_settings",
+}
 
 
 def name(path):
@@ -163,7 +166,7 @@ def test_scripts_are_installed_or_executable():
     In the source tree only the latter may be executable: rosrun would find the others twice and ask which is meant.
     """
     cmake = (TREE / "CMakeLists.txt").read_text()
-    installed = set(re.findall(r"scripts/(\w+)", "".join(re.findall(r"catkin_install_python\([^)]*\)", cmake))))
+    installed = set(re.findall(r"scripts/([\w-]+)", "".join(re.findall(r"catkin_install_python\([^)]*\)", cmake))))
     there = {path.name for path in (TREE / "scripts").iterdir() if not path.suffix}
     assert there - SOURCE_TREE_TOOLS == installed
     assert {name for name in there if os.access(TREE / "scripts" / name, os.X_OK)} == SOURCE_TREE_TOOLS

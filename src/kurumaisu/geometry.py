@@ -11,9 +11,18 @@ def wrap(angle: FloatArray | float) -> FloatArray:
     return np.asarray((np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi, dtype=np.float64)
 
 
+def cos_sin(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return cosines and sines of angles [rad], the same to the last bit wherever they lie in memory.
+
+    For strided arguments numpy chooses between two implementations by addresses, and their last bits differ.
+    """
+    together = np.array(angles, order="C")
+    return np.cos(together), np.sin(together)
+
+
 def compose(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return map_from_b = map_from_a * a_from_b for poses (..., 3)."""
-    c, s = np.cos(a[..., 2]), np.sin(a[..., 2])
+    c, s = cos_sin(a[..., 2])
     return np.stack(
         [
             a[..., 0] + c * b[..., 0] - s * b[..., 1],
@@ -26,7 +35,7 @@ def compose(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def between(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return a_from_b for poses a, b (..., 3) in the same frame; the angle is not wrapped."""
-    c, s = np.cos(a[..., 2]), np.sin(a[..., 2])
+    c, s = cos_sin(a[..., 2])
     dx, dy = b[..., 0] - a[..., 0], b[..., 1] - a[..., 1]
     return np.stack([c * dx + s * dy, -s * dx + c * dy, b[..., 2] - a[..., 2]], axis=-1)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
@@ -36,18 +37,17 @@ class Grid:
         return (self.x, self.x + width * self.resolution, self.y, self.y + height * self.resolution)
 
 
-def save_map(grid: Grid, path: Path) -> tuple[Path, Path]:
-    """Write path.pgm and path.yaml for map_server and return their names; path has no suffix.
+def save_map(grid: Grid, path: Path, suffix: str = ".pgm") -> tuple[Path, Path]:
+    """Write an image (.pgm or .png) and path.yaml for map_server and return their names; path has no suffix.
 
     Raise Error naming the file that cannot be written.
     """
     shades = np.full(grid.cells.shape, _UNKNOWN, dtype=np.uint8)
     shades[grid.cells > _OCCUPIED_ABOVE] = _OCCUPIED
     shades[(grid.cells >= 0) & (grid.cells < _FREE_BELOW)] = _FREE
-    height, width = shades.shape
-    image, text = path.with_name(path.name + ".pgm"), path.with_name(path.name + ".yaml")
+    image, text = path.with_name(path.name + suffix), path.with_name(path.name + ".yaml")
     try:
-        image.write_bytes(f"P5\n{width} {height}\n255\n".encode() + shades[::-1].tobytes())
+        Image.fromarray(np.ascontiguousarray(shades[::-1])).save(image)
         text.write_text(
             f"image: {image.name}\nresolution: {grid.resolution:.6f}\n"
             f"origin: [{grid.x:.6f}, {grid.y:.6f}, 0.0]\nnegate: 0\n"

@@ -15,34 +15,34 @@ constexpr double kFarthest = 1e7;  // [m] from the map's origin; beyond, a doubl
 constexpr int kMostThreads = 256;
 constexpr std::size_t kMostSamples = 1000000;  // of a fan: more is a slip of the pen
 
-std::string number(std::size_t i) { return std::to_string(i); }
-
-void require(bool good, const std::string& complaint) {
-  if (!good) throw std::invalid_argument(complaint);
+[[noreturn]] void refuse(const char* what, std::size_t i, const std::string& why) {
+  throw std::invalid_argument(std::string(what) + " " + std::to_string(i) + why);
 }
 
 bool within(double value) { return std::abs(value) <= kFarthest; }  // not NaN either
 
 void requirePose(const Pose& p, const char* what, std::size_t i) {
-  require(within(p.x) && within(p.y) && within(p.z) && within(p.heading),
-          std::string(what) + " " + number(i) + " is not finite, or beyond 1e7 (m or rad)");
+  if (within(p.x) && within(p.y) && within(p.z) && within(p.heading)) return;
+  refuse(what, i, " is not finite, or beyond 1e7 (m or rad)");
 }
 
 void requireFace(const Face& f, const char* what, std::size_t i) {
-  const std::string name = std::string(what) + " " + number(i);
-  require(within(f.line.ax) && within(f.line.ay) && within(f.line.bx) && within(f.line.by),
-          name + ": its ends are not finite, or beyond 1e7 m");
-  require(f.z_low <= f.z_high, name + ": z_low " + std::to_string(f.z_low) + " must not be above z_high " +
-                                   std::to_string(f.z_high));
-  require(!std::isnan(f.ranger_return), name + ": its ranger return is not a number");
+  if (!within(f.line.ax) || !within(f.line.ay) || !within(f.line.bx) || !within(f.line.by))
+    refuse(what, i, ": its ends are not finite, or beyond 1e7 m");
+  if (!(f.z_low <= f.z_high)) {
+    const std::string low = std::to_string(f.z_low);
+    refuse(what, i, ": z_low " + low + " must not be above z_high " + std::to_string(f.z_high));
+  }
+  if (std::isnan(f.ranger_return)) refuse(what, i, ": its ranger return is not a number");
 }
 
 void requireFan(const Beams& fan, std::size_t i) {
-  const std::string name = "fan " + number(i);
-  require(std::abs(fan.first) <= kFarthest, name + ": its first bearing must be finite");
-  require(std::abs(fan.increment) <= kTurn, name + ": its increment must be within a turn");
-  require(fan.samples <= kMostSamples, name + ": " + number(fan.samples) + " samples are more than 1000000");
-  require(fan.range_max > 0, name + ": range_max must be positive, not " + std::to_string(fan.range_max));
+  if (!within(fan.first)) refuse("fan", i, ": its first bearing is not finite, or beyond 1e7 rad");
+  if (!(std::abs(fan.increment) <= kTurn)) refuse("fan", i, ": its increment must be within a turn");
+  if (fan.samples > kMostSamples)
+    refuse("fan", i, ": " + std::to_string(fan.samples) + " samples are more than 1000000");
+  if (!(fan.range_max > 0))
+    refuse("fan", i, ": range_max must be positive, not " + std::to_string(fan.range_max));
 }
 
 std::vector<Wall> checked(std::vector<Wall> walls) {
@@ -51,9 +51,8 @@ std::vector<Wall> checked(std::vector<Wall> walls) {
 }
 
 int checkedThreads(int threads) {
-  require(threads >= 1 && threads <= kMostThreads,
-          "threads must be from 1 to 256, not " + std::to_string(threads));
-  return threads;
+  if (threads >= 1 && threads <= kMostThreads) return threads;
+  throw std::invalid_argument("threads must be from 1 to 256, not " + std::to_string(threads));
 }
 
 Echo echoOf(const Hit& hit, const Layer& layer, const std::vector<Wall>& walls) {
@@ -81,8 +80,8 @@ void Arena::remove(int body) {
 
 void Arena::requireKnown(const std::vector<int>& bodies) const {
   for (const int body : bodies) {
-    require(body >= 0 && static_cast<std::size_t>(body) < bodies_.size() && bodies_[body].present,
-            "there is no body " + std::to_string(body));
+    if (body < 0 || static_cast<std::size_t>(body) >= bodies_.size() || !bodies_[body].present)
+      throw std::invalid_argument("there is no body " + std::to_string(body));
   }
 }
 
@@ -125,7 +124,8 @@ void Arena::scan(const std::vector<Viewpoint>& from, const std::vector<Beams>& f
 }
 
 void Arena::cast(const std::vector<Viewpoint>& from, double range_max, double* ranges, double* returns) {
-  require(range_max > 0, "range_max must be positive, not " + std::to_string(range_max));
+  if (!(range_max > 0))
+    throw std::invalid_argument("range_max must be positive, not " + std::to_string(range_max));
   const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<const Layer*> layers;
   for (std::size_t i = 0; i < from.size(); ++i) {

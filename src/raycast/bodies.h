@@ -28,24 +28,25 @@ struct Face {
 /// Things of one tree neither see nor hit each other; a negative number is of no tree.
 inline bool related(int tree, int other) { return tree == other && tree >= 0; }
 
-/// Bodies by number, with the bounding circles of their outlines in a coarse grid that repeats itself.
+/// Bodies by number, with the cylinders that enclose them in a coarse grid that repeats itself.
 class Bodies {
  public:
   struct Body {
     std::vector<Face> faces;      ///< in the body's frame
     std::vector<Segment> placed;  ///< the same lines in the map frame
-    double middle_x, middle_y;    ///< of the bounding circle, in the body's frame [m]
-    double z_low, z_high;         ///< of all faces, above the body's frame [m]
+    double middle_x, middle_y;    ///< of the cylinder, in the body's frame [m]
+    double z_low, z_high;         ///< of the cylinder, above the body's frame [m]
     Pose pose;
     bool present;
   };
 
-  /// Bounding circle in the map frame; next: in the same cell, -1: the last.
-  struct Circle {
-    double x, y, radius;  ///< [m]
+  /// Encloses a body's faces, in the map frame: all that a search looks at.
+  struct Cylinder {
+    double x, y, radius;   ///< [m]
+    double z_low, z_high;  ///< [m], both belong to it
     int tree;
     int cell;  ///< kWide: not in the grid, kGone: removed
-    int next;
+    int next;  ///< body in the same cell, -1: this is the last
   };
 
   Bodies() : first_(static_cast<std::size_t>(kSide) * kSide, -1) {}
@@ -57,20 +58,20 @@ class Bodies {
 
   std::size_t size() const { return bodies_.size(); }  ///< removed ones included
   const Body& operator[](int body) const { return bodies_[static_cast<std::size_t>(body)]; }
-  const Circle& circle(int body) const { return circles_[static_cast<std::size_t>(body)]; }
+  const Cylinder& cylinder(int body) const { return cylinders_[static_cast<std::size_t>(body)]; }
 
-  /// Calls visit(body) for each body whose circle comes within `reach` [m] of a place; reach may be +inf.
+  /// Calls visit(body) for each body whose cylinder comes within `reach` [m] of a place; reach may be +inf.
   template <typename Visit>
   void near(double x, double y, double reach, const Visit& visit) const {
     const double out = reach + widest_;
     const auto visitIfNear = [&](int body) {
-      const Circle& c = circle(body);
+      const Cylinder& c = cylinder(body);
       const double distance = reach + c.radius;
       if ((c.x - x) * (c.x - x) + (c.y - y) * (c.y - y) <= distance * distance) visit(body);
     };
     if (2 * out >= (kSide - 1) * kCell) {  // the window would meet itself
-      for (std::size_t i = 0; i < circles_.size(); ++i)
-        if (circles_[i].cell != kGone) visitIfNear(static_cast<int>(i));
+      for (std::size_t i = 0; i < cylinders_.size(); ++i)
+        if (cylinders_[i].cell != kGone) visitIfNear(static_cast<int>(i));
       return;
     }
     for (const int body : wide_) visitIfNear(body);
@@ -78,7 +79,7 @@ class Bodies {
     const int last_column = cellOf(x + out);
     for (int row = cellOf(y - out); row <= last_row; ++row) {
       for (int column = cellOf(x - out); column <= last_column; ++column) {
-        for (int i = first_[slot(column, row)]; i >= 0; i = circle(i).next) visitIfNear(i);
+        for (int i = first_[slot(column, row)]; i >= 0; i = cylinder(i).next) visitIfNear(i);
       }
     }
   }
@@ -100,7 +101,7 @@ class Bodies {
   void enterCell(int body, int cell);
 
   std::vector<Body> bodies_;
-  std::vector<Circle> circles_;
+  std::vector<Cylinder> cylinders_;
   std::vector<int> first_;  ///< body of each cell, -1: none
   std::vector<int> wide_;   ///< bodies too wide for the grid
   double widest_ = 0.0;     ///< radius of a body that was ever in the grid [m]

@@ -3,143 +3,85 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
+#include <limits>
 
 namespace kurumaisu {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr float kFarAway = std::numeric_limits<float>::infinity();
-
-/// A number in [-2, 2] that grows with the angle of (x, y) in [-pi, pi], without trigonometry.
-double turn(double x, double y) {
-  constexpr double kTiny = 1e-300;  // [m] keeps the eye itself from dividing by zero
-  const double part = y / (std::fabs(x) + std::fabs(y) + kTiny);
-  if (x >= 0) return part;
-  return y >= 0 ? 2 - part : -2 - part;
-}
 
 }  // namespace
 
-void validate(const Optics& o) {
-  constexpr int kMost = 8192;
-  if (o.width < 1 || o.width > kMost || o.height < 1 || o.height > kMost)
-    throw std::invalid_argument("width and height must be 1 to 8192 pixels");
-  if (!(o.fov_h > 0 && o.fov_h < kPi && o.fov_v > 0 && o.fov_v < kPi))
-    throw std::invalid_argument("fields of view must be above 0 and below pi");
-  if (!(o.near >= 0 && o.far > o.near && std::isfinite(o.far)))
-    throw std::invalid_argument("near and far must be 0 <= near < far, finite");
-  if (!(std::fabs(o.tilt) <= kPi / 2)) throw std::invalid_argument("tilt must be within +-pi / 2");
-}
+Camera::Camera(const Optics& optics) : optics_(optics), sights_(makeSights(optics)) {}
 
-Camera::Camera(const Optics& optics) : optics_(optics) {
-  validate(optics);
-  sights_.resize(static_cast<std::size_t>(optics.width) * static_cast<std::size_t>(optics.height));
-  if (optics.tilt == 0) {
-    lookAhead();
-  } else {
-    lookDown();
-  }
-  float most = 0;
-  for (const Sight& sight : sights_) most = std::max(most, 1.0F / sight.scale);
-  reach_ = optics.far * static_cast<double>(most) * (1 + 1e-6);
-}
-
-/// Without tilt, the columns of the picture are the half-planes.
-void Camera::lookAhead() {
-  const double fx = optics_.width / (2 * std::tan(optics_.fov_h / 2));
-  const double fy = optics_.height / (2 * std::tan(optics_.fov_v / 2));
-  const int w = optics_.width;
-  std::vector<double> azimuths(static_cast<std::size_t>(w));
-  for (int u = 0; u < w; ++u) {
-    const double right = (u + 0.5 - w / 2.0) / fx;
-    const double level = std::hypot(1.0, right);
-    azimuths[static_cast<std::size_t>(w - 1 - u)] = std::atan(-right);
-    for (int v = 0; v < optics_.height; ++v) {
-      const double down = (v + 0.5 - optics_.height / 2.0) / fy;
-      sights_[static_cast<std::size_t>(v) * static_cast<std::size_t>(w) + static_cast<std::size_t>(u)] = {
-          w - 1 - u, static_cast<float>(-down / level), static_cast<float>(1 / level)};
-    }
-  }
-  setColumns(azimuths);
-}
-
-void Camera::lookDown() {
-  const double fx = optics_.width / (2 * std::tan(optics_.fov_h / 2));
-  const double fy = optics_.height / (2 * std::tan(optics_.fov_v / 2));
-  const double c = std::cos(optics_.tilt);
-  const double s = std::sin(optics_.tilt);
-  std::vector<double> angles(sights_.size());
-  std::size_t i = 0;
-  for (int v = 0; v < optics_.height; ++v) {
-    const double down = (v + 0.5 - optics_.height / 2.0) / fy;
-    for (int u = 0; u < optics_.width; ++u, ++i) {
-      const double right = (u + 0.5 - optics_.width / 2.0) / fx;
-      const double ahead = c - down * s;
-      constexpr double kSteep = 1e-6;  // straight up and down have no azimuth
-      const double level = std::max(std::hypot(ahead, right), kSteep);
-      angles[i] = std::atan2(-right, ahead);
-      sights_[i] = {0, static_cast<float>((-s - down * c) / level), static_cast<float>(1 / level)};
-    }
-  }
-  const auto [low, high] = std::minmax_element(angles.begin(), angles.end());
-  const double width = std::max(*high - *low, 1e-9);
-  const int n = std::clamp(static_cast<int>(kFiner * width * fx), 2, 2 * kFiner * optics_.width);
-  std::vector<double> azimuths(static_cast<std::size_t>(n));
-  for (int k = 0; k < n; ++k) azimuths[static_cast<std::size_t>(k)] = *low + width * k / (n - 1);
-  for (i = 0; i < sights_.size(); ++i)
-    sights_[i].column = static_cast<std::int32_t>(std::lround((angles[i] - *low) / width * (n - 1)));
-  setColumns(azimuths);
-}
-
-void Camera::setColumns(const std::vector<double>& azimuths) {
-  for (const double azimuth : azimuths) {
-    dx_.push_back(std::cos(azimuth));
-    dy_.push_back(std::sin(azimuth));
-    order_.push_back(turn(dx_.back(), dy_.back()));
-  }
-}
-
-void Camera::render(const std::vector<Panel>& panels, const std::vector<Stand>& stands,
-                    const std::vector<char>& hidden, const Stand& eye, const Background& background,
+void Camera::render(const std::vector<Panel>& panels, const std::vector<Pose>& poses,
+                    const std::vector<char>& hidden, const Pose& eye, const Background& background,
                     std::uint32_t* rgba, float* depth) {
-  std::vector<double> cosines, sines;
-  for (const Stand& stand : stands) {
-    cosines.push_back(std::cos(stand.heading - eye.heading));
-    sines.push_back(std::sin(stand.heading - eye.heading));
-  }
-  const double c = std::cos(eye.heading);
-  const double s = std::sin(eye.heading);
-  visible_.clear();
-  for (std::size_t i = 0; i < panels.size(); ++i) {
-    const Panel& p = panels[i];
-    const auto body = static_cast<std::size_t>(p.body);
-    if (hidden[body]) continue;
-    const Stand& at = stands[body];
-    const double x = c * (at.x - eye.x) + s * (at.y - eye.y);
-    const double y = -s * (at.x - eye.x) + c * (at.y - eye.y);
-    const double cb = cosines[body];
-    const double sb = sines[body];
-    cover({static_cast<std::int32_t>(i), 0, 0, x + cb * p.ax - sb * p.ay, y + sb * p.ax + cb * p.ay,
-           x + cb * p.bx - sb * p.by, y + sb * p.bx + cb * p.by, at.z - eye.z});
-  }
+  place(panels, poses, hidden, eye);
   findCrossings(panels);
   spans_.clear();
   first_span_.clear();
-  for (std::size_t k = 0; k < order_.size(); ++k) {
+  for (std::size_t k = 0; k < sights_.columns.size(); ++k) {
     Crossing* from = crossings_.data() + offsets_[k];
     Crossing* to = crossings_.data() + offsets_[k + 1];
     std::stable_sort(from, to, [](const Crossing& a, const Crossing& b) { return a.distance < b.distance; });
     first_span_.push_back(spans_.size());
-    painter_.paint(from, static_cast<std::size_t>(to - from), eye.z, background, spans_);
+    painter_.paint(around_, from, static_cast<std::size_t>(to - from), eye.z, background, spans_);
   }
   shade(background, rgba, depth);
 }
 
+/// Moves all panels into the frame of the eye and keeps those that it may see.
+void Camera::place(const std::vector<Panel>& panels, const std::vector<Pose>& poses,
+                   const std::vector<char>& hidden, const Pose& eye) {
+  std::vector<double> cosines, sines;
+  for (const Pose& pose : poses) {
+    cosines.push_back(std::cos(pose.heading - eye.heading));
+    sines.push_back(std::sin(pose.heading - eye.heading));
+  }
+  const double c = std::cos(eye.heading);
+  const double s = std::sin(eye.heading);
+  visible_.clear();
+  around_.clear();
+  for (std::size_t i = 0; i < panels.size(); ++i) {
+    const Panel& p = panels[i];
+    const auto body = static_cast<std::size_t>(p.body);
+    if (hidden[body]) continue;
+    const Pose& at = poses[body];
+    const double x = c * (at.x - eye.x) + s * (at.y - eye.y);
+    const double y = -s * (at.x - eye.x) + c * (at.y - eye.y);
+    const double cb = cosines[body];
+    const double sb = sines[body];
+    const Visible v{static_cast<std::int32_t>(i),
+                    0,
+                    0,
+                    x + cb * p.ax - sb * p.ay,
+                    y + sb * p.ax + cb * p.ay,
+                    x + cb * p.bx - sb * p.by,
+                    y + sb * p.bx + cb * p.by,
+                    at.z - eye.z};
+    noteBehind(v, p);
+    cover(v);
+  }
+}
+
+/// Finds the prisms around the eye: those whose outline crosses the half-line behind it an odd number of times.
+void Camera::noteBehind(const Visible& v, const Panel& p) {
+  if (p.prism < 0 || (v.ay < 0) == (v.by < 0)) return;
+  if (v.ax - v.ay * (v.bx - v.ax) / (v.by - v.ay) >= 0) return;
+  const auto same = [&](const Crossing& wall) { return wall.prism == p.prism; };
+  const auto found = std::find_if(around_.begin(), around_.end(), same);
+  if (found == around_.end()) {
+    around_.push_back({0.0, p.low + v.up, p.high + v.up, p.color, p.prism});
+  } else {
+    around_.erase(found);
+  }
+}
+
 /// Notes which columns a panel is seen in.
-void Camera::cover(Visible v) {
-  if (std::min(v.ax, v.bx) > reach_ || std::max(v.ax, v.bx) < -reach_) return;
-  if (std::min(v.ay, v.by) > reach_ || std::max(v.ay, v.by) < -reach_) return;
+void Camera::cover(const Visible& v) {
+  if (std::min(v.ax, v.bx) > sights_.reach || std::max(v.ax, v.bx) < -sights_.reach) return;
+  if (std::min(v.ay, v.by) > sights_.reach || std::max(v.ay, v.by) < -sights_.reach) return;
   const double a = turn(v.ax, v.ay);
   const double b = turn(v.bx, v.by);
   const bool left_to_right = v.ax * v.by - v.ay * v.bx < 0;  // clockwise, seen from the eye
@@ -155,19 +97,21 @@ void Camera::cover(Visible v) {
 
 void Camera::addColumns(const Visible& visible, double from, double to) {
   Visible v = visible;
-  const auto begin = order_.begin();
-  v.first = static_cast<std::int32_t>(std::lower_bound(begin, order_.end(), from) - begin);
-  v.last = static_cast<std::int32_t>(std::lower_bound(begin + v.first, order_.end(), to) - begin);
+  const auto& columns = sights_.columns;
+  const auto before = [](const Sights::Column& column, double at) { return column.turn < at; };
+  const auto begin = columns.begin();
+  v.first = static_cast<std::int32_t>(std::lower_bound(begin, columns.end(), from, before) - begin);
+  v.last = static_cast<std::int32_t>(std::lower_bound(begin + v.first, columns.end(), to, before) - begin);
   if (v.first < v.last) visible_.push_back(v);
 }
 
 /// Sorts what is seen into the columns.
 void Camera::findCrossings(const std::vector<Panel>& panels) {
-  offsets_.assign(order_.size() + 1, 0);
+  offsets_.assign(sights_.columns.size() + 1, 0);
   for (const Visible& v : visible_) {
     for (std::int32_t k = v.first; k < v.last; ++k) ++offsets_[static_cast<std::size_t>(k) + 1];
   }
-  for (std::size_t k = 0; k < order_.size(); ++k) offsets_[k + 1] += offsets_[k];
+  for (std::size_t k = 0; k < sights_.columns.size(); ++k) offsets_[k + 1] += offsets_[k];
   crossings_.resize(offsets_.back());
   fill_.assign(offsets_.begin(), offsets_.end() - 1);
   for (const Visible& v : visible_) {
@@ -176,10 +120,10 @@ void Camera::findCrossings(const std::vector<Panel>& panels) {
     const double ey = v.by - v.ay;
     const double moment = v.ax * ey - v.ay * ex;
     for (auto k = static_cast<std::size_t>(v.first); k < static_cast<std::size_t>(v.last); ++k) {
-      const double across = dx_[k] * ey - dy_[k] * ex;
-      // The inside is to the left of a counter-clockwise outline.
-      crossings_[fill_[k]++] = {
-          std::fmax(moment / across, 0.0), p.low + v.up, p.high + v.up, p.color, p.prism, across < 0};
+      const Sights::Column& column = sights_.columns[k];
+      const double across = column.dx * ey - column.dy * ex;
+      crossings_[fill_[k]++] = {std::fmax(moment / across, 0.0), p.low + v.up, p.high + v.up, p.color,
+                                p.prism};
     }
   }
 }
@@ -189,8 +133,8 @@ void Camera::shade(const Background& background, std::uint32_t* rgba, float* dep
   at_span_ = first_span_;
   const auto near = static_cast<float>(optics_.near);
   const auto far = static_cast<float>(optics_.far);
-  for (std::size_t i = 0; i < sights_.size(); ++i) {
-    const Sight sight = sights_[i];
+  for (std::size_t i = 0; i < sights_.pixels.size(); ++i) {
+    const Sights::Sight sight = sights_.pixels[i];
     const auto column = static_cast<std::size_t>(sight.column);
     std::size_t at = at_span_[column];
     while (sight.slope < spans_[at].low) ++at;

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "raycast/bodies.h"
 #include "raycast/column.h"
+#include "raycast/optics.h"
 
 namespace kurumaisu {
 
@@ -14,30 +16,13 @@ struct Panel {
   double ax, ay, bx, by;
   double low, high;
   std::uint32_t color;  ///< four bytes: red, green, blue, alpha
-  std::int32_t prism;   ///< closed outline, counter-clockwise, that it is part of; -1: none
+  std::int32_t prism;   ///< closed outlines that it is part of; -1: none
   std::int32_t body;
 };
 
-/// x, y, z [m], heading [rad] in the map.
-struct Stand {
-  double x, y, z, heading;
-};
-
-/// What a camera is: pixels, fields of view [rad], depths [m], tilt [rad] downward.
-struct Optics {
-  int width, height;
-  double fov_h, fov_v;
-  double near, far;
-  double tilt;
-};
-
-/// Throws std::invalid_argument naming the value that makes no camera.
-void validate(const Optics& optics);
-
 /// Draws pictures; keeps its tables and its memory between them.
 ///
-/// Pixel centres are sampled. Without tilt, a column of pixels is one half-plane and every pixel is exact. With
-/// tilt, the half-planes are kFiner times as fine as the pixels and each pixel takes the nearest one.
+/// Every pixel is exact, but for what Sights says of tilted cameras.
 class Camera {
  public:
   explicit Camera(const Optics& optics);
@@ -45,43 +30,33 @@ class Camera {
   /// rgba: height * width * 4 bytes; depth: height * width, along the optical axis [m]: -inf nearer than `near`,
   /// +inf where nothing is nearer than `far`, which is painted as the sky. Rows from top to bottom.
   ///
-  /// stands: of each body; hidden: bodies not drawn. The heading of the eye is that of the optical axis.
-  void render(const std::vector<Panel>& panels, const std::vector<Stand>& stands,
-              const std::vector<char>& hidden, const Stand& eye, const Background& background,
+  /// poses: of each body; hidden: bodies not drawn. The heading of the eye is that of the optical axis.
+  void render(const std::vector<Panel>& panels, const std::vector<Pose>& poses,
+              const std::vector<char>& hidden, const Pose& eye, const Background& background,
               std::uint32_t* rgba, float* depth);
 
   const Optics& optics() const { return optics_; }
 
-  static constexpr int kFiner = 4;
-
  private:
-  /// Where a pixel looks.
-  struct Sight {
-    std::int32_t column;
-    float slope;  ///< rise per horizontal distance
-    float scale;  ///< depth per horizontal distance
-  };
   struct Visible {
     std::int32_t panel;
     std::int32_t first, last;   ///< columns, half-open
     double ax, ay, bx, by, up;  ///< in the frame of the eye; up: of its body's base
   };
 
-  void lookAhead();
-  void lookDown();
-  void setColumns(const std::vector<double>& azimuths);
-  void cover(Visible visible);
+  void place(const std::vector<Panel>& panels, const std::vector<Pose>& poses,
+             const std::vector<char>& hidden, const Pose& eye);
+  void cover(const Visible& visible);
+  void noteBehind(const Visible& visible, const Panel& panel);
   void addColumns(const Visible& visible, double from, double to);
   void findCrossings(const std::vector<Panel>& panels);
   void shade(const Background& background, std::uint32_t* rgba, float* depth);
 
   Optics optics_;
-  double reach_ = 0.0;  ///< horizontal distance beyond which all is too far [m]
-  std::vector<Sight> sights_;
-  std::vector<double> order_;  ///< of each column: grows with its azimuth, see turn()
-  std::vector<double> dx_, dy_;
+  Sights sights_;
 
   std::vector<Visible> visible_;
+  std::vector<Crossing> around_;      ///< see ColumnPainter::paint
   std::vector<std::size_t> offsets_;  ///< of each column's crossings, and the total
   std::vector<std::size_t> fill_;
   std::vector<Crossing> crossings_;

@@ -1,29 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The camera's part of kurumaisu._core.
-#include <pybind11/numpy.h>
-#include <pybind11/pybind11.h>
-
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
 #include <string>
 
+#include "bindings.h"
 #include "raycast/camera.h"
 
+namespace kurumaisu {
 namespace py = pybind11;
-namespace k = kurumaisu;
-
-void bindCamera(py::module_& m);
-
 namespace {
 
-using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Indices = py::array_t<std::int32_t, py::array::c_style | py::array::forcecast>;
 using Colors = py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>;
 using Flags = py::array_t<bool, py::array::c_style | py::array::forcecast>;
 
 struct Panels {
-  std::vector<k::Panel> panels;
+  std::vector<Panel> panels;
   std::int32_t bodies;  ///< more than the highest body
 };
 
@@ -63,7 +57,7 @@ Panels makePanels(const Array& walls, const Colors& colors, const Indices& prism
   return out;
 }
 
-py::tuple render(k::Camera& camera, const Panels& panels, const Array& poses, const Flags& hidden,
+py::tuple render(Camera& camera, const Panels& panels, const Array& poses, const Flags& hidden,
                  const Array& eye, const Colors& ground, const Colors& sky) {
   const py::ssize_t n = poses.ndim() == 2 ? poses.shape(0) : 0;
   requireShape(poses, n, 4, "poses");
@@ -74,7 +68,7 @@ py::tuple render(k::Camera& camera, const Panels& panels, const Array& poses, co
   requireFinite(poses, "poses");
   requireFinite(eye, "eye");
   if (n < panels.bodies) throw std::invalid_argument("poses has fewer rows than there are bodies");
-  std::vector<k::Stand> stands;
+  std::vector<Pose> stands;
   for (py::ssize_t i = 0; i < n; ++i) {
     stands.push_back({poses.at(i, 0), poses.at(i, 1), poses.at(i, 2), poses.at(i, 3)});
   }
@@ -97,14 +91,14 @@ void bindCamera(py::module_& m) {
       .def(py::init(&makePanels), py::arg("walls"), py::arg("colors"), py::arg("prisms"), py::arg("bodies"),
            "From walls (m, 6): x, y of both ends, lowest and highest z [m]; colors (m, 4) of bytes; prisms "
            "(m,):\n"
-           "the closed counter-clockwise outline a wall is part of, -1 for none; bodies (m,). Raises "
+           "the closed outlines a wall is part of, -1 for none; bodies (m,). Raises "
            "ValueError.")
       .def("__len__", [](const Panels& panels) { return panels.panels.size(); });
 
-  py::class_<k::Camera>(m, "Camera", "A colour and depth camera that needs no display.")
+  py::class_<Camera>(m, "Camera", "A colour and depth camera that needs no display.")
       .def(py::init(
                [](int width, int height, double fov_h, double fov_v, double near, double far, double tilt) {
-                 return k::Camera({width, height, fov_h, fov_v, near, far, tilt});
+                 return Camera({width, height, fov_h, fov_v, near, far, tilt});
                }),
            py::kw_only(), py::arg("width"), py::arg("height"), py::arg("fov_h"), py::arg("fov_v"),
            py::arg("near"), py::arg("far"), py::arg("tilt"))
@@ -115,3 +109,5 @@ void bindCamera(py::module_& m) {
            "too far. poses (b, 4) of the bodies, hidden (b,), eye (4,): x, y, z [m], heading [rad] in the "
            "map.");
 }
+
+}  // namespace kurumaisu

@@ -2,6 +2,7 @@
 #include "raycast/column.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace kurumaisu {
@@ -16,12 +17,19 @@ double slopeTo(double rise, double distance) {
   return rise > 0 ? kInfinity : -kInfinity;
 }
 
+/// Height above the eye of the lid that it sees; 0: none.
+double lidOf(const Crossing& wall) {
+  if (wall.high < 0) return wall.high;
+  return std::max(wall.low, 0.0);
+}
+
 }  // namespace
 
-void ColumnPainter::paint(const Crossing* crossings, std::size_t n, double eye_height,
-                          const Background& background, std::vector<Span>& out) {
+void ColumnPainter::paint(const std::vector<Crossing>& around, const Crossing* crossings, std::size_t n,
+                          double eye_height, const Background& background, std::vector<Span>& out) {
   gaps_.assign(1, {-kInfinity, kInfinity});
   open_.clear();
+  for (const Crossing& wall : around) enter(wall);
   seen_.clear();
   for (std::size_t i = 0; i < n && !gaps_.empty(); ++i) {
     const Crossing& c = crossings[i];
@@ -40,10 +48,17 @@ void ColumnPainter::paint(const Crossing* crossings, std::size_t n, double eye_h
   }
 }
 
+void ColumnPainter::enter(const Crossing& wall) {
+  const auto nearer = [](const Open& open, const Crossing& other) {
+    return std::fabs(lidOf(open.wall)) < std::fabs(lidOf(other));
+  };
+  open_.insert(std::lower_bound(open_.begin(), open_.end(), wall, nearer), {wall, wall.distance});
+}
+
 /// The face of a prism that the eye sees between two distances: the top from above, the bottom from below.
 void ColumnPainter::lid(const Crossing& wall, double from, double to) {
-  const double rise = wall.high < 0 ? wall.high : wall.low;
-  if (wall.high >= 0 && wall.low <= 0) return;
+  const double rise = lidOf(wall);
+  if (rise == 0) return;
   const double a = slopeTo(rise, from);
   const double b = slopeTo(rise, to);
   show(std::min(a, b), std::max(a, b), {0.0F, 0.0F, static_cast<float>(rise), wall.color});
@@ -56,16 +71,13 @@ void ColumnPainter::lidsUpTo(double distance) {
   }
 }
 
+/// Every other crossing of a closed outline leads out of it again.
 void ColumnPainter::passThrough(const Crossing& crossing) {
   if (crossing.prism < 0) return;
-  if (crossing.entering) {
-    open_.push_back({crossing, crossing.distance});
-    return;
-  }
   const auto same = [&](const Open& open) { return open.wall.prism == crossing.prism; };
   const auto found = std::find_if(open_.begin(), open_.end(), same);
   if (found == open_.end()) {
-    lid(crossing, 0.0, crossing.distance);
+    enter(crossing);
   } else {
     open_.erase(found);
   }

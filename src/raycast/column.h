@@ -14,8 +14,7 @@ struct Crossing {
   double distance;      ///< horizontal, from the eye [m]
   double low, high;     ///< of the wall
   std::uint32_t color;  ///< four bytes: red, green, blue, alpha
-  std::int32_t prism;   ///< the closed outline that the wall is part of; -1: of none, so that it has no lids
-  bool entering;        ///< the line of sight enters the prism here (else it leaves it)
+  std::int32_t prism;   ///< the closed outlines that the wall is part of; -1: of none, so that it has no lids
 };
 
 /// Part of the view of one surface. Slopes: rise per horizontal distance, up positive.
@@ -40,10 +39,10 @@ class ColumnPainter {
  public:
   /// Appends to `out` the spans of one half-plane, from the highest to the lowest.
   ///
-  /// crossings: n of them, sorted by distance; eye_height: above the ground [m]. The lids (top and bottom faces)
-  /// of prisms are seen from above or below. A prism that the eye is over or under is taken to begin at the eye.
-  void paint(const Crossing* crossings, std::size_t n, double eye_height, const Background& background,
-             std::vector<Span>& out);
+  /// around: a wall of each prism that the eye is in, over or under; crossings: n of them, sorted by distance;
+  /// eye_height: above the ground [m]. The lids (top and bottom faces) of prisms are seen from above or below.
+  void paint(const std::vector<Crossing>& around, const Crossing* crossings, std::size_t n, double eye_height,
+             const Background& background, std::vector<Span>& out);
 
  private:
   struct Seen {
@@ -55,6 +54,7 @@ class ColumnPainter {
     double reached;  ///< up to this distance its lid has been drawn [m]
   };
 
+  void enter(const Crossing& wall);
   void lid(const Crossing& wall, double from, double to);
   void lidsUpTo(double distance);
   void passThrough(const Crossing& crossing);
@@ -62,7 +62,7 @@ class ColumnPainter {
 
   std::vector<std::pair<double, double>> gaps_;  ///< slopes not yet covered, ascending
   std::vector<std::pair<double, double>> rest_;
-  std::vector<Open> open_;
+  std::vector<Open> open_;  ///< the nearest in height first: its lid hides those of the others
   std::vector<Seen> seen_;
 };
 

@@ -45,15 +45,15 @@ bool meet(const Segment& p, const Segment& q) {
   return !besides(p, q) && !besides(q, p);
 }
 
-bool reaches(const Segment& line, const Bodies::Circle& circle) {
-  return !apart(line.ax, line.bx, circle.x - circle.radius, circle.x + circle.radius) &&
-         !apart(line.ay, line.by, circle.y - circle.radius, circle.y + circle.radius);
+bool reaches(const Segment& line, const Bodies::Cylinder& around) {
+  return !apart(line.ax, line.bx, around.x - around.radius, around.x + around.radius) &&
+         !apart(line.ay, line.by, around.y - around.radius, around.y + around.radius);
 }
 
-bool facesMeet(const Bodies::Body& one, const Bodies::Body& other, const Bodies::Circle& around_other) {
+bool facesMeet(const Bodies::Body& one, const Bodies::Body& other, const Bodies::Cylinder& around_it) {
   for (std::size_t i = 0; i < one.faces.size(); ++i) {
     const Face& a = one.faces[i];
-    if (!a.solid || !reaches(one.placed[i], around_other)) continue;
+    if (!a.solid || !reaches(one.placed[i], around_it)) continue;
     for (std::size_t j = 0; j < other.faces.size(); ++j) {
       const Face& b = other.faces[j];
       if (!b.solid || one.pose.z + a.z_low > other.pose.z + b.z_high ||
@@ -67,11 +67,11 @@ bool facesMeet(const Bodies::Body& one, const Bodies::Body& other, const Bodies:
 }
 
 bool touchesBody(const Bodies& bodies, int body) {
-  const Bodies::Circle& circle = bodies.circle(body);
+  const Bodies::Cylinder& around = bodies.cylinder(body);
   bool found = false;
-  bodies.near(circle.x, circle.y, circle.radius, [&](int other) {
-    if (found || other == body || related(circle.tree, bodies.circle(other).tree)) return;
-    found = facesMeet(bodies[body], bodies[other], bodies.circle(other));
+  bodies.near(around.x, around.y, around.radius, [&](int other) {
+    if (found || other == body || related(around.tree, bodies.cylinder(other).tree)) return;
+    found = facesMeet(bodies[body], bodies[other], bodies.cylinder(other));
   });
   return found;
 }
@@ -95,24 +95,24 @@ bool Contact::touches(const Bodies& bodies, int body) const {
 }
 
 bool Contact::touchesWall(const Bodies& bodies, int body) const {
-  const Bodies::Circle& circle = bodies.circle(body);
-  if (freeOfWalls(circle)) return false;
+  const Bodies::Cylinder& around = bodies.cylinder(body);
+  if (freeOfWalls(around)) return false;
   const Bodies::Body& b = bodies[body];
   for (std::size_t i = 0; i < b.faces.size(); ++i) {
     const Face& face = b.faces[i];
     if (!face.solid) continue;
-    if (touchesWall(b.placed[i], b.pose.z + face.z_low, b.pose.z + face.z_high, circle.tree)) return true;
+    if (touchesWall(b.placed[i], b.pose.z + face.z_low, b.pose.z + face.z_high, around.tree)) return true;
   }
   return false;
 }
 
 // Cells that are nearer to the middle's cell than its clearance are empty. Seen from outside the grid, the nearest
 // point of the grid is nearer to every wall.
-bool Contact::freeOfWalls(const Bodies::Circle& circle) const {
+bool Contact::freeOfWalls(const Bodies::Cylinder& around) const {
   if (walls_.empty()) return true;
-  const int column = clampedCell((circle.x - grid_.left()) / grid_.cell(), grid_.width());
-  const int row = clampedCell((circle.y - grid_.bottom()) / grid_.cell(), grid_.height());
-  return (grid_.clearance(grid_.index(column, row)) - 1) * grid_.cell() > circle.radius;
+  const int column = clampedCell((around.x - grid_.left()) / grid_.cell(), grid_.width());
+  const int row = clampedCell((around.y - grid_.bottom()) / grid_.cell(), grid_.height());
+  return (grid_.clearance(grid_.index(column, row)) - 1) * grid_.cell() > around.radius;
 }
 
 bool Contact::touchesWall(const Segment& line, double low, double high, int tree) const {

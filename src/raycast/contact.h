@@ -24,7 +24,7 @@ class Contact {
  private:
   bool touchesWall(const Bodies& bodies, int body) const;
   bool touchesWall(const Segment& line, double low, double high, int tree) const;
-  bool freeOfWalls(const Bodies::Circle& circle) const;
+  bool freeOfWalls(const Bodies::Cylinder& around) const;
   bool inCell(std::size_t cell, const Segment& line, double low, double high, int tree) const;
 
   std::vector<Wall> walls_;  ///< the solid ones

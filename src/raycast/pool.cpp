@@ -39,7 +39,7 @@ void Pool::run(std::size_t count, const std::function<void(std::size_t, std::siz
     ++round_;
   }
   wake_.notify_all();
-  takeParts();
+  takeParts(work);
   std::unique_lock<std::mutex> lock(mutex_);
   work_ = nullptr;  // whoever has slept through it need not be waited for
   done_.wait(lock, [this] { return busy_ == 0; });
@@ -48,25 +48,27 @@ void Pool::run(std::size_t count, const std::function<void(std::size_t, std::siz
 void Pool::wait() {
   std::size_t seen = 0;
   while (true) {
+    const std::function<void(std::size_t, std::size_t)>* work = nullptr;
     {
       std::unique_lock<std::mutex> lock(mutex_);
       wake_.wait(lock, [&] { return stop_ || round_ != seen; });
       if (stop_) return;
       seen = round_;
       if (work_ == nullptr) continue;
+      work = work_;
       ++busy_;
     }
-    takeParts();
+    takeParts(*work);
     const std::lock_guard<std::mutex> lock(mutex_);
     if (--busy_ == 0) done_.notify_one();
   }
 }
 
-void Pool::takeParts() {
+void Pool::takeParts(const std::function<void(std::size_t, std::size_t)>& work) {
   while (true) {
     const std::size_t begin = next_.fetch_add(part_);
     if (begin >= count_) return;
-    (*work_)(begin, std::min(begin + part_, count_));
+    work(begin, std::min(begin + part_, count_));
   }
 }
 

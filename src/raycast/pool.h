@@ -30,7 +30,7 @@ class Pool {
 
  private:
   void wait();
-  void takeParts();
+  void takeParts(const std::function<void(std::size_t, std::size_t)>& work);
 
   pid_t owner_;
   std::vector<std::thread> threads_;

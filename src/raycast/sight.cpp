@@ -20,10 +20,8 @@ bool visible(const Face& face, double body_z, double z) {
   return face.ranger_return >= 0 && z >= body_z + face.z_low && z <= body_z + face.z_high;
 }
 
-bool mayBeSeen(const Bodies& bodies, int number, const Viewpoint& from) {
-  const Bodies::Body& body = bodies[number];
-  return !related(bodies.circle(number).tree, from.tree) && from.pose.z >= body.pose.z + body.z_low &&
-         from.pose.z <= body.pose.z + body.z_high;
+bool mayBeSeen(const Bodies::Cylinder& around, const Viewpoint& from) {
+  return from.pose.z >= around.z_low && from.pose.z <= around.z_high && !related(around.tree, from.tree);
 }
 
 void testRay(const Bodies::Body& body, const Ray& ray, double z, double range_max, Echo& echo) {
@@ -58,15 +56,15 @@ class FanView {
   FanView(const Viewpoint& from, const Beams& fan, Echo* echoes)
       : from_(from.pose), fan_(fan), finder_(fan, from.pose.heading), echoes_(echoes) {}
 
-  void see(const Bodies::Body& body, const Bodies::Circle& circle) const {
-    const double dx = circle.x - from_.x;
-    const double dy = circle.y - from_.y;
+  void see(const Bodies::Body& body, const Bodies::Cylinder& around) const {
+    const double dx = around.x - from_.x;
+    const double dy = around.y - from_.y;
     const double distance = std::sqrt(dx * dx + dy * dy);
-    if (distance <= circle.radius) {
+    if (distance <= around.radius) {
       seeWhole(body, 0, kTurn, 0);
     } else {
-      seeWhole(body, roughDirection(dx, dy), atLeastArcsine(circle.radius / distance) + kRough,
-               distance - circle.radius);
+      seeWhole(body, roughDirection(dx, dy), atLeastArcsine(around.radius / distance) + kRough,
+               distance - around.radius);
     }
   }
 
@@ -117,13 +115,13 @@ class FanView {
 
 void seeAlong(const Bodies& bodies, int number, const Viewpoint& from, double range_max, Echo& echo,
               const Ray& ray) {
-  const Bodies::Circle& circle = bodies.circle(number);
-  const double dx = circle.x - ray.x;
-  const double dy = circle.y - ray.y;
+  const Bodies::Cylinder& around = bodies.cylinder(number);
+  const double dx = around.x - ray.x;
+  const double dy = around.y - ray.y;
   const double aside = ray.dx * dy - ray.dy * dx;
   const double ahead = ray.dx * dx + ray.dy * dy;
-  if (std::abs(aside) > circle.radius || ahead < -circle.radius || ahead > echo.range + circle.radius) return;
-  if (mayBeSeen(bodies, number, from)) testRay(bodies[number], ray, from.pose.z, range_max, echo);
+  if (std::abs(aside) > around.radius || ahead < -around.radius || ahead > echo.range + around.radius) return;
+  if (mayBeSeen(around, from)) testRay(bodies[number], ray, from.pose.z, range_max, echo);
 }
 
 }  // namespace
@@ -132,7 +130,8 @@ void seeBodies(const Bodies& bodies, const Viewpoint& from, const Beams& fan, Ec
   if (fan.samples == 0) return;
   const FanView view(from, fan, echoes);
   bodies.near(from.pose.x, from.pose.y, fan.range_max, [&](int number) {
-    if (mayBeSeen(bodies, number, from)) view.see(bodies[number], bodies.circle(number));
+    const Bodies::Cylinder& around = bodies.cylinder(number);
+    if (mayBeSeen(around, from)) view.see(bodies[number], around);
   });
 }
 

@@ -73,7 +73,7 @@ def _minutes(repeats: int) -> float:
     title = f"Plant, {_MINUTE:g} s at {_RATE:g} Hz from voltages in one chunk"
     table = Table(title, "effects", "CPU [ms]", "of limit [%]")
     model = load_model(shipped("launch/md100.yaml"))
-    settings = {effect.id: _setting(effect) for effect in effects.ALL}
+    settings = {effect.id: _setting(effect) for effect in effects.BASE}
     variants = {"none": (), **{name: (setting,) for name, setting in settings.items()}, "all": tuple(settings.values())}
     costs = {}
     for name, chosen in variants.items():
@@ -82,7 +82,7 @@ def _minutes(repeats: int) -> float:
     return max(cost for name, cost in costs.items() if name != "all")
 
 
-def _setting(effect: type[effects.Effect]) -> EffectSetting:
+def _setting(effect: type[effects.Mechanism]) -> EffectSetting:
     """Return the effect at half its typical size."""
     return EffectSetting(effect.id, {p.name: p.null + 0.5 * p.scale for p in effect.parameters})
 
@@ -93,10 +93,10 @@ def _minute(model: Model, repeats: int) -> float:
     count = int(_MINUTE * _RATE)
     held = np.repeat(rng.uniform(-0.8, 0.8, (2, count // 50)), 50, axis=1)  # a new command every second
     v, w = held
-    volts = model.translation.volts(v), model.steering.volts(w), np.sign(v), np.sign(w)
+    volts = effects.Volts(model.translation.volts(v), model.steering.volts(w), np.sign(v), np.sign(w))
 
     def simulate() -> None:
-        Plant(model, 1 / _RATE, rng).from_voltages(*volts)
+        Plant(model, 1 / _RATE, rng).from_voltages(volts)
 
     return _cpu(simulate, (), repeats)
 

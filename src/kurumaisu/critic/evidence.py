@@ -60,7 +60,7 @@ def catalogue(model: Model) -> tuple[Term, ...]:
     own = {setting.id: setting.parameters for setting in model.effects}
     return tuple(
         Term(effect.id, parameter, own.get(effect.id, {}).get(parameter.name, parameter.null))
-        for effect in effects.ALL
+        for effect in effects.CRITICISED
         if not effect.random
         for parameter in effect.parameters
     )

@@ -30,7 +30,8 @@ def figures(problem: Problem, settings: Sequence[EffectSetting], ids: Iterable[s
 
     The other effects of the fit are in, so each figure shows one cause alone.
     """
-    return tuple(_figure(problem, settings, effects.by_id(name)) for name in ids)
+    by_id = {effect.id: effect for effect in effects.CRITICISED}
+    return tuple(_figure(problem, settings, by_id[name]) for name in ids)
 
 
 def covariate(drive: Drive, follows: Follows) -> FloatArray:

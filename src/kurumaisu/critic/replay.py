@@ -9,10 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import effects, geometry
-from kurumaisu._core import integrate
 from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.params import EffectSetting, Model
-from kurumaisu.sim.plant import Plant
+from kurumaisu.sim import plant
 from kurumaisu.types import FloatArray
 
 
@@ -22,18 +21,18 @@ def extend(model: Model, settings: Sequence[EffectSetting]) -> Model:
     return replace(model, effects=(*(own for own in model.effects if own.id not in given), *settings))
 
 
-def rates(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[FloatArray, FloatArray]:
-    """Return v [m/s] and w [rad/s] of the simulated chair on the drive's grid, (n,) each, without random effects."""
+def motion(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> effects.Motion:
+    """Return the motion of the simulated chair on the drive's grid, without random effects."""
+    heading = float(drive.poses[0, 2])  # the grid begins at the first pose, or a little before it
     random = {effect.id for effect in effects.ALL if effect.random}
     extended = extend(model, settings)
     mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in random))
-    return Plant(mean, GRID, np.random.default_rng(0)).from_rates(drive.v, drive.w)
+    return plant.Plant(mean, GRID, np.random.default_rng(0)).from_rates(drive.v, drive.w, heading)
 
 
 def path(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return the simulated poses at the reference's times, (m + 1, 3), starting at the first reference pose."""
-    v, w = rates(drive, model, settings)
-    poses = integrate(v, w, np.full(len(v), GRID))
+    poses = plant.path(motion(drive, model, settings), np.zeros(3))
     grid = drive.start + GRID * np.arange(len(poses))
     at = geometry.interpolate(grid, poses, drive.times)
     return geometry.compose(drive.poses[0], geometry.between(at[0], at))

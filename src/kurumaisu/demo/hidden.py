@@ -38,7 +38,7 @@ def run(folder: Path, seed: int) -> None:
 
 def draw(rng: np.random.Generator) -> EffectSetting:
     """Return one effect of the catalogue, of a size that matters."""
-    candidates = [effect for effect in effects.ALL if not effect.random]
+    candidates = [effect for effect in effects.CRITICISED if not effect.random]
     effect = candidates[rng.integers(len(candidates))]
     values = {}
     for parameter in effect.parameters:

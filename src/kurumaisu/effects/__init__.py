@@ -1,18 +1,63 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The catalogue of effects: one mechanism per file, and ALL, the only list of them."""
+"""The catalogue of effects: one mechanism per file, and ALL, the only list of them.
 
-from kurumaisu.effects.base import Context, Effect, Follows, Motion, Parameter, Rate, Stage
+Effects of one stage act in the order of the list, whatever a file's order.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kurumaisu.effects.accel_limit import AccelLimit
+from kurumaisu.effects.backlash import Backlash
+from kurumaisu.effects.base import (
+    BaseEffect,
+    Context,
+    Effect,
+    Follows,
+    Motion,
+    Parameter,
+    Rate,
+    Reference,
+    ReferenceEffect,
+    Stage,
+    VoltageEffect,
+    Volts,
+)
+from kurumaisu.effects.battery_sag import BatterySag
+from kurumaisu.effects.caster_reversal import CasterReversal
+from kurumaisu.effects.clock_scale import ClockScale
+from kurumaisu.effects.cross import CrossVToW, CrossWToV
+from kurumaisu.effects.curvature import CurvatureV, CurvatureW
+from kurumaisu.effects.dac_quantisation import DacQuantisation
+from kurumaisu.effects.dac_zero import DacZeroF, DacZeroS
 from kurumaisu.effects.dead_zone import DeadZoneV, DeadZoneW
 from kurumaisu.effects.delay import Delay
 from kurumaisu.effects.gain import GainV, GainW
 from kurumaisu.effects.lag import LagV, LagW
+from kurumaisu.effects.laser import LASER, BeamEffect, Beams, Echoes, LaserEffect, ReadingEffect
+from kurumaisu.effects.laser.chain import LaserChain, incidence, slanted
+from kurumaisu.effects.lateral_slip import LateralSlip
 from kurumaisu.effects.left_right_gain import LeftRightGain
+from kurumaisu.effects.map_error import MapError
+from kurumaisu.effects.marker import MarkerX, MarkerY
+from kurumaisu.effects.mechanism import Mechanism, WorldEffect
+from kurumaisu.effects.payload import Payload
 from kurumaisu.effects.process_noise import ProcessNoise
+from kurumaisu.effects.reverse_gain import ReverseGain
+from kurumaisu.effects.saturation import Saturation
+from kurumaisu.effects.sign import Sign
+from kurumaisu.effects.slope import Slope
+from kurumaisu.effects.steering_law import SteeringLaw
+from kurumaisu.effects.understeer import Understeer
 from kurumaisu.effects.veer import Veer
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting
 
-ALL: tuple[type[Effect], ...] = (
+# What the critic looks for.
+CRITICISED: tuple[type[Effect], ...] = (
     GainV,
     GainW,
     LeftRightGain,
@@ -25,8 +70,48 @@ ALL: tuple[type[Effect], ...] = (
     ProcessNoise,
 )
 
+BASE: tuple[type[BaseEffect], ...] = (
+    *CRITICISED,
+    DacZeroF,
+    DacZeroS,
+    DacQuantisation,
+    SteeringLaw,
+    Sign,
+    Backlash,
+    ReverseGain,
+    CurvatureV,
+    CurvatureW,
+    Saturation,
+    BatterySag,
+    CrossWToV,
+    CrossVToW,
+    AccelLimit,
+    Payload,
+    Understeer,
+    CasterReversal,
+    LateralSlip,
+    Slope,
+    MarkerX,
+    MarkerY,
+    ClockScale,
+)
 
-def by_id(name: str) -> type[Effect]:
+WORLD: tuple[type[WorldEffect], ...] = (MapError,)
+
+# What the simulator can run.
+ALL: tuple[type[Mechanism], ...] = (*BASE, *LASER, *WORLD)
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The effects on the base, each kind in the order in which they act."""
+
+    volts: tuple[VoltageEffect, ...]
+    rates: tuple[Effect, ...]
+    reference: tuple[ReferenceEffect, ...]
+
+
+def by_id(name: str) -> type[Mechanism]:
     """Return the effect of an id. Raise Error when it is not in the catalogue."""
     for effect in ALL:
         if effect.id == name:
@@ -39,29 +124,83 @@ def fluctuation(sd_v: float, sd_w: float, tau: float) -> EffectSetting:
     return EffectSetting(ProcessNoise.id, {"sd_v": sd_v, "sd_w": sd_w, "tau": tau})
 
 
-def build(settings: tuple[EffectSetting, ...], context: Context) -> tuple[Effect, ...]:
-    """Return the effects of a model file in the order in which they act.
+def check(settings: tuple[EffectSetting, ...]) -> None:
+    """Raise Error for an unknown id, an id given twice, or parameters that do not fit, of a model file."""
+    for effect, values in _chosen(settings):
+        effect.check(values)
+
+
+def build(settings: tuple[EffectSetting, ...], context: Context) -> Chain:
+    """Return the effects on the base among those of a model file.
 
     Raise Error for an unknown id, an id given twice, or parameters that do not fit.
     """
-    ids = [setting.id for setting in settings]
-    for name in ids:
-        if ids.count(name) > 1:
-            raise Error(f"effects: {name!r} is given twice")
-    effects = [by_id(setting.id)(setting.parameters, context) for setting in settings]
-    return tuple(sorted(effects, key=lambda effect: effect.stage))
+    built = [effect(values, context) for effect, values in _chosen(settings) if issubclass(effect, BaseEffect)]
+    built.sort(key=lambda effect: effect.stage)
+    return Chain(
+        tuple(effect for effect in built if isinstance(effect, VoltageEffect)),
+        tuple(effect for effect in built if isinstance(effect, Effect)),
+        tuple(effect for effect in built if isinstance(effect, ReferenceEffect)),
+    )
+
+
+def build_laser(settings: tuple[EffectSetting, ...], rng: np.random.Generator) -> LaserChain:
+    """Return the effects on a laser among those of a model file; raises as build does.
+
+    Each draws from a generator of its own, so that its noise does not depend on which others there are.
+    """
+    chosen = [(effect, values) for effect, values in _chosen(settings) if issubclass(effect, LaserEffect)]
+    seed = int(rng.integers(2**63))
+    built = [effect(values, np.random.default_rng([seed, LASER.index(effect)])) for effect, values in chosen]
+    return LaserChain(sorted(built, key=lambda effect: effect.stage))
+
+
+def build_world(settings: tuple[EffectSetting, ...], rng: np.random.Generator) -> tuple[WorldEffect, ...]:
+    """Return the effects on the world's walls among those of a model file; raises as build does."""
+    return tuple(effect(values, rng) for effect, values in _chosen(settings) if issubclass(effect, WorldEffect))
+
+
+def _chosen(settings: tuple[EffectSetting, ...]) -> list[tuple[type[Mechanism], Mapping[str, float]]]:
+    """Return effects and parameters in the catalogue's order. Raise Error for an id unknown or given twice."""
+    twice = [name for name, count in Counter(setting.id for setting in settings).items() if count > 1]
+    if twice:
+        raise Error(f"effects: {twice[0]!r} is given twice")
+    found = [(by_id(setting.id), setting.parameters) for setting in settings]
+    return sorted(found, key=lambda pair: ALL.index(pair[0]))
 
 
 __all__ = [
     "ALL",
+    "BASE",
+    "CRITICISED",
+    "LASER",
+    "WORLD",
+    "BeamEffect",
+    "Beams",
+    "Chain",
     "Context",
+    "Echoes",
     "Effect",
     "Follows",
+    "LaserChain",
+    "LaserEffect",
+    "Mechanism",
     "Motion",
     "Parameter",
     "Rate",
+    "ReadingEffect",
+    "Reference",
+    "ReferenceEffect",
     "Stage",
+    "VoltageEffect",
+    "Volts",
+    "WorldEffect",
     "build",
+    "build_laser",
+    "build_world",
     "by_id",
+    "check",
     "fluctuation",
+    "incidence",
+    "slanted",
 ]

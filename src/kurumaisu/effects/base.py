@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an effect is: one mechanism by which a real chair departs from equations (1)-(3).
+"""Effects of the base: on the voltages, on the rates that they make, and on what a reference sees of the motion.
 
 The simulator applies effects chunk by chunk as time goes on, the critic to a whole run at once; because an
 effect keeps its state between chunks, both get the same motion from the same code.
@@ -16,17 +16,21 @@ from typing import ClassVar
 import numpy as np
 
 from kurumaisu._core import AxisLaw
-from kurumaisu.errors import Error
+from kurumaisu.effects.mechanism import Mechanism, Parameter
 from kurumaisu.types import FloatArray
 
 
 class Stage(IntEnum):
-    """Where in the drive chain an effect acts; effects apply in this order."""
+    """Where in the drive chain an effect acts; effects apply in this order, those of a stage in the catalogue's."""
 
-    TRANSPORT = 0  # command to motor controller
-    THRESHOLD = 1  # what the joystick input swallows
-    GAIN = 2  # steady state
-    RESPONSE = 3  # motors, chair and floor
+    CONVERTER = 0  # D/A converter: what the motor controller is given
+    CONTROLLER = 1  # what the motor controller makes of the voltages
+    TRANSPORT = 2  # command to motor controller
+    THRESHOLD = 3  # what the joystick input swallows
+    GAIN = 4  # steady state
+    RESPONSE = 5  # motors and chair
+    FLOOR = 6  # what the wheels make of it on the floor
+    REFERENCE = 7  # what measures the motion
 
 
 class Rate(Enum):
@@ -46,27 +50,37 @@ class Follows(Enum):
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """A number of an effect.
+class Volts:
+    """What the D/A converter puts out: v_f, v_s [V]; signs of the rates meant, NaN where unknown; all (n,)."""
 
-    null: value at which the effect is absent; scale: a typical size; lower, upper: bounds of a fit.
-    """
-
-    name: str
-    unit: str
-    null: float
-    scale: float
-    lower: float
-    upper: float
+    v_f: FloatArray
+    v_s: FloatArray
+    sign_v: FloatArray
+    sign_w: FloatArray
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Rates on a uniform time grid: dt [s]; v [m/s] and w [rad/s], both (n,)."""
+    """Rates on a uniform time grid: dt [s]; v forward, u leftward [m/s] and w [rad/s], all (n,).
+
+    u: None where the chair does not slip, which is 0 throughout. heading [rad] in the map at the first sample; None
+    where nobody knows it: an effect that needs it then goes on from where its own sum of the turns has come.
+    """
 
     dt: float
     v: FloatArray
     w: FloatArray
+    u: FloatArray | None = None
+    heading: float | None = None
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a reference measures: times (...) [s], poses (..., 3) in the map, rates (..., 3) forward, leftward, yaw."""
+
+    times: FloatArray
+    poses: FloatArray
+    rates: FloatArray
 
 
 @dataclass(frozen=True)
@@ -78,29 +92,56 @@ class Context:
     rng: np.random.Generator
 
 
-class Effect(ABC):
-    """One mechanism with its parameters and the state it has reached."""
+class BaseEffect(Mechanism):
+    """An effect somewhere in the drive chain."""
 
-    id: ClassVar[str]
     stage: ClassVar[Stage]
-    parameters: ClassVar[tuple[Parameter, ...]]
-    sentence: ClassVar[str]
-    shows_in: ClassVar[Rate]
-    follows: ClassVar[Follows]
-    random: ClassVar[bool] = False  # it draws noise, so its mean effect on the motion is none
 
     def __init__(self, values: Mapping[str, float], context: Context) -> None:
-        names = [parameter.name for parameter in self.parameters]
-        if sorted(values) != sorted(names):
-            raise Error(f"{self.id}: needs the parameters {', '.join(names)}; got {', '.join(values) or 'none'}")
-        for parameter in self.parameters:
-            value = values[parameter.name]
-            if not parameter.lower <= value <= parameter.upper:
-                limits = f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
-                raise Error(f"{self.id}: {parameter.name} must be {limits}: {value:g}")
-        self.values = dict(values)
+        super().__init__(values)
         self.context = context
+
+
+class Effect(BaseEffect, ABC):
+    """An effect on the rates, with the state it has reached."""
+
+    shows_in: ClassVar[Rate]
+    follows: ClassVar[Follows]
 
     @abstractmethod
     def apply(self, motion: Motion) -> Motion:
         """Return the motion with this effect, continuing from where the last chunk ended."""
+
+
+class VoltageEffect(BaseEffect, ABC):
+    """An effect on the voltages, before they become rates."""
+
+    @abstractmethod
+    def apply(self, volts: Volts) -> Volts:
+        """Return the voltages with this effect, continuing from where the last chunk ended."""
+
+
+class ReferenceEffect(BaseEffect, ABC):
+    """An effect on what is measured of the motion; it has no state."""
+
+    stage = Stage.REFERENCE
+
+    @abstractmethod
+    def apply(self, reference: Reference) -> Reference:
+        """Return what the reference measures."""
+
+
+__all__ = [
+    "BaseEffect",
+    "Context",
+    "Effect",
+    "Follows",
+    "Motion",
+    "Parameter",
+    "Rate",
+    "Reference",
+    "ReferenceEffect",
+    "Stage",
+    "VoltageEffect",
+    "Volts",
+]

@@ -25,6 +25,8 @@ class DeadZoneV(Effect):
     stage = Stage.THRESHOLD
     parameters = _WIDTH
     sentence = "small translation voltages are swallowed: the dead zone of V_f is wider than modelled"
+    formula = "sign(v) · max(0, |v| − width · |gain of V_f|)"
+    source = "assumed: joystick inputs have a neutral zone; 5-50 mV"
     shows_in = Rate.V
     follows = Follows.V
 
@@ -40,6 +42,8 @@ class DeadZoneW(Effect):
     stage = Stage.THRESHOLD
     parameters = _WIDTH
     sentence = "small steering voltages are swallowed: the dead zone of V_s is wider than modelled"
+    formula = "sign(w) · max(0, |w| − width · |gain of V_s|)"
+    source = "assumed: joystick inputs have a neutral zone; 5-50 mV"
     shows_in = Rate.W
     follows = Follows.W
 

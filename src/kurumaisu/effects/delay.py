@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """base.delay: everything happens later than commanded."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
@@ -14,6 +16,8 @@ class Delay(Effect):
     stage = Stage.TRANSPORT
     parameters = (Parameter("delay", "s", null=0.0, scale=0.05, lower=0.0, upper=1.0),)
     sentence = "the motion follows the command after a pure delay"
+    formula = "v, w of t − delay"
+    source = "assumed: buses and motor controllers; 20-300 ms"
     shows_in = Rate.V
     follows = Follows.V_CHANGE
 
@@ -29,4 +33,4 @@ class Delay(Effect):
         n = len(motion.v)
         shifted = (1 - part) * samples[:, 1 : n + 1] + part * samples[:, :n]
         self._past = samples[:, -keep:]
-        return Motion(motion.dt, shifted[0], shifted[1])
+        return replace(motion, v=shifted[0], w=shifted[1])

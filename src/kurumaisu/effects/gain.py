@@ -15,6 +15,8 @@ class GainV(Effect):
     stage = Stage.GAIN
     parameters = _GAIN
     sentence = "the chair drives faster or slower than commanded, in proportion to the speed"
+    formula = "v · (1 + gain)"
+    source = "UMBmark 1996; wheel radius, tyre pressure; ±5 %"
     shows_in = Rate.V
     follows = Follows.V
 
@@ -30,6 +32,8 @@ class GainW(Effect):
     stage = Stage.GAIN
     parameters = _GAIN
     sentence = "the chair turns more or less than commanded, in proportion to the yaw rate (effective track)"
+    formula = "w · (1 + gain)"
+    source = "UMBmark 1996, E_b: effective track; ±10 %"
     shows_in = Rate.W
     follows = Follows.W
 

@@ -15,6 +15,8 @@ class LeftRightGain(Effect):
     stage = Stage.GAIN
     parameters = (Parameter("asymmetry", "1", null=0.0, scale=0.05, lower=-0.9, upper=0.9),)
     sentence = "left and right turns have different gains"
+    formula = "w · (1 + asymmetry · sign(w))"
+    source = "branches of (2) differ; ±8 %"
     shows_in = Rate.W
     follows = Follows.W
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """base.process_noise: floor, tyres and casters disturb the rates."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -11,13 +13,15 @@ class ProcessNoise(Effect):
     """Ornstein-Uhlenbeck noise on both rates; it starts at rest and acts only on a moving chair."""
 
     id = "base.process_noise"
-    stage = Stage.RESPONSE
+    stage = Stage.FLOOR
     parameters = (
         Parameter("sd_v", "m/s", null=0.0, scale=0.01, lower=0.0, upper=1.0),
         Parameter("sd_w", "rad/s", null=0.0, scale=0.02, lower=0.0, upper=2.0),
         Parameter("tau", "s", null=0.3, scale=0.3, lower=1.0e-3, upper=30.0),
     )
     sentence = "the rates fluctuate about their command"
+    formula = "v + n_v, w + n_w while moving; n: Ornstein-Uhlenbeck, sd, tau"
+    source = "assumed: floor, tyres, casters; 10 mm/s, 20 mrad/s, 0.3 s"
     shows_in = Rate.W
     follows = Follows.W
     random = True
@@ -31,8 +35,8 @@ class ProcessNoise(Effect):
         noise = [lfilter([1], [1, -decay], draws[:, i], zi=[decay * self._level[i]])[0] for i in range(2)]
         self._level = (float(noise[0][-1]), float(noise[1][-1]))
         moving = (motion.v != 0) | (motion.w != 0)
-        return Motion(
-            motion.dt,
-            motion.v + moving * self.values["sd_v"] * noise[0],
-            motion.w + moving * self.values["sd_w"] * noise[1],
+        return replace(
+            motion,
+            v=motion.v + moving * self.values["sd_v"] * noise[0],
+            w=motion.w + moving * self.values["sd_w"] * noise[1],
         )

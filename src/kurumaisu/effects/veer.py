@@ -13,6 +13,8 @@ class Veer(Effect):
     stage = Stage.GAIN
     parameters = (Parameter("curvature", "rad/m", null=0.0, scale=0.03, lower=-2.0, upper=2.0),)
     sentence = "the chair veers to one side in proportion to the distance driven (unequal wheels)"
+    formula = "w + curvature · v"
+    source = "UMBmark 1996, E_d: unequal wheels; 0.02-0.1 rad/m"
     shows_in = Rate.W
     follows = Follows.V
 

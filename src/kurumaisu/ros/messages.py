@@ -6,12 +6,13 @@ from __future__ import annotations
 import math
 
 import rospy
-from geometry_msgs.msg import Quaternion, TransformStamped
+from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from kurumaisu.msg import Voltages
 from kurumaisu.params import Laser
+from kurumaisu.ros.rotation import quaternion_of
 from kurumaisu.sim.chair import Command
 from kurumaisu.types import FloatArray
 
@@ -19,16 +20,6 @@ from kurumaisu.types import FloatArray
 def stamp_of(nanoseconds: int) -> rospy.Time:
     """Return a stamp for whole nanoseconds."""
     return rospy.Time(*divmod(nanoseconds, 1_000_000_000))
-
-
-def quaternion_of(yaw: float) -> Quaternion:
-    """Return the rotation by yaw [rad] about z."""
-    return Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
-
-
-def yaw_of(rotation: Quaternion) -> float:
-    """Return the yaw [rad], in (-pi, pi], of a rotation about z."""
-    return 2 * math.atan2(rotation.z, rotation.w) if rotation.w >= 0 else 2 * math.atan2(-rotation.z, -rotation.w)
 
 
 def odometry(stamp: rospy.Time, frame: str, child: str, pose: FloatArray, rates: FloatArray) -> Odometry:

@@ -123,8 +123,10 @@ class SimNode:
             first_beam = messages.stamp_of(self._epoch + round(observation.scan.time * _NS))
             self._scan.publish(messages.laser_scan(first_beam, settings.model.laser, observation.scan.ranges))
         if self._steps % settings.ground_truth_every == 0:
+            seen = observation.reference
+            measured = messages.stamp_of(self._epoch + round(float(seen.times) * _NS))
             self._truth.publish(
-                messages.odometry(stamp, settings.map_frame, settings.base_frame, observation.pose, observation.rates)
+                messages.odometry(measured, settings.map_frame, settings.base_frame, seen.poses, seen.rates)
             )
         if self._steps % settings.clock_every == 0:
             self._clock.publish(Clock(stamp))

@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry
 from kurumaisu import settings
 from kurumaisu.driving import Driver, Route, read_route
 from kurumaisu.errors import Error, one_line
-from kurumaisu.ros.messages import yaw_of
+from kurumaisu.ros.rotation import yaw_of
 
 
 class WaypointNode:

@@ -9,8 +9,10 @@ import numpy as np
 import pymunk
 
 from kurumaisu import _core
+from kurumaisu.effects import Motion
 from kurumaisu.geometry import between
 from kurumaisu.params import Chassis
+from kurumaisu.sim.plant import path
 from kurumaisu.sim.settings import Physics
 from kurumaisu.types import FloatArray
 
@@ -25,7 +27,7 @@ class ChairBody:
         """
         self._physics = physics
         self._pose = np.array(start, dtype=np.float64)
-        self._imposed = (0.0, 0.0)
+        self._imposed = (0.0, 0.0, 0.0)
         self._space = pymunk.Space()
         self._space.iterations = physics.iterations
         self._space.collision_slop = physics.collision_slop
@@ -48,29 +50,29 @@ class ChairBody:
         """Return whether the footprint overlaps an obstacle."""
         return bool(self._space.shape_query(self._footprint))
 
-    def move(self, v: float, w: float) -> tuple[FloatArray, bool]:
-        """Drive one step at v [m/s], w [rad/s].
+    def move(self, v: float, w: float, u: float) -> tuple[FloatArray, bool]:
+        """Drive one step at v forward [m/s], w [rad/s], and u leftward [m/s], which the wheels slip.
 
         Return the step's mean rates (3,): forward, leftward [m/s], yaw [rad/s]; and if it met an obstacle.
         """
         step = self._physics.step
         before = self._pose
-        self._pose = _core.integrate(np.array([v]), np.array([w]), np.array([step]), before.tolist())[1]
+        self._pose = _advance(before, (v, u, w), step)
         self._follow_pose()
         if not self.touches():
-            return np.array([v, 0.0, w]), False
+            return np.array([v, u, w]), False
         self._pose = before
         self._follow_pose()
-        self._push(v, w)
+        self._push(v, w, u)
         return between(before, self._pose) / step, True
 
-    def _push(self, v: float, w: float) -> None:
+    def _push(self, v: float, w: float, u: float) -> None:
         """Take a step against obstacles: contacts first, then what they leave of the motion, in substeps.
 
         pymunk's own order, motion first, would drive the chair into the wall at every substep.
         """
         substep = self._physics.step / self._physics.contact_substeps
-        self._imposed = (v, w)
+        self._imposed = (v, u, w)
         for _ in range(self._physics.contact_substeps):
             self._body.velocity = (0.0, 0.0)  # of itself the step only pushes overlaps apart
             self._body.angular_velocity = 0.0
@@ -80,8 +82,9 @@ class ChairBody:
         self._pose = np.array([*self._body.position, self._body.angle])
 
     def _impose(self, body: pymunk.Body, _gravity: tuple[float, float], _damping: float, _substep: float) -> None:
-        v, w = self._imposed
-        body.velocity = (v * math.cos(body.angle), v * math.sin(body.angle))
+        v, u, w = self._imposed
+        c, s = math.cos(body.angle), math.sin(body.angle)
+        body.velocity = (c * v - s * u, s * v + c * u)
         body.angular_velocity = w
 
     def _follow_pose(self) -> None:
@@ -101,3 +104,11 @@ def _chair(chassis: Chassis, friction: float) -> tuple[pymunk.Body, pymunk.Poly]
     footprint = pymunk.Poly(body, corners)
     footprint.friction = friction
     return body, footprint
+
+
+def _advance(pose: FloatArray, rates: tuple[float, float, float], step: float) -> FloatArray:
+    """Return where forward, leftward speed and yaw rate lead in a step; nearly always nothing slips."""
+    v, u, w = (np.array([rate]) for rate in rates)
+    if rates[1]:
+        return np.asarray(path(Motion(step, v, w, u), pose)[1])
+    return np.asarray(_core.integrate(v, w, np.array([step]), pose.tolist())[1])

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -48,9 +47,10 @@ class Drive:
 
 def without_nonsense(commands: FloatArray) -> tuple[FloatArray, int]:
     """Return commands (n, 3), zero where one of a robot's numbers is not finite, and how many robots that were."""
-    if math.isfinite(commands.sum()):
+    good = np.isfinite(commands)
+    if good.all():
         return commands, 0
-    bad = ~np.isfinite(commands).all(axis=1)
+    bad = ~good.all(axis=1)
     return np.where(bad[:, np.newaxis], 0.0, commands), int(bad.sum())
 
 

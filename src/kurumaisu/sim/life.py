@@ -20,7 +20,10 @@ _FARTHEST = 1e6  # [m, rad] a pose may be from the map's origin
 
 def checked_pose(pose: FloatArray | Sequence[float]) -> FloatArray:
     """Return a pose (4,) as an array. Raise Error unless it is four finite numbers within reach."""
-    array = np.asarray(pose, dtype=np.float64)
+    try:
+        array = np.array(pose, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise Error(f"pose: must be x, y, z [m], heading [rad]: {pose!r}") from error
     if array.shape != (4,) or not (np.abs(array) <= _FARTHEST).all():
         raise Error(f"pose: must be x, y, z [m], heading [rad], each within {_FARTHEST:g}: {array.tolist()}")
     return array
@@ -55,7 +58,7 @@ def moved(old: Machinery, index: int, pose: FloatArray) -> Machinery:
 
 def rebuilt(old: Machinery, population: Population) -> Machinery:
     """Return machinery of another population, in which all that both have goes on; rangers have yet to start."""
-    new = Machinery(population, old.options, old.interval)
+    new = Machinery(population, old.options, old.interval, old.dynamics)
     into, out = _common(new, old, new.bodies.heads, old.bodies.heads)
     state, known = new.motion.state(), old.motion.state()
     new.frames[into], new.before[into] = old.frames[out], old.before[out]
@@ -80,6 +83,15 @@ def same_fans(new: Machinery, old: Machinery) -> list[tuple[int, int]]:
 
     known = {key(old, i): i for i in range(len(old.fans))}
     return [(i, known[key(new, i)]) for i in range(len(new.fans)) if key(new, i) in known]
+
+
+def stuck(machinery: Machinery) -> list[str]:
+    """Say which robots cannot move from where they are."""
+    return [
+        f"{robot.place}: {robot.name or robot.type} touches something where it begins; it stalls until it is free"
+        for robot, touches in zip(machinery.robots, machinery.touching(), strict=True)
+        if touches
+    ]
 
 
 def _numbers(models: Sequence[Model]) -> IntArray:

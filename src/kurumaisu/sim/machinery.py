@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
@@ -16,27 +17,28 @@ from kurumaisu.sim.partition import attached, build_arena, is_robot, relative, s
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.rangers import Rangers
 from kurumaisu.sim.rhythm import Rhythm, period
+from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import BoolArray, FloatArray, IntArray
-from kurumaisu.world.model import Position
+from kurumaisu.world.model import Model, Position
 
 
 class Machinery:
     """Built once for a population; a new one takes over from an old one when models come, go, or walls move."""
 
-    def __init__(self, population: Population, options: Options, interval: float) -> None:
-        """Place all bodies where they begin; interval [s] is a step's length."""
+    def __init__(self, population: Population, options: Options, interval: float, dynamics: Dynamics | None) -> None:
+        """Place all bodies where they begin; interval [s] is a step's length; dynamics: None for Stage's semantics."""
         models = population.models
         self.population = population
         self.interval = interval
         self.options = options
-        self.exact = options.semantics == "physical"
-        self.bodies = sort(models, [is_robot(model) for model in models])
+        self.dynamics = dynamics
+        self.bodies = sort(models, _moving(models, physical=dynamics is not None))
         self.arena, self.numbers, self.walls = build_arena(models, population.poses, self.bodies, options.threads)
         self.robot_rows = np.array([i for i, head in enumerate(self.bodies.heads) if is_robot(models[head])], np.int64)
         self.robots = tuple(models[self.bodies.heads[row]] for row in self.robot_rows)
         self._everybody_drives = len(self.robot_rows) == len(self.bodies)
         self.fans = fans.find(models, population.poses, self.bodies, self.robot_rows.tolist())
-        self.motion: Motion = StageMotion(self.arena, self.numbers, self.bodies)
+        self.motion = self._make_motion()
         self.frames = np.zeros((len(self.bodies) + 1, 4))  # of the bodies, and of the map at the end
         self.before = self.frames.copy()  # those one step ago
         self.stalled = np.zeros(len(self.bodies), dtype=np.bool_)
@@ -49,14 +51,24 @@ class Machinery:
         devices = [cast(Position, model.device) for model in self.robots]
         starts = self.robot_poses
         born = self.population.born
-        periods = self._periods([model.update_interval for model in self.robots], always=self.exact)
+        periods = self._periods([model.update_interval for model in self.robots], always=self.dynamics is not None)
         self.rhythm = Rhythm(periods, born[[model.index for model in self.robots]].astype(np.int64))
         self.drive = Drive(devices, periods * self.interval, self.options.limit_acceleration)
-        self.localization = Localization(devices, starts, self.interval, self.options.odometry_walk, self.exact)
+        self.localization = Localization(
+            devices, starts, self.interval, self.options.odometry_walk, self.dynamics is not None
+        )
         looks = self._periods([fan.model.update_interval for fan in self.fans], always=False)
         births = born[[fan.model.index for fan in self.fans]].astype(np.int64)
         sweep = self.options.scan_sweep / self.interval
         self.rangers = Rangers(self.arena, self.fans, np.stack([looks, births], axis=-1), sweep)
+
+    def _make_motion(self) -> Motion:
+        if self.dynamics is None:
+            return StageMotion(self.arena, self.numbers, self.bodies)
+        from kurumaisu.sim.following import Followed  # loads pymunk, which Stage's semantics need not pay for
+
+        start = self.population
+        return Followed(self.arena, self.numbers, start.models, start.poses, self.dynamics)
 
     @property
     def robot_keys(self) -> IntArray:
@@ -121,3 +133,13 @@ class Machinery:
 
     def _periods(self, intervals: list[float], always: bool) -> IntArray:
         return np.array([1 if always else period(i, self.interval) for i in intervals], dtype=np.int64)
+
+
+def _moving(models: Sequence[Model], physical: bool) -> list[bool]:
+    """Return which models (m,) have poses of their own to move."""
+    if not physical:
+        return [is_robot(model) for model in models]
+    from kurumaisu.sim.bodies import movable
+
+    moving = set(movable(models))
+    return [model.index in moving for model in models]

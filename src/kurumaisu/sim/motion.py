@@ -33,7 +33,7 @@ class Motion(Protocol):
         """
 
     def state(self) -> dict[str, StateArray]:
-        """Return all that the next moves depend on, by name, arrays (b, ...): copies; `poses` is one of them."""
+        """Return all that the next moves depend on, by name, arrays (b, ...), copies."""
 
     def restore(self, state: dict[str, StateArray]) -> None:
         """Go back to a state; its arrays have a row for each body."""
@@ -49,10 +49,9 @@ class StageMotion:
         self._numbers = numbers
         self._poses = np.zeros((count, 4))
         self._stalled = np.zeros(count, dtype=np.bool_)
-        # A position is a complex number: turning it is one multiplication
-        self._delta, self._new = np.zeros((count, 4)), np.zeros((count, 4))
-        self._turns = np.zeros(count)
-        self._heading = np.zeros(count, dtype=np.complex128)
+        self._new = np.zeros((count, 4))
+        self._steps, self._across = np.zeros((count, 3)), np.zeros((count, 2))
+        self._headings, self._cos, self._sin, self._turns = (np.zeros((count, 1)) for _ in range(4))
         carriers = set(bodies.carrier.tolist())
         self._riders = [_riders(bodies, body) if body in carriers else [] for body in range(count)]
         self._carries = np.array([len(riders) > 0 for riders in self._riders], dtype=np.bool_)
@@ -72,7 +71,7 @@ class StageMotion:
             if not self._apart:
                 for body in np.flatnonzero(moving & self._carries):
                     self._settle_stack(int(body))
-                self._euler(velocities, dt)  # of those that were carried
+                    self._euler(velocities, dt)  # of those that were carried
                 moving &= ~self._carries
             self._settle(slice(None) if moving.all() else np.flatnonzero(moving))
         return self._poses, self._stalled
@@ -88,18 +87,24 @@ class StageMotion:
 
     def _euler(self, velocities: FloatArray, dt: float) -> None:
         """Leave in self._new where each body would go."""
-        headings, new = self._poses[:, 3], self._new
-        np.multiply(velocities[:, :2], dt, out=self._delta[:, :2])
-        np.multiply(velocities[:, 2], dt, out=self._delta[:, 3])
-        np.cos(headings, out=self._heading.real)
-        np.sin(headings, out=self._heading.imag)
-        step = self._delta.view(np.complex128)[:, 0]
-        np.multiply(step, self._heading, out=step)
-        np.add(self._poses, self._delta, out=new)
-        np.multiply(new[:, 3], 1 / _TURN, out=self._turns)
+        steps, across, new = self._steps, self._across, self._new
+        np.multiply(velocities, dt, out=steps)
+        np.negative(steps[:, 1], out=across[:, 0])  # steps turned by a quarter
+        across[:, 1] = steps[:, 0]
+        self._headings[:] = self._poses[:, 3:]  # in one piece: see geometry.cos_sin
+        np.cos(self._headings, out=self._cos)
+        np.sin(self._headings, out=self._sin)
+        new[:] = self._poses
+        new[:, 3] += steps[:, 2]
+        along = steps[:, :2]
+        np.multiply(along, self._cos, out=along)
+        np.multiply(across, self._sin, out=across)
+        np.add(along, across, out=along)
+        new[:, :2] += along
+        np.multiply(new[:, 3:], 1 / _TURN, out=self._turns)
         np.rint(self._turns, out=self._turns)
         np.multiply(self._turns, _TURN, out=self._turns)
-        np.subtract(new[:, 3], self._turns, out=new[:, 3])
+        new[:, 3:] -= self._turns
 
     def _settle(self, which: slice | IntArray) -> None:
         """Let bodies take their steps, each on its own."""

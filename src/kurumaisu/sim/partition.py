@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu._core import Arena
+from kurumaisu.geometry import cos_sin
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
 
@@ -43,11 +44,6 @@ class Outline:
 def is_robot(model: Model) -> bool:
     """Return whether it is of type position."""
     return isinstance(model.device, Position)
-
-
-def is_movable(model: Model) -> bool:
-    """Return whether forces can move it: robots, what has a mass, what hangs on a hinge."""
-    return is_robot(model) or model.mass > 0 or model.hinge is not None
 
 
 def sort(models: Sequence[Model], moves: Sequence[bool]) -> Bodies:
@@ -89,9 +85,14 @@ def outline(models: Sequence[Model], poses: FloatArray, members: IntArray, frame
 
 
 def build_arena(
-    models: Sequence[Model], poses: FloatArray, bodies: Bodies, threads: int
+    models: Sequence[Model], poses: FloatArray, bodies: Bodies, threads: int, see_solids: bool = False
 ) -> tuple[Arena, IntArray, Outline]:
-    """Return an arena of models at poses (models, 4), its numbers (b,) of the bodies, and the walls."""
+    """Return an arena of models at poses (models, 4), its numbers (b,) of the bodies, and the walls.
+
+    see_solids: rays see what is solid instead of what rangers see.
+    """
+    if see_solids:
+        models = [replace(m, ranger_return=1.0 if m.obstacle_return else -1.0) for m in models]
     walls = outline(models, poses, np.flatnonzero(bodies.body_of < 0), np.zeros(4))
     arena = Arena(walls.faces, walls.returns, walls.solid, walls.trees, threads)
     numbers = np.array([_add(arena, models, poses, bodies, i) for i in range(len(bodies))], dtype=np.int64)
@@ -101,14 +102,14 @@ def build_arena(
 
 def relative(frame: FloatArray, pose: FloatArray) -> FloatArray:
     """Return a pose (..., 4) of the map as seen in a frame (..., 4) of the map."""
-    c, s = np.cos(frame[..., 3]), np.sin(frame[..., 3])
+    c, s = cos_sin(frame[..., 3])
     d = pose - frame
     return np.stack([c * d[..., 0] + s * d[..., 1], c * d[..., 1] - s * d[..., 0], d[..., 2], d[..., 3]], axis=-1)
 
 
 def attached(frame: FloatArray, pose: FloatArray) -> FloatArray:
     """Return in the map what is a pose (..., 4) in a frame (..., 4); the heading is not wrapped."""
-    c, s = np.cos(frame[..., 3]), np.sin(frame[..., 3])
+    c, s = cos_sin(frame[..., 3])
     x, y = pose[..., 0], pose[..., 1]
     return np.stack(
         [

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from kurumaisu import effects
+from kurumaisu import _core, effects
 from kurumaisu._core import AxisInverse
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
@@ -20,6 +22,7 @@ class Plant:
         Raise Error for effects that are unknown or whose parameters do not fit.
         """
         self.dt = dt
+        self._model = model
         self._translation = AxisInverse(model.translation)
         self._steering = AxisInverse(model.steering)
         self._effects = effects.build(
@@ -31,15 +34,42 @@ class Plant:
         """Samples so far whose voltages stood for two rates."""
         return int(self._translation.ambiguous_samples + self._steering.ambiguous_samples)
 
-    def from_voltages(
-        self, v_f: FloatArray, v_s: FloatArray, sign_v: FloatArray, sign_w: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return v [m/s], w [rad/s] for voltages [V], all (n,); signs as commanded, NaN where unknown."""
-        return self.from_rates(self._translation.rates(v_f, sign_v), self._steering.rates(v_s, sign_w))
+    def from_voltages(self, volts: effects.Volts, heading: float | None = None) -> effects.Motion:
+        """Return the motion for voltages; heading [rad] of the chair before them, if somebody knows it."""
+        for effect in self._effects.volts:
+            volts = effect.apply(volts)
+        v = self._translation.rates(volts.v_f, volts.sign_v)
+        w = self._steering.rates(volts.v_s, volts.sign_w)
+        return self._respond(v, w, heading)
 
-    def from_rates(self, v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return v, w for commanded rates, all (n,)."""
-        motion = effects.Motion(self.dt, v, w)
-        for effect in self._effects:
+    def from_rates(self, v: FloatArray, w: FloatArray, heading: float | None = None) -> effects.Motion:
+        """Return the motion for commanded rates, both (n,)."""
+        if not self._effects.volts:
+            return self._respond(v, w, heading)
+        model = self._model
+        volts = effects.Volts(model.translation.volts(v), model.steering.volts(w), np.sign(v), np.sign(w))
+        return self.from_voltages(volts, heading)
+
+    def seen(self, reference: effects.Reference) -> effects.Reference:
+        """Return what a reference measures where the truth is as given."""
+        for effect in self._effects.reference:
+            reference = effect.apply(reference)
+        return reference
+
+    def _respond(self, v: FloatArray, w: FloatArray, heading: float | None) -> effects.Motion:
+        motion = effects.Motion(self.dt, v, w, heading=heading)
+        for effect in self._effects.rates:
             motion = effect.apply(motion)
-        return motion.v, motion.w
+        return motion
+
+
+def path(motion: effects.Motion, start: FloatArray) -> FloatArray:
+    """Return poses (n + 1, 3) [m, m, rad] from a start (3,) on, by equation (3).
+
+    A leftward speed adds the path of a chair that heads to the left.
+    """
+    dt = np.full(len(motion.v), motion.dt)
+    poses = _core.integrate(motion.v, motion.w, dt, start.tolist())
+    if motion.u is not None:
+        poses[:, :2] += _core.integrate(motion.u, motion.w, dt, [0.0, 0.0, start[2] + math.pi / 2])[:, :2]
+    return poses

@@ -77,9 +77,11 @@ class _Cohort:
         self._mounts = np.array([fan.mount for fan in fans]).reshape(-1, 4)
         self._fans = np.array([[*spread(f.fan), f.fan.samples, f.fan.range_max] for f in fans]).reshape(-1, 4)
         self._noise = RangerNoise([fan.fan for fan in fans])
+        self._ahead = np.ascontiguousarray(self._mounts[:, :2])
+        self._aside = np.stack([-self._ahead[:, 1], self._ahead[:, 0]], axis=-1)  # turned by a quarter
         self._origins = np.empty((len(fans), 4))
-        self._heading = np.empty(len(fans), dtype=np.complex128)
-        self._offset = np.empty(len(fans), dtype=np.complex128)
+        self._part = np.empty((len(fans), 2))
+        self._headings, self._cos, self._sin = (np.empty((len(fans), 1)) for _ in range(3))
         self._beams = _Beams(fans, sweep) if sweep or self._noise.on_bearings else None
 
     def measure(self, time: float, count: int, before: FloatArray, now: FloatArray, rng: np.random.Generator) -> Sweep:
@@ -95,13 +97,14 @@ class _Cohort:
         """Return where the fans are (f, 4)."""
         origins = self._origins
         np.take(frames, self._body, axis=0, out=origins, mode="wrap")  # with a buffer, numpy wants a mode
-        np.cos(origins[:, 3], out=self._heading.real)
-        np.sin(origins[:, 3], out=self._heading.imag)
-        # x and y as one complex number
-        np.multiply(self._heading, self._mounts.view(np.complex128)[:, 0], out=self._offset)
-        places = origins.view(np.complex128)[:, 0]
-        np.add(places, self._offset, out=places)
-        np.add(origins[:, 2:], self._mounts[:, 2:], out=origins[:, 2:])
+        self._headings[:] = origins[:, 3:]  # in one piece: see geometry.cos_sin
+        np.cos(self._headings, out=self._cos)
+        np.sin(self._headings, out=self._sin)
+        np.multiply(self._ahead, self._cos, out=self._part)
+        origins[:, :2] += self._part
+        np.multiply(self._aside, self._sin, out=self._part)
+        origins[:, :2] += self._part
+        origins[:, 2:] += self._mounts[:, 2:]
         return origins
 
     def _cast(

@@ -3,23 +3,23 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu._core import Scene
+from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose, interpolate
 from kurumaisu.params import Laser
+from kurumaisu.sim.walls import Walls
 from kurumaisu.types import FloatArray
 
 
 @dataclass(frozen=True)
 class Scan:
-    """Readings (beams,) [m]: +inf no return, NaN below range_min.
+    """Readings (beams,) [m]: +inf no return, NaN no valid reading, as one below range_min.
 
-    time [s] and pose (3,): base_link in the map, both at the first beam.
+    time [s] on the scan's stamp, which is that of the first beam; pose (3,): base_link in the map at that time.
     """
 
     time: float
@@ -30,10 +30,11 @@ class Scan:
 class Scanner:
     """Takes a scan every scan_time from the poses of the chair."""
 
-    def __init__(self, laser: Laser, scene: Scene, rng: np.random.Generator) -> None:
-        """Start a scan at time 0. Raise Error for a fan that outlasts scan_time."""
+    def __init__(self, laser: Laser, walls: Walls, chain: LaserChain, rng: np.random.Generator) -> None:
+        """Start a scan at time 0; chain: the laser's effects. Raise Error for a fan that outlasts scan_time."""
         self._laser = laser
-        self._scene = scene
+        self._walls = walls
+        self._chain = chain
         self._rng = rng
         self._mount = np.array([laser.mount.x, laser.mount.y, laser.mount.yaw])
         self._bearings = laser.bearings
@@ -46,26 +47,62 @@ class Scanner:
         self._count = 0  # of scans taken
         self._times: list[float] = []
         self._poses: list[FloatArray] = []
+        self._aim()
 
     def observe(self, time: float, pose: FloatArray) -> Scan | None:
-        """Note where the chair is, times increasing [s]; return the scan that is complete, if any."""
+        """Note where the chair is, times increasing [s]; return the scan that is complete, if any.
+
+        That is when its last beam has been fired, in truth and by its stamp.
+        """
         self._times.append(time)
         self._poses.append(pose)
-        start = self._count * self._laser.scan_time
         rounding = 1e-9  # [s] of multiples of the step
-        if time < start + self._delays[-1] - rounding:
+        if time < self._complete - rounding:
             return None
-        self._count += 1
+        beams = self._beams
         times, poses = np.array(self._times), np.array(self._poses)
-        scan = self._scan(start, interpolate(times, poses, start + self._delays))
-        self._forget(self._count * self._laser.scan_time)
+        at_stamp = interpolate(times, poses, np.array([beams.stamp]))[0]
+        scan = Scan(beams.stamp, at_stamp, self._readings(beams, interpolate(times, poses, beams.times)))
+        self._count += 1
+        self._aim()
+        self._forget(min(self._beams.stamp, self._beams.times.min()))
         return scan
 
-    def _scan(self, start: float, poses: FloatArray) -> Scan:
-        origins = compose(poses, self._mount)
-        ranges = self._scene.cast(origins, self._bearings, math.inf)
-        readings = self._laser.error.reading(ranges, self._rng.standard_normal(len(ranges)))
-        return Scan(start, poses[0], readings)
+    def _aim(self) -> None:
+        """Prepare the beams of the next scan."""
+        stamp = self._count * self._laser.scan_time
+        level = np.zeros(self._laser.beams)
+        height = self._laser.mount.z
+        said = stamp + self._delays
+        self._beams = self._chain.aim(Beams(stamp, said, self._mount, height, self._bearings, level))
+        self._complete = max(said[-1], self._beams.times.max())
+
+    def _readings(self, beams: Beams, poses: FloatArray) -> FloatArray:
+        error = self._laser.error
+        origins = compose(poses, beams.mount)
+        level = self._walls.cast(origins, beams.bearings)
+        noise = self._rng.standard_normal(len(level))
+        if self._chain.empty:
+            return error.reading(level, noise)
+        ranges = slanted(level, beams)
+        echoes = Echoes(
+            stamp=beams.stamp,
+            bearings=self._bearings,
+            ranges=ranges,
+            incidence=self._incidence(origins, beams, level),
+            returns=self._walls.returns(origins, beams.bearings),
+            mean=error.mean(ranges),
+            sd=error.deviation(ranges),
+            noise=noise,
+            readings=ranges,
+        )
+        # What the law, without its noise, makes of the range that it means by a reading: rounding and gate are left.
+        return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges)))
+
+    def _incidence(self, origins: FloatArray, beams: Beams, ranges: FloatArray) -> FloatArray:
+        if not self._chain.oblique:
+            return np.zeros(len(ranges))
+        return incidence(self._walls.cast, origins, beams.bearings, ranges)
 
     def _forget(self, before: float) -> None:
         """Drop what the next scan does not need: all but the last pose that is not after its start."""

@@ -50,3 +50,34 @@ def with_effects(model: Model, path: Path) -> Model:
     more = effects_of(top)
     top.end()
     return replace(model, effects=(*model.effects, *more))
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """What bodies do when they touch, and what the floor does to them; [-] but for density [kg/m^3].
+
+    wheel_friction: of a robot's wheels, which limits the force of its motors; floor_friction: of other movable bodies;
+    density: of robots and doors whose file gives no mass; hinge_torque [N m]: friction of a hinge.
+    """
+
+    contacts: Physics
+    wheel_friction: float
+    floor_friction: float
+    density: float
+    hinge_torque: float
+    slip: bool
+
+
+def load_dynamics(path: Path) -> Dynamics:
+    """Read a physical.yaml. Raise Error naming file and key."""
+    top = settings.load(path)
+    dynamics = Dynamics(
+        contacts=read_physics(top.section("physics")),
+        wheel_friction=top.number("wheel_friction", above=0),
+        floor_friction=top.number("floor_friction", at_least=0),
+        density=top.number("density", above=0),
+        hinge_torque=top.number("hinge_torque", at_least=0),
+        slip=top.text("slip", ("on", "off")) == "on",
+    )
+    top.end()
+    return dynamics

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from kurumaisu.errors import Error
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 Pixels = NDArray[Any]  # (height, width), row 0 at the top, of whatever type the image has
 
@@ -61,8 +61,27 @@ def is_map(path: Path) -> bool:
 
 def outline(occupied: BoolArray) -> FloatArray:
     """Return the borders (m, 4) between wall and free pixels, straight runs joined; row 0 at the bottom."""
-    flat, upright = _runs(occupied), _runs(np.ascontiguousarray(occupied.T))
-    return np.concatenate([flat, upright[:, [1, 0, 3, 2]]])
+    pixels = np.pad(occupied.view(np.int8), 1)
+    y, x0, x1 = _runs(np.diff(pixels, axis=0))
+    x, y0, y1 = _runs(np.diff(pixels, axis=1).T)
+    flat, upright = np.array([x0, y, x1, y]), np.array([x, y0, x, y1])
+    return np.ascontiguousarray(np.hstack([flat, upright]).T, dtype=np.float64)
+
+
+def _runs(step: NDArray[np.int8]) -> tuple[IntArray, IntArray, IntArray]:
+    """Return row, first and last column of runs of one non-zero value in an array whose outer columns are 0.
+
+    step is +1 at the lower border of a wall, -1 at its upper border; borders of opposite sense are never joined.
+    """
+    changes = step[:, 1:] != step[:, :-1]
+    if step.flags.c_contiguous:
+        row, column = np.divmod(np.flatnonzero(changes), changes.shape[1])
+    else:
+        column, row = np.divmod(np.flatnonzero(changes.T), changes.shape[0])
+        order = np.lexsort((column, row))
+        row, column = row[order], column[order]
+    starts = np.flatnonzero(step[row, column + 1])  # a change to nothing ends a run and begins none
+    return row[starts], column[starts], column[starts + 1]
 
 
 def _bitmap(path: Path, occupied: BoolArray) -> Bitmap:
@@ -72,29 +91,16 @@ def _bitmap(path: Path, occupied: BoolArray) -> Bitmap:
     return Bitmap(path, outline(occupied[::-1]), occupied.shape[1], occupied.shape[0])
 
 
-def _runs(occupied: BoolArray) -> FloatArray:
-    """Return the borders that run along rows: x0, y, x1, y."""
-    rows, columns = occupied.shape
-    step = np.zeros((rows + 1, columns + 2), dtype=np.int8)  # with a column of nothing on either side
-    step[:-1, 1:-1] = occupied
-    step[1:, 1:-1] -= occupied  # +1 at the lower border of a wall, -1 at its upper border
-    # A run ends where the step changes along the row; borders of opposite sense are never joined.
-    y, x = np.nonzero(step[:, 1:] != step[:, :-1])
-    starts = np.flatnonzero(step[y, x + 1])  # a change to nothing ends a run and begins none
-    return np.array([x[starts], y[starts], x[starts + 1], y[starts]], dtype=np.float64).T
-
-
 def _pixels(path: Path, every_channel: bool) -> Pixels:
     """Return the first channel, or the mean of the colours, of all pixels (height, width), row 0 at the top."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our own limit is just below
-            image = Image.open(path)
-        with image:
-            if image.width * image.height > _MOST_PIXELS:
-                raise Error(f"{path}: has {image.width} x {image.height} pixels, more than {_MOST_PIXELS}")
-            pixels: Pixels = _channel(image, every_channel)
-            return pixels
+            warnings.simplefilter("ignore")  # of large images, for which there is our own limit, and of damaged ones
+            with Image.open(path) as image:
+                if image.width * image.height > _MOST_PIXELS:
+                    raise Error(f"{path}: has {image.width} x {image.height} pixels, more than {_MOST_PIXELS}")
+                pixels: Pixels = _channel(image, every_channel)
+                return pixels
     except Error:
         raise
     except Exception as error:  # decoders of foreign files raise whatever they come across

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import re
 
+from kurumaisu.world.notes import Notes
 from kurumaisu.world.syntax import Entity
-from kurumaisu.world.values import Notes
 
 MODELS = (
     *("model", "position", "ranger", "camera", "fiducial", "bumper", "gripper"),

@@ -44,9 +44,9 @@ def named(name: str) -> tuple[float, float, float] | None:
     """Return a colour by its X11 name, blanks and case being ignored; None: there is no such colour."""
     name = name.replace(" ", "").lower()
     level = re.fullmatch(r"gr[ae]y(\d{1,3})", name)
-    if level and int(level[1]) <= 100:
-        shade = round(int(level[1]) * 2.55) / 255
-        return (shade, shade, shade)
+    if level:
+        shade = int(int(level[1]) * 2.55 + 0.5) / 255  # as in rgb.txt, where 50 is 127 and 90 is 229
+        return (shade, shade, shade) if shade <= 1 else None
     if name in _NAMES:
         return _scaled(bytes.fromhex(_NAMES[name]), 1.0)
     if name in ImageColor.colormap:

@@ -113,8 +113,8 @@ def _fiducial(values: Values) -> Fiducial:
 
 def _bumper(values: Values) -> Bumper:
     count = values.whole("bcount", 0)
-    if not 0 <= count <= _MOST_STRIPS or (values.has("bcount") and count == 0):
-        raise values.error("bcount", f"bcount must be 1 to {_MOST_STRIPS}, not {count}")
+    if not 0 <= count <= _MOST_STRIPS:
+        raise values.error("bcount", f"bcount must be 0 to {_MOST_STRIPS}, not {count}")
     common = values.length("blength", 0.0)
     poses = [values.several(f"bpose[{i}]", "llla", (0.0,) * 4) for i in range(count)]
     lengths = [values.length(f"blength[{i}]", common) for i in range(count)]
@@ -125,6 +125,9 @@ def _gripper(values: Values) -> Gripper:
     size = np.array(values.several("paddle_size", "lll", (0.66, 0.1, 0.4)))
     if (size <= 0).any() or (size > (1, 0.5, 1)).any():
         raise values.error("paddle_size", "paddle_size must be shares of the gripper's size: up to 1, 0.5 and 1")
+    state = values.entity.properties.get("paddle_state")
+    if state and len(state.values) < 2:
+        raise state.name.error("paddle_state needs 2 strings: open or closed, up or down")
     return Gripper(size, values.text("paddle_state", "open") != "closed", values.whole("autosnatch", 0) != 0)
 
 

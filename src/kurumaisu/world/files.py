@@ -10,10 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from kurumaisu.errors import Error
+from kurumaisu.world.notes import Notes
 from kurumaisu.world.tokens import Kind, Source, Token, skip_line, tokenize
 
 _MOST_BYTES = 2**26  # of one file
 _MOST_TOKENS = 1_000_000  # of a world with its includes; Stage's largest has 40 000
+_MOST_OPEN = 1_000  # brackets not closed yet
 _DEEPEST = 64  # nested includes; more is a loop
 
 # A parameter `${name}` or `${name=default}` outside of comments; Stage's own language has no `$`.
@@ -48,8 +50,11 @@ class Reader:
 
     top: Path
     values: Mapping[str, str]
+    notes: Notes
     used: set[str] = field(default_factory=set)
     tokens: list[Token] = field(default_factory=list)
+    _open: int = 0  # brackets not closed yet
+    _sources: dict[Path, Source] = field(default_factory=dict)
 
     def read(self) -> list[Token]:
         """Return the tokens of all files in the order Stage sees them, the last being END."""
@@ -69,6 +74,12 @@ class Reader:
                 tokens = tokenize(source, self._include(token, next(tokens), depth))
                 continue
             append(token)
+            if token.kind is Kind.OPEN:
+                self._open += 1
+                if self._open > _MOST_OPEN:
+                    raise token.error(f"more than {_MOST_OPEN} levels of brackets")
+            elif token.kind is Kind.CLOSE:
+                self._open -= 1
             if len(self.tokens) > _MOST_TOKENS:
                 raise token.error(f"more than {_MOST_TOKENS} words, numbers and brackets")
 
@@ -76,14 +87,25 @@ class Reader:
         """Splice an included file and return where its line ends: as in Stage, the rest of the line is not read."""
         if name.kind is not Kind.STRING:
             raise name.error(f"include needs a string, not {name}")
+        if name.at == include.at + len(include.text):
+            raise include.error("include needs a blank before its string")
         if depth == _DEEPEST:
             raise include.error(f"more than {_DEEPEST} levels of includes")
         self.tokens.append(Token(Kind.LINE_END, "\n", include.source, include.at))
         self._splice(self._source(find(name, self.top, search_path=True), name), depth + 1)
-        return skip_line(include.source, name.at)
+        text, end = include.source.text, skip_line(include.source, name.at)
+        rest = text[name.at + len(name.text) : end].split("#")[0].strip()
+        if rest:
+            self.notes.add(include, f"what follows on the line of an include is not read, as in Stage: {rest}")
+        return end
 
     def _source(self, path: Path, asked: Token | None) -> Source:
         """Return the text of a file with its parameters filled in."""
+        if path not in self._sources:
+            self._sources[path] = self._fill_in(self._read(path, asked))
+        return self._sources[path]
+
+    def _read(self, path: Path, asked: Token | None) -> Source:
         try:
             with path.open("rb") as file:
                 data = file.read(_MOST_BYTES + 1)
@@ -92,10 +114,12 @@ class Reader:
             raise asked.error(reason) if asked else Error(reason) from error
         if len(data) > _MOST_BYTES:
             raise Error(f"{path}: is larger than {_MOST_BYTES} bytes")
-        source = Source(path, data.decode(errors="surrogateescape"))
-        return self._fill_in(source) if "${" in source.text else source
+        return Source(path, data.decode(errors="surrogateescape"))
 
     def _fill_in(self, source: Source) -> Source:
+        if "${" not in source.text:
+            return source
+
         def replace(match: re.Match[str]) -> str:
             if match[0].startswith("#"):
                 return match[0]

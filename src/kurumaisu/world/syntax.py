@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from kurumaisu.world.files import Reader
+from kurumaisu.world.notes import Notes
 from kurumaisu.world.tokens import Kind, Source, Token
 
 _DEEPEST = 100  # levels of entities in entities, and of macros of macros
-_MOST_STEPS = 2_000_000  # properties and entities read, once for each macro and instance
+_MOST_STEPS = 2_000_000  # properties and entities read; the largest world of Stage's own comes to some ten thousand
 
 _VALUES = (Kind.NUMBER, Kind.STRING)
 
@@ -45,16 +46,17 @@ class _Macro:
     known: int = 0  # how many macros were known when the template was made: a later one may change it
 
 
-def parse(top: Path, values: Mapping[str, str]) -> Entity:
+def parse(top: Path, values: Mapping[str, str], notes: Notes) -> Entity:
     """Return the world entity of a file, parameters filled in. Raise Error with the place of what does not parse."""
-    return _Parser(Reader(top, values).read(), top).world()
+    return _Parser(Reader(top, values, notes).read(), top, notes).world()
 
 
 class _Parser:
     """All tokens, and the macros known so far. Methods take and return places among the tokens."""
 
-    def __init__(self, tokens: list[Token], top: Path) -> None:
+    def __init__(self, tokens: list[Token], top: Path, notes: Notes) -> None:
         self._tokens = tokens
+        self._notes = notes
         self._macros: dict[str, _Macro] = {}
         self._steps = 0
         self._world = Entity("world", Token(Kind.WORD, "world", Source(top, tokens[-1].source.text), 0))
@@ -93,6 +95,17 @@ class _Parser:
                 return at
         raise self._tokens[opening].error(f"the '(' of {define.text} is never closed")
 
+    def _count(self, word: Token, steps: int) -> None:
+        """Count what is read. Raise Error if macros of macros come to too much."""
+        self._steps += steps
+        if self._steps > _MOST_STEPS:
+            raise word.error(f"the macros come to more than {_MOST_STEPS} properties and entities")
+
+    def _instance(self, base: Entity, word: Token) -> Entity:
+        """Return a copy of what a macro comes to, to read more into."""
+        self._count(word, len(base.properties) + len(base.children))
+        return Entity(base.type, word, dict(base.properties), list(base.children))
+
     def _after_line_ends(self, at: int) -> int:
         while self._tokens[at].kind is Kind.LINE_END:
             at += 1
@@ -100,9 +113,7 @@ class _Parser:
 
     def _word(self, entity: Entity, at: int, depth: int) -> int:
         """Read a property or a child of an entity."""
-        self._steps += 1
-        if self._steps > _MOST_STEPS:
-            raise entity.name.error("the macros come to too much")
+        self._count(entity.name, 1)
         word, following = self._tokens[at], self._after_line_ends(at + 1)
         kind = self._tokens[following].kind
         if kind is Kind.OPEN:
@@ -127,11 +138,7 @@ class _Parser:
         if depth > _DEEPEST:
             raise word.error(f"more than {_DEEPEST} levels of entities")
         macro = self._macros.get(word.text)
-        if macro is None:
-            child = Entity(word.text, word)
-        else:
-            base = self._template(macro, word, depth)
-            child = Entity(base.type, word, dict(base.properties), list(base.children))
+        child = self._instance(self._template(macro, word, depth), word) if macro else Entity(word.text, word)
         parent.children.append(child)
         return self._body(child, at, depth)
 
@@ -145,10 +152,24 @@ class _Parser:
                 at = self._word(entity, at, depth)
             elif kind is Kind.CLOSE:
                 return at + 1
+            elif kind is Kind.OPEN:
+                entity, at = self._second_bracket(entity, tokens[at]), at + 1
             elif kind is Kind.END:
                 raise entity.name.error(f"the '(' of {entity.name.text} is never closed")
             else:
                 raise tokens[at].error(f"expected a property or an entity, not {tokens[at]}")
+
+    def _second_bracket(self, entity: Entity, bracket: Token) -> Entity:
+        """Return the entity that a '(' without a name before it begins: as in Stage, another one of the same type.
+
+        It ends at the same ')', and there is none if the type is a macro.
+        """
+        self._notes.add(bracket, "a '(' without a name: is this meant?")
+        self._count(bracket, 1)
+        if entity.name.text in self._macros:
+            return entity
+        entity.children.append(Entity(entity.name.text, entity.name))
+        return entity.children[-1]
 
     def _template(self, macro: _Macro, word: Token, depth: int) -> Entity:
         """Return what a macro comes to, read once for all its instances."""
@@ -156,11 +177,10 @@ class _Parser:
             raise macro.base.error(f"macro {word.text} never ends")
         if macro.template is None or macro.known != len(self._macros):
             known = self._macros.get(macro.base.text)
-            if known is None:
-                template = Entity(macro.base.text, macro.base)
-            else:
-                base = self._template(known, word, depth + 1)
-                template = Entity(base.type, macro.base, dict(base.properties), list(base.children))
+            name = macro.base
+            template = (
+                self._instance(self._template(known, word, depth + 1), name) if known else Entity(name.text, name)
+            )
             self._body(template, macro.start, depth)
             macro.template, macro.known = template, len(self._macros)
         return macro.template

@@ -90,7 +90,7 @@ _WITH_TEXT = (Kind.WORD, Kind.NUMBER, Kind.STRING)
 # escapes; a line feed after a carriage return and the other way round belong to the same line end.
 _LINE_END = re.compile(r"\r\n|\n\r|\r|\n")
 _TOKEN = re.compile(
-    r"""(?:[ \t]+ | \#[^\r\n]*)*
+    r"""(?:[ \t]++ | \#[^\r\n]*+)*+
       (?:(?P<WORD>[A-Za-z][A-Za-z0-9.\-_\[\]]*)
       | (?P<NUMBER>[-+.0-9]+)
       | (?P<LINE_END>\r\n|\n\r|\r|\n)
@@ -99,7 +99,7 @@ _TOKEN = re.compile(
       | (?P<END>\Z))""",
     re.VERBOSE,
 )
-_BLANK = re.compile(r"(?:[ \t]+|#[^\r\n]*)*")
+_BLANK = re.compile(r"(?:[ \t]++|#[^\r\n]*+)*+")
 _KINDS = {kind.name: kind for kind in Kind}
 
 

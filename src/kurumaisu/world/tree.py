@@ -15,11 +15,13 @@ from kurumaisu.world.catalogue import MODELS
 from kurumaisu.world.colors import color
 from kurumaisu.world.devices import device
 from kurumaisu.world.model import Hinge, Model
+from kurumaisu.world.notes import Notes
 from kurumaisu.world.shapes import Shaper
 from kurumaisu.world.syntax import Entity
-from kurumaisu.world.values import Notes, Units, Values
+from kurumaisu.world.values import Units, Values
 
-_MOST_MODELS = 100_000
+_MOST_MODELS = 100_000  # of a world
+_MOST_ENTITIES = 2_000_000  # models, blocks and sensors of a world
 _DEEPEST = 100  # levels of models on models
 _SIZE = (0.4, 0.4, 1.0)  # [m], as in Stage
 _SIZES = {  # [m], of types with another size if the file gives none
@@ -40,6 +42,7 @@ class Builder:
     notes: Notes
     shaper: Shaper
     models: list[Model] = field(default_factory=list)
+    _visited: int = 0
     _known: dict[int, dict[str, Any]] = field(default_factory=dict)  # of an entity: what all its models have in common
 
     def build(self, world: Entity) -> tuple[Model, ...]:
@@ -50,6 +53,9 @@ class Builder:
     def _children(self, entity: Entity, parent: int, root: int, depth: int) -> None:
         if depth > _DEEPEST:
             raise entity.name.error(f"more than {_DEEPEST} levels of models")
+        self._visited += len(entity.children)
+        if self._visited > _MOST_ENTITIES:
+            raise entity.name.error(f"the macros come to more than {_MOST_ENTITIES} entities")
         for child in entity.children:
             if child.type in MODELS:
                 self._add(child, parent, root, depth)

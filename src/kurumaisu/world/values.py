@@ -6,28 +6,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from kurumaisu.errors import Error
+from kurumaisu.world.notes import Notes
 from kurumaisu.world.syntax import Entity, Property
 from kurumaisu.world.tokens import Kind, Token
 
-_LARGEST = 1e9  # of a number, as libstage/blockgroup.cc assumes of coordinates
+_LARGEST = 2.0**31  # of a number: what C's int holds
 _PREFIX = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")  # what C's atof takes of a string
-
-
-@dataclass
-class Notes:
-    """Warnings, each with its place, and each kind of them once."""
-
-    texts: list[str] = field(default_factory=list)
-    _seen: set[str] = field(default_factory=set)
-
-    def add(self, token: Token, text: str, kind: str | None = None) -> None:
-        """Add a warning, unless there was one of this kind (by default: with the same text) before."""
-        if (kind or text) not in self._seen:
-            self._seen.add(kind or text)
-            self.texts.append(f"{token.place}: {text}")
+_WHOLE = re.compile(r"\s*[+-]?\d+")
 
 
 @dataclass(frozen=True)
@@ -69,8 +57,13 @@ class Values:
         return self.number(name, default / self.units.angle) * self.units.angle
 
     def whole(self, name: str, default: int) -> int:
-        """Return a whole number, what follows the point being dropped."""
-        return int(self.number(name, default))
+        """Return a whole number: what stands before the first character that is no digit, as C's atoi takes it."""
+        given = self.entity.properties.get(name)
+        if given is None:
+            return default
+        token = self._first(given)
+        value, match = self._number(given, token), _WHOLE.match(token.string)
+        return int(value) if token.kind is Kind.NUMBER else int(match[0]) if match else 0
 
     def text(self, name: str, default: str) -> str:
         """Return a string."""

@@ -14,11 +14,12 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world import catalogue
 from kurumaisu.world.bitmaps import is_map
 from kurumaisu.world.model import Model
+from kurumaisu.world.notes import Notes
 from kurumaisu.world.shapes import Shaper
 from kurumaisu.world.syntax import Entity, Property, parse
 from kurumaisu.world.tokens import Kind, Source, Token
 from kurumaisu.world.tree import Builder, global_poses
-from kurumaisu.world.values import Notes, Units, Values
+from kurumaisu.world.values import Units, Values
 
 _RESOLUTION = 0.02  # [m], as in Stage
 _INTERVAL = 100.0  # [ms], as in Stage
@@ -71,6 +72,12 @@ class World:
         return self.starts[0].pose
 
     @property
+    def returns(self) -> FloatArray:
+        """Reflectance (m,) [1] of the segments: the ranger_return of their models."""
+        seen = [m for m in self.models if m.ranger_return >= 0 and not _on_position(m, self.models)]
+        return np.repeat([m.ranger_return for m in seen], [len(m.shape.segments) for m in seen])
+
+    @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Smallest x, smallest y, largest x, largest y [m] of the walls. Raise Error if there are none."""
         both = np.concatenate([self.segments, self.obstacles]).reshape(-1, 2)
@@ -93,9 +100,9 @@ def load_world(path: Path, *, image_extents: bool = False, values: Mapping[str, 
             raise Error(f"{path}: a map has no parameters, as {next(iter(values))}")
         top, image_extents = _map_alone(path), True
     else:
-        top = parse(path, values or {})
-    catalogue.check(top, notes)
+        top = parse(path, values or {}, notes)
     said = Values(top, _units(top, notes), notes)
+    catalogue.check(top, notes)
     models = Builder(said.units, notes, Shaper(path, image_extents)).build(top)
     return _world(path, models, said)
 
@@ -137,9 +144,6 @@ def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
     interval = said.number("interval_sim", _INTERVAL)
     if interval < _SHORTEST:
         raise said.error("interval_sim", f"interval_sim must be at least {_SHORTEST:g} ms, not {interval:g}")
-    quit_time = said.number("quit_time", 0.0)
-    if quit_time < 0:
-        raise said.error("quit_time", f"quit_time must not be below 0, not {quit_time:g}")
     poses = global_poses(models)
     walls = [model for model in models if not _on_position(model, models)]
     starts = (model for model in models if model.type == "position")
@@ -150,7 +154,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
         poses=poses,
         resolution=resolution,
         interval=interval / 1000,
-        quit_time=quit_time,
+        quit_time=max(said.number("quit_time", 0.0), 0.0),
         speedup=said.number("speedup", 1.0),
         segments=_outlines([model for model in walls if model.ranger_return >= 0], poses),
         obstacles=_outlines([model for model in walls if model.obstacle_return], poses),

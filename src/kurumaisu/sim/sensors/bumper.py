@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from kurumaisu.sim.sensors.rays import Rays, place
@@ -10,11 +12,20 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Bumper
 
 
+@dataclass(frozen=True)
+class BumperSettings:
+    """Strips, and how far ahead of themselves they feel [m]; 0: on their line only, as in Stage."""
+
+    bumper: Bumper
+    travel: float
+
+
 class BumperSensor:
     """Feels what crosses its strips: a strip lies across the heading of its pose, which is its middle."""
 
-    def __init__(self, bumper: Bumper, travel: float) -> None:
-        """Prepare n strips that feel as far as `travel` [m] ahead of themselves; 0: on their line only, as in Stage."""
+    def __init__(self, settings: BumperSettings) -> None:
+        """Prepare n strips."""
+        bumper, travel = settings.bumper, settings.travel
         half = bumper.lengths / 2
         zero, turned = np.zeros(len(half)), np.full(len(half), np.pi / 2)
         lines = [(zero, -half, turned, bumper.lengths)]

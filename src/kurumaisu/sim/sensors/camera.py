@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kurumaisu import _core
 from kurumaisu.errors import Error
 from kurumaisu.types import BoolArray, ByteArray, FloatArray, IntArray
-from kurumaisu.world.model import Camera, Model
+from kurumaisu.world.model import Camera, Model, Polygon
 
 GROUND = (255, 255, 255)  # Stage's floor
 SKY = (179, 179, 204)  # what Stage clears its window to: 0.7, 0.7, 0.8
@@ -69,10 +69,23 @@ def millimetres(picture: Picture, camera: Camera) -> NDArray[np.uint16]:
     return np.where(inside, values, 0).astype(np.uint16)
 
 
+def build(camera: Camera) -> _core.Camera:
+    """Return the tables of a camera. Raise ValueError naming a value that makes no camera."""
+    return _core.Camera(
+        width=camera.width,
+        height=camera.height,
+        fov_h=camera.fov_h,
+        fov_v=camera.fov_v,
+        near=camera.near,
+        far=camera.far,
+        tilt=camera.tilt,
+    )
+
+
 class Scenery:
     """What cameras see of a world: the walls of all models, each in the frame of its model.
 
-    A block or box has a top and a bottom; the walls of a bitmap are sheets without them.
+    Blocks, boxes and the occupied parts of a bitmap have a top and a bottom. Colours are flat, as in Stage.
     """
 
     def __init__(self, models: Sequence[Model]) -> None:
@@ -89,6 +102,9 @@ class Scenery:
         )
         self._roots: IntArray = np.array([model.root for model in models], dtype=np.int64)
 
+    def __deepcopy__(self, memo: object) -> Scenery:
+        return self  # it never changes
+
     def hidden_from(self, root: int) -> BoolArray:
         """Return which models (n,) a camera in the tree of a top-level model does not see: its own."""
         return np.asarray(self._roots == root)
@@ -100,19 +116,14 @@ class CameraSensor:
     def __init__(self, camera: Camera, ground: tuple[int, int, int] = GROUND, sky: tuple[int, int, int] = SKY) -> None:
         """Prepare for the camera's optics. Raise Error naming a value that makes no camera."""
         try:
-            self._camera = _core.Camera(
-                width=camera.width,
-                height=camera.height,
-                fov_h=camera.fov_h,
-                fov_v=camera.fov_v,
-                near=camera.near,
-                far=camera.far,
-                tilt=camera.tilt,
-            )
+            self._camera = build(camera)
         except ValueError as error:
             raise Error(f"camera: {error}: {camera}") from error
         self._ground = np.array([*ground, 255], dtype=np.uint8)
         self._sky = np.array([*sky, 255], dtype=np.uint8)
+
+    def __deepcopy__(self, memo: object) -> CameraSensor:
+        return self  # it has no state that a picture depends on
 
     def take(self, scenery: Scenery, poses: FloatArray, eye: FloatArray, root: int) -> Picture:
         """Return the picture from an eye (4,) on the tree of the model `root`, all models being at poses (n, 4)."""
@@ -129,19 +140,20 @@ class _Part:
 
 
 def _parts(model: Model) -> Iterator[_Part]:
-    edges = 0
-    for polygon in model.shape.polygons:
-        corners = polygon.corners
-        following = np.roll(corners, -1, axis=0)
-        area = float((corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]).sum())
-        if area < 0:
-            corners, following = following, corners
-        walls = np.hstack([corners, following, np.tile(polygon.heights, (len(corners), 1))])
-        edges += len(walls)
-        yield _Part(walls, _bytes(polygon.color), area != 0, model.index)
-    if len(model.shape.segments) > edges:
-        walls = np.hstack([model.shape.segments, model.shape.heights])
-        yield _Part(walls, _bytes(model.color), False, model.index)
+    prisms = [_prism(polygon) for polygon in model.shape.polygons]
+    for polygon, walls in zip(model.shape.polygons, prisms, strict=True):
+        yield _Part(walls, _bytes(polygon.color), True, model.index)
+    segments = np.hstack([model.shape.segments, model.shape.heights])
+    edges = np.concatenate([np.empty((0, 6)), *prisms])
+    bitmap = len(segments) - len(edges)  # its outline comes first
+    told_apart = bitmap >= 0 and np.allclose(segments[bitmap:], edges)
+    if bitmap or not told_apart:
+        yield _Part(segments[: bitmap if told_apart else None], _bytes(model.color), told_apart, model.index)
+
+
+def _prism(polygon: Polygon) -> FloatArray:
+    corners = polygon.corners
+    return np.hstack([corners, np.roll(corners, -1, axis=0), np.tile(polygon.heights, (len(corners), 1))])
 
 
 def _bytes(color: tuple[float, float, float, float]) -> tuple[int, ...]:

@@ -54,22 +54,24 @@ class FiducialFinder:
         """Return what finders at global poses (f, 4), of trees (f,), see of models at poses (n, 4)."""
         f = self._fiducial
         targets = poses[self._marked]
-        offset = targets[None, :, :2] - finders[:, None, :2]
-        ranges = np.hypot(offset[..., 0], offset[..., 1])
-        bearings = wrap(np.arctan2(offset[..., 1], offset[..., 0]) - finders[:, None, 3])
-        near = (ranges < f.range_max) & (np.abs(bearings) <= f.fov / 2) & (self._roots[None] != trees[:, None])
-        finder, target = np.nonzero(near)
+        close = np.abs(targets[None, :, 0] - finders[:, None, 0]) < f.range_max
+        close &= np.abs(targets[None, :, 1] - finders[:, None, 1]) < f.range_max
+        finder, target = np.nonzero(close & (self._roots[None] != trees[:, None]))
+        offset = targets[target, :2] - finders[finder, :2]
+        ranges = np.hypot(offset[:, 0], offset[:, 1])
+        bearings = wrap(np.arctan2(offset[:, 1], offset[:, 0]) - finders[finder, 3])
+        near = (ranges < f.range_max) & (np.abs(bearings) <= f.fov / 2)
+        finder, target, ranges, bearings = finder[near], target[near], ranges[near], bearings[near]
         lines = finders[finder].copy()
-        lines[:, 3] += bearings[finder, target]
+        lines[:, 3] += bearings
         seen = self._in_sight(rays, lines, trees[finder], target, targets[target])
-        finder, target = finder[seen], target[seen]
-        distance = ranges[finder, target]
+        finder, target, ranges, bearings = finder[seen], target[seen], ranges[seen], bearings[seen]
         return Sightings(
             finder=finder,
             model=self._marked[target],
-            id=np.where(distance < f.range_max_id, self._ids[target], 0),
-            range=distance,
-            bearing=bearings[finder, target],
+            id=np.where(ranges < f.range_max_id, self._ids[target], 0),
+            range=ranges,
+            bearing=bearings,
             heading=wrap(targets[target, 3] - finders[finder, 3]),
         )
 

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Print the catalogue of effects as docs/effects.md has it: python3 -m kurumaisu.effects."""
+
+from collections.abc import Sequence
+
+from kurumaisu import effects
+from kurumaisu.effects.mechanism import Mechanism, Parameter
+
+_HEAD = """\
+# The effects that the simulator can have
+
+Written by `scripts/run python3 -m kurumaisu.effects > docs/effects.md`; a test compares the two.
+
+An effect is one way in which a real chair, laser or world departs from equations (1)-(4). It is switched on in the
+list `effects` of a model file, or in a file of its own, whose effects act besides the model's:
+
+```yaml
+effects:
+  - {id: base.lag_w, parameters: {tau: 0.2}}
+  - {id: laser.latency, parameters: {delay: 0.02}}
+```
+
+    scripts/run roslaunch kurumaisu sim.launch effects:=$PWD/effects.yaml
+
+Every parameter must be given. The order of the list does not matter: effects act by stage, those of a stage in the
+order of the tables. Each effect on the laser draws from a generator of its own, so that the laser's noise is the same
+with it and without. With a size of 0 an effect is absent; a form's other parameters have a middle instead, as `tau`
+900 ± 600 s. Sizes are what we expect, for a fit to start from, and measured only where a source says so; bounds are
+what the reader of the file accepts.
+
+Symbols: v, u, w forward, leftward speed [m/s] and yaw rate [rad/s]; V_f, V_s voltages [V]; t time since the reset [s];
+r true range [m], φ bearing, a angle of incidence (0: along the wall's normal) [rad]; µ, σ mean and standard deviation
+of a reading [m]; n, z standard normal. Rates are means over the simulator's steps.
+"""
+_BASE = """
+## The base
+
+Voltages pass the stages CONVERTER and CONTROLLER; the rates that they stand for pass TRANSPORT, THRESHOLD, GAIN,
+RESPONSE and FLOOR; effects of the stage REFERENCE change what `ground_truth` says and not the motion. The critic looks
+for those marked with *.
+"""
+_LASER = """
+## The laser
+
+GEOMETRY changes where a beam leaves from, and when; then the ray is cast. BIAS changes the mean and SPREAD the
+standard deviation that equation (4) gives, NOISE the noise; the reading is made of the three. OUTLIER and GRID change
+readings. The laser's own resolution and range gate come last: NaN is no valid reading, +inf no return. A stamp that is
+wrong is wrong in truth: the chair is where it is at the beams' own times.
+"""
+_WORLD = """
+## The world
+
+The walls are moved when the simulator is reset, for the laser and for contacts alike; the world file is the map.
+"""
+
+
+def main() -> None:
+    """Print it."""
+    print(text(), end="")
+
+
+def text() -> str:
+    """Return the catalogue in Markdown."""
+    parts = [_HEAD]
+    for head, family in ((_BASE, effects.BASE), (_LASER, effects.LASER), (_WORLD, effects.WORLD)):
+        parts.append(head)
+        parts.append(_table(family))
+    return "\n".join(parts)
+
+
+def _table(family: Sequence[type[Mechanism]]) -> str:
+    ordered = sorted(family, key=lambda effect: getattr(effect, "stage", 0))
+    rows = [
+        "| id | stage | what is seen | form | parameters: typical size, bounds | known from; size expected |",
+        "|---|---|---|---|---|---|",
+    ]
+    for effect in ordered:
+        stage = effect.stage.name if hasattr(effect, "stage") else "-"
+        name = f"`{effect.id}`{'*' if effect in effects.CRITICISED else ''}"
+        sizes = "; ".join(_size(parameter) for parameter in effect.parameters)
+        cells = (name, stage, effect.sentence, effect.formula, sizes, effect.source)
+        rows.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+    return "\n".join(rows) + "\n"
+
+
+def _size(parameter: Parameter) -> str:
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    about = f"{parameter.null:g} ± " if parameter.null else ""
+    return f"`{parameter.name}` {about}{parameter.scale:g}{unit}, {parameter.lower:g} to {parameter.upper:g}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""base.accel_limit: the motor controller ramps its rates."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from kurumaisu import _core
+from kurumaisu.effects.base import Context, Effect, Follows, Motion, Parameter, Rate, Stage
+
+
+class AccelLimit(Effect):
+    """Both rates run after their targets with a limited slope; its inverse is the parameter, so that 0 is none."""
+
+    id = "base.accel_limit"
+    stage = Stage.RESPONSE
+    parameters = (
+        Parameter("slowness_v", "s^2/m", null=0.0, scale=1.0, lower=0.0, upper=20.0),
+        Parameter("slowness_w", "s^2/rad", null=0.0, scale=0.5, lower=0.0, upper=20.0),
+    )
+    sentence = "the rates are ramped: large changes take longer than small ones"
+    formula = "|dv'/dt| ≤ 1 / slowness_v, |dw'/dt| ≤ 1 / slowness_w, towards v, w"
+    source = "assumed: motor controllers ramp; 0.3-1.5 m/s²"
+    shows_in = Rate.V
+    follows = Follows.V_CHANGE
+
+    def __init__(self, values: Mapping[str, float], context: Context) -> None:
+        super().__init__(values, context)
+        self._v = self._w = 0.0  # at the end of the last step
+
+    def apply(self, motion: Motion) -> Motion:
+        """Ramp v and w; a sample is the step's mean rate."""
+        v, self._v = _core.ramp(motion.v, self.values["slowness_v"], motion.dt, self._v)
+        w, self._w = _core.ramp(motion.w, self.values["slowness_w"], motion.dt, self._w)
+        return replace(motion, v=v, w=w)

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""base.battery_sag: the chair gets slower as its battery runs down."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
+
+
+class BatterySag(Effect):
+    """Both rates shrink in proportion to the time since the start, until the chair stands still."""
+
+    id = "base.battery_sag"
+    stage = Stage.GAIN
+    parameters = (Parameter("sag", "1/s", null=0.0, scale=1.0e-3, lower=-0.01, upper=0.1),)
+    sentence = "the chair gets slower in the course of a drive, as from a battery that runs down"
+    formula = "v, w · max(0, 1 − sag · t)"
+    source = "assumed: battery voltage; 5-15 % in a recording"
+    shows_in = Rate.V
+    follows = Follows.V
+
+    _count = 0  # of samples before the next chunk
+
+    def apply(self, motion: Motion) -> Motion:
+        """Scale v and w by what is left in the middle of each step."""
+        middles = motion.dt * (self._count + 0.5 + np.arange(len(motion.v)))
+        self._count += len(motion.v)
+        left = np.maximum(1 - self.values["sag"] * middles, 0.0)
+        return replace(motion, v=motion.v * left, w=motion.w * left)

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""base.caster_reversal: when the chair reverses, its casters swing round and kick it to one side."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
+from kurumaisu.types import BoolArray, FloatArray
+
+
+class CasterReversal(Effect):
+    """After each change of the driving direction an additional yaw rate, which dies away with the distance.
+
+    Its side is that of the last turn before the reversal, which is where the casters stand.
+    """
+
+    id = "base.caster_reversal"
+    stage = Stage.FLOOR
+    parameters = (
+        Parameter("kick", "rad/s", null=0.0, scale=0.1, lower=-2.0, upper=2.0),
+        Parameter("length", "m", null=0.25, scale=0.25, lower=0.01, upper=5.0),
+    )
+    sentence = "after reversing the chair swings to one side until its casters have turned"
+    formula = "w ± kick · exp(−s / length) while driving; s: distance since the reversal, ±: side of the last turn"
+    source = "study of front casters in reverse, 2003: worst from 90°; 0.05-0.3 rad/s over 0.25 m"
+    shows_in = Rate.W
+    follows = Follows.V_CHANGE
+
+    _direction = 0.0  # last direction driven, 0: none yet
+    _turn = 0.0  # side of the last turn
+    _side = 0.0  # of the kick under way
+    _travel = 0.0  # [m] since the last reversal
+
+    def apply(self, motion: Motion) -> Motion:
+        """Kick w after reversals; a step counts with the distance at its middle."""
+        direction = _held(np.sign(motion.v), self._direction)
+        turn = _held(np.sign(motion.w), self._turn)
+        earlier = np.concatenate([[self._direction], direction[:-1]])
+        reversed_here = (direction != earlier) & (earlier != 0)
+        sides = np.concatenate([[self._turn], turn[:-1]])  # before each step
+        side = _last(reversed_here, sides, self._side)
+        way = np.abs(motion.v) * motion.dt
+        gone = np.concatenate([[0.0], np.cumsum(way)])
+        since = gone[:-1] - _last(reversed_here, gone[:-1], -self._travel)
+        kick = self.values["kick"] * np.exp(-(since + way / 2) / self.values["length"])
+        self._direction, self._turn, self._side = float(direction[-1]), float(turn[-1]), float(side[-1])
+        self._travel = float(since[-1] + way[-1])
+        return replace(motion, w=motion.w + side * kick * (motion.v != 0))
+
+
+def _held(signs: FloatArray, before: float) -> FloatArray:
+    """Return signs (n,) with the last one before in place of each 0."""
+    return _last(signs != 0, signs, before)
+
+
+def _last(where: BoolArray, values: FloatArray, before: float) -> FloatArray:
+    """Return, for each sample, the value where the condition held last, up to it; before: while it never did."""
+    index = np.maximum.accumulate(np.where(where, np.arange(1, len(values) + 1), 0))
+    return np.asarray(np.concatenate([[before], values])[index])

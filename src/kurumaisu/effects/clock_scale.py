@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""base.clock_scale: the reference's clock runs faster or slower than that of the commands."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu.effects.base import Parameter, Reference, ReferenceEffect
+
+
+class ClockScale(ReferenceEffect):
+    """The reference's times stretched from 0 on, and its rates, which are per its seconds."""
+
+    id = "base.clock_scale"
+    parameters = (Parameter("scale", "1", null=0.0, scale=1.0e-3, lower=-0.2, upper=0.2),)
+    sentence = "the reference's clock and that of the commands run at different speeds"
+    formula = "t · (1 + scale), rates / (1 + scale)"
+    source = "assumed: computers without a common clock; 0.01-0.5 %"
+
+    def apply(self, reference: Reference) -> Reference:
+        """Stretch the times."""
+        stretch = 1 + self.values["scale"]
+        return replace(reference, times=np.asarray(reference.times * stretch), rates=reference.rates / stretch)

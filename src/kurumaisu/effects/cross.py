@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""base.cross_w_to_v and base.cross_v_to_w: one axis leaks into the other."""
+
+from dataclasses import replace
+
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
+
+
+class CrossWToV(Effect):
+    """Forward speed plus a share of the yaw rate: base_link is not on the axis about which the chair turns."""
+
+    id = "base.cross_w_to_v"
+    stage = Stage.GAIN
+    parameters = (Parameter("lever", "m", null=0.0, scale=0.03, lower=-1.0, upper=1.0),)
+    sentence = "turning moves the chair forward or backward"
+    formula = "v + lever · w"
+    source = "UMBmark 1996; exactly like base.marker_y with y = −lever to a reference pose"
+    shows_in = Rate.V
+    follows = Follows.W
+
+    def apply(self, motion: Motion) -> Motion:
+        """Add a share of w to v."""
+        return replace(motion, v=motion.v + self.values["lever"] * motion.w)
+
+
+class CrossVToW(Effect):
+    """The yaw rate that a share of V_f makes on the steering input: crosstalk of the joystick's two lines.
+
+    Other than base.veer it has the jump of V_f where the chair starts to move.
+    """
+
+    id = "base.cross_v_to_w"
+    stage = Stage.GAIN
+    parameters = (Parameter("share", "1", null=0.0, scale=0.01, lower=-0.5, upper=0.5),)
+    sentence = "the translation voltage leaks into the steering"
+    formula = "w + share · V_f(v) · gain of V_s(w)"
+    source = "paper, section on identification: weak, correlation 0.003"
+    shows_in = Rate.W
+    follows = Follows.V
+
+    def apply(self, motion: Motion) -> Motion:
+        """Add what a share of V_f makes to w."""
+        leak = self.values["share"] * self.context.translation.volts(motion.v)
+        return replace(motion, w=motion.w + leak * self.context.steering.gain(motion.w))

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects of a laser: on where its beams leave from and when, and on what they read.
+
+Each works on one scan as arrays over its beams, and knows no scene, so any simulated ranger can have them.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar
+
+import numpy as np
+
+from kurumaisu.effects.mechanism import Mechanism
+from kurumaisu.types import FloatArray
+
+
+class LaserStage(IntEnum):
+    """When an effect acts on a scan; effects apply in this order, those of a stage in the catalogue's."""
+
+    GEOMETRY = 0  # where beams leave from, and when
+    BIAS = 1  # the mean reading
+    SPREAD = 2  # the standard deviation of its noise
+    NOISE = 3  # the noise itself
+    OUTLIER = 4  # readings that are something else
+    GRID = 5  # the values a reading can have
+
+
+@dataclass(frozen=True)
+class Beams:
+    """Where the beams of a scan leave from, and when.
+
+    stamp [s]: what the message will say; times (n,) [s] at which the beams are fired; mount (3,): base_from_laser;
+    height [m] of the laser above the floor; bearings, elevations (n,) [rad] in the frame that the mount gives.
+    """
+
+    stamp: float
+    times: FloatArray
+    mount: FloatArray
+    height: float
+    bearings: FloatArray
+    elevations: FloatArray
+
+
+@dataclass(frozen=True)
+class Echoes:
+    """What the beams of a scan met, and what becomes of it on the way to a reading; all arrays are (n,).
+
+    stamp [s]; bearings [rad] as the message gives them; ranges [m], true; incidence [rad], 0 along the wall's normal,
+    and where no effect of the chain is oblique; returns [1]: reflectance, 1 being the surface that the laser's law was
+    measured on; mean, sd [m] of a reading; noise [1]: standard deviates; readings [m]: made of the three after the
+    stage NOISE, until then they mean nothing.
+    A beam that met nothing has a range of +inf in the stages OUTLIER and GRID, and of 0 before them.
+    """
+
+    stamp: float
+    bearings: FloatArray
+    ranges: FloatArray
+    incidence: FloatArray
+    returns: FloatArray
+    mean: FloatArray
+    sd: FloatArray
+    noise: FloatArray
+    readings: FloatArray
+
+
+class LaserEffect(Mechanism):
+    """An effect on the scans of one laser."""
+
+    stage: ClassVar[LaserStage]
+
+    def __init__(self, values: Mapping[str, float], rng: np.random.Generator) -> None:
+        super().__init__(values)
+        self.rng = rng
+
+
+class BeamEffect(LaserEffect, ABC):
+    """An effect on where the beams leave from, and when; it has no state."""
+
+    stage = LaserStage.GEOMETRY
+
+    @abstractmethod
+    def apply(self, beams: Beams) -> Beams:
+        """Return the beams as they are in truth."""
+
+
+class ReadingEffect(LaserEffect, ABC):
+    """An effect on the readings of a scan, with the state that the scans before have left."""
+
+    oblique: ClassVar[bool] = False  # it needs the incidence, which costs more rays
+
+    @abstractmethod
+    def apply(self, echoes: Echoes) -> Echoes:
+        """Return the echoes with this effect; scans come in the order of their stamps."""

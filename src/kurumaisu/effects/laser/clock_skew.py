@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""laser.clock_skew: the laser's clock, which stamps its scans, runs fast or slow."""
+
+from dataclasses import replace
+
+from kurumaisu.effects.laser.base import BeamEffect, Beams
+from kurumaisu.effects.mechanism import Parameter
+
+
+class ClockSkew(BeamEffect):
+    """Stamps that grow by (1 + skew) per second since time 0."""
+
+    id = "laser.clock_skew"
+    parameters = (Parameter("skew", "1", null=0.0, scale=1.0e-4, lower=-0.05, upper=0.05),)
+    sentence = "the laser's clock runs fast or slow, so that its stamps go more and more wrong"
+    formula = "beams fired at t / (1 + skew)"
+    source = "urg_stamped; 10-500 ppm, one real unit 0.125 %"
+
+    def apply(self, beams: Beams) -> Beams:
+        """Stretch the times."""
+        return replace(beams, times=beams.times / (1 + self.values["skew"]))

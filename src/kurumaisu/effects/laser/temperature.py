@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""laser.temperature: ranges follow the room's temperature."""
+
+import math
+from dataclasses import replace
+
+from kurumaisu.effects.laser.base import Echoes, LaserStage, ReadingEffect
+from kurumaisu.effects.mechanism import Parameter
+
+
+class Temperature(ReadingEffect):
+    """An offset in proportion to a temperature that goes up and down, as under a heater's control."""
+
+    id = "laser.temperature"
+    stage = LaserStage.BIAS
+    parameters = (
+        Parameter("coefficient", "m/K", null=0.0, scale=5.0e-4, lower=-0.01, upper=0.01),
+        Parameter("swing", "K", null=5.0, scale=5.0, lower=0.0, upper=50.0),
+        Parameter("period", "s", null=600.0, scale=600.0, lower=1.0, upper=1.0e5),
+    )
+    sentence = "ranges follow the temperature"
+    formula = "µ + coefficient · swing · sin(2π t / period)"
+    source = "assumed; 0.1-1 mm/K"
+
+    def apply(self, echoes: Echoes) -> Echoes:
+        """Shift the mean by the temperature of now."""
+        warmer = self.values["swing"] * math.sin(2 * math.pi * echoes.stamp / self.values["period"])
+        return replace(echoes, mean=echoes.mean + self.values["coefficient"] * warmer)

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""base.slope: the floor is not level, so speed depends on the direction driven."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
+
+
+class Slope(Effect):
+    """Forward speed less what the climb costs; a chair at rest is held by its brakes."""
+
+    id = "base.slope"
+    stage = Stage.FLOOR
+    parameters = (
+        Parameter("climb_x", "m/s", null=0.0, scale=0.02, lower=-0.5, upper=0.5),
+        Parameter("climb_y", "m/s", null=0.0, scale=0.02, lower=-0.5, upper=0.5),
+    )
+    sentence = "the chair is slower in one direction than in the opposite one, as on a slope"
+    formula = "v − climb_x · cos(θ) − climb_y · sin(θ) while moving; θ: heading in the map"
+    source = "a wheelchair's model with gravity on inclines, 2016; 10-40 mm/s"
+    shows_in = Rate.V
+    follows = Follows.V
+
+    _heading = 0.0  # [rad] before the next chunk, where nobody knows it
+
+    def apply(self, motion: Motion) -> Motion:
+        """Slow v by the heading in the middle of each step."""
+        before = self._heading if motion.heading is None else motion.heading
+        after = before + np.cumsum(motion.w) * motion.dt
+        self._heading = float(after[-1])
+        heading = after - motion.w * motion.dt / 2
+        loss = self.values["climb_x"] * np.cos(heading) + self.values["climb_y"] * np.sin(heading)
+        moving = (motion.v != 0) | (motion.w != 0)
+        return replace(motion, v=motion.v - moving * loss)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""base.steering_law: the chair follows equation (2) with intercepts of the other sign."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu._core import AxisInverse, AxisLaw, Branch
+from kurumaisu.effects.base import Context, Parameter, Stage, VoltageEffect, Volts
+
+
+class SteeringLaw(VoltageEffect):
+    """The motor controller turns V_s into the yaw rate by a law whose intercepts are scaled by (1 - 2 flip)."""
+
+    id = "base.steering_law"
+    stage = Stage.CONTROLLER
+    parameters = (Parameter("flip", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),)
+    sentence = "the steering law's intercepts have the other sign"
+    formula = "w of V_s by (2) with intercepts · (1 − 2 flip)"
+    source = "paper, equation (2): as printed, its two branches overlap"
+
+    def __init__(self, values: Mapping[str, float], context: Context) -> None:
+        super().__init__(values, context)
+        factor = 1 - 2 * self.values["flip"]
+        sides = context.steering.positive, context.steering.negative
+        self._inverse = AxisInverse(AxisLaw(*(Branch(side.slope, factor * side.intercept) for side in sides)))
+
+    def apply(self, volts: Volts) -> Volts:
+        """Return the voltage that by the model's law stands for the yaw rate that the chair takes."""
+        if self.values["flip"] == 0:
+            return volts
+        w = self._inverse.rates(volts.v_s, volts.sign_w)
+        return replace(volts, v_s=self.context.steering.volts(w), sign_w=np.sign(w))

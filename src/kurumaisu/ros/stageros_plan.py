@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What stageros publishes of a world: one plan for each robot, without ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kurumaisu.geometry import compose
+from kurumaisu.ros.stageros_names import Names, devices_of, robots_of
+from kurumaisu.ros.stageros_settings import StagerosSettings
+from kurumaisu.types import FloatArray
+from kurumaisu.world.model import Camera, Fan, Model, Ranger
+
+
+@dataclass(frozen=True)
+class ScanPlan:
+    """A sensor of a ranger; fan None: the ranger has no sensor, so it has a frame only.
+
+    mount (4,): x, y, z [m], heading [rad] in base_link; index: of the reading in Observation.scans.
+    """
+
+    topic: str
+    frame: str
+    mount: FloatArray
+    fan: Fan | None
+    index: int
+    is_range: bool
+
+
+@dataclass(frozen=True)
+class CameraPlan:
+    """A camera; mount (4,): x, y, z [m], heading [rad] in base_link; number: among several, else None."""
+
+    model: Model
+    camera: Camera
+    names: Names
+    number: int | None
+    frame: str
+    mount: FloatArray
+
+
+@dataclass(frozen=True)
+class RobotPlan:
+    """A robot; row: of the observation's arrays."""
+
+    row: int
+    model: Model
+    names: Names
+    scans: tuple[ScanPlan, ...]
+    cameras: tuple[CameraPlan, ...]
+
+
+def plan_world(models: Sequence[Model], names: Sequence[Names], settings: StagerosSettings) -> tuple[RobotPlan, ...]:
+    """Return the plans of all robots, in file order, each with its names."""
+    return tuple(
+        RobotPlan(
+            row,
+            robot,
+            names[row],
+            _scans(models, robot, names[row], settings),
+            _cameras(models, robot, names[row], settings.frames.camera),
+        )
+        for row, robot in enumerate(robots_of(models))
+    )
+
+
+@dataclass(frozen=True)
+class _Sensor:
+    """A sensor before it has a name."""
+
+    mount: FloatArray
+    fan: Fan | None
+    index: int
+
+
+def _scans(models: Sequence[Model], robot: Model, names: Names, settings: StagerosSettings) -> tuple[ScanPlan, ...]:
+    sensors = [
+        sensor
+        for ranger in devices_of(models, robot, Ranger)
+        for sensor in _sensors(models, robot, ranger, settings.all_sensors)
+    ]
+    sonars = [sensor for sensor in sensors if settings.sonar_as_range and _is_sonar(sensor)]
+    lasers = [sensor for sensor in sensors if not (settings.sonar_as_range and _is_sonar(sensor))]
+    frames = settings.frames
+    return (
+        *_numbered(lasers, names, "base_scan", frames.base_laser_link, False),
+        *_numbered(sonars, names, "base_sonar", frames.base_sonar_link, True),
+    )
+
+
+def _is_sonar(sensor: _Sensor) -> bool:
+    return sensor.fan is not None and sensor.fan.samples == 1
+
+
+def _sensors(models: Sequence[Model], robot: Model, ranger: Model, every: bool) -> list[_Sensor]:
+    """Return the first sensor of a ranger where stage_ros puts it, or every one where it really is."""
+    assert isinstance(ranger.device, Ranger)
+    fans = ranger.device.fans
+    first = _readings_before(models, ranger)
+    top = np.array([0.0, 0.0, robot.size[2], 0.0])
+    if not every or not fans:  # stage_ros' frame leaves out the ranger's origin and the sensor's pose
+        return [_Sensor(ranger.pose + top, fans[0] if fans else None, first)]
+    return [_Sensor(_beam_plane(ranger, fan) + top, fan, first + number) for number, fan in enumerate(fans)]
+
+
+def _beam_plane(ranger: Model, fan: Fan) -> FloatArray:
+    """Return where a sensor's beams start, (4,), from the robot's top."""
+    planar = compose(compose(_planar(ranger.pose), _planar(ranger.origin)), _planar(fan.pose))
+    z = ranger.pose[2] + ranger.origin[2] + fan.pose[2] + fan.height / 2
+    return np.array([planar[0], planar[1], z, planar[2]])
+
+
+def _planar(pose: FloatArray) -> FloatArray:
+    return pose[[0, 1, 3]]
+
+
+def _readings_before(models: Sequence[Model], device: Model) -> int:
+    """Return how many scans an observation has before those of a ranger."""
+    return sum(len(model.device.fans) for model in models[: device.index] if isinstance(model.device, Ranger))
+
+
+def _numbered(sensors: Sequence[_Sensor], names: Names, topic: str, frame: str, is_range: bool) -> list[ScanPlan]:
+    """Name sensors of one kind; only several have numbers."""
+    return [
+        ScanPlan(
+            names.topic(topic, number), names.frame(frame, number), sensor.mount, sensor.fan, sensor.index, is_range
+        )
+        for number, sensor in ((i if len(sensors) > 1 else None, sensor) for i, sensor in enumerate(sensors))
+    ]
+
+
+def _cameras(models: Sequence[Model], robot: Model, names: Names, frame: str) -> tuple[CameraPlan, ...]:
+    cameras = devices_of(models, robot, Camera)
+    top = np.array([0.0, 0.0, robot.size[2], 0.0])
+    plans = []
+    for i, model in enumerate(cameras):
+        assert isinstance(model.device, Camera)
+        number = i if len(cameras) > 1 else None
+        plans.append(CameraPlan(model, model.device, names, number, names.frame(frame, number), model.pose + top))
+    return tuple(plans)

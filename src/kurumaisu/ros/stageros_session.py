@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A world that runs, with what is published of it and what can be done to it."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Pose, Twist
+
+from kurumaisu.errors import Error
+from kurumaisu.ros.rotation import pose_of
+from kurumaisu.ros.stageros_names import Names, names_of, names_of_another
+from kurumaisu.ros.stageros_plan import plan_world
+from kurumaisu.ros.stageros_publish import Publisher
+from kurumaisu.ros.stageros_robot import Ears
+from kurumaisu.ros.stageros_settings import StagerosSettings
+from kurumaisu.sim.simulator import Simulator
+from kurumaisu.types import FloatArray
+from kurumaisu.world import World
+from kurumaisu.world.model import Model
+
+_NS = 1_000_000_000
+_Command = tuple[float, float, float]
+
+
+class Session:
+    """Steps a world and publishes every step; all but hear and carry must be called by one thread."""
+
+    def __init__(self, world: World, settings: StagerosSettings, use_model_names: bool) -> None:
+        """Advertise everything; the node must have been initialised."""
+        self.paused = False
+        self._settings = settings
+        self._use_model_names = use_model_names
+        self._seed = settings.seed
+        self._simulator = Simulator(world, settings.options)
+        self._simulator.reset(self._seed)
+        self._step_ns = round(world.interval * _NS)
+        self._number = 0  # of steps since the start; /clock is that many times the interval
+        self._last_command = 0  # [ns]
+        self._heard: deque[tuple[Names, _Command]] = deque()
+        self._carried: deque[tuple[Names, FloatArray]] = deque()
+        self._home = names_of(world.models, settings, use_model_names)
+        self._numbered = len(self._home)  # robots that there have ever been
+        self._publisher = Publisher(settings, world.interval, self._ears)
+        self._take(self._home)
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._number * self._step_ns / _NS
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the world says and is not heeded, and what is odd about it, in words."""
+        return self._simulator.warnings
+
+    def step(self) -> None:
+        """Simulate one interval of the world and publish it."""
+        self._obey()
+        observation = self._simulator.step(self._commands)
+        self._number += 1
+        now = self._number * self._step_ns
+        timeout = self._settings.watchdog_timeout
+        if timeout > 0 and now - self._last_command >= timeout * _NS:
+            self._commands[:] = 0.0  # of all robots: any command for any robot keeps all going, as in 1.8.0
+        self._publisher.publish(observation, self._model_poses, self._number, divmod(now, _NS))
+
+    def _ears(self, names: Names) -> Ears:
+        return Ears(partial(self.hear, names), partial(self.carry, names))
+
+    def _obey(self) -> None:
+        """Heed what has been heard since the last step."""
+        while self._heard:
+            names, command = self._heard.popleft()
+            if names in self._rows:
+                self._commands[self._rows[names]] = command
+            self._last_command = self._number * self._step_ns
+        while self._carried:
+            names, pose = self._carried.popleft()
+            if names in self._rows:
+                self._simulator.set_pose(self._simulator.robots[self._rows[names]], pose)
+
+    def carry(self, names: Names, pose: Pose) -> None:
+        """Put a robot to a pose, from any thread, before the next step."""
+        try:
+            self._carried.append((names, pose_of(pose)))
+        except Error as error:
+            rospy.logwarn_throttle(5.0, f"STAGEROS_POSE_BAD {names.topic('cmd_pose')}: dropped: {error}")
+
+    def hear(self, names: Names, message: Twist) -> None:
+        """Take a robot's command, from any thread; the next step heeds it."""
+        command = (message.linear.x, message.linear.y, message.angular.z)
+        if all(map(math.isfinite, command)):
+            self._heard.append((names, command))
+        else:
+            topic = names.topic("cmd_vel")
+            rospy.logwarn_throttle(5.0, f"STAGEROS_COMMAND_NAN {topic}: dropped, not finite: {command}")
+
+    def reset(self, seed: int | None = None) -> None:
+        """Start again as the file says, with the same or another seed; /clock runs on, as time must not jump back."""
+        self._seed = self._seed if seed is None else seed
+        self._simulator.reset(self._seed)
+        self._take(self._home)
+
+    def reset_positions(self) -> None:
+        """Put the robots back to where they started; their odometry does not notice, as in 1.8.0."""
+        self._simulator.reset_positions()
+
+    def set_pose(self, name: str | Names, pose: FloatArray) -> None:
+        """Put a model or a robot to x, y, z [m], heading [rad]. Raise Error for an unknown one."""
+        self._simulator.set_pose(self._model(name), pose)
+
+    def spawn(self, like: str, name: str, pose: FloatArray) -> None:
+        """Add a copy of a model with all that stands on it. Raise Error for an unknown one or a name that is taken."""
+        pattern = self._model(like)
+        if any(model.name == name for model in self._simulator.models):
+            raise Error(f"name {name!r}: there is a model of this name")
+        models = _copy(_family(self._simulator.models, pattern), name or None)
+        before = set(self._rows)
+        self._simulator.spawn(models, pose)
+        names = sorted(before, key=self._rows.__getitem__)
+        self._take([*names, *self._names_of_more(self._simulator.robots[len(names) :])])
+
+    def delete(self, name: str) -> None:
+        """Take a model with all that stands on it away. Raise Error for an unknown one."""
+        gone = {model.index for model in _family(self._simulator.models, self._model(name))}
+        stay = [names for names, row in self._rows.items() if self._simulator.robots[row].index not in gone]
+        self._simulator.delete(self._model(name))
+        self._take(stay)
+
+    def save(self, file: Path) -> None:
+        """Write the whole state to a file."""
+        try:
+            file.write_bytes(self._simulator.save())
+        except OSError as error:
+            raise Error(f"{file}: {error.strerror}") from error
+
+    def load(self, file: Path) -> None:
+        """Go back to a state that was saved of this world; /clock runs on."""
+        try:
+            saved = file.read_bytes()
+        except OSError as error:
+            raise Error(f"{file}: {error.strerror}") from error
+        self._simulator.load(saved)
+        self._commands[:] = 0.0
+
+    def _model_poses(self) -> FloatArray:
+        return self._simulator.model_poses
+
+    def _take(self, names: list[Names]) -> None:
+        """Publish the robots that there are now, under these names."""
+        self._rows = {each: row for row, each in enumerate(names)}
+        self._commands = np.zeros((len(names), 3))
+        models = self._simulator.models
+        self._publisher.change(models, plan_world(models, names, self._settings))
+
+    def _names_of_more(self, robots: tuple[Model, ...]) -> list[Names]:
+        first = self._numbered
+        self._numbered += len(robots)
+        return [
+            names_of_another(first + i, robot, self._settings, self._use_model_names) for i, robot in enumerate(robots)
+        ]
+
+    def _model(self, name: str | Names) -> Model:
+        """Return the model of a name in the world file, or a robot's by the front of its topics, as robot_1."""
+        for names, row in self._rows.items():
+            if name in (names, names.prefix or ""):
+                return self._simulator.robots[row]
+        found = [model for model in self._simulator.models if model.name == name]
+        if len(found) != 1:
+            known = ", ".join(sorted({model.name for model in self._simulator.models if model.name}))
+            raise Error(f"name {name!r}: {'several models have' if found else 'no model has'} it; there are: {known}")
+        return found[0]
+
+
+def _family(models: tuple[Model, ...], first: Model) -> list[Model]:
+    """Return a model and all that stand on it."""
+    family = {first.index}
+    for model in models[first.index + 1 :]:
+        if model.parent in family:
+            family.add(model.index)
+    return [model for model in models if model.index in family]
+
+
+def _copy(family: list[Model], name: str | None) -> list[Model]:
+    """Return a model and all that stand on it under another name, numbered from 0."""
+    places = {model.index: i for i, model in enumerate(family)}
+    return [
+        replace(model, index=i, parent=places.get(model.parent, -1), root=0, name=model.name if i else name)
+        for i, model in enumerate(family)
+    ]

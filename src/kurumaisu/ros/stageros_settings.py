@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Private parameters of stageros, laid over launch/stageros.yaml."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from typing import Any
+
+from kurumaisu import settings
+from kurumaisu.errors import Error
+from kurumaisu.params import shipped
+from kurumaisu.settings import Section
+from kurumaisu.sim.options import Options, read_options
+
+FRAMES = ("odom", "base_footprint", "base_link", "base_laser_link", "base_sonar_link", "camera")
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The last part of the frames' names."""
+
+    odom: str
+    base_footprint: str
+    base_link: str
+    base_laser_link: str
+    base_sonar_link: str
+    camera: str
+    ground_truth: str
+
+
+@dataclass(frozen=True)
+class Rates:
+    """How often something is published [Hz]; 0: in every step."""
+
+    clock: float
+    tf: float
+    odom: float
+    ground_truth: float
+    scan: float
+    image: float
+    collision: float
+
+
+@dataclass(frozen=True)
+class StagerosSettings:
+    """What stageros needs to know; see launch/stageros.yaml for units and meaning."""
+
+    watchdog_timeout: float
+    depth_canonical: bool
+    frames: Frames
+    strip_leading_slash: bool
+    relative_topics: bool
+    robot_prefix: str
+    publish_tf: bool
+    set_child_frame_id: bool
+    pose_variances: tuple[float, ...]
+    twist_variances: tuple[float, ...]
+    scan_timing: bool
+    all_sensors: bool
+    sonar_as_range: bool
+    publish_collision: bool
+    rates: Rates
+    headless_rate: float
+    seed: int
+    options: Options
+    image_extents: bool
+    parameters: dict[str, Any]
+    unknown: tuple[str, ...]  # parameters nobody reads, in words; stage_ros starts with them, too
+
+
+def read_settings(values: Any, where: str) -> StagerosSettings:
+    """Return the settings of a parameter tree over the shipped ones. Raise Error naming the key and the value."""
+    path = shipped("launch/stageros.yaml")
+    tree, unknown = _over(settings.load(path), Section(values, where), where)
+    top = Section(tree, where)
+    filled = _flag(top, "fill_covariance")
+    variances = [_variances(top, key, filled) for key in ("pose_variances", "twist_variances")]
+    result = StagerosSettings(
+        watchdog_timeout=top.number("base_watchdog_timeout"),
+        depth_canonical=_flag(top, "is_depth_canonical"),
+        frames=_frames(top),
+        strip_leading_slash=_flag(top, "strip_leading_slash"),
+        relative_topics=_flag(top, "relative_topics"),
+        robot_prefix=top.text("robot_prefix", choices=("stage", "always", "never")),
+        publish_tf=_flag(top, "publish_tf"),
+        set_child_frame_id=_flag(top, "set_child_frame_id"),
+        pose_variances=variances[0],
+        twist_variances=variances[1],
+        scan_timing=_flag(top, "scan_timing"),
+        all_sensors=top.text("sensors", choices=("first", "all")) == "all",
+        sonar_as_range=_flag(top, "sonar_as_range"),
+        publish_collision=_flag(top, "publish_collision"),
+        rates=_rates(top.section("rates")),
+        headless_rate=top.number("headless_rate", at_least=0),
+        seed=top.integer("seed", at_least=0),
+        options=_options(_mapping(top, "simulator"), where),
+        image_extents=_flag(top, "image_extents"),
+        parameters=_mapping(top, "parameters"),
+        unknown=unknown,
+    )
+    top.end()
+    return result
+
+
+def _options(values: dict[str, Any], where: str) -> Options:
+    """Return the simulator's options; unlike above, a key it does not know is an error: 1.8.0 had none of them."""
+    tree, unknown = _over(settings.load(shipped("launch/simulator.yaml")), Section(values, where), f"{where}/simulator")
+    if unknown:
+        raise Error(unknown[0])
+    return read_options(Section(tree, where, "simulator"))
+
+
+def _over(below: Section, above: Section, where: str) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return the shipped tree with what is given put in its place, and words about what has no place."""
+    tree = {key: below.take(key) for key in below.names()}
+    unknown = []
+    for key in above.names():
+        value = above.take(key)
+        if key not in tree:
+            close = difflib.get_close_matches(key, tree, 1)
+            unknown.append(f"{where}/{key} is not a parameter" + (f"; is {close[0]} meant?" if close else ""))
+        elif isinstance(tree[key], dict) and isinstance(value, dict):
+            tree[key] = {**tree[key], **value}
+        else:
+            tree[key] = value
+    return tree, tuple(unknown)
+
+
+def _flag(section: Section, key: str) -> bool:
+    value = section.take(key)
+    if not isinstance(value, bool):
+        raise section.error(key, f"must be true or false: {value!r}")
+    return value
+
+
+def _mapping(section: Section, key: str) -> dict[str, Any]:
+    value = section.take(key)
+    if not isinstance(value, dict):
+        raise section.error(key, f"must be a mapping: {value!r}")
+    return value
+
+
+def _variances(top: Section, key: str, filled: bool) -> tuple[float, ...]:
+    """Return six variances; zeros, as in stage_ros, if they are not to be filled in."""
+    values = top.numbers(key, 6)
+    if min(values) < 0:
+        raise top.error(key, f"must not be negative: {list(values)}")
+    return values if filled else (0.0,) * 6
+
+
+def _frames(top: Section) -> Frames:
+    names = {
+        "odom": _frame(top, "frame_odom"),
+        "base_footprint": _frame(top, "frame_base_footprint"),
+        "base_link": _frame(top, "frame_base_link"),
+        "base_laser_link": _frame(top, "frame_base_laser_link"),
+        "base_sonar_link": _frame(top, "frame_base_sonar_link"),
+        "camera": _frame(top, "frame_camera"),
+    }
+    for key, name in names.items():
+        if list(names.values()).count(name) > 1:
+            raise top.error(f"frame_{key}", f"is the name of another frame, too: {name}")
+    return Frames(**names, ground_truth=_frame(top, "frame_ground_truth"))
+
+
+def _frame(top: Section, key: str) -> str:
+    frame = top.text(key)
+    if frame.startswith("/"):
+        raise top.error(key, f"must not start with a slash, which comes with the robot's name: {frame}")
+    return frame
+
+
+def _rates(section: Section) -> Rates:
+    rates = Rates(
+        clock=section.number("clock", at_least=0),
+        tf=section.number("tf", at_least=0),
+        odom=section.number("odom", at_least=0),
+        ground_truth=section.number("base_pose_ground_truth", at_least=0),
+        scan=section.number("base_scan", at_least=0),
+        image=section.number("image", at_least=0),
+        collision=section.number("collision", at_least=0),
+    )
+    section.end()
+    return rates

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Physical motion with an Arena that follows it, so that rangers see what moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kurumaisu._core import Arena
+from kurumaisu.geometry import wrap
+from kurumaisu.sim.bodies import assemble
+from kurumaisu.sim.motion import StateArray
+from kurumaisu.sim.physical import PhysicalMotion
+from kurumaisu.sim.settings import Dynamics
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+from kurumaisu.world.model import Model
+
+
+class Followed:
+    """PhysicalMotion as the simulator wants its Motion."""
+
+    def __init__(
+        self, arena: Arena, numbers: IntArray, models: Sequence[Model], poses: FloatArray, dynamics: Dynamics
+    ) -> None:
+        """Move the bodies of models, which began at poses (models, 4) and have numbers (b,) in the arena."""
+        self._arena = arena
+        self._numbers = numbers
+        self._motion = PhysicalMotion(*assemble(models, poses, dynamics), dynamics)
+
+    def place(self, poses: FloatArray) -> None:
+        """Put all bodies at poses (b, 4), at rest."""
+        self._motion.place(poses)
+        self._arena.set_poses(self._numbers, poses)
+
+    def move(self, velocities: FloatArray, dt: float) -> tuple[FloatArray, BoolArray]:
+        """Move all bodies; see Motion."""
+        poses, stalled = self._motion.move(velocities, dt)
+        poses[:, 3] = wrap(poses[:, 3])
+        self._arena.set_poses(self._numbers, poses)
+        return poses, stalled
+
+    def state(self) -> dict[str, StateArray]:
+        """Return what the next moves depend on."""
+        return self._motion.state()
+
+    def restore(self, state: dict[str, StateArray]) -> None:
+        """Go back to a state."""
+        self._motion.restore(state)
+        self._arena.set_poses(self._numbers, np.ascontiguousarray(self._motion.poses))

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What in a world will surprise its user, in words."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from kurumaisu._core import Arena
+from kurumaisu.types import FloatArray
+from kurumaisu.world.layout import beam_height, moves, outline_in_map
+from kurumaisu.world.model import Model, Place, Position, Ranger
+from kurumaisu.world.world import World
+
+_MOST_ROBOTS = 10  # that contents() tells of one by one
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that may not be what its author meant."""
+
+    place: Place
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.message}"
+
+
+def findings(world: World) -> tuple[Finding, ...]:
+    """Return what the world says and its author may not mean, by place in its files."""
+    found = [finding for rule in _RULES for finding in rule(world)]
+    return tuple(sorted(found, key=lambda finding: (str(finding.place.file), finding.place.line, finding.place.column)))
+
+
+def _beams(world: World) -> Iterator[Finding]:
+    """Lasers whose plane misses every wall."""
+    walls = [model for model in world.models if not moves(world, model) and model.ranger_return >= 0]
+    heights = [model.shape.heights + world.poses[model.index, 2] for model in walls if len(model.shape.segments)]
+    if not heights:
+        return
+    spans = np.concatenate(heights)
+    for model in world.models:
+        if not isinstance(model.device, Ranger):
+            continue
+        for fan in model.device.fans:
+            z = beam_height(world, model, fan)
+            if not ((spans[:, 0] <= z) & (z <= spans[:, 1])).any():
+                where = "above" if z > spans[:, 1].max() else "below" if z < spans[:, 0].min() else "between"
+                yield Finding(fan.place, f"the beams, {z:.2f} m above the ground, pass {where} all walls")
+
+
+def _thin(world: World) -> Iterator[Finding]:
+    for model in world.models:
+        points = model.shape.segments.reshape(-1, 2)
+        if not len(points):
+            continue
+        extent = points.max(axis=0) - points.min(axis=0)
+        if extent.min() < world.resolution and model.type == "model":
+            yield Finding(
+                model.place,
+                f"{_name(model)} is {1000 * extent.min():.0f} mm thin, less than the resolution of "
+                f"{1000 * world.resolution:.0f} mm: Stage may draw nothing of it, here it is solid",
+            )
+
+
+def _in_walls(world: World) -> Iterator[Finding]:
+    """Robots that touch something solid at their start."""
+    solid = [model for model in world.models if model.obstacle_return and len(model.shape.segments)]
+    fixed = [model for model in solid if not moves(world, model)]
+    outlines = [outline_in_map(world, model) for model in fixed]
+    walls = np.concatenate([np.empty((0, 6)), *outlines])
+    tree = np.repeat([model.root for model in fixed], [len(outline) for outline in outlines]).astype(np.int64)
+    arena = Arena(walls, np.ones(len(walls)), np.ones(len(walls), dtype=np.bool_), tree, 1)
+    bodies = {}
+    for model in solid:
+        if moves(world, model):
+            outline = outline_in_map(world, model)
+            number = len(outline)
+            body = arena.add_body(outline, np.ones(number), np.ones(number, dtype=np.bool_), model.root)
+            arena.set_poses(np.array([body]), np.zeros((1, 4)))
+            bodies[body] = model
+    if bodies:
+        for body, touches in zip(bodies, arena.touches(np.array(list(bodies))), strict=True):
+            if touches:
+                yield Finding(bodies[body].place, f"{_name(bodies[body])} touches something solid at its start")
+
+
+def _speed(world: World) -> Iterator[Finding]:
+    stage = np.array([[-1, 1]] * 3 + [[-math.pi / 2, math.pi / 2]])
+    for model, position in _positions(world):
+        if np.allclose(position.velocity_bounds, stage):
+            yield Finding(model.place, f"{_name(model)} is clamped to 1 m/s and 90 deg/s, for want of velocity_bounds")
+
+
+def _localization(world: World) -> Iterator[Finding]:
+    for model, position in _positions(world):
+        if position.localization == "gps":
+            for name in ("odom_error", "localization_origin"):
+                if getattr(position, name) is not None:
+                    yield Finding(model.place, f'{_name(model)}: {name} has no effect with localization "gps"')
+        elif model.update_interval > world.interval:
+            share = world.interval / model.update_interval
+            yield Finding(
+                model.place,
+                f"{_name(model)}: odometry adds up only {100 * share:.0f} % of the way, as in Stage, because "
+                "update_interval is longer than interval_sim",
+            )
+
+
+def _sensorless(world: World) -> Iterator[Finding]:
+    robots = [model for model, _ in _positions(world)]
+    if len(robots) < 2:
+        return
+    for robot in robots:
+        if not any(isinstance(other.device, Ranger) and other.parent == robot.index for other in world.models):
+            yield Finding(
+                robot.place, f"{_name(robot)} has no laser, but as a position counts as a robot in topic names"
+            )
+
+
+def _rangers(world: World) -> Iterator[Finding]:
+    for model in world.models:
+        if not isinstance(model.device, Ranger):
+            continue
+        fans = model.device.fans
+        if len(fans) > 1:
+            yield Finding(
+                model.place, f"{_name(model)} has {len(fans)} sensors; stage_ros publishes the first one only"
+            )
+        if model.update_interval > world.interval:
+            yield Finding(
+                model.place,
+                f"{_name(model)} is updated every {model.update_interval:g} s, the world every {world.interval:g} s: "
+                "the same scan is published again in between",
+            )
+        for fan in fans:
+            if fan.samples > 1 and math.isclose(fan.fov, 2 * math.pi):
+                yield Finding(fan.place, "with fov 360 the first and the last beam are the same")
+
+
+def _intangible(world: World) -> Iterator[Finding]:
+    for model in world.models:
+        if moves(world, model) or not len(model.shape.segments):
+            continue
+        if model.ranger_return < 0 and model.obstacle_return:
+            yield Finding(model.place, f"{_name(model)} stops robots but lasers do not see it (ranger_return below 0)")
+        if model.ranger_return >= 0 and not model.obstacle_return:
+            yield Finding(
+                model.place, f"{_name(model)} is seen by lasers but robots drive through it (obstacle_return 0)"
+            )
+
+
+def _own_tree(world: World) -> Iterator[Finding]:
+    for model, _ in _positions(world):
+        if model.root != model.index and not isinstance(world.models[model.root].device, Position):
+            yield Finding(
+                model.place,
+                f"{_name(model)} stands inside {_name(world.models[model.root])}: its lasers see nothing of it, "
+                "nor does it bump into it",
+            )
+
+
+def _positions(world: World) -> Iterator[tuple[Model, Position]]:
+    for model in world.models:
+        if isinstance(model.device, Position):
+            yield model, model.device
+
+
+def _name(model: Model) -> str:
+    return model.name or f"the {model.type}"
+
+
+_RULES: tuple[Callable[[World], Iterator[Finding]], ...] = (
+    _beams,
+    _thin,
+    _in_walls,
+    _speed,
+    _localization,
+    _sensorless,
+    _rangers,
+    _intangible,
+    _own_tree,
+)
+
+
+def contents(world: World) -> Iterator[str]:
+    """Yield lines that say what the world consists of."""
+    x0, y0, x1, y1 = world.bounds
+    yield f"{world.name}: {x1 - x0:.2f} x {y1 - y0:.2f} m, x {x0:.2f} to {x1:.2f}, y {y0:.2f} to {y1:.2f}"
+    yield f"step {1000 * world.interval:g} ms, resolution {world.resolution:g} m, {len(world.segments)} wall segments"
+    kinds = {kind: sum(model.type == kind for model in world.models) for kind in {m.type for m in world.models}}
+    yield "models: " + ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
+    robots = list(_positions(world))
+    for model, position in robots[:_MOST_ROBOTS]:
+        yield _robot(world, model, position)
+        for other in world.models:
+            if isinstance(other.device, Ranger) and other.parent == model.index:
+                yield from _fans(world, other, other.device)
+    if len(robots) > _MOST_ROBOTS:
+        yield f"... and {len(robots) - _MOST_ROBOTS} more robots"
+
+
+def _fans(world: World, model: Model, ranger: Ranger) -> Iterator[str]:
+    alike = Counter(
+        f"{fan.samples} beam{'s' if fan.samples > 1 else ''} over {math.degrees(fan.fov):g} deg, {fan.range_max:g} m, "
+        f"{beam_height(world, model, fan):.2f} m high"
+        for fan in ranger.fans
+    )
+    for text, count in alike.items():
+        yield f"  ranger: {f'{count} x ' if count > 1 else ''}{text}"
+
+
+def _robot(world: World, model: Model, position: Position) -> str:
+    x, y, _, heading = world.poses[model.index]
+    size: FloatArray = model.size
+    return (
+        f"robot {_name(model)}: at {x:.2f} {y:.2f}, {math.degrees(heading):.0f} deg; {size[0]:.2f} x {size[1]:.2f} m, "
+        f"{position.drive}, {position.localization}"
+    )

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The commands check-world and export-world."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from kurumaisu.errors import Error
+from kurumaisu.maps import save_map
+from kurumaisu.world.check import contents, findings
+from kurumaisu.world.drawing import to_svg
+from kurumaisu.world.occupancy import occupancy
+from kurumaisu.world.world import World, load_world
+
+
+def check_world(arguments: list[str] | None = None) -> int:
+    """Say what a world contains and what in it will surprise. Return 0, 1 with findings, 2 for a bad file."""
+    parser = argparse.ArgumentParser(
+        prog="check-world", description="Say what a world file contains and what in it will surprise."
+    )
+    _add_world(parser)
+    options = parser.parse_args(arguments)
+    try:
+        world = _load(options)
+    except Error as error:
+        print(f"check-world: {error}", file=sys.stderr)
+        return 2
+    print("\n".join(contents(world)))
+    surprises = list(dict.fromkeys([*world.warnings, *map(str, findings(world))]))  # a macro's are the same each time
+    count = f"{len(surprises)} surprise{'s' if len(surprises) > 1 else ''}:" if surprises else "no surprises"
+    print("\n".join(["", count, *surprises]))
+    return 1 if surprises else 0
+
+
+def export_world(arguments: list[str] | None = None) -> int:
+    """Write a world as a map for map_server and as a drawing. Return 0, or 2 for bad input."""
+    parser = argparse.ArgumentParser(
+        prog="export-world", description="Write a world as a map_server pair (NAME.pgm, NAME.yaml) and as NAME.svg."
+    )
+    _add_world(parser)
+    parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", default=Path(), help="where to (.)")
+    parser.add_argument("--resolution", type=float, default=0.05, metavar="M", help="of the map's cells [m] (0.05)")
+    parser.add_argument(
+        "--height", type=float, default=0.4, metavar="M", help="of the plane that the map cuts [m] (0.4, a laser's)"
+    )
+    parser.add_argument(
+        "--png", action="store_true", help="the map as NAME.png, much smaller, which map_server reads too"
+    )
+    options = parser.parse_args(arguments)
+    try:
+        if not 1e-3 <= options.resolution <= 10:
+            raise Error(f"--resolution: must be 0.001 to 10 m: {options.resolution:g}")
+        world = _load(options)
+        options.output.mkdir(parents=True, exist_ok=True)
+        path = options.output / options.world.stem
+        image, text = save_map(
+            occupancy(world, options.resolution, options.height), path, ".png" if options.png else ".pgm"
+        )
+        drawing = path.with_name(path.name + ".svg")
+        drawing.write_text(to_svg(world), encoding="utf-8")
+    except (Error, OSError) as error:
+        print(f"export-world: {error}", file=sys.stderr)
+        return 2
+    print(f"written: {image}, {text}, {drawing}")
+    return 0
+
+
+def _add_world(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("world", type=Path, metavar="FILE", help="a Stage world, or a map_server YAML")
+    parser.add_argument(
+        "--image-extents",
+        action="store_true",
+        help="bitmaps fill their size with their margins, not trimmed as in Stage",
+    )
+    parser.add_argument("values", nargs="*", metavar="NAME=VALUE", help="values for the world's parameters")
+
+
+def _load(options: argparse.Namespace) -> World:
+    values = {}
+    for value in options.values:
+        name, equals, text = value.partition("=")
+        if not equals:
+            raise Error(f"{value!r}: a parameter is given as NAME=VALUE")
+        values[name] = text
+    return load_world(options.world, image_extents=options.image_extents, values=values)

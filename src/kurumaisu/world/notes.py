@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Warnings about what a file says and what will surprise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from kurumaisu.world.tokens import Token
+
+_MOST = 200  # more are not read
+
+
+@dataclass
+class Notes:
+    """Warnings, each with its place, and each kind of them once."""
+
+    texts: list[str] = field(default_factory=list)
+    _seen: set[str] = field(default_factory=set)
+
+    def add(self, token: Token, text: str, kind: str | None = None) -> None:
+        """Add a warning, unless there was one of this kind (by default: with the same text) before."""
+        if (kind or text) in self._seen or len(self.texts) > _MOST:
+            return
+        self._seen.add(kind or text)
+        self.texts.append(f"{token.place}: {text}" if len(self.texts) < _MOST else "there are more warnings")

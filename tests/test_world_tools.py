@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""check-world and export-world: what they find, and maps against a point-in-polygon oracle."""
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+from shapely import affinity
+from shapely import geometry as shapely
+
+from kurumaisu.errors import Error
+from kurumaisu.params import load_model, shipped
+from kurumaisu.world import load_world
+from kurumaisu.world.check import findings
+from kurumaisu.world.cli import check_world, export_world
+from kurumaisu.world.layout import beam_height
+from kurumaisu.world.model import Ranger
+from kurumaisu.world.occupancy import occupancy, rasterise
+
+WORLDS = sorted(shipped("worlds/room.world").parent.glob("*.world"))
+CELL = 0.05  # [m]
+
+
+def ring(corners: np.ndarray) -> np.ndarray:
+    return np.hstack([corners, np.roll(corners, -1, axis=0)])
+
+
+def read(folder: Path, text: str):
+    path = folder / "t.world"
+    path.write_text(text)
+    return load_world(path)
+
+
+@settings(max_examples=40)
+@given(
+    st.tuples(*[st.floats(-3, 3)] * 2),
+    st.tuples(*[st.floats(0.001, 0.6)] * 2),
+    st.floats(-np.pi, np.pi),
+)
+def test_a_map_covers_a_box_and_no_cell_that_it_does_not_enter(middle, size, angle):
+    solid = affinity.rotate(shapely.box(-size[0] / 2, -size[1] / 2, size[0] / 2, size[1] / 2), angle, (0, 0), True)
+    solid = affinity.translate(solid, *middle)
+    grid = rasterise([ring(np.array(solid.exterior.coords)[:-1])], solid.bounds, CELL, 2)
+    for (row, column), value in np.ndenumerate(grid.cells):
+        x, y = grid.x + column * CELL, grid.y + row * CELL
+        overlap = shapely.box(x, y, x + CELL, y + CELL).intersection(solid).area / CELL**2
+        # a corner's tip between two lines may be missed, never a real part of a cell
+        assert overlap > 1e-9 if value else overlap < 0.26
+
+
+def test_walls_along_the_axes_are_found_however_thin():
+    thin = ring(np.array([[0.01, 0.512], [2.0, 0.512], [2.0, 0.5121], [0.01, 0.5121]]))
+    grid = rasterise([thin], (0, 0, 2, 1), CELL, 0)
+    assert (grid.cells == 100).sum() == 40
+    assert (grid.cells[10] == 100).all()
+
+
+def test_a_wall_that_ends_at_a_cell_does_not_enter_the_next():
+    square = ring(np.array([[0.1, 0.1], [0.3, 0.1], [0.3, 0.3], [0.1, 0.3]]))
+    assert (rasterise([square], (0, 0, 1, 1), 0.1, 0).cells == 100).sum() == 4
+
+
+def test_a_bitmap_comes_back_as_itself(tmp_path):
+    pixels = np.where(np.random.default_rng(3).random((30, 40)) < 0.3, 0, 255).astype(np.uint8)
+    pixels[[0, -1]] = pixels[:, [0, -1]] = 0
+    Image.fromarray(pixels).save(tmp_path / "map.png")
+    world = read(tmp_path, 'model ( bitmap "map.png" size [4.0 3.0 1.0] pose [2.0 1.5 0 0] )')
+    grid = occupancy(world, 0.1, 0.5)
+    inner = grid.cells[4:-4, 4:-4]
+    np.testing.assert_array_equal(inner[::-1] == 100, pixels == 0)
+
+
+def test_a_map_cuts_at_its_height(tmp_path):
+    world = read(tmp_path, "model ( size [1 1 0.3] )\nmodel ( pose [3 0 0 0] size [1 1 1] )")
+    low, high = occupancy(world, 0.1, 0.2), occupancy(world, 0.1, 0.5)
+    assert (low.cells == 100).sum() == 200
+    assert (high.cells == 100).sum() == 100
+    with pytest.raises(Error, match=r"t\.world: nothing is 2 m above"):
+        occupancy(world, 0.1, 2.0)
+
+
+def test_a_map_too_large_is_refused(tmp_path):
+    world = read(tmp_path, "model ( size [30000 30000 1] )")
+    with pytest.raises(Error, match="coarser"):
+        occupancy(world, 0.05, 0.4)
+
+
+ROBOT = "position ( %s size [0.4 0.4 0.2] velocity_bounds [-2 2 0 0 0 0 -90 90] %s )\n"
+LASER = "ranger ( %s sensor ( range [0 8] fov 180 samples 181 ) )"
+WALL = "model ( pose [3 0 0 0] size [0.2 4 %s] %s )\n"
+
+SURPRISES = {
+    "pass above all walls": (WALL % ("0.1", "") + ROBOT % ("", LASER % ""), "beam above the map"),
+    "pass below all walls": ("model ( pose [3 0 1 0] size [0.2 4 1] )\n" + ROBOT % ("", LASER % ""), "beam below"),
+    "5 mm thin": ("model ( pose [3 0 0 0] size [0.005 4 1] )\n" + ROBOT % ("", LASER % ""), "thin wall"),
+    "touches something solid": (WALL % ("1", "") + ROBOT % ("pose [2.8 0 0 0]", LASER % ""), "robot in a wall"),
+    "clamped to 1 m/s": (WALL % ("1", "") + f"position ( size [0.4 0.4 0.2] {LASER % ''} )", "clamped speed"),
+    "odom_error has no effect": (WALL % ("1", "") + ROBOT % ("odom_error [0.1 0 0 0]", LASER % ""), "gps"),
+    "adds up only 20 %": (
+        "interval_sim 20\n" + WALL % ("1", "") + ROBOT % ('localization "odom"', LASER % "update_interval 20"),
+        "slow odometry",
+    ),
+    "the same scan is published again": (
+        "interval_sim 20\n" + WALL % ("1", "") + ROBOT % ("update_interval 20", LASER % ""),
+        "slow laser",
+    ),
+    "has no laser, but": (WALL % ("1", "") + ROBOT % ("", LASER % "") + ROBOT % ("pose [0 2 0 0]", ""), "sensorless"),
+    "first one only": (
+        WALL % ("1", "") + ROBOT % ("", "ranger ( sensor ( range [0 8] ) sensor ( range [0 8] ) )"),
+        "ring",
+    ),
+    "first and the last beam": (
+        WALL % ("1", "") + ROBOT % ("", "ranger ( sensor ( range [0 8] fov 360 samples 8 ) )"),
+        "full circle",
+    ),
+    "lasers do not see it": (WALL % ("1", "ranger_return -1") + WALL % ("1", "") + ROBOT % ("", LASER % ""), "glass"),
+    "drive through it": (WALL % ("1", "obstacle_return 0") + ROBOT % ("", LASER % ""), "ghost"),
+    "stands inside": ("model ( size [5 5 1] stack_children 0 " + ROBOT % ("", LASER % "") + ")", "own tree"),
+}
+
+
+@pytest.mark.parametrize("message", SURPRISES, ids=lambda m: SURPRISES[m][1])
+def test_says_what_will_surprise(tmp_path, message):
+    found = findings(read(tmp_path, SURPRISES[message][0]))
+    told = [str(finding) for finding in found if message in finding.message]
+    assert len(told) == 1, found
+    assert told[0].startswith(f"{tmp_path}/t.world:")
+
+
+def test_says_nothing_of_a_world_without_surprises(tmp_path):
+    assert findings(read(tmp_path, WALL % ("1", "") + ROBOT % ("", LASER % ""))) == ()
+
+
+@pytest.mark.parametrize("path", WORLDS, ids=lambda path: path.stem)
+def test_our_own_worlds_have_no_surprises(path, capsys):
+    assert check_world([str(path)]) == 0, capsys.readouterr().out
+    assert "no surprises" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("path", WORLDS, ids=lambda path: path.stem)
+def test_the_maps_that_ship_are_those_of_the_worlds(path, tmp_path):
+    assert export_world([str(path), "-o", str(tmp_path), "--png"]) == 0
+    ours = shipped(f"worlds/maps/{path.stem}.yaml")
+    assert ours.read_text() == (tmp_path / ours.name).read_text()
+    with Image.open(tmp_path / f"{path.stem}.png") as new, Image.open(ours.with_suffix(".png")) as old:
+        np.testing.assert_array_equal(np.asarray(new), np.asarray(old))
+    ElementTree.parse(tmp_path / f"{path.stem}.svg")
+
+
+def test_a_shipped_map_is_a_world_again():
+    world, again = load_world(shipped("worlds/room.world")), load_world(shipped("worlds/maps/room.yaml"))
+    np.testing.assert_allclose(again.bounds, world.bounds, atol=1e-6)
+    settings_ = yaml.safe_load(shipped("worlds/maps/room.yaml").read_text())
+    assert settings_["resolution"] == pytest.approx(0.05)
+
+
+def test_the_chair_of_the_worlds_is_the_one_of_the_model_file():
+    model, world = load_model(shipped("launch/md100.yaml")), load_world(shipped("worlds/room.world"))
+    chair = next(m for m in world.models if m.type == "position")
+    corners = chair.shape.segments.reshape(-1, 2)
+    chassis = model.chassis
+    np.testing.assert_allclose(corners.max(axis=0), [chassis.axle_to_front, chassis.width / 2], atol=1e-9)
+    np.testing.assert_allclose(corners.min(axis=0)[0], chassis.axle_to_front - chassis.length, atol=1e-9)
+    assert chair.mass == chassis.mass
+    ranger = next(m for m in world.models if isinstance(m.device, Ranger))
+    fan, laser = ranger.device.fans[0], model.laser
+    assert (fan.samples, fan.range_min, fan.range_max) == (laser.beams, laser.range_min, laser.range_max)
+    assert beam_height(world, ranger, fan) == pytest.approx(laser.mount.z)
+    first, last = ranger.pose[3] - fan.fov / 2, ranger.pose[3] + fan.fov / 2
+    np.testing.assert_allclose([first, last], laser.mount.yaw + laser.bearings[[0, -1]], atol=2e-5)
+    np.testing.assert_allclose(ranger.pose[:2], [laser.mount.x, laser.mount.y])
+
+
+def test_a_bad_world_is_said_with_its_place(tmp_path, capsys):
+    path = tmp_path / "bad.world"
+    path.write_text("model ( size [1 2\n 3] )\n")
+    assert check_world([str(path)]) == 2
+    assert f"{path}:1:" in capsys.readouterr().err
+    assert export_world([str(path)]) == 2
+    assert check_world([str(path), "speed"]) == 2
+    assert "NAME=VALUE" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--resolution=0", "--resolution=nan", "--height=99"])
+def test_export_refuses_what_makes_no_map(tmp_path, option, capsys):
+    assert export_world([str(shipped("worlds/room.world")), "-o", str(tmp_path), option]) == 2
+    assert "export-world: " in capsys.readouterr().err
