@@ -116,10 +116,13 @@ void Fan::fill(std::size_t i, std::size_t k) {
   const std::int32_t segment = segments_[i];
   std::fill(segments_.begin() + static_cast<std::ptrdiff_t>(i) + 1,
             segments_.begin() + static_cast<std::ptrdiff_t>(k), segment);
-  const Segment s = segment < 0 ? Segment{} : scene_.segment(segment);
-  for (std::size_t m = i + 1; m < k; ++m) {
-    ranges_[m] = segment < 0 ? kInfinity : std::max(rangeToLine(endsOf(ray(m), s)), 0.0);
+  if (segment < 0) {
+    std::fill(ranges_.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+              ranges_.begin() + static_cast<std::ptrdiff_t>(k), kInfinity);
+    return;
   }
+  const Segment s = scene_.segment(segment);
+  for (std::size_t m = i + 1; m < k; ++m) ranges_[m] = std::max(rangeToLine(endsOf(ray(m), s)), 0.0);
 }
 
 /// How many beams from beam i, counted along the fan (sense 1) or back (-1), until its segment ends.

@@ -130,8 +130,7 @@ void Scene::cast(const Pose2D* poses, bool one_pose, const double* bearings, std
 
 void Scene::castFan(const Pose2D& origin, double first, double increment, std::size_t n, double max_range,
                     Hit* hits) const {
-  // As far as a wedge hides things from its neighbours, witnesses pay: few beams, or such that are far apart, seldom
-  // meet the same wall, and a witness costs a hundredth of a ray.
+  // Beams that are few or far apart seldom meet the same wall, and a witness costs about a hundredth of a ray.
   constexpr double kFarApart = 0.1;     // [rad]
   constexpr double kTooClose = 1e-4;    // [rad] the witnesses' angles are rough
   constexpr double kAlmostATurn = 6.0;  // [rad]
