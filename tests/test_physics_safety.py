@@ -37,7 +37,7 @@ def test_no_speed_takes_a_robot_through_a_wall_without_thickness(
         assert np.abs(corners(body, pose)[:, 0]).max() < 1.0 + SKIN
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=25)
 @given(
     headings=st.tuples(*[st.floats(-math.pi, math.pi)] * 3),
     speeds=st.tuples(*[st.floats(-10, 10)] * 3),
@@ -71,7 +71,7 @@ def worst_overlap(bodies: list[Rigid], poses: FloatArray) -> float:
     return deepest
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=20)
 @given(seed=st.integers(0, 10**6), friction=st.floats(0.0, 0.5))
 def test_without_motors_energy_never_grows(seed: int, friction: float) -> None:
     rng = np.random.default_rng(seed)

@@ -9,6 +9,7 @@ namespace kurumaisu::contact {
 namespace {
 
 constexpr int kMaxAdvances = 100000;  // a guard; each advance covers at least 1 % of the touching distance
+constexpr double kLost = 0.03;        // [1] of it: what is so near cannot be told from what overlaps
 constexpr double kArrived = 0.01;  // [1] of the touching distance that may be left when it counts as reached
 
 /// sin(x) / x; below the bound the series is exact to double precision.
@@ -64,13 +65,15 @@ double cornerTouch(const Mover& a, const Point& corner, const Mover& b, const Ed
                    double limit) {
   const double rise = acceleration(a, norm(corner)) + acceleration(b, std::max(norm(edge.a), norm(edge.b)));
   double time = 0;
+  double target = touch.distance;
   for (int i = 0; i < kMaxAdvances; ++i) {
     const Pose pose_b = b.at(time);
     const Gap gap = gapOf(carry(a, a.at(time), corner), carry(b, pose_b, edge.a), carry(b, pose_b, edge.b));
-    if (i == 0 && gap.distance <= touch.known) return limit;
-    const double left = gap.distance - touch.distance;
-    if (left <= kArrived * touch.distance && gap.closing > 0) return time;
-    time += timeToClose(std::max(left, kArrived * touch.distance), gap.closing, rise);
+    if (i == 0 && gap.distance <= touch.known) target = std::max(gap.distance - touch.give, gap.distance / 2);
+    if (target < kLost * touch.distance) return limit;
+    const double left = gap.distance - target;
+    if (left <= kArrived * target && gap.closing > 0) return time;
+    time += timeToClose(std::max(left, kArrived * target), gap.closing, rise);
     if (time >= limit) return limit;
   }
   return time;

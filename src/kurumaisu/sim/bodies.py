@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.geometry import between
+from kurumaisu.sim.gripping import relative
 from kurumaisu.sim.rigid import Ground, Part, Pivot, Rigid, convex, moved, rigid
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import FloatArray
@@ -60,7 +60,7 @@ def _rigid(model: Model, members: Sequence[Model], poses: FloatArray, dynamics: 
     edges = [np.empty((0, 6))]
     for m in members:
         if m.obstacle_return:
-            place = _relative(poses[model.index], poses[m.index])
+            place = relative(poses[model.index], poses[m.index])
             parts += _parts(m.shape, place)
             edges.append(_placed(m.shape, place))
     own_friction = dynamics.wheel_friction if driven else dynamics.floor_friction
@@ -72,7 +72,7 @@ def _rigid(model: Model, members: Sequence[Model], poses: FloatArray, dynamics: 
         mass=mass,
         friction=own_friction if model.friction is None else model.friction,
     )
-    jaws = [_jaws(m, _relative(poses[model.index], poses[m.index])) for m in members if isinstance(m.device, Gripper)]
+    jaws = [_jaws(m, relative(poses[model.index], poses[m.index])) for m in members if isinstance(m.device, Gripper)]
     piece = replace(piece, jaws=jaws[0] if jaws else None, grippable=model.gripper_return)
     return piece if model.hinge is None else _hung(piece, model, poses[model.index], dynamics)
 
@@ -101,12 +101,6 @@ def _jaws(model: Model, pose: FloatArray) -> Part:
 
 def _flat(pose: FloatArray) -> FloatArray:
     return np.array([pose[0], pose[1], 0.0, pose[3]])
-
-
-def _relative(base: FloatArray, pose: FloatArray) -> FloatArray:
-    """Return a pose (4,) in the frame of another."""
-    x, y, heading = between(base[[0, 1, 3]], pose[[0, 1, 3]])
-    return np.array([x, y, pose[2] - base[2], heading])
 
 
 def _placed(shape: Shape, pose: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from kurumaisu.sim.joints import Hinges, constraints
 from kurumaisu.sim.layers import Layers
 from kurumaisu.sim.rigid import Ground, Rigid
 from kurumaisu.sim.settings import Dynamics
+from kurumaisu.sim.slip import turned
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _STATE = (
@@ -64,6 +65,9 @@ class Island:
         self._hinges = Hinges([r.pivot for r in self._rigids])
         self._driven = np.array([r.driven for r in self._rigids])
         self._masses = np.array([[r.mass, r.mass, r.moment] for r in self._rigids])
+        self._imposed = self._driven & (not dynamics.slip)  # wheels that slip give all speeds by force
+        brakes = [(0.0, 0.0) if r.driven else (r.grip / r.mass, r.twist_grip / r.moment) for r in self._rigids]
+        self._brakes = np.array(brakes)  # [m/s^2], [rad/s^2] of those that the floor brakes
         self._walls: set[int] = set()
         self._floor = pymunk.Body(body_type=pymunk.Body.STATIC)
         self._motors: list[pymunk.Body] = []
@@ -100,15 +104,22 @@ class Island:
         step = longest
         for _ in range(2):  # what touches earlier shortens the substep, and with it the impulses of motors and floor
             velocities, hindered, poses = self._solve(moving, step)
+            ways = self._ways(moving.velocities, velocities, step)
             limit = self._hinges.time(poses, velocities, step)
             touch = self._clearance.first_touch(
-                self._numbers, poses, velocities, known=2 * self._skin, distance=1.5 * self._skin, limit=limit
+                self._numbers,
+                poses,
+                ways,
+                known=2 * self._skin,
+                distance=1.5 * self._skin,
+                give=0.5 * self._skin,
+                limit=limit,
             )
             if touch >= step:
                 break
             step = touch
         moving.poses = poses
-        moving.poses[:, [0, 1, 3]] += velocities * step
+        moving.poses[:, [0, 1, 3]] += ways * step
         self._hinges.project(moving.poses, velocities)
         moving.velocities, moving.hindered = velocities, hindered
         return step
@@ -122,7 +133,7 @@ class Island:
         """
         self._limit_grips(step)
         targets = chords(moving.poses[:, 3], moving.commands, step)
-        start = np.where((self._driven & ~moving.hindered)[:, None], targets, moving.velocities)
+        start = np.where((self._imposed & ~moving.hindered)[:, None], targets, moving.velocities)
         state = np.zeros((len(start) + len(self._motors) + 1, 9))
         bodies = state[: len(start)]
         bodies[:, :3] = moving.poses[:, [0, 1, 3]]
@@ -136,6 +147,22 @@ class Island:
         velocities = result[:, 3:6].copy()
         hindered = self._driven & (np.abs(velocities - targets).max(axis=1) > _AT_REST)
         return velocities, hindered, poses
+
+    def _ways(self, before: FloatArray, after: FloatArray, step: float) -> FloatArray:
+        """Return mean velocities (k, 3) over a substep: half-way, where nothing but the floor braked a body.
+
+        Otherwise contacts were solved for, and they allow the velocity at the end only.
+        """
+        ways = after.copy()
+        for columns, brakes in ((slice(0, 2), self._brakes[:, 0]), (slice(2, 3), self._brakes[:, 1])):
+            speed = np.hypot.reduce(before[:, columns], axis=1)
+            loss = np.minimum(speed, brakes * step)
+            left = np.divide(speed - loss, speed, out=np.zeros_like(speed), where=speed > 0)
+            expected = before[:, columns] * left[:, None]
+            braked = (loss > 0) & (np.abs(after[:, columns] - expected).max(axis=1) < _AT_REST)
+            mean = np.where(speed > loss, (1 + left) / 2, speed / (2 * np.maximum(brakes * step, 1e-300)))
+            ways[:, columns][braked] = (before[:, columns] * mean[:, None])[braked]
+        return ways
 
     def _write(self, state: FloatArray) -> None:
         buffer = Buffer()
@@ -196,11 +223,8 @@ class Island:
 def chords(headings: FloatArray, commands: FloatArray, step: float) -> FloatArray:
     """Return constant velocities (n, 3) in the map that end where arcs of commands (n, 3) end after a step."""
     half = 0.5 * commands[:, 2] * step
-    direction = headings + half
-    c, s = np.cos(direction), np.sin(direction)
-    shorter = np.sinc(half / np.pi)
-    x, y = commands[:, 0] * shorter, commands[:, 1] * shorter
-    return np.stack([c * x - s * y, s * x + c * y, commands[:, 2]], axis=1)
+    shorter = np.stack([np.sinc(half / np.pi)] * 2 + [np.ones(len(half))], axis=1)
+    return turned(commands * shorter, headings + half)
 
 
 def _shape(body: pymunk.Body, corners: FloatArray, skin: float) -> pymunk.Shape:
