@@ -3,101 +3,69 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
 import numpy as np
 import pymunk
 
-from kurumaisu import _core
 from kurumaisu.geometry import between
-from kurumaisu.params import Chassis
-from kurumaisu.sim.settings import Physics
+from kurumaisu.params import Chassis, shipped
+from kurumaisu.sim.physical import PhysicalMotion
+from kurumaisu.sim.rigid import Ground, Part, Rigid, rigid
+from kurumaisu.sim.settings import Physics, load_dynamics
 from kurumaisu.types import FloatArray
+
+_HEIGHTS = np.array([0.0, 1.0])  # [m] any: a chair and its obstacles are as high as each other
+_CHAIR, _OBSTACLE = 0, 1  # trees
 
 
 class ChairBody:
     """A rigid footprint whose rates the motors impose and obstacles limit."""
 
     def __init__(self, chassis: Chassis, obstacles: FloatArray, physics: Physics, start: FloatArray) -> None:
-        """Stand at rest at a start pose (3,) among obstacles: segments (n, 4) [m].
-
-        A new run needs a new body: pymunk's contacts remember the forces of the last steps.
-        """
-        self._physics = physics
-        self._pose = np.array(start, dtype=np.float64)
-        self._imposed = (0.0, 0.0)
-        self._space = pymunk.Space()
-        self._space.iterations = physics.iterations
-        self._space.collision_slop = physics.collision_slop
-        self._space.collision_bias = physics.collision_bias
-        self._body, self._footprint = _chair(chassis, physics.friction)
-        self._body.velocity_func = self._impose
-        self._space.add(self._body, self._footprint)
-        for ax, ay, bx, by in obstacles.tolist():
-            wall = pymunk.Segment(self._space.static_body, (ax, ay), (bx, by), 0.0)
-            wall.friction = physics.friction
-            self._space.add(wall)
-        self._follow_pose()
+        """Stand at rest at a start pose (3,) among obstacles: segments (n, 4) [m]."""
+        dynamics = replace(load_dynamics(shipped("launch/physical.yaml")), contacts=physics, slip=False)
+        self._step = physics.step
+        self._obstacles = obstacles
+        self._chair = _chair(chassis, dynamics.wheel_friction)
+        heights = np.broadcast_to(_HEIGHTS, (len(obstacles), 2))
+        ground = Ground(np.concatenate([obstacles, heights], axis=1), np.full(len(obstacles), _OBSTACLE))
+        self._motion = PhysicalMotion([self._chair], ground, dynamics)
+        self._motion.place(np.array([[start[0], start[1], 0.0, start[2]]]))
 
     @property
     def pose(self) -> FloatArray:
         """Pose (3,) in the map; theta is not wrapped."""
-        return self._pose.copy()
+        return np.array(self._motion.poses[0, [0, 1, 3]])
 
     def touches(self) -> bool:
         """Return whether the footprint overlaps an obstacle."""
-        return bool(self._space.shape_query(self._footprint))
+        space = pymunk.Space()
+        for ax, ay, bx, by in self._obstacles.tolist():
+            space.add(pymunk.Segment(space.static_body, (ax, ay), (bx, by), 0.0))
+        x, y, theta = self.pose.tolist()
+        body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        body.position, body.angle = (x, y), theta
+        footprint = pymunk.Poly(body, self._chair.parts[0].corners.tolist())
+        space.add(body, footprint)
+        return bool(space.shape_query(footprint))
 
     def move(self, v: float, w: float) -> tuple[FloatArray, bool]:
         """Drive one step at v [m/s], w [rad/s].
 
-        Return the step's mean rates (3,): forward, leftward [m/s], yaw [rad/s]; and if it met an obstacle.
+        Return the step's mean rates (3,): forward, leftward [m/s], yaw [rad/s]; and if an obstacle limited them.
         """
-        step = self._physics.step
-        before = self._pose
-        self._pose = _core.integrate(np.array([v]), np.array([w]), np.array([step]), before.tolist())[1]
-        self._follow_pose()
-        if not self.touches():
+        before = self.pose
+        _, stalled = self._motion.move(np.array([[v, 0.0, w]]), self._step)
+        if not stalled[0]:
             return np.array([v, 0.0, w]), False
-        self._pose = before
-        self._follow_pose()
-        self._push(v, w)
-        return between(before, self._pose) / step, True
-
-    def _push(self, v: float, w: float) -> None:
-        """Take a step against obstacles: contacts first, then what they leave of the motion, in substeps.
-
-        pymunk's own order, motion first, would drive the chair into the wall at every substep.
-        """
-        substep = self._physics.step / self._physics.contact_substeps
-        self._imposed = (v, w)
-        for _ in range(self._physics.contact_substeps):
-            self._body.velocity = (0.0, 0.0)  # of itself the step only pushes overlaps apart
-            self._body.angular_velocity = 0.0
-            self._space.step(substep)  # leaves the allowed rates in the body
-            self._body.position += self._body.velocity * substep
-            self._body.angle += self._body.angular_velocity * substep
-        self._pose = np.array([*self._body.position, self._body.angle])
-
-    def _impose(self, body: pymunk.Body, _gravity: tuple[float, float], _damping: float, _substep: float) -> None:
-        v, w = self._imposed
-        body.velocity = (v * math.cos(body.angle), v * math.sin(body.angle))
-        body.angular_velocity = w
-
-    def _follow_pose(self) -> None:
-        x, y, theta = self._pose.tolist()
-        self._body.position = (x, y)
-        self._body.angle = theta
-        self._space.reindex_shapes_for_body(self._body)
+        return between(before, self.pose) / self._step, True
 
 
-def _chair(chassis: Chassis, friction: float) -> tuple[pymunk.Body, pymunk.Poly]:
-    """Return a body whose origin is base_link, with its footprint."""
+def _chair(chassis: Chassis, friction: float) -> Rigid:
+    """Return a piece whose origin is base_link, with the chair's footprint."""
     front, rear = chassis.axle_to_front, chassis.axle_to_front - chassis.length
     half = chassis.width / 2
-    corners = [(front, half), (rear, half), (rear, -half), (front, -half)]
-    # The motors turn the chair about base_link, so contacts see its mass there as well.
-    body = pymunk.Body(chassis.mass, pymunk.moment_for_poly(chassis.mass, corners))
-    footprint = pymunk.Poly(body, corners)
-    footprint.friction = friction
-    return body, footprint
+    corners = np.array([(front, half), (rear, half), (rear, -half), (front, -half)])
+    edges = np.concatenate([corners, np.roll(corners, -1, axis=0), np.broadcast_to(_HEIGHTS, (4, 2))], axis=1)
+    return rigid([Part(corners, _HEIGHTS)], edges, driven=True, tree=_CHAIR, mass=chassis.mass, friction=friction)
