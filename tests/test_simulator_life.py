@@ -4,17 +4,21 @@
 import math
 import os
 import pickle
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from sim_worlds import LASER, ROOM, drive, robot, simulator
+from sim_worlds import LASER, OPTIONS, ROOM, drive, robot, simulator
 
 from kurumaisu.errors import Error
+from kurumaisu.params import shipped
 from kurumaisu.sim import Observation, Simulator, state
 from kurumaisu.sim.options import OdometryWalk
+from kurumaisu.sim.sensors.settings import SensorSettings, load_sensors
 from kurumaisu.world import load_world
 
 NOISY = LASER.replace("fov 180", "fov 180 noise [0.0004 0.01 0.5]")
@@ -242,3 +246,42 @@ def write(folder: Path, text: str) -> Path:
     path = folder / "guest.world"
     path.write_text(text)
     return path
+
+
+@pytest.fixture(scope="module")
+def sensors() -> tuple[SensorSettings, ...]:
+    return load_sensors(shipped("launch/sensors.yaml"))
+
+
+def test_sensors_are_read_at_their_rates_and_saved(tmp_path: Path, sensors: tuple[SensorSettings, ...]) -> None:
+    path = write(tmp_path, "interval_sim 20\n" + CROWD)
+    sim = Simulator(load_world(path), OPTIONS, sensors)
+    commands = np.random.default_rng(2).uniform(-0.5, 0.5, (40, 4, 3))
+    counts = Counter(reading.sensor.name for row in commands for reading in sim.step(row).readings)
+    assert counts == {sensor.name: round(0.8 * sensor.rate) for sensor in sensors if 0.8 * sensor.rate >= 1}
+    saved = sim.save()
+    hashes = []
+    for _ in range(2):
+        for row in commands:
+            sim.step(row)
+        hashes.append(sim.state_hash())
+        sim.load(saved)
+    assert hashes[0] == hashes[1]
+    sim.delete("r1")
+    seen = sim.step(commands[0, :3]).readings
+    assert all(set(reading.robots) == {0, 1, 2} for reading in seen)
+
+
+def test_a_sensor_on_a_robot_that_is_not_there_is_refused(tmp_path: Path, sensors: tuple[SensorSettings, ...]) -> None:
+    path = write(tmp_path, CROWD)
+    with pytest.raises(Error, match="the world has no position of this name: nobody"):
+        Simulator(load_world(path), OPTIONS, [replace(sensors[0], robot="nobody")])
+
+
+def test_an_imu_feels_that_a_robot_has_stalled(tmp_path: Path, sensors: tuple[SensorSettings, ...]) -> None:
+    path = write(tmp_path, ROOM + robot("", "4.7 0 0 0"))
+    imu = next(sensor for sensor in sensors if sensor.name == "imu")
+    sim = Simulator(load_world(path), OPTIONS, [imu])
+    turn = [drive(sim, (0.5, 0, 0.6), 1)[-1].readings[0].value for _ in range(10)]
+    assert sim.observe().stalled[0]
+    assert abs(np.asarray(turn[-1].angular_velocity).max()) < 0.1

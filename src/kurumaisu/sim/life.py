@@ -85,6 +85,15 @@ def same_fans(new: Machinery, old: Machinery) -> list[tuple[int, int]]:
     return [(i, known[key(new, i)]) for i in range(len(new.fans)) if key(new, i) in known]
 
 
+def stuck(machinery: Machinery) -> list[str]:
+    """Say which robots cannot move from where they are."""
+    return [
+        f"{robot.place}: {robot.name or robot.type} touches something where it begins; it stalls until it is free"
+        for robot, touches in zip(machinery.robots, machinery.touching(), strict=True)
+        if touches
+    ]
+
+
 def _numbers(models: Sequence[Model]) -> IntArray:
     return np.array([model.index for model in models], dtype=np.int64)
 

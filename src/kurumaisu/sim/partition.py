@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -85,9 +85,14 @@ def outline(models: Sequence[Model], poses: FloatArray, members: IntArray, frame
 
 
 def build_arena(
-    models: Sequence[Model], poses: FloatArray, bodies: Bodies, threads: int
+    models: Sequence[Model], poses: FloatArray, bodies: Bodies, threads: int, see_solids: bool = False
 ) -> tuple[Arena, IntArray, Outline]:
-    """Return an arena of models at poses (models, 4), its numbers (b,) of the bodies, and the walls."""
+    """Return an arena of models at poses (models, 4), its numbers (b,) of the bodies, and the walls.
+
+    see_solids: rays see what is solid instead of what rangers see.
+    """
+    if see_solids:
+        models = [replace(m, ranger_return=1.0 if m.obstacle_return else -1.0) for m in models]
     walls = outline(models, poses, np.flatnonzero(bodies.body_of < 0), np.zeros(4))
     arena = Arena(walls.faces, walls.returns, walls.solid, walls.trees, threads)
     numbers = np.array([_add(arena, models, poses, bodies, i) for i in range(len(bodies))], dtype=np.int64)

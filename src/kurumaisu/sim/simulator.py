@@ -14,11 +14,14 @@ from kurumaisu.params import shipped
 from kurumaisu.sim import snapshot, state
 from kurumaisu.sim.drive import without_nonsense
 from kurumaisu.sim.fans import RangerFan
-from kurumaisu.sim.life import checked_pose, moved, rebuilt, same_fans, with_newcomers
+from kurumaisu.sim.life import checked_pose, moved, rebuilt, same_fans, stuck, with_newcomers
 from kurumaisu.sim.machinery import Machinery
 from kurumaisu.sim.observation import Observation
 from kurumaisu.sim.options import Options
 from kurumaisu.sim.population import Population
+from kurumaisu.sim.sensing import Sensing
+from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
+from kurumaisu.sim.sensors.suite import Reading
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
@@ -28,8 +31,12 @@ from kurumaisu.world.model import Model
 class Simulator:
     """All robots of one world; several simulators do not know of each other."""
 
-    def __init__(self, world: World, options: Options) -> None:
-        """Build the world and reset it with seed 0. Raise Error for options that do not fit the world."""
+    def __init__(self, world: World, options: Options, sensors: Sequence[SensorSettings] = ()) -> None:
+        """Build the world and reset it with seed 0; sensors: those that a world file cannot describe.
+
+        Raise Error for options or sensors that do not fit the world.
+        """
+        self._sensors = tuple(sensors)
         if options.scan_sweep > world.interval:
             raise Error(
                 f"scan_sweep: {options.scan_sweep:g} s is more than a step of {world.path}: {world.interval:g} s"
@@ -39,21 +46,26 @@ class Simulator:
         self._late = options.timing == "consistent" or options.semantics == "physical"
         dynamics = load_dynamics(shipped("launch/physical.yaml")) if options.semantics == "physical" else None
         self._home = Machinery(Population.first(world.models, world.poses), options, world.interval, dynamics)
-        self._fingerprint = state.digest((world.models, world.poses, world.interval, replace(options, threads=1)))
+        what = world.models, world.poses, world.interval, replace(options, threads=1), self._sensors
+        self._fingerprint = state.digest(what)
+        self._sensing: Sensing | None = None
+        self._readings: tuple[Reading, ...] = ()
         self.reset(0)
-        self.warnings = (*world.warnings, *self._stuck())
+        self.warnings = (*world.warnings, *stuck(self._home))
 
     def reset(self, seed: int) -> Observation:
         """Go back to the world file's start, time 0, and start randomness anew."""
         self._machinery = self._home
         home = self._home
-        self._odometry_rng, self._ranger_rng = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
+        streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(3))
+        self._odometry_rng, self._ranger_rng, self._sensor_rng = streams
         self._step = 0
         self._dropped = 0
         home.place(home.population.poses[home.bodies.heads])
         home.begin()
         home.localization.draw_errors(self._odometry_rng)
         home.rangers.start(0.0, home.frames, self._ranger_rng)
+        self._power_up()
         return self.observe()
 
     def step(self, commands: FloatArray) -> Observation:
@@ -76,6 +88,8 @@ class Simulator:
         machinery.rangers.update(self._step, self.time, way, self._ranger_rng)
         if not self._late:
             machinery.move()
+        if self._sensing is not None:
+            self._readings = self._sensing.read(self.time)
         return self.observe()
 
     def observe(self) -> Observation:
@@ -89,6 +103,7 @@ class Simulator:
             stalled=machinery.robots_stalled,
             scans=machinery.rangers.scans,
             dropped=self._dropped,
+            readings=self._readings,
         )
 
     def reset_positions(self) -> None:
@@ -129,8 +144,12 @@ class Simulator:
             machinery.begin()
         self._machinery = machinery
         self._step, self._dropped = known["step"], known["dropped"]
-        self._odometry_rng.bit_generator.state, self._ranger_rng.bit_generator.state = known["random"]
         snapshot.restore(machinery, known["machinery"])
+        self._power_up()
+        if self._sensing is not None:
+            self._sensing.restore(known["sensors"])
+        for rng, random in zip(self._rngs, known["random"], strict=True):
+            rng.bit_generator.state = random
         return self.observe()
 
     def state_hash(self) -> str:
@@ -167,6 +186,10 @@ class Simulator:
         """Poses (m, 4) of all models in the map now."""
         return self._machinery.model_poses()
 
+    @property
+    def _rngs(self) -> tuple[np.random.Generator, ...]:
+        return self._odometry_rng, self._ranger_rng, self._sensor_rng
+
     def _state(self) -> dict[str, Any]:
         machinery = self._machinery
         return {
@@ -174,9 +197,21 @@ class Simulator:
             "population": None if machinery is self._home else machinery.population,
             "step": self._step,
             "dropped": self._dropped,
-            "random": (self._odometry_rng.bit_generator.state, self._ranger_rng.bit_generator.state),
+            "random": tuple(rng.bit_generator.state for rng in self._rngs),
             "machinery": snapshot.take(machinery),
+            "sensors": self._sensing.state() if self._sensing is not None else None,
         }
+
+    def _power_up(self) -> None:
+        """Start the sensors of sensors.yaml; they start anew when models come or go."""
+        self._readings = ()
+        names = {robot.name for robot in self.robots} | {EVERY_ROBOT}
+        home = self._machinery is self._home
+        sensors = [sensor for sensor in self._sensors if home or sensor.robot in names]  # at home a wrong name is said
+        if sensors:
+            self._sensing = Sensing(sensors, self._machinery, self.time, self._sensor_rng)
+        else:
+            self._sensing = None
 
     def _heard(self, commands: FloatArray) -> FloatArray:
         """Return commands that are numbers."""
@@ -198,12 +233,4 @@ class Simulator:
             machinery.localization.draw_errors(self._odometry_rng, fresh)
             machinery.rangers.start(self.time, machinery.frames, self._ranger_rng)
             machinery.rangers.take_over(old.rangers.scans, same_fans(machinery, old))
-
-    def _stuck(self) -> list[str]:
-        """Say which robots cannot move from where they begin."""
-        machinery = self._machinery
-        return [
-            f"{robot.place}: {robot.name or robot.type} touches something where it begins; it stalls until it is free"
-            for robot, touches in zip(machinery.robots, machinery.touching(), strict=True)
-            if touches
-        ]
+            self._power_up()

@@ -23,6 +23,7 @@ _PLAIN = {
     ("pathlib", "PosixPath"),
 }
 _OURS = ("kurumaisu.world.model", "kurumaisu.sim.population", "kurumaisu.sim.observation")
+_SENSORS = "kurumaisu.sim.sensors."
 
 
 def pack(state: dict[str, Any]) -> bytes:
@@ -62,9 +63,13 @@ def _feed(sha: Any, value: Any) -> None:
         sha.update(f"[{len(value)}".encode())
         for item in value:
             _feed(sha, item)
+    elif isinstance(value, np.random.Generator):
+        _feed(sha, value.bit_generator.state)
     elif dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
             _feed(sha, getattr(value, field.name))
+    elif type(value).__module__.startswith(_SENSORS):
+        _feed(sha, vars(value))
     else:
         sha.update(f"{type(value).__name__} {value!r};".encode())
 
@@ -73,6 +78,6 @@ class _Reader(pickle.Unpickler):
     """Makes plain values and the classes of a state, nothing else."""
 
     def find_class(self, module: str, name: str) -> Any:
-        if (module, name) in _PLAIN or module in _OURS:
+        if (module, name) in _PLAIN or module in _OURS or module.startswith(_SENSORS):
             return super().find_class(module, name)
         raise pickle.UnpicklingError(f"{module}.{name} is no part of a state")

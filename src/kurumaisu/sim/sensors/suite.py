@@ -22,6 +22,8 @@ from kurumaisu.sim.sensors.sonar import Sonar, SonarSettings
 from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world.model import Camera, Fiducial, Model, Position
 
+_STATELESS = (BumperSensor, CameraSensor, FiducialFinder, Sonar)
+
 
 @dataclass(frozen=True)
 class Moment:
@@ -94,6 +96,25 @@ class SensorSuite:
             for running in self._running
             if _due(running, moment.time)
         )
+
+    def state(self) -> list[dict[str, Any]]:
+        """Return what the next readings depend on: not copies."""
+        return [
+            {
+                "time": running.time,
+                "random": running.rng.bit_generator.state,
+                "sensor": None if isinstance(running.sensor, _STATELESS) else vars(running.sensor),
+            }
+            for running in self._running
+        ]
+
+    def restore(self, state: Sequence[dict[str, Any]]) -> None:
+        """Go back to a state of the same sensors; it belongs to the suite from then on."""
+        for running, known in zip(self._running, state, strict=True):
+            running.time = known["time"]
+            running.rng.bit_generator.state = known["random"]
+            if known["sensor"] is not None:
+                vars(running.sensor).update(known["sensor"])
 
     def _read(self, running: _Running, moment: Moment) -> Any:
         dt, running.time = moment.time - running.time, moment.time

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The sensors of a sensors.yaml on a simulator's robots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kurumaisu._core import Arena
+from kurumaisu.geometry import between, wrap
+from kurumaisu.sim.machinery import Machinery
+from kurumaisu.sim.partition import build_arena
+from kurumaisu.sim.sensors.bumper import BumperSettings
+from kurumaisu.sim.sensors.settings import SensorSettings
+from kurumaisu.sim.sensors.suite import Moment, Reading, SensorSuite
+from kurumaisu.types import FloatArray
+
+_PLANAR = [0, 1, 3]
+
+
+class Sensing:
+    """Reads the sensors that are due, in every step."""
+
+    def __init__(
+        self, sensors: Sequence[SensorSettings], machinery: Machinery, time: float, rng: np.random.Generator
+    ) -> None:
+        """Power up the sensors at a time [s]. Raise Error for a robot that the world has not."""
+        self._machinery = machinery
+        self._solids, self._numbers = machinery.arena, machinery.numbers
+        if any(isinstance(sensor.parameters, BumperSettings) for sensor in sensors):
+            start = machinery.population
+            threads = machinery.options.threads
+            self._solids, self._numbers, _ = build_arena(start.models, start.poses, machinery.bodies, threads, True)
+        self._suite = SensorSuite(sensors, machinery.population.models, self._moment(time), rng)
+
+    def read(self, time: float) -> tuple[Reading, ...]:
+        """Return the readings that are due."""
+        return self._suite.read(self._moment(time))
+
+    def state(self) -> list[dict[str, Any]]:
+        """Return what the next readings depend on: not copies."""
+        return self._suite.state()
+
+    def restore(self, state: Sequence[dict[str, Any]]) -> None:
+        """Go back to a state of the same sensors."""
+        self._suite.restore(state)
+
+    def _moment(self, time: float) -> Moment:
+        machinery = self._machinery
+        return Moment(time, machinery.arena, self._moved_solids(), machinery.model_poses(), velocities(machinery))
+
+    def _moved_solids(self) -> Arena:
+        machinery = self._machinery
+        if self._solids is not machinery.arena:
+            self._solids.set_poses(self._numbers, np.ascontiguousarray(machinery.frames[:-1]))
+        return self._solids
+
+
+def velocities(machinery: Machinery) -> FloatArray:
+    """Return how the robots (n, 3) moved in the last step: forward, leftward [m/s], turn [rad/s]; stalled: zeros."""
+    rows = machinery.robot_rows
+    way = between(machinery.before[rows][:, _PLANAR], machinery.frames[rows][:, _PLANAR])
+    way[:, 2] = wrap(way[:, 2])
+    return way / machinery.interval
