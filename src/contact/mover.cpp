@@ -9,7 +9,6 @@ namespace kurumaisu::contact {
 namespace {
 
 constexpr int kMaxAdvances = 100000;  // a guard; each advance covers at least 1 % of the touching distance
-constexpr double kLost = 0.03;        // [1] of it: what is so near cannot be told from what overlaps
 constexpr double kArrived = 0.01;  // [1] of the touching distance that may be left when it counts as reached
 
 /// sin(x) / x; below the bound the series is exact to double precision.
@@ -69,11 +68,14 @@ double cornerTouch(const Mover& a, const Point& corner, const Mover& b, const Ed
   for (int i = 0; i < kMaxAdvances; ++i) {
     const Pose pose_b = b.at(time);
     const Gap gap = gapOf(carry(a, a.at(time), corner), carry(b, pose_b, edge.a), carry(b, pose_b, edge.b));
-    if (i == 0 && gap.distance <= touch.known) target = std::max(gap.distance - touch.give, gap.distance / 2);
-    if (target < kLost * touch.distance) return limit;
+    if (i == 0 && gap.distance <= touch.known) {
+      // A gap less than give may close and turn into an overlap, which distances do not tell from a gap.
+      if (gap.distance <= touch.give) return std::min(limit, timeToClose(touch.give, gap.closing, rise));
+      target = gap.distance - touch.give;
+    }
     const double left = gap.distance - target;
-    if (left <= kArrived * target && gap.closing > 0) return time;
-    time += timeToClose(std::max(left, kArrived * target), gap.closing, rise);
+    if (left <= kArrived * touch.distance && gap.closing > 0) return time;
+    time += timeToClose(std::max(left, kArrived * touch.distance), gap.closing, rise);
     if (time >= limit) return limit;
   }
   return time;

@@ -59,7 +59,7 @@ struct Mover {
 };
 
 /// Nearer than this distance [m] is touching. What is nearer than known [m] already at the start may come nearer by
-/// give [m], or by half its gap.
+/// give [m].
 struct Touch {
   double known;
   double distance;

@@ -60,7 +60,7 @@ class Island:
         self._clearance = clearance
         self._skin = dynamics.contacts.collision_slop
         self._friction = dynamics.contacts.friction
-        self._substeps = dynamics.contacts.contact_substeps
+        self._longest = dynamics.contacts.step
         self._rigids = [rigids[n] for n in numbers.tolist()]
         self._hinges = Hinges([r.pivot for r in self._rigids])
         self._driven = np.array([r.driven for r in self._rigids])
@@ -82,7 +82,6 @@ class Island:
         """Move the bodies on, in place; return who was hindered meanwhile."""
         fastest = _fastest(moving)
         reach = 2 * fastest * seconds + _NEAR
-        self._longest = seconds / self._substeps
         self._layers = Layers(self._rigids, moving.poses)
         self._add_bodies(moving.poses)
         self._add_walls(moving.poses, reach)

@@ -13,7 +13,7 @@ from kurumaisu.sim.drive import Drive, Rows
 from kurumaisu.sim.motion import Motion, StageMotion
 from kurumaisu.sim.odometry import Localization
 from kurumaisu.sim.options import Options
-from kurumaisu.sim.partition import attached, build_arena, is_robot, relative, sort
+from kurumaisu.sim.partition import Distort, attached, build_arena, is_robot, relative, sort
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.rangers import Rangers
 from kurumaisu.sim.rhythm import Rhythm, period
@@ -25,15 +25,28 @@ from kurumaisu.world.model import Model, Position
 class Machinery:
     """Built once for a population; a new one takes over from an old one when models come, go, or walls move."""
 
-    def __init__(self, population: Population, options: Options, interval: float, dynamics: Dynamics | None) -> None:
-        """Place all bodies where they begin; interval [s] is a step's length; dynamics: None for Stage's semantics."""
+    def __init__(
+        self,
+        population: Population,
+        options: Options,
+        interval: float,
+        dynamics: Dynamics | None,
+        distort: Distort | None = None,
+    ) -> None:
+        """Place all bodies where they begin; interval [s] is a step's length; dynamics: None for Stage's semantics.
+
+        distort: says where the walls are in truth.
+        """
         models = population.models
         self.population = population
         self.interval = interval
         self.options = options
         self.dynamics = dynamics
+        self.distort = distort
         self.bodies = sort(models, _moving(models, physical=dynamics is not None))
-        self.arena, self.numbers, self.walls = build_arena(models, population.poses, self.bodies, options.threads)
+        self.arena, self.numbers, self.walls = build_arena(
+            models, population.poses, self.bodies, options.threads, distort=distort
+        )
         self.robot_rows = np.array([i for i, head in enumerate(self.bodies.heads) if is_robot(models[head])], np.int64)
         self.robots = tuple(models[self.bodies.heads[row]] for row in self.robot_rows)
         self._everybody_drives = len(self.robot_rows) == len(self.bodies)
@@ -65,10 +78,17 @@ class Machinery:
     def _make_motion(self) -> Motion:
         if self.dynamics is None:
             return StageMotion(self.arena, self.numbers, self.bodies)
-        from kurumaisu.sim.following import Followed  # loads pymunk, which Stage's semantics need not pay for
+        # these load pymunk, which Stage's semantics need not pay for
+        from kurumaisu.sim.bodies import assemble
+        from kurumaisu.sim.following import Followed
+        from kurumaisu.sim.physical import PhysicalMotion
+        from kurumaisu.sim.rigid import Ground
 
         start = self.population
-        return Followed(self.arena, self.numbers, start.models, start.poses, self.dynamics)
+        pieces, _ = assemble(start.models, start.poses, self.dynamics)
+        walls = self.walls
+        ground = Ground(walls.faces[walls.solid], walls.trees[walls.solid])
+        return Followed(self.arena, self.numbers, PhysicalMotion(pieces, ground, self.dynamics))
 
     @property
     def robot_keys(self) -> IntArray:

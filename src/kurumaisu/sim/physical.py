@@ -47,6 +47,8 @@ class PhysicalMotion:
         self._driven = np.array([r.driven for r in rigids], dtype=np.bool_)
         self._pivots = [r.pivot for r in rigids]
         self._centres = np.array([[*r.centre, 0.0] for r in rigids]).reshape(-1, 3)
+        self._off_centre = bool(self._centres.any())
+        self._distance = 2 * dynamics.contacts.collision_slop  # [m] that is touching
         self.place(np.zeros((len(rigids), 4)))
 
     def place(self, poses: FloatArray) -> None:
@@ -69,7 +71,11 @@ class PhysicalMotion:
         Raise Error if a velocity is not finite.
         """
         _require_finite("velocity", velocities, (len(self._numbers), 3))
-        course = self._course(np.where(self._driven[:, None], velocities, 0.0), dt)
+        commands = np.where(self._driven[:, None], velocities, 0.0)
+        free = self.glide(commands, dt)
+        if free is not None:
+            return free, np.zeros(len(free), dtype=np.bool_)
+        course = self._course(commands, dt)
         times, pairs = self._meetings(course)
         islands = _islands(pairs, times < dt)
         poses = arcs(self._poses, course.rates, dt)
@@ -85,7 +91,25 @@ class PhysicalMotion:
             self._velocities[self._driven & ~self._hindered] = 0.0  # nobody asks: they start as commanded
         self._grips.carry(poses)
         self._poses = poses
+        self._rest()
         return self.poses, stalled
+
+    def glide(self, velocities: FloatArray, dt: float) -> FloatArray | None:
+        """Move all bodies on by dt [s] and return their poses (b, 4), or None, and nothing moved, if that takes more.
+
+        That is if something slides, or may meet something else. velocities (b, 3) are finite, and 0 where not driven.
+        """
+        if not self._quiet:
+            return None
+        solid = self._solid
+        times, _ = self._clearance.free_times(
+            self._numbers[solid], self._poses[solid], velocities[solid], dt, self._distance
+        )
+        if len(times) and times.min() < dt:
+            return None
+        self._poses = arcs(self._poses, velocities, dt)
+        self._grips.carry(self._poses)
+        return self.poses
 
     def grip(self, row: int, closed: bool) -> bool:
         """Close or open the gripper of a body; return whether it holds something now."""
@@ -98,7 +122,7 @@ class PhysicalMotion:
     @property
     def poses(self) -> FloatArray:
         """Poses (b, 4) now."""
-        return _shifted(self._poses, -self._centres)
+        return _shifted(self._poses, -self._centres) if self._off_centre else self._poses.copy()
 
     def state(self) -> dict[str, FloatArray | BoolArray]:
         """Return copies of all that the next moves depend on, by name, a row for each body."""
@@ -123,8 +147,13 @@ class PhysicalMotion:
         rigids = self._grips.rigids
         self._solid = np.flatnonzero([len(r.parts) > 0 for r in rigids])
         self._velocities[self._grips.held] = 0.0
+        self._rest()
         most = [(r.grip / r.mass, r.twist_grip / r.moment) for r in rigids]
         self._most = np.array(most, dtype=np.float64).reshape(-1, 2)  # [m/s^2], [rad/s^2] that wheels give
+
+    def _rest(self) -> None:
+        """Note whether the next step depends on nothing but poses and commands."""
+        self._quiet = not (self._dynamics.slip or self._velocities.any() or self._hindered.any())
 
     def _course(self, commands: FloatArray, dt: float) -> _Course:
         if not self._dynamics.slip:
@@ -139,9 +168,8 @@ class PhysicalMotion:
         sliding = self._velocities.any(axis=1) & ~self._driven
         twists = np.where(sliding[:, None], self._velocities, course.rates)  # of those sliding only the speed matters
         times = np.full(len(twists), course.dt)
-        distance = 2 * self._dynamics.contacts.collision_slop
         times[solid], pairs = self._clearance.free_times(
-            self._numbers[solid], self._poses[solid], twists[solid], course.dt, distance
+            self._numbers[solid], self._poses[solid], twists[solid], course.dt, self._distance
         )
         times[sliding] = 0.0
         return times, solid[pairs]
