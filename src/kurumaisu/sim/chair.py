@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,9 @@ from kurumaisu import effects
 from kurumaisu.effects import Reference, Volts
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, shipped
+from kurumaisu.sim import state
 from kurumaisu.sim.chair_body import seat
+from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.plant import Plant
 from kurumaisu.sim.scanner import Scan, Scanner
 from kurumaisu.sim.sensing import Sensing
@@ -23,6 +26,7 @@ from kurumaisu.sim.sight import Sight
 from kurumaisu.sim.surroundings import Surroundings
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
+from kurumaisu.world.model import Model as WorldModel
 
 
 @dataclass(frozen=True)
@@ -69,32 +73,36 @@ class ChairSimulator:
         self._dynamics = replace(load_dynamics(shipped("launch/physical.yaml")), contacts=physics)
         self._scene = seat(world, model.chassis)
         effects.check(model.effects)
-        self._surroundings = self._build(())
+        self._errs = bool(effects.build_world(model.effects, np.random.default_rng(0)))
+        self._surroundings = self._build(None)
         if self._surroundings.overlaps():
             raise Error(
                 f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose, "
                 "or something else that is solid"
             )
+        self._seed = 0
         name = self._scene.models[self._scene.chair].name
         own = [replace(s, robot=name) if s.robot == EVERY_ROBOT and name else s for s in sensors]
         self._sensors = tuple(own)
+        self._fingerprint = state.digest(
+            (self._scene.models, self._scene.poses, model.chassis, model.effects, self._sensors, self._dynamics)
+        )
         self.reset(0)
 
     def reset(self, seed: int) -> Observation:
         """Put all back to the start, at rest, and start time and randomness anew."""
+        self._seed = seed
         streams = np.random.SeedSequence(seed).spawn(5)
-        plant_rng, laser_rng, effects_rng, world_rng, sensor_rng = map(np.random.default_rng, streams)
+        *others, world_seed = streams[0], streams[1], streams[2], streams[4], streams[3]
+        plant_rng, laser_rng, effects_rng, self._sensor_rng = map(np.random.default_rng, others)
         self._plant = Plant(self._model, self.step_time, plant_rng)
-        errors = effects.build_world(self._model.effects, world_rng)
-        if errors:
-            self._surroundings = self._build(errors)
+        if self._errs:
+            self._surroundings = self._build(world_seed)
         self._surroundings.begin()
         chain = effects.build_laser(self._model.effects, effects_rng)
         self._scanner = Scanner(self._model.laser, Sight(self._surroundings), chain, laser_rng)
         self._steps = 0
-        self._sensing = None
-        if self._sensors:
-            self._sensing = Sensing(self._sensors, self._surroundings.machinery, 0.0, sensor_rng)
+        self._power_up()
         return self._observe(np.zeros(3), False)
 
     def step(self, command: Command) -> Observation:
@@ -106,21 +114,106 @@ class ChairSimulator:
         self._steps += 1
         return self._observe(rates, contact)
 
-    def _observe(self, rates: FloatArray, contact: bool) -> Observation:
-        time, pose = self.time, self._surroundings.pose
-        reference = self._plant.seen(Reference(np.array(time), pose, rates))
-        readings = self._sensing.read(time) if self._sensing is not None and self._steps else ()
-        return Observation(time, pose, rates, contact, self._scanner.observe(time, pose), reference, readings)
+    def command(self, robot: str, velocity: FloatArray | Sequence[float]) -> None:
+        """Let another robot drive on at forward, leftward [m/s], turn [rad/s], as its world file bounds it.
 
-    def _build(self, errors: tuple[effects.WorldEffect, ...]) -> Surroundings:
-        """Build the world with effects on what its file says of walls."""
+        From a reset on it drives as its file says. Raise Error for an unknown robot, or numbers that are none.
+        """
+        self._surroundings.command(robot, np.asarray(velocity, dtype=np.float64))
+
+    def set_pose(self, name: str, pose: FloatArray | Sequence[float]) -> None:
+        """Put a model, with all that stands on it, to a pose (4,) in the map: x, y, z [m], heading [rad].
+
+        Raise Error, with nothing changed, for an unknown one and for a pose at which the chair does not fit.
+        """
+        before = self._surroundings.machinery
+        self._surroundings.set_pose(name, np.asarray(pose, dtype=np.float64))
+        self._scanner.sight.restart()
+        if self._surroundings.machinery is not before:
+            self._power_up()
+
+    def save(self) -> bytes:
+        """Return the whole state, from which load continues bit for bit."""
+        return state.pack(self._state())
+
+    def load(self, saved: bytes) -> Observation:
+        """Continue from a state that was saved of the same world, chassis, effects and sensors.
+
+        Raise Error for another one. Voltage laws and the laser's law are not compared.
+        """
+        known = state.unpack(saved)
+        if known.get("world") != self._fingerprint:
+            raise Error("state: is of another world, chassis, list of effects or of sensors")
+        self.reset(known["seed"])
+        self._steps = known["steps"]
+        self._surroundings.restore(known["surroundings"])
+        self._power_up()
+        if self._sensing is not None:
+            self._sensing.restore(known["sensors"])
+        self._scanner.restore(known["scanner"])
+        recall(self._plant, known["plant"])
+        recall(self._sensor_rng, known["random"])
+        self._rates, self._contact = known["rates"], known["contact"]
+        return self._seen(None, ())
+
+    def state_hash(self) -> str:
+        """Return a digest of the whole state, randomness included."""
+        return state.digest(self._state())
+
+    def _state(self) -> dict[str, Any]:
+        return {
+            "world": self._fingerprint,
+            "seed": self._seed,
+            "steps": self._steps,
+            "rates": self._rates,
+            "contact": self._contact,
+            "surroundings": self._surroundings.state(),
+            "sensors": self._sensing.state() if self._sensing is not None else None,
+            "scanner": self._scanner.state(),
+            "plant": remember(self._plant),
+            "random": remember(self._sensor_rng),
+        }
+
+    @property
+    def models(self) -> tuple[WorldModel, ...]:
+        """All models that there are, the chair among them."""
+        return self._surroundings.machinery.population.models
+
+    @property
+    def model_poses(self) -> FloatArray:
+        """Poses (m, 4) of all models in the map now."""
+        return self._surroundings.machinery.model_poses()
+
+    @property
+    def chair(self) -> WorldModel:
+        """The model that the chair is."""
+        return self.models[self._surroundings.chair]
+
+    def _observe(self, rates: FloatArray, contact: bool) -> Observation:
+        self._rates, self._contact = rates, contact
+        readings = self._sensing.read(self.time) if self._sensing is not None and self._steps else ()
+        return self._seen(self._scanner.observe(self.time, self._surroundings.pose), readings)
+
+    def _seen(self, scan: Scan | None, readings: tuple[Reading, ...]) -> Observation:
+        time, pose, rates = self.time, self._surroundings.pose, self._rates
+        reference = self._plant.seen(Reference(np.array(time), pose, rates))
+        return Observation(time, pose, rates, self._contact, scan, reference, readings)
+
+    def _build(self, seed: np.random.SeedSequence | None) -> Surroundings:
+        """Build the world, with a seed for the effects on what its file says of walls."""
 
         def distort(walls: FloatArray) -> FloatArray:
-            for effect in errors:
+            for effect in effects.build_world(self._model.effects, np.random.default_rng(seed)):
                 walls = effect.apply(walls)
             return walls
 
-        return Surroundings(self._scene, self._model.chassis, self._dynamics, distort if errors else None)
+        return Surroundings(self._scene, self._model.chassis, self._dynamics, distort if seed else None)
+
+    def _power_up(self) -> None:
+        """Start the further sensors."""
+        self._sensing = None
+        if self._sensors:
+            self._sensing = Sensing(self._sensors, self._surroundings.machinery, self.time, self._sensor_rng)
 
     @property
     def time(self) -> float:
@@ -139,4 +232,4 @@ class ChairSimulator:
 
 
 def _volts(command: Command) -> Volts:
-    return Volts(*(np.array([value]) for value in (command.v_f, command.v_s, command.sign_v, command.sign_w)))
+    return Volts(*np.array([[command.v_f], [command.v_s], [command.sign_v], [command.sign_w]]))

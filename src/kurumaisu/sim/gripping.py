@@ -63,8 +63,6 @@ class Grips:
     def carry(self, poses: FloatArray) -> None:
         """Put what is held where its holder has taken it, in place."""
         rows = np.flatnonzero(self.held)
-        if not len(rows):
-            return
         carriers = poses[self.holders[rows]]
         x, y, heading = compose(carriers[:, [0, 1, 3]], self.offsets[rows][:, [0, 1, 3]]).T
         poses[rows, 0], poses[rows, 1], poses[rows, 3] = x, y, heading

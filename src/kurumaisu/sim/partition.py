@@ -13,7 +13,6 @@ from kurumaisu.geometry import cos_sin
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
 
-
 Distort = Callable[[FloatArray], FloatArray]  # both ends of walls (m, 4) [m] -> the same, changed
 
 

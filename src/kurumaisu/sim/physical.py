@@ -72,9 +72,9 @@ class PhysicalMotion:
         """
         _require_finite("velocity", velocities, (len(self._numbers), 3))
         commands = np.where(self._driven[:, None], velocities, 0.0)
-        free = self.glide(commands, dt)
-        if free is not None:
-            return free, np.zeros(len(free), dtype=np.bool_)
+        glided = self.glide(commands, dt)
+        if glided is not None:
+            return glided, np.zeros(len(glided), dtype=np.bool_)
         course = self._course(commands, dt)
         times, pairs = self._meetings(course)
         islands = _islands(pairs, times < dt)
@@ -89,7 +89,8 @@ class PhysicalMotion:
             self._velocities[free] = turned(course.after, poses[:, 3])[free]
         else:
             self._velocities[self._driven & ~self._hindered] = 0.0  # nobody asks: they start as commanded
-        self._grips.carry(poses)
+        if self._holding:
+            self._grips.carry(poses)
         self._poses = poses
         self._rest()
         return self.poses, stalled
@@ -101,14 +102,12 @@ class PhysicalMotion:
         """
         if not self._quiet:
             return None
-        solid = self._solid
-        times, _ = self._clearance.free_times(
-            self._numbers[solid], self._poses[solid], velocities[solid], dt, self._distance
-        )
-        if len(times) and times.min() < dt:
+        times, _ = self._free_times(velocities, dt)
+        if min(times.tolist(), default=dt) < dt:
             return None
         self._poses = arcs(self._poses, velocities, dt)
-        self._grips.carry(self._poses)
+        if self._holding:
+            self._grips.carry(self._poses)
         return self.poses
 
     def grip(self, row: int, closed: bool) -> bool:
@@ -146,6 +145,7 @@ class PhysicalMotion:
         """Note what the pieces are now, which changes as grippers close and open."""
         rigids = self._grips.rigids
         self._solid = np.flatnonzero([len(r.parts) > 0 for r in rigids])
+        self._holding = bool(self._grips.held.any())
         self._velocities[self._grips.held] = 0.0
         self._rest()
         most = [(r.grip / r.mass, r.twist_grip / r.moment) for r in rigids]
@@ -164,15 +164,19 @@ class PhysicalMotion:
 
     def _meetings(self, course: _Course) -> tuple[FloatArray, IntArray]:
         """Return times (b,) [s] until each body touches something, and pairs (p, 2) that could meet in this step."""
-        solid = self._solid
         sliding = self._velocities.any(axis=1) & ~self._driven
         twists = np.where(sliding[:, None], self._velocities, course.rates)  # of those sliding only the speed matters
         times = np.full(len(twists), course.dt)
-        times[solid], pairs = self._clearance.free_times(
-            self._numbers[solid], self._poses[solid], twists[solid], course.dt, self._distance
-        )
+        times[self._solid], pairs = self._free_times(twists, course.dt)
         times[sliding] = 0.0
-        return times, solid[pairs]
+        return times, self._solid[pairs]
+
+    def _free_times(self, twists: FloatArray, dt: float) -> tuple[FloatArray, IntArray]:
+        """Return what Clearance.free_times does, of those bodies that are solid."""
+        if len(self._solid) == len(self._numbers):  # as nearly always: nothing to choose
+            return self._clearance.free_times(self._numbers, self._poses, twists, dt, self._distance)
+        solid = self._solid
+        return self._clearance.free_times(self._numbers[solid], self._poses[solid], twists[solid], dt, self._distance)
 
     def _collide(self, rows: IntArray, poses: FloatArray, course: _Course, touch: float) -> BoolArray:
         """Move some bodies in place from the first touch [s] to the end of the step; return who stalled."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose
 from kurumaisu.params import Laser
+from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.sight import Sight
 from kurumaisu.types import FloatArray
 
@@ -44,12 +46,7 @@ class Scanner:
                 f"laser: the last beam comes {self._delays[-1]:g} s after the first, "
                 f"more than scan_time = {laser.scan_time:g} s"
             )
-        self.start(0)
-
-    def start(self, count: int) -> None:
-        """Go on as if so many scans had been taken."""
-        self.count = count
-        self._aim()
+        self._start(0)
 
     def observe(self, time: float, pose: FloatArray) -> Scan | None:
         """Note where the chair is, times increasing [s]; return the scan that is complete, if any.
@@ -62,13 +59,30 @@ class Scanner:
             return None
         beams = self._beams
         scan = Scan(beams.stamp, self.sight.poses(np.array([beams.stamp]))[0], self._readings(beams))
-        self.start(self.count + 1)
+        self._start(self._count + 1)
         self.sight.forget(min(self._beams.stamp, self._beams.times.min()))
         return scan
 
+    def state(self) -> dict[str, Any]:
+        """Return all that the next scans depend on."""
+        chain, random = remember(self._chain), remember(self._rng)
+        return {"count": self._count, "sight": self.sight.state(), "chain": chain, "random": random}
+
+    def restore(self, known: dict[str, Any]) -> None:
+        """Go back to a state of the same laser, as new."""
+        recall(self._chain, known["chain"])
+        recall(self._rng, known["random"])
+        self.sight.restore(known["sight"])
+        self._start(known["count"])
+
+    def _start(self, count: int) -> None:
+        """Go on as if so many scans had been taken."""
+        self._count = count
+        self._aim()
+
     def _aim(self) -> None:
         """Prepare the beams of the next scan."""
-        stamp = self.count * self._laser.scan_time
+        stamp = self._count * self._laser.scan_time
         level = np.zeros(self._laser.beams)
         height = self._laser.mount.z
         said = stamp + self._delays
@@ -90,7 +104,7 @@ class Scanner:
             bearings=self._bearings,
             ranges=ranges,
             incidence=incidence(look.ranges, origins, beams.bearings, level) if oblique else np.zeros(len(level)),
-            returns=returns,
+            returns=np.where(np.isfinite(level), returns, 1.0),
             mean=error.mean(ranges),
             sd=error.deviation(ranges),
             noise=noise,

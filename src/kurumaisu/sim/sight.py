@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from kurumaisu.geometry import interpolate
 from kurumaisu.sim.surroundings import Surroundings
-from kurumaisu.types import FloatArray
+from kurumaisu.types import FloatArray, IntArray
 
 # Parts of a step in which others count as standing, at where they are in its middle: what moves at 1.5 m/s is off by
 # at most 2 mm for steps of 10 ms.
@@ -49,21 +50,18 @@ class Sight:
 
     def look(self, times: FloatArray, height: float) -> Look:
         """Return what is to be seen at times (n,) from so far above the chair's base [m]."""
-        return Look(self._surroundings, height, list(self._moments(times)))
+        return Look(self._surroundings, height, [] if self._standing() else list(self._moments(times)))
 
-    def state(self) -> dict[str, object]:
+    def state(self) -> dict[str, Any]:
         """Return all that is remembered."""
         return {"times": list(self._times), "chair": list(self._chair), "frames": list(self._frames)}
 
-    def restore(self, state: dict[str, list]) -> None:
+    def restore(self, state: dict[str, Any]) -> None:
         """Go back to a state."""
         self._times, self._chair, self._frames = (list(state[name]) for name in ("times", "chair", "frames"))
 
-    def _moments(self, times: FloatArray) -> Iterator[tuple[FloatArray | slice, FloatArray | None]]:
-        """Yield rows of times, and where the bodies (b, 4) then are, None: where they are now."""
-        if self._standing():
-            yield slice(None), None
-            return
+    def _moments(self, times: FloatArray) -> Iterator[tuple[IntArray, FloatArray]]:
+        """Yield rows of times, and where the bodies (b, 4) then were."""
         known = np.array(self._times)
         parts = np.floor((times - known[0]) / self._surroundings.step * _PARTS)
         for part in np.unique(parts):
@@ -71,6 +69,7 @@ class Sight:
             yield rows, self._then(known, float(times[rows].mean()))
 
     def _standing(self) -> bool:
+        """Return whether all but the chair are still where they were."""
         frames = self._frames
         mine = self._surroundings.body
         return all((np.delete(f, mine, 0) == np.delete(frames[-1], mine, 0)).all() for f in frames[:-1])
@@ -88,14 +87,13 @@ class Sight:
 class Look:
     """Rays of one scan; the chair is invisible to them."""
 
-    def __init__(
-        self,
-        surroundings: Surroundings,
-        height: float,
-        moments: list[tuple[FloatArray | slice, FloatArray | None]],
-    ) -> None:
+    def __init__(self, surroundings: Surroundings, height: float, moments: list[tuple[IntArray, FloatArray]]) -> None:
+        """Look from so far above the chair's base [m]; moments: rows of beams and where the bodies (b, 4) then were.
+
+        Without moments all are where they are now.
+        """
         self._surroundings = surroundings
-        self._height = height
+        self._z = float(surroundings.machinery.frames[surroundings.body, 2]) + height
         self._moments = moments
 
     def ranges(self, poses: FloatArray, bearings: FloatArray) -> FloatArray:
@@ -103,18 +101,19 @@ class Look:
         return self.cast(poses, bearings)[0]
 
     def cast(self, poses: FloatArray, bearings: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return ranges as above, and the reflectance (n,) of what is met; 1 where that is nothing."""
-        machinery, body = self._surroundings.machinery, self._surroundings.body
-        origins = np.empty((len(bearings), 4))
+        """Return ranges as above, and the reflectance (n,) of what is met; 0 where that is nothing."""
+        machinery = self._surroundings.machinery
+        arena, count = machinery.arena, len(bearings)
+        origins = np.empty((count, 4))
         origins[:, :2] = poses[:, :2]
-        origins[:, 2] = machinery.frames[body, 2] + self._height
+        origins[:, 2] = self._z
         np.add(poses[:, 2], bearings, out=origins[:, 3])
-        trees = np.full(len(bearings), self._surroundings.tree)
-        ranges, returns = np.empty(len(bearings)), np.empty(len(bearings))
+        trees = np.full(count, self._surroundings.tree)
+        if not self._moments:
+            return arena.cast(origins, trees, math.inf)
+        ranges, returns = np.empty(count), np.empty(count)
         for rows, frames in self._moments:
-            if frames is not None:
-                machinery.arena.set_poses(machinery.numbers, frames)
-            ranges[rows], returns[rows] = machinery.arena.cast(origins[rows], trees[rows], math.inf)
-        if self._moments[-1][1] is not None:
-            machinery.arena.set_poses(machinery.numbers, np.ascontiguousarray(machinery.frames[:-1]))
-        return ranges, np.where(np.isfinite(ranges), returns, 1.0)
+            arena.set_poses(machinery.numbers, frames)
+            ranges[rows], returns[rows] = arena.cast(origins[rows], trees[rows], math.inf)
+        arena.set_poses(machinery.numbers, np.ascontiguousarray(machinery.frames[:-1]))
+        return ranges, returns

@@ -59,16 +59,15 @@ class Surroundings:
 
         Return the chair's mean rates (3,): forward, leftward [m/s], yaw [rad/s]; and if an obstacle limited them.
         """
-        machinery = self.machinery
+        machinery, before = self.machinery, self.pose
         machinery.drive.velocities[self._row] = v, u, w
-        if not (self.alone and self._glide()):
+        free = self.alone and self._glide()
+        if not free:
             machinery.move()
-            if machinery.stalled[self.body]:
-                before = self.pose
-                self._look()
-                return between(before, self.pose) / self.step, True
         self._look()
-        return np.array([v, u, w]), False
+        if free or not machinery.stalled[self.body]:
+            return np.array([v, u, w]), False
+        return between(before, self.pose) / self.step, True
 
     def command(self, robot: str, velocity: FloatArray) -> None:
         """Let another robot drive on at forward, leftward [m/s], turn [rad/s] (3,), as its world file bounds it.
@@ -141,8 +140,7 @@ class Surroundings:
         if poses is None:
             return False
         machinery.before, machinery.frames = machinery.frames, machinery.before
-        machinery.frames[:-1] = poses
-        machinery.stalled[:] = False
+        machinery.frames[0] = poses[0]
         return True
 
     def _look(self) -> None:
