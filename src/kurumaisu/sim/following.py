@@ -40,6 +40,10 @@ class Followed:
         self._arena.set_poses(self._numbers, poses)
         return poses, stalled
 
+    def grip(self, body: int, closed: bool) -> bool:
+        """Close or open the gripper of a body; return whether it holds something now."""
+        return self._motion.grip(body, closed)
+
     def state(self) -> dict[str, StateArray]:
         """Return what the next moves depend on."""
         return self._motion.state()

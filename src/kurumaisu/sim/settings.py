@@ -12,7 +12,10 @@ from kurumaisu.params import Model, effects_of
 
 @dataclass(frozen=True)
 class Physics:
-    """Step [s], the longest in which contacts are solved once; slop [m]; bias: share of an overlap left after 1 s; friction, iterations [-]."""
+    """Step [s], the longest in which contacts are solved once; slop [m]; friction, iterations [-].
+
+    bias: share of an overlap left after 1 s.
+    """
 
     step: float
     collision_slop: float
