@@ -73,9 +73,12 @@ class Island:
         left, travelled = seconds, 0.0
         ever = moving.hindered.copy()
         while left > 1e-12 * seconds:
+            rest = moving.poses, moving.velocities
             taken = self._advance(moving, min(left, self._longest))
             left -= taken
             ever |= moving.hindered
+            if all(np.abs(change).max() < _AT_REST for change in (moving.poses - rest[0], rest[1], moving.velocities)):
+                break  # the next substep would be like this one
             travelled += taken * float(np.hypot(*moving.velocities[:, :2].T).max())
             if travelled > reach - _NEAR:
                 self._add_walls(moving.poses, reach)
