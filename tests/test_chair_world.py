@@ -146,7 +146,7 @@ def test_a_scan_sees_each_thing_where_it_is_when_the_beam_is_fired(tmp_path):
 
 
 def test_a_passer_by_crosses_the_scan(tmp_path):
-    walker = 'position ( name "walker" pose [2 -2 0 90] size [0.3 0.3 1.7] origin [0 0 0 0] velocity [1 0 0 0] )'
+    walker = 'model ( pose [2 -2 0 0] size [0.3 0.3 1.7] mass 70 waypoint[0] [2 3] walk_speed 1 walk_mode "once" )'
     simulator = among(tmp_path, walker, EXACT)
     seen = []
     for _ in range(400):
@@ -239,6 +239,7 @@ def test_set_pose_moves_things_and_the_chair_where_it_fits(tmp_path):
 THINGS = """
 model ( name "box" pose [1.2 0.1 0 0] size [0.4 0.4 0.6] mass 8 )
 position ( name "other" pose [3 1 0 200] velocity [0.3 0 0 20] )
+model ( pose [2 -2 0 0] size [0.3 0.3 1.7] mass 70 waypoint[0] [2 3] waypoint[1] [2 -2] walk_speed 1 social 1 )
 model ( pose [5 0 0 0] size [0.2 9 1] ranger_return 0.5 )
 """
 

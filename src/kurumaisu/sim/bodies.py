@@ -18,12 +18,8 @@ _LIGHTEST = 1.0e-3  # [kg] of what has no size to guess its mass from
 
 
 def movable(models: Sequence[Model]) -> list[int]:
-    """Return the indices of the models that are pieces: positions, what has a hinge, what has mass on the ground."""
-    return [
-        m.index
-        for m in models
-        if isinstance(m.device, Position) or m.hinge is not None or (m.parent < 0 and m.mass > 0)
-    ]
+    """Return the indices of the models that are pieces: what is driven, hangs on a hinge, or has mass on the ground."""
+    return [m.index for m in models if _driven(m) or m.hinge is not None or (m.parent < 0 and m.mass > 0)]
 
 
 def assemble(models: Sequence[Model], poses: FloatArray, dynamics: Dynamics) -> tuple[list[Rigid], Ground]:
@@ -43,6 +39,10 @@ def assemble(models: Sequence[Model], poses: FloatArray, dynamics: Dynamics) -> 
     return pieces, Ground(np.concatenate([np.empty((0, 6)), *walls]), np.concatenate([np.empty(0, np.int64), *trees]))
 
 
+def _driven(model: Model) -> bool:
+    return isinstance(model.device, Position) or model.walk is not None
+
+
 def _owners(models: Sequence[Model]) -> list[int]:
     """Return for each model the movable one it belongs to, or -1. Parents come before children."""
     pieces = set(movable(models))
@@ -53,7 +53,7 @@ def _owners(models: Sequence[Model]) -> list[int]:
 
 
 def _rigid(model: Model, members: Sequence[Model], poses: FloatArray, dynamics: Dynamics) -> Rigid:
-    driven = isinstance(model.device, Position)
+    driven = _driven(model)
     given = sum(m.mass for m in members)
     mass = given or max(_LIGHTEST, dynamics.density * float(np.prod(model.size)))
     parts: list[Part] = []

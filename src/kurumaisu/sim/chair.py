@@ -15,6 +15,7 @@ from kurumaisu.errors import Error
 from kurumaisu.params import Model, shipped
 from kurumaisu.sim import state
 from kurumaisu.sim.chair_body import seat
+from kurumaisu.sim.chair_world import ChairWorld
 from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.plant import Plant
 from kurumaisu.sim.scanner import Scan, Scanner
@@ -23,7 +24,6 @@ from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
 from kurumaisu.sim.sensors.suite import Reading
 from kurumaisu.sim.settings import Physics, load_dynamics
 from kurumaisu.sim.sight import Sight
-from kurumaisu.sim.surroundings import Surroundings
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
 from kurumaisu.world.model import Model as WorldModel
@@ -74,8 +74,8 @@ class ChairSimulator:
         self._scene = seat(world, model.chassis)
         effects.check(model.effects)
         self._errs = bool(effects.build_world(model.effects, np.random.default_rng(0)))
-        self._surroundings = self._build(None)
-        if self._surroundings.overlaps():
+        self._world = self._build(None)
+        if self._world.overlaps():
             raise Error(
                 f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose, "
                 "or something else that is solid"
@@ -97,20 +97,20 @@ class ChairSimulator:
         plant_rng, laser_rng, effects_rng, self._sensor_rng = map(np.random.default_rng, others)
         self._plant = Plant(self._model, self.step_time, plant_rng)
         if self._errs:
-            self._surroundings = self._build(world_seed)
-        self._surroundings.begin()
+            self._world = self._build(world_seed)
+        self._world.begin()
         chain = effects.build_laser(self._model.effects, effects_rng)
-        self._scanner = Scanner(self._model.laser, Sight(self._surroundings), chain, laser_rng)
+        self._scanner = Scanner(self._model.laser, Sight(self._world), chain, laser_rng)
         self._steps = 0
         self._power_up()
         return self._observe(np.zeros(3), False)
 
     def step(self, command: Command) -> Observation:
         """Advance by one physics step with the command held."""
-        surroundings = self._surroundings
-        motion = self._plant.from_voltages(_volts(command), float(surroundings.pose[2]))
+        around = self._world
+        motion = self._plant.from_voltages(_volts(command), float(around.pose[2]))
         u = 0.0 if motion.u is None else float(motion.u[0])
-        rates, contact = surroundings.drive(float(motion.v[0]), float(motion.w[0]), u)
+        rates, contact = around.drive(float(motion.v[0]), float(motion.w[0]), u)
         self._steps += 1
         return self._observe(rates, contact)
 
@@ -119,17 +119,17 @@ class ChairSimulator:
 
         From a reset on it drives as its file says. Raise Error for an unknown robot, or numbers that are none.
         """
-        self._surroundings.command(robot, np.asarray(velocity, dtype=np.float64))
+        self._world.command(robot, np.asarray(velocity, dtype=np.float64))
 
     def set_pose(self, name: str, pose: FloatArray | Sequence[float]) -> None:
         """Put a model, with all that stands on it, to a pose (4,) in the map: x, y, z [m], heading [rad].
 
         Raise Error, with nothing changed, for an unknown one and for a pose at which the chair does not fit.
         """
-        before = self._surroundings.machinery
-        self._surroundings.set_pose(name, np.asarray(pose, dtype=np.float64))
+        before = self._world.machinery
+        self._world.set_pose(name, np.asarray(pose, dtype=np.float64))
         self._scanner.sight.restart()
-        if self._surroundings.machinery is not before:
+        if self._world.machinery is not before:
             self._power_up()
 
     def save(self) -> bytes:
@@ -146,7 +146,7 @@ class ChairSimulator:
             raise Error("state: is of another world, chassis, list of effects or of sensors")
         self.reset(known["seed"])
         self._steps = known["steps"]
-        self._surroundings.restore(known["surroundings"])
+        self._world.restore(known["motion"])
         self._power_up()
         if self._sensing is not None:
             self._sensing.restore(known["sensors"])
@@ -167,7 +167,7 @@ class ChairSimulator:
             "steps": self._steps,
             "rates": self._rates,
             "contact": self._contact,
-            "surroundings": self._surroundings.state(),
+            "motion": self._world.state(),
             "sensors": self._sensing.state() if self._sensing is not None else None,
             "scanner": self._scanner.state(),
             "plant": remember(self._plant),
@@ -177,29 +177,29 @@ class ChairSimulator:
     @property
     def models(self) -> tuple[WorldModel, ...]:
         """All models that there are, the chair among them."""
-        return self._surroundings.machinery.population.models
+        return self._world.machinery.population.models
 
     @property
     def model_poses(self) -> FloatArray:
         """Poses (m, 4) of all models in the map now."""
-        return self._surroundings.machinery.model_poses()
+        return self._world.machinery.model_poses()
 
     @property
     def chair(self) -> WorldModel:
         """The model that the chair is."""
-        return self.models[self._surroundings.chair]
+        return self.models[self._world.chair]
 
     def _observe(self, rates: FloatArray, contact: bool) -> Observation:
         self._rates, self._contact = rates, contact
         readings = self._sensing.read(self.time) if self._sensing is not None and self._steps else ()
-        return self._seen(self._scanner.observe(self.time, self._surroundings.pose), readings)
+        return self._seen(self._scanner.observe(self.time, self._world.pose), readings)
 
     def _seen(self, scan: Scan | None, readings: tuple[Reading, ...]) -> Observation:
-        time, pose, rates = self.time, self._surroundings.pose, self._rates
+        time, pose, rates = self.time, self._world.pose, self._rates
         reference = self._plant.seen(Reference(np.array(time), pose, rates))
         return Observation(time, pose, rates, self._contact, scan, reference, readings)
 
-    def _build(self, seed: np.random.SeedSequence | None) -> Surroundings:
+    def _build(self, seed: np.random.SeedSequence | None) -> ChairWorld:
         """Build the world, with a seed for the effects on what its file says of walls."""
 
         def distort(walls: FloatArray) -> FloatArray:
@@ -207,13 +207,13 @@ class ChairSimulator:
                 walls = effect.apply(walls)
             return walls
 
-        return Surroundings(self._scene, self._model.chassis, self._dynamics, distort if seed else None)
+        return ChairWorld(self._scene, self._model.chassis, self._dynamics, distort if seed else None)
 
     def _power_up(self) -> None:
         """Start the further sensors."""
         self._sensing = None
         if self._sensors:
-            self._sensing = Sensing(self._sensors, self._surroundings.machinery, self.time, self._sensor_rng)
+            self._sensing = Sensing(self._sensors, self._world.machinery, self.time, self._sensor_rng)
 
     @property
     def time(self) -> float:

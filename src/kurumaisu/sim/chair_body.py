@@ -81,6 +81,7 @@ def _chair(world: World, first: Model | None, index: int, pose: FloatArray, chas
         update_interval=world.interval,
         hinge=None,
         device=_base(),
+        walk=None,
     )
 
 
@@ -110,6 +111,7 @@ def _bare(model: Model) -> Model:
         mass=0.0,
         hinge=None,
         device=None,
+        walk=None,
     )
 
 

@@ -37,6 +37,10 @@ class Followed:
         """Move all bodies if none meets anything, without telling the arena; see PhysicalMotion."""
         return self._motion.glide(velocities, dt)
 
+    def grip(self, body: int, closed: bool) -> bool:
+        """Close or open the gripper of a body; return whether it holds something now."""
+        return self._motion.grip(body, closed)
+
     def state(self) -> dict[str, StateArray]:
         """Return what the next moves depend on."""
         return self._motion.state()

@@ -11,8 +11,9 @@ import numpy as np
 from kurumaisu._core import Clearance, arcs
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose
+from kurumaisu.sim.contact_space import Exchange
 from kurumaisu.sim.gripping import Grips
-from kurumaisu.sim.island import Island, Moving
+from kurumaisu.sim.island import Island, Moving, Surroundings
 from kurumaisu.sim.joints import settled
 from kurumaisu.sim.rigid import Ground, Rigid
 from kurumaisu.sim.settings import Dynamics
@@ -39,10 +40,10 @@ class PhysicalMotion:
 
     def __init__(self, rigids: Sequence[Rigid], ground: Ground, dynamics: Dynamics) -> None:
         """Put everything in one place: call place before move."""
-        self._ground = ground
         self._dynamics = dynamics
         self._clearance = Clearance(ground.walls, ground.trees)
         self._numbers = np.array([self._clearance.add_body(r.edges, r.tree) for r in rigids], dtype=np.int64)
+        self._world = Surroundings(ground, self._clearance, dynamics, Exchange())
         self._grips = Grips(rigids, self._clearance, self._numbers)
         self._driven = np.array([r.driven for r in rigids], dtype=np.bool_)
         self._pivots = [r.pivot for r in rigids]
@@ -191,7 +192,7 @@ class PhysicalMotion:
             commands=course.commands[rows],
             hindered=self._hindered[rows],
         )
-        island = Island(self._numbers[rows], self._grips.rigids, self._ground, self._clearance, self._dynamics)
+        island = Island(self._numbers[rows], self._grips.rigids, self._world)
         stalled = island.run(moving, course.dt - touch)
         poses[rows] = moving.poses
         self._velocities[rows] = moving.velocities

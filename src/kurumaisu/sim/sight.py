@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kurumaisu.geometry import interpolate
-from kurumaisu.sim.surroundings import Surroundings
+from kurumaisu.sim.chair_world import ChairWorld
 from kurumaisu.types import FloatArray, IntArray
 
 # Parts of a step in which others count as standing, at where they are in its middle: what moves at 1.5 m/s is off by
@@ -21,8 +21,8 @@ _PARTS = 4
 class Sight:
     """Remembers where the chair and all others were, for beams that are fired before the scan is made."""
 
-    def __init__(self, surroundings: Surroundings) -> None:
-        self._surroundings = surroundings
+    def __init__(self, world: ChairWorld) -> None:
+        self._world = world
         self._times: list[float] = []
         self._chair: list[FloatArray] = []
         self._frames: list[FloatArray] = []  # of all bodies, if there are others
@@ -31,8 +31,8 @@ class Sight:
         """Note where all are now, times increasing [s]; pose (3,): the chair's."""
         self._times.append(time)
         self._chair.append(pose)
-        if not self._surroundings.alone:
-            self._frames.append(self._surroundings.machinery.frames[:-1].copy())
+        if not self._world.alone:
+            self._frames.append(self._world.machinery.frames[:-1].copy())
 
     def forget(self, before: float) -> None:
         """Drop what no beam from a time on needs: all but the last pose that is not after it."""
@@ -41,8 +41,8 @@ class Sight:
 
     def restart(self) -> None:
         """Forget where the others were, as some have come or been put elsewhere; the chair's way stays."""
-        now = self._surroundings.machinery.frames[:-1]
-        self._frames = [] if self._surroundings.alone else [now.copy() for _ in self._times]
+        now = self._world.machinery.frames[:-1]
+        self._frames = [] if self._world.alone else [now.copy() for _ in self._times]
 
     def poses(self, times: FloatArray) -> FloatArray:
         """Return where the chair was (n, 3), at times (n,)."""
@@ -50,7 +50,7 @@ class Sight:
 
     def look(self, times: FloatArray, height: float) -> Look:
         """Return what is to be seen at times (n,) from so far above the chair's base [m]."""
-        return Look(self._surroundings, height, [] if self._standing() else list(self._moments(times)))
+        return Look(self._world, height, [] if self._standing() else list(self._moments(times)))
 
     def state(self) -> dict[str, Any]:
         """Return all that is remembered."""
@@ -63,7 +63,7 @@ class Sight:
     def _moments(self, times: FloatArray) -> Iterator[tuple[IntArray, FloatArray]]:
         """Yield rows of times, and where the bodies (b, 4) then were."""
         known = np.array(self._times)
-        parts = np.floor((times - known[0]) / self._surroundings.step * _PARTS)
+        parts = np.floor((times - known[0]) / self._world.step * _PARTS)
         for part in np.unique(parts):
             rows = np.flatnonzero(parts == part)
             yield rows, self._then(known, float(times[rows].mean()))
@@ -71,7 +71,7 @@ class Sight:
     def _standing(self) -> bool:
         """Return whether all but the chair are still where they were."""
         frames = self._frames
-        mine = self._surroundings.body
+        mine = self._world.body
         return all((np.delete(f, mine, 0) == np.delete(frames[-1], mine, 0)).all() for f in frames[:-1])
 
     def _then(self, known: FloatArray, time: float) -> FloatArray:
@@ -87,13 +87,13 @@ class Sight:
 class Look:
     """Rays of one scan; the chair is invisible to them."""
 
-    def __init__(self, surroundings: Surroundings, height: float, moments: list[tuple[IntArray, FloatArray]]) -> None:
+    def __init__(self, world: ChairWorld, height: float, moments: list[tuple[IntArray, FloatArray]]) -> None:
         """Look from so far above the chair's base [m]; moments: rows of beams and where the bodies (b, 4) then were.
 
         Without moments all are where they are now.
         """
-        self._surroundings = surroundings
-        self._z = float(surroundings.machinery.frames[surroundings.body, 2]) + height
+        self._world = world
+        self._z = float(world.machinery.frames[world.body, 2]) + height
         self._moments = moments
 
     def ranges(self, poses: FloatArray, bearings: FloatArray) -> FloatArray:
@@ -102,13 +102,13 @@ class Look:
 
     def cast(self, poses: FloatArray, bearings: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ranges as above, and the reflectance (n,) of what is met; 0 where that is nothing."""
-        machinery = self._surroundings.machinery
+        machinery = self._world.machinery
         arena, count = machinery.arena, len(bearings)
         origins = np.empty((count, 4))
         origins[:, :2] = poses[:, :2]
         origins[:, 2] = self._z
         np.add(poses[:, 2], bearings, out=origins[:, 3])
-        trees = np.full(count, self._surroundings.tree)
+        trees = np.full(count, self._world.tree)
         if not self._moments:
             return arena.cast(origins, trees, math.inf)
         ranges, returns = np.empty(count), np.empty(count)

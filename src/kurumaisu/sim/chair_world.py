@@ -34,7 +34,7 @@ _OPTIONS = Options(
 )
 
 
-class Surroundings:
+class ChairWorld:
     """A world in motion, of which one robot, the chair, is driven by its plant."""
 
     def __init__(self, scene: Scene, chassis: Chassis, dynamics: Dynamics, distort: Distort | None) -> None:
