@@ -129,6 +129,13 @@ class Simulator:
         """Remove a model with all that stands on it. Raise Error for an unknown one."""
         self._have(rebuilt(self._machinery, self._machinery.population.without(self._index(model))))
 
+    def grip(self, robot: int, closed: bool) -> bool:
+        """Close or open the gripper of a robot, by its number; return whether it holds something now.
+
+        It takes what is between its paddles and has a gripper_return. Raise Error in Stage's semantics.
+        """
+        return self._machinery.grip(robot, closed)
+
     def save(self) -> bytes:
         """Return the whole state, from which load continues bit for bit."""
         return state.pack(self._state())
