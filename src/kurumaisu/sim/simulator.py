@@ -46,7 +46,7 @@ class Simulator:
         self._late = options.timing == "consistent" or options.semantics == "physical"
         dynamics = load_dynamics(shipped("launch/physical.yaml")) if options.semantics == "physical" else None
         start = Population.first(world.models, world.poses)
-        self._home = Machinery(start, options, world.interval, world.resolution, dynamics)
+        self._home = Machinery(start, options, world.interval, dynamics, resolution=world.resolution)
         what = world.models, world.poses, world.interval, replace(options, threads=1), self._sensors
         self._fingerprint = state.digest(what)
         self._sensing: Sensing | None = None
@@ -130,6 +130,13 @@ class Simulator:
         """Remove a model with all that stands on it. Raise Error for an unknown one."""
         self._have(rebuilt(self._machinery, self._machinery.population.without(self._index(model))))
 
+    def grip(self, robot: int, closed: bool) -> bool:
+        """Close or open the gripper of a robot, by its number; return whether it holds something now.
+
+        It takes what is between its paddles and has a gripper_return. Raise Error in Stage's semantics.
+        """
+        return self._machinery.grip(robot, closed)
+
     def save(self) -> bytes:
         """Return the whole state, from which load continues bit for bit."""
         return state.pack(self._state())
@@ -141,8 +148,7 @@ class Simulator:
             raise Error(f"state: is of another world than {self._world.path}, or of other options")
         machinery = self._home
         if known["population"] is not None:
-            home = self._home
-            machinery = Machinery(known["population"], home.options, home.interval, home.resolution, home.dynamics)
+            machinery = self._home.of(known["population"])
             machinery.begin()
         self._machinery = machinery
         self._step, self._dropped = known["step"], known["dropped"]

@@ -12,6 +12,7 @@ def take(machinery: Machinery) -> dict[str, Any]:
     """Return copies of all that changes while a population stays the same."""
     return {
         "motion": machinery.motion.state(),
+        "walks": machinery.pedestrians.state(),
         "frames": machinery.frames.copy(),
         "before": machinery.before.copy(),
         "stalled": machinery.stalled.copy(),
@@ -28,6 +29,7 @@ def restore(machinery: Machinery, values: dict[str, Any]) -> None:
     machinery.before[:] = values["before"]
     machinery.motion.place(machinery.frames[:-1])
     machinery.motion.restore(values["motion"])
+    machinery.pedestrians.restore(values["walks"])
     machinery.stalled[:] = values["stalled"]
     machinery.drive.velocities[:] = values["velocities"]
     machinery.localization.estimates[:] = values["estimates"]

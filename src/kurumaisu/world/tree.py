@@ -19,6 +19,7 @@ from kurumaisu.world.notes import Notes
 from kurumaisu.world.shapes import Shaper
 from kurumaisu.world.syntax import Entity
 from kurumaisu.world.values import Units, Values
+from kurumaisu.world.walks import walk
 
 _MOST_MODELS = 100_000  # of a world
 _MOST_ENTITIES = 2_000_000  # models, blocks and sensors of a world
@@ -103,6 +104,7 @@ class Builder:
             "update_interval": _interval(values),
             "hinge": _hinge(values),
             "device": device(values),
+            "walk": walk(values),
         }
 
     def _size(self, values: Values) -> FloatArray:
