@@ -17,7 +17,7 @@ constexpr double kFarthest = 1 << 30;                 // cells
 
 /// As in Stage: nothing happens to an angle that is in range.
 double normalized(double angle) {
-  constexpr double kMany = 100.0;  // [rad]
+  constexpr double kMany = 1e4;  // [rad] more than any file says
   if (std::abs(angle) > kMany) angle = std::remainder(angle, 2 * kHalfTurn);
   while (angle < -kHalfTurn) angle += 2 * kHalfTurn;
   while (angle > kHalfTurn) angle -= 2 * kHalfTurn;

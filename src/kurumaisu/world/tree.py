@@ -32,7 +32,7 @@ _SIZES = {  # [m], of types with another size if the file gives none
     "gripper": (0.2, 0.3, 0.2),
     "blinkenlight": (0.02, 0.02, 0.02),
 }
-_MANY = 100.0  # [rad] of a heading
+_MANY = 1.0e4  # [rad] of a heading, more than any file says
 _INTERVAL = 100  # [ms] between updates of a model
 
 
