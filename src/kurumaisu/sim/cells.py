@@ -42,7 +42,12 @@ def build_cells(
 
 
 def _body(models: Sequence[Model], members: Sequence[Model]) -> Arrays:
-    """Return a body, whose pose is that of the first of its models, as one chain of models, parents first."""
+    """Return a body, whose pose is that of the first of its models, as its solid models and what carries them."""
+    carrying = {members[0].index}
+    for model in reversed(members):
+        if model.index in carrying or (model.obstacle_return and len(model.shape.segments)):
+            carrying |= {model.index, model.parent}
+    members = [model for model in members if model.index in carrying]
     number = {model.index: i for i, model in enumerate(members)}
     parents, places = [-1], [np.array([0.0, 0.0, 0.0, 0.0, 0.0, *_origin(members[0])])]
     for model in members[1:]:
