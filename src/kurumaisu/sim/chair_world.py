@@ -26,6 +26,7 @@ _STILL = OdometryWalk(distance=0.0, heading_per_metre=0.0, heading_per_radian=0.
 # The rest of the simulator's options is about robots with odometry and rangers of their own.
 _OPTIONS = Options(
     semantics="physical",
+    collision="exact",
     timing="consistent",
     threads=1,
     limit_acceleration=False,

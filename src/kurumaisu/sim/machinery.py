@@ -10,6 +10,8 @@ import numpy as np
 
 from kurumaisu.errors import Error
 from kurumaisu.sim import fans
+from kurumaisu.sim.cells import build_cells
+from kurumaisu.sim.collisions import Collisions, Crossing, SharedCells
 from kurumaisu.sim.drive import Drive, Rows
 from kurumaisu.sim.motion import StageMotion
 from kurumaisu.sim.odometry import Localization
@@ -37,14 +39,17 @@ class Machinery:
         interval: float,
         dynamics: Dynamics | None,
         distort: Distort | None = None,
+        resolution: float | None = None,
     ) -> None:
         """Place all bodies where they begin; interval [s] is a step's length; dynamics: None for Stage's semantics.
 
-        distort: says where the walls are in truth.
+        distort: says where the walls are in truth; resolution [m]: of cells in which outlines collide, if options say
+        so. Raise Error if there would be too many cells.
         """
         models = population.models
         self.population = population
         self.interval = interval
+        self.resolution = resolution
         self.options = options
         self.dynamics = dynamics
         self.distort = distort
@@ -56,6 +61,7 @@ class Machinery:
         self.robots = tuple(models[self.bodies.heads[row]] for row in self.robot_rows)
         self._everybody_drives = len(self.robot_rows) == len(self.bodies)
         self.fans = fans.find(models, population.poses, self.bodies, self.robot_rows.tolist())
+        self.collisions = self._make_collisions()
         self.motion = self._make_motion()
         self.pedestrians = self._make_pedestrians()
         self.frames = np.zeros((len(self.bodies) + 1, 4))  # of the bodies, and of the map at the end
@@ -64,6 +70,10 @@ class Machinery:
         self.place(population.poses[self.bodies.heads])
         self._velocities = np.zeros((len(self.bodies), 3))
         self.begin()
+
+    def of(self, population: Population) -> Machinery:
+        """Return new machinery of the same kind for another population."""
+        return Machinery(population, self.options, self.interval, self.dynamics, self.distort, self.resolution)
 
     def begin(self) -> None:
         """Make drives, odometry and rangers anew, as they are before the first step."""
@@ -84,7 +94,7 @@ class Machinery:
 
     def _make_motion(self) -> StageMotion | Followed:
         if self.dynamics is None:
-            return StageMotion(self.arena, self.numbers, self.bodies)
+            return StageMotion(self.collisions, self.bodies)
         # these load pymunk, which Stage's semantics need not pay for
         from kurumaisu.sim.bodies import assemble
         from kurumaisu.sim.following import Followed
@@ -101,6 +111,14 @@ class Machinery:
         walks = [self.population.models[head].walk for head in self.bodies.heads]
         rows = np.array([row for row, walk in enumerate(walks) if walk is not None], dtype=np.int64)
         return Pedestrians([walk for walk in walks if walk is not None], rows, self.walls.faces[self.walls.solid])
+
+    def _make_collisions(self) -> Collisions:
+        if self.options.collision == "exact" or self.dynamics is not None or self.resolution is None:
+            return Crossing(self.arena, self.numbers)
+        layers = 2 if self.options.collision == "cells_stale" else 1
+        start = self.population
+        cells, known_as = build_cells(start.models, start.poses, self.bodies, self.resolution, layers)
+        return SharedCells(self.arena, self.numbers, cells, known_as, layers)
 
     @property
     def robot_keys(self) -> IntArray:
@@ -170,7 +188,7 @@ class Machinery:
 
     def touching(self) -> BoolArray:
         """Return which robots (n,) touch something where they are."""
-        return self.arena.touches(self.numbers)[self.robot_rows]
+        return self.collisions.touching()[self.robot_rows]
 
     def _periods(self, intervals: list[float], always: bool) -> IntArray:
         return np.array([1 if always else period(i, self.interval) for i in intervals], dtype=np.int64)
