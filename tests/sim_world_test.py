@@ -195,13 +195,15 @@ class SimWorldTest(unittest.TestCase):
         twist = Twist()
         twist.linear.x = 0.5
         self.other.publish(twist)
-        bearings, count = [], len(self.scan.messages)
-        while not bearings or bearings[-1] < 0.5:
-            ranges = self.scan_after(count)
-            count += 1
+        bearings, first = [], len(self.scan.messages)
+        for number in range(200):  # 20 s; the way takes 6
+            ranges = self.scan_after(first + number)
             ahead = self.model.laser.bearings[np.isfinite(ranges) & (np.abs(self.model.laser.bearings) < 1.2)]
             bearings.append(float(ahead.mean()))
+            if bearings[-1] > 0.5:
+                break
         assert bearings[0] < -0.5
+        assert bearings[-1] > 0.5
         assert np.median(np.diff(bearings)) > 0
         assert np.sum(np.diff(bearings) < -0.02) == 0
 
