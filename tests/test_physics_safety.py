@@ -20,7 +20,6 @@ def corners(body: Rigid, pose: FloatArray) -> FloatArray:
     return np.asarray(points @ np.array([[c, s], [-s, c]]) + pose[:2])
 
 
-@settings(deadline=None)
 @given(
     heading=st.floats(-math.pi, math.pi),
     y=st.floats(-3, 3),
@@ -37,7 +36,7 @@ def test_no_speed_takes_a_robot_through_a_wall_without_thickness(
         assert np.abs(corners(body, pose)[:, 0]).max() < 1.0 + SKIN
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10**6), fastest=st.floats(0.0, 10.0))
 def test_a_crowd_in_a_room_stays_in_it_and_apart(seed: int, fastest: float) -> None:
     rng = np.random.default_rng(seed)
@@ -66,7 +65,7 @@ def worst_overlap(bodies: list[Rigid], poses: FloatArray) -> float:
     return deepest
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6), friction=st.floats(0.0, 0.5))
 def test_without_motors_energy_never_grows(seed: int, friction: float) -> None:
     rng = np.random.default_rng(seed)
