@@ -234,6 +234,8 @@ def test_set_pose_moves_things_and_the_chair_where_it_fits(tmp_path):
     simulator.set_pose("box", (4, 4, 0, 0))
     assert drive(simulator, 0.5, 0.0, 8.0)[-1].pose[0] == pytest.approx(4.9 - FRONT, abs=0.005)
     assert simulator.reset(1).pose.tolist() == [0, 0, 0]
+    assert where(simulator, "wall").tolist() == [3, 0, 0, 0]
+    assert where(simulator, "box").tolist() == [2, 2, 0, 0]
 
 
 THINGS = """

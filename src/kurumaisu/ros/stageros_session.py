@@ -7,7 +7,6 @@ import math
 from collections import deque
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import rospy
@@ -134,19 +133,12 @@ class Session:
         self._simulator.delete(self._model(name))
         self._take(stay)
 
-    def save(self, file: Path) -> None:
-        """Write the whole state to a file."""
-        try:
-            file.write_bytes(self._simulator.save())
-        except OSError as error:
-            raise Error(f"{file}: {error.strerror}") from error
+    def save(self) -> bytes:
+        """Return the whole state."""
+        return self._simulator.save()
 
-    def load(self, file: Path) -> None:
+    def load(self, saved: bytes) -> None:
         """Go back to a state that was saved of this world; /clock runs on."""
-        try:
-            saved = file.read_bytes()
-        except OSError as error:
-            raise Error(f"{file}: {error.strerror}") from error
         self._simulator.load(saved)
         self._commands[:] = 0.0
 

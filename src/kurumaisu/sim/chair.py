@@ -180,6 +180,17 @@ class ChairSimulator:
         return self._world.machinery.population.models
 
     @property
+    def robot(self) -> int:
+        """Number of the chair among the robots, as readings have it."""
+        return self._world.robot
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Names of the other robots that have one."""
+        robots = self._world.machinery.robots
+        return tuple(r.name for i, r in enumerate(robots) if i != self.robot and r.name is not None)
+
+    @property
     def model_poses(self) -> FloatArray:
         """Poses (m, 4) of all models in the map now."""
         return self._world.machinery.model_poses()

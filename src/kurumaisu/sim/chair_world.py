@@ -50,6 +50,7 @@ class ChairWorld:
 
     def begin(self) -> None:
         """Put everything back to where it began, at rest."""
+        self._have(self._home)
         machinery = self.machinery
         machinery.place(machinery.population.poses[machinery.bodies.heads])
         machinery.begin()
@@ -61,13 +62,14 @@ class ChairWorld:
         Return the chair's mean rates (3,): forward, leftward [m/s], yaw [rad/s]; and if an obstacle limited them.
         """
         machinery, before = self.machinery, self.pose
-        machinery.drive.velocities[self._row] = v, u, w
-        free = self.alone and self._glide()
+        machinery.drive.velocities[self.robot] = v, u, w
+        wheels = machinery.wheels()
+        free = self.alone and self._glide(wheels)
         if not free:
             machinery.move()
         self._look()
         if free or not machinery.stalled[self.body]:
-            return np.array([v, u, w]), False
+            return wheels[self.robot].copy(), False
         return between(before, self.pose) / self.step, True
 
     def command(self, robot: str, velocity: FloatArray) -> None:
@@ -77,7 +79,7 @@ class ChairWorld:
         """
         machinery = self.machinery
         index = machinery.population.index(robot)
-        rows = [row for row, model in enumerate(machinery.robots) if model.index == index and row != self._row]
+        rows = [row for row, model in enumerate(machinery.robots) if model.index == index and row != self.robot]
         if not rows or not np.isfinite(velocity).all():
             raise Error(f"{robot}: no other robot, or not finite: {np.asarray(velocity).tolist()}")
         commands = np.zeros((len(machinery.robots), 3))
@@ -130,14 +132,14 @@ class ChairWorld:
         self.chair = int(np.flatnonzero(machinery.population.keys == self._chair_key)[0])
         self.tree = machinery.population.models[self.chair].root
         self.body = int(machinery.bodies.body_of[self.chair])
-        self._row = int(np.flatnonzero(machinery.robot_rows == self.body)[0])
+        self.robot = int(np.flatnonzero(machinery.robot_rows == self.body)[0])
         self.alone = len(machinery.bodies) == 1
         self._motion = cast(Followed, machinery.motion)
 
-    def _glide(self) -> bool:
+    def _glide(self, wheels: FloatArray) -> bool:
         """Move the chair, which alone can move, if nothing is in its way; the arena need not know: it sees no other."""
         machinery = self.machinery
-        poses = self._motion.glide(machinery.drive.velocities, self.step)
+        poses = self._motion.glide(wheels, self.step)
         if poses is None:
             return False
         machinery.before, machinery.frames = machinery.frames, machinery.before
