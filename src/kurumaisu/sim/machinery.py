@@ -10,6 +10,8 @@ import numpy as np
 
 from kurumaisu.errors import Error
 from kurumaisu.sim import fans
+from kurumaisu.sim.cells import build_cells
+from kurumaisu.sim.collisions import Collisions, Crossing, SharedCells
 from kurumaisu.sim.drive import Drive, Rows
 from kurumaisu.sim.motion import StageMotion
 from kurumaisu.sim.odometry import Localization
@@ -20,6 +22,7 @@ from kurumaisu.sim.population import Population
 from kurumaisu.sim.rangers import Rangers
 from kurumaisu.sim.rhythm import Rhythm, period
 from kurumaisu.sim.settings import Dynamics
+from kurumaisu.sim.slopes import Slopes
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
 
@@ -37,14 +40,17 @@ class Machinery:
         interval: float,
         dynamics: Dynamics | None,
         distort: Distort | None = None,
+        resolution: float | None = None,
     ) -> None:
         """Place all bodies where they begin; interval [s] is a step's length; dynamics: None for Stage's semantics.
 
-        distort: says where the walls are in truth.
+        distort: says where the walls are in truth; resolution [m]: of cells in which outlines collide, if options say
+        so. Raise Error if there would be too many cells.
         """
         models = population.models
         self.population = population
         self.interval = interval
+        self.resolution = resolution
         self.options = options
         self.dynamics = dynamics
         self.distort = distort
@@ -56,14 +62,21 @@ class Machinery:
         self.robots = tuple(models[self.bodies.heads[row]] for row in self.robot_rows)
         self._everybody_drives = len(self.robot_rows) == len(self.bodies)
         self.fans = fans.find(models, population.poses, self.bodies, self.robot_rows.tolist())
+        self.collisions = self._make_collisions()
         self.motion = self._make_motion()
         self.pedestrians = self._make_pedestrians()
+        self._slopes = self._make_slopes()
+        self._sideways = np.array([cast(Position, model.device).drive == "omni" for model in self.robots], np.bool_)
         self.frames = np.zeros((len(self.bodies) + 1, 4))  # of the bodies, and of the map at the end
         self.before = self.frames.copy()  # those one step ago
         self.stalled = np.zeros(len(self.bodies), dtype=np.bool_)
         self.place(population.poses[self.bodies.heads])
         self._velocities = np.zeros((len(self.bodies), 3))
         self.begin()
+
+    def of(self, population: Population) -> Machinery:
+        """Return new machinery of the same kind for another population."""
+        return Machinery(population, self.options, self.interval, self.dynamics, self.distort, self.resolution)
 
     def begin(self) -> None:
         """Make drives, odometry and rangers anew, as they are before the first step."""
@@ -84,7 +97,7 @@ class Machinery:
 
     def _make_motion(self) -> StageMotion | Followed:
         if self.dynamics is None:
-            return StageMotion(self.arena, self.numbers, self.bodies)
+            return StageMotion(self.collisions, self.bodies)
         # these load pymunk, which Stage's semantics need not pay for
         from kurumaisu.sim.bodies import assemble
         from kurumaisu.sim.following import Followed
@@ -97,10 +110,24 @@ class Machinery:
         ground = Ground(walls.faces[walls.solid], walls.trees[walls.solid])
         return Followed(self.arena, self.numbers, PhysicalMotion(pieces, ground, self.dynamics))
 
+    def _make_slopes(self) -> Slopes:
+        """Return the slopes of what stands still; Stage knows none."""
+        models, body_of = self.population.models, self.bodies.body_of
+        still = [m for m, body in zip(models, body_of, strict=True) if body < 0] if self.dynamics else []
+        return Slopes(still, self.population.poses, self.dynamics.slope_speed if self.dynamics else 0.0)
+
     def _make_pedestrians(self) -> Pedestrians:
         walks = [self.population.models[head].walk for head in self.bodies.heads]
         rows = np.array([row for row, walk in enumerate(walks) if walk is not None], dtype=np.int64)
         return Pedestrians([walk for walk in walks if walk is not None], rows, self.walls.faces[self.walls.solid])
+
+    def _make_collisions(self) -> Collisions:
+        if self.options.collision == "exact" or self.dynamics is not None or self.resolution is None:
+            return Crossing(self.arena, self.numbers)
+        layers = 2 if self.options.collision == "cells_stale" else 1
+        start = self.population
+        cells, known_as = build_cells(start.models, start.poses, self.bodies, self.resolution, layers)
+        return SharedCells(self.arena, self.numbers, cells, known_as, layers)
 
     @property
     def robot_keys(self) -> IntArray:
@@ -141,13 +168,20 @@ class Machinery:
         poses = self.frames if self._everybody_drives else self.frames[self.robot_rows]
         self.localization.update(due, poses[: len(self.robots)], self.drive.velocities, rng)
 
+    def wheels(self) -> FloatArray:
+        """Return what the robots' wheels make of the drives' velocities (n, 3) on the floor there."""
+        wanted = self.drive.velocities
+        if not len(self._slopes):
+            return wanted
+        return self._slopes.slowed(wanted, self.frames[self.robot_rows], self._sideways, self.interval)
+
     def move(self) -> None:
         """Move all bodies as the drives want."""
         if self._everybody_drives:
-            velocities = self.drive.velocities
+            velocities = self.wheels()
         else:
             velocities = self._velocities
-            velocities[self.robot_rows] = self.drive.velocities
+            velocities[self.robot_rows] = self.wheels()
             if len(self.pedestrians.rows):
                 now, before = self.frames[:-1], self.before[:-1]
                 velocities[self.pedestrians.rows] = self.pedestrians.velocities(now, before, self.interval)
@@ -171,7 +205,7 @@ class Machinery:
 
     def touching(self) -> BoolArray:
         """Return which robots (n,) touch something where they are."""
-        return self.arena.touches(self.numbers)[self.robot_rows]
+        return self.collisions.touching()[self.robot_rows]
 
     def _periods(self, intervals: list[float], always: bool) -> IntArray:
         return np.array([1 if always else period(i, self.interval) for i in intervals], dtype=np.int64)

@@ -28,11 +28,14 @@ class Shape:
     segments: (m, 4), x and y of both ends [m]; heights: (m, 2), lowest and highest z above the base [m];
     polygons: closed polygons (k, 2) [m] of blocks and boxes, for contact and drawing, with their heights (2,) and
     colours; a bitmap has segments only.
+    edges: (k, 6), the same outlines as Stage draws them into cells, to the last bit: x and y from and to, lowest and
+    highest z [m], before the origin is applied; None: the segments, and no origin.
     """
 
     segments: FloatArray
     heights: FloatArray
     polygons: tuple[Polygon, ...]
+    edges: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -165,6 +168,7 @@ class Model:
     ranger_return: below 0 invisible to rangers, else the intensity of a hit; obstacle_return: False: no collisions;
     mass [kg], 0: not given; friction [1], None: not given; update_interval [s].
     device: what a typed model does; None: of a type that only has a body; walk: None: goes nowhere by itself.
+    slope (2,): an addition to Stage's language: rise per metre along x and y of the pose's frame [1], in the outline.
     """
 
     index: int
@@ -190,3 +194,4 @@ class Model:
     hinge: Hinge | None
     device: Device | None
     walk: Walk | None = None
+    slope: FloatArray | None = None

@@ -32,6 +32,8 @@ _SIZES = {  # [m], of types with another size if the file gives none
     "gripper": (0.2, 0.3, 0.2),
     "blinkenlight": (0.02, 0.02, 0.02),
 }
+_MANY = 1.0e4  # [rad] of a heading, more than any file says
+_STEEPEST = 1.0  # rise per metre: 45 degrees; nothing on wheels climbs it
 _INTERVAL = 100  # [ms] between updates of a model
 
 
@@ -104,6 +106,7 @@ class Builder:
             "hinge": _hinge(values),
             "device": device(values),
             "walk": walk(values),
+            "slope": _slope(values),
         }
 
     def _size(self, values: Values) -> FloatArray:
@@ -133,18 +136,40 @@ def _hinge(values: Values) -> Hinge | None:
     return Hinge(np.array([x, y]), lowest, highest)
 
 
+def _slope(values: Values) -> FloatArray | None:
+    """Read `slope [gx gy]`, rise per metre, an addition to Stage's language."""
+    if not values.has("slope"):
+        return None
+    if values.entity.type != "model":
+        raise values.error("slope", f"a slope belongs to a model, not to a {values.entity.type}")
+    rise = np.array(values.several("slope", "ff", ()))
+    if np.hypot(*rise) > _STEEPEST:
+        raise values.error("slope", f"slope must be of at most {_STEEPEST:g} m per metre, not {np.hypot(*rise):g}")
+    return rise
+
+
 def global_poses(models: Sequence[Model]) -> FloatArray:
     """Return the models' poses (n, 4) in the map, each on top of its parent if that stacks its children."""
     poses = np.empty((len(models), 4))
     for model in models:
         if model.parent < 0:
-            poses[model.index] = model.pose
+            poses[model.index] = (*model.pose[:3], _normal(float(model.pose[3])))
             continue
         parent = models[model.parent]
         x, y, z, heading = poses[model.parent].tolist()
         c, s = math.cos(heading), math.sin(heading)
         dx, dy, dz, turn = model.pose.tolist()
         top = parent.size[2] if parent.stack_children else 0.0
-        poses[model.index] = (x + c * dx - s * dy, y + s * dx + c * dy, z + dz + top, heading + turn)
-    poses[:, 3] = (poses[:, 3] + math.pi) % (2 * math.pi) - math.pi
+        poses[model.index] = (x + c * dx - s * dy, y + s * dx + c * dy, z + dz + top, _normal(heading + turn))
     return poses
+
+
+def _normal(heading: float) -> float:
+    """Return a heading within half a turn; one that is there already keeps its last bit, as in Stage."""
+    if abs(heading) > _MANY:
+        heading = math.remainder(heading, math.tau)
+    while heading < -math.pi:
+        heading += math.tau
+    while heading > math.pi:
+        heading -= math.tau
+    return heading

@@ -46,7 +46,7 @@ class World:
     resolution: edge of Stage's cells [m]; interval: of a step [s]; quit_time [s], 0: never; speedup: of the clock,
     0 or less: as fast as possible.
     For a chair alone: segments: (m, 4), x and y of both ends of all that a laser sees [m]; obstacles: (n, 4), all
-    that a chair bumps into, at any height, in both without the position models; starts: those, in file order;
+    that a chair bumps into, at any height, in both without what drives or walks; starts: those, in file order;
     bounds: smallest x, smallest y, largest x, largest y [m] of the walls.
     warnings: what the file says and this reader does not heed, in words.
     """
@@ -139,7 +139,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
     if interval < _SHORTEST:
         raise said.error("interval_sim", f"interval_sim must be at least {_SHORTEST:g} ms, not {interval:g}")
     poses = global_poses(models)
-    walls = [model for model in models if not _on_position(model, models)]
+    walls = [model for model in models if not _travels(model, models)]
     starts = (model for model in models if model.type == "position")
     return World(
         name=said.text("name", path.stem),
@@ -157,11 +157,11 @@ def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
     )
 
 
-def _on_position(model: Model, models: tuple[Model, ...]) -> bool:
-    """Return whether a model is a position or stands on one."""
-    while model.type != "position" and model.parent >= 0:
+def _travels(model: Model, models: tuple[Model, ...]) -> bool:
+    """Return whether a model is a position or walks, or stands on one that does."""
+    while model.type != "position" and model.walk is None and model.parent >= 0:
         model = models[model.parent]
-    return model.type == "position"
+    return model.type == "position" or model.walk is not None
 
 
 def _outlines(models: list[Model], poses: FloatArray) -> FloatArray:
