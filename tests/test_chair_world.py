@@ -175,6 +175,24 @@ def test_what_is_over_the_chair_does_not_stop_it(tmp_path):
     assert drive(simulator, 0.5, 0.0, 4.0)[-1].pose[0] == pytest.approx(2.0)
 
 
+def test_a_wall_is_felt_where_it_is_seen_though_the_map_is_wrong(tmp_path):
+    wrong = replace(EXACT, effects=(EffectSetting("world.map_error", {"scale": 0.1, "sd": 0.02}),))
+    simulator = among(tmp_path, "model ( pose [2.5 0 0 0] size [1 3 1] )\nmodel ( pose [9 9 0 0] mass 1 )", wrong)
+    scan = next(o.scan for o in (simulator.step(NEUTRAL) for _ in range(10)) if o.scan is not None)
+    near = np.abs(MODEL.laser.bearings) < 0.3
+    points = scan.ranges[near] * np.stack([np.cos(MODEL.laser.bearings[near]), np.sin(MODEL.laser.bearings[near])])
+    slope, seen = np.polyfit(points[1], points[0] + MODEL.laser.mount.x, 1)
+    assert abs(seen - 2.2) < 0.06
+    assert abs(seen - 2.2) > 1e-4
+    last = drive(simulator, 0.3, 0.0, 8.0)[-1].pose
+    half = WIDTH / 2
+    corners = last[:2] + [
+        (FRONT * math.cos(last[2]) - y * math.sin(last[2]), FRONT * math.sin(last[2]) + y * math.cos(last[2]))
+        for y in (half, -half)
+    ]
+    assert max(x - (seen + slope * y) for x, y in corners) == pytest.approx(0.0, abs=0.003)
+
+
 def test_of_the_table_in_the_flat_the_laser_sees_the_legs(tmp_path):
     world = load_world(shipped("worlds/flat.world"))
     table = next(m for m in world.models if m.name == "table")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from kurumaisu.errors import Error
 from kurumaisu.params import Model, shipped
 from kurumaisu.sim import state
 from kurumaisu.sim.chair_body import seat
+from kurumaisu.sim.chair_data import NEUTRAL, Command, Observation
 from kurumaisu.sim.chair_world import ChairWorld
 from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.plant import Plant
@@ -28,36 +29,7 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world import World
 from kurumaisu.world.model import Model as WorldModel
 
-
-@dataclass(frozen=True)
-class Command:
-    """What the D/A puts out: voltages [V], and the signs of the rates they stand for, NaN where unknown."""
-
-    v_f: float
-    v_s: float
-    sign_v: float
-    sign_w: float
-
-
-NEUTRAL = Command(0.0, 0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Observation:
-    """The truth after a step, and the scan that ended in it, if one did.
-
-    time [s] since the reset; pose (3,) of base_link in the map, theta not wrapped; rates (3,) over the step:
-    forward, leftward [m/s], yaw [rad/s]; contact: an obstacle limited the motion; reference: what is measured of
-    time, pose and rates, with the effects that act on that; readings: of further sensors that were due.
-    """
-
-    time: float
-    pose: FloatArray
-    rates: FloatArray
-    contact: bool
-    scan: Scan | None
-    reference: Reference
-    readings: tuple[Reading, ...]
+__all__ = ["NEUTRAL", "ChairSimulator", "Command", "Observation"]
 
 
 class ChairSimulator:

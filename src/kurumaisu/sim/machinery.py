@@ -182,8 +182,9 @@ class Machinery:
         else:
             velocities = self._velocities
             velocities[self.robot_rows] = self.wheels()
-            now, before = self.frames[:-1], self.before[:-1]
-            velocities[self.pedestrians.rows] = self.pedestrians.velocities(now, before, self.interval)
+            if len(self.pedestrians.rows):
+                now, before = self.frames[:-1], self.before[:-1]
+                velocities[self.pedestrians.rows] = self.pedestrians.velocities(now, before, self.interval)
         poses, stalled = self.motion.move(velocities, self.interval)
         self.before, self.frames = self.frames, self.before
         self.frames[:-1] = poses

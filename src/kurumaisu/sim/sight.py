@@ -25,14 +25,14 @@ class Sight:
         self._world = world
         self._times: list[float] = []
         self._chair: list[FloatArray] = []
-        self._frames: list[FloatArray] = []  # of all bodies, if there are others
+        self._frames: list[FloatArray] = []  # of all bodies, if there are others; the chair's, which is unseen, are 0
 
     def note(self, time: float, pose: FloatArray) -> None:
         """Note where all are now, times increasing [s]; pose (3,): the chair's."""
         self._times.append(time)
         self._chair.append(pose)
         if not self._world.alone:
-            self._frames.append(self._world.machinery.frames[:-1].copy())
+            self._frames.append(self._others())
 
     def forget(self, before: float) -> None:
         """Drop what no beam from a time on needs: all but the last pose that is not after it."""
@@ -41,8 +41,7 @@ class Sight:
 
     def restart(self) -> None:
         """Forget where the others were, as some have come or been put elsewhere; the chair's way stays."""
-        now = self._world.machinery.frames[:-1]
-        self._frames = [] if self._world.alone else [now.copy() for _ in self._times]
+        self._frames = [] if self._world.alone else [self._others()] * len(self._times)
 
     def poses(self, times: FloatArray) -> FloatArray:
         """Return where the chair was (n, 3), at times (n,)."""
@@ -62,17 +61,20 @@ class Sight:
 
     def _moments(self, times: FloatArray) -> Iterator[tuple[IntArray, FloatArray]]:
         """Yield rows of times, and where the bodies (b, 4) then were."""
-        known = np.array(self._times)
-        parts = np.floor((times - known[0]) / self._world.step * _PARTS)
-        for part in np.unique(parts):
-            rows = np.flatnonzero(parts == part)
-            yield rows, self._then(known, float(times[rows].mean()))
+        known, width = np.array(self._times), self._world.step / _PARTS
+        parts = np.floor((times - known[0]) / width)
+        order = np.argsort(parts, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(parts[order])) + 1):
+            yield rows, self._then(known, float(known[0] + (parts[rows[0]] + 0.5) * width))
 
     def _standing(self) -> bool:
         """Return whether all but the chair are still where they were."""
-        frames = self._frames
-        mine = self._world.body
-        return all((np.delete(f, mine, 0) == np.delete(frames[-1], mine, 0)).all() for f in frames[:-1])
+        return all((frames == self._frames[-1]).all() for frames in self._frames[:-1])
+
+    def _others(self) -> FloatArray:
+        frames: FloatArray = self._world.machinery.frames[:-1].copy()
+        frames[self._world.body] = 0.0
+        return frames
 
     def _then(self, known: FloatArray, time: float) -> FloatArray:
         """Return where the bodies (b, 4) were."""

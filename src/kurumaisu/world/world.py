@@ -72,12 +72,6 @@ class World:
         return self.starts[0].pose
 
     @property
-    def returns(self) -> FloatArray:
-        """Reflectance (m,) [1] of the segments: the ranger_return of their models."""
-        seen = [m for m in self.models if m.ranger_return >= 0 and not _travels(m, self.models)]
-        return np.repeat([m.ranger_return for m in seen], [len(m.shape.segments) for m in seen])
-
-    @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Smallest x, smallest y, largest x, largest y [m] of the walls. Raise Error if there are none."""
         both = np.concatenate([self.segments, self.obstacles]).reshape(-1, 2)
