@@ -8,8 +8,11 @@ from typing import cast
 
 import numpy as np
 
+from kurumaisu.effects import Reference
+from kurumaisu.geometry import between, wrap
 from kurumaisu.sim import fans
 from kurumaisu.sim.drive import Drive, Rows
+from kurumaisu.sim.fleet_effects import FleetEffects
 from kurumaisu.sim.motion import Motion, StageMotion
 from kurumaisu.sim.odometry import Localization
 from kurumaisu.sim.options import Options
@@ -21,11 +24,15 @@ from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
 
+_PLANAR = [0, 1, 3]
+
 
 class Machinery:
     """Built once for a population; a new one takes over from an old one when models come, go, or walls move."""
 
-    def __init__(self, population: Population, options: Options, interval: float, dynamics: Dynamics | None) -> None:
+    def __init__(
+        self, population: Population, options: Options, interval: float, dynamics: Dynamics | None, seed: int
+    ) -> None:
         """Place all bodies where they begin; interval [s] is a step's length; dynamics: None for Stage's semantics."""
         models = population.models
         self.population = population
@@ -44,10 +51,11 @@ class Machinery:
         self.stalled = np.zeros(len(self.bodies), dtype=np.bool_)
         self.place(population.poses[self.bodies.heads])
         self._velocities = np.zeros((len(self.bodies), 3))
-        self.begin()
+        self.begin(seed)
 
-    def begin(self) -> None:
-        """Make drives, odometry and rangers anew, as they are before the first step."""
+    def begin(self, seed: int) -> None:
+        """Make drives, odometry, rangers and effects anew, as they are before the first step; seed: of the effects."""
+        self.seed = seed
         devices = [cast(Position, model.device) for model in self.robots]
         starts = self.robot_poses
         born = self.population.born
@@ -60,7 +68,10 @@ class Machinery:
         looks = self._periods([fan.model.update_interval for fan in self.fans], always=False)
         births = born[[fan.model.index for fan in self.fans]].astype(np.int64)
         sweep = self.options.scan_sweep / self.interval
-        self.rangers = Rangers(self.arena, self.fans, np.stack([looks, births], axis=-1), sweep)
+        self.effects = FleetEffects(self.options, self.robots, self.robot_keys, self.interval)
+        self.effects.begin(seed)
+        touched = self.effects.begin_fans(self.fans, self.population.keys, self.arena)
+        self.rangers = Rangers(self.arena, self.fans, np.stack([looks, births], axis=-1), sweep, touched)
 
     def _make_motion(self) -> Motion:
         if self.dynamics is None:
@@ -110,16 +121,30 @@ class Machinery:
         self.localization.update(due, poses[: len(self.robots)], self.drive.velocities, rng)
 
     def move(self) -> None:
-        """Move all bodies as the drives want."""
-        if self._everybody_drives:
-            velocities = self.drive.velocities
-        else:
+        """Move all bodies as the drives want, or as the effects let them."""
+        velocities = self.drive.velocities
+        if self.effects.moves:
+            velocities = self.effects.driven(velocities, self.frames[self.robot_rows, 3])
+        if not self._everybody_drives:
+            self._velocities[self.robot_rows] = velocities
             velocities = self._velocities
-            velocities[self.robot_rows] = self.drive.velocities
         poses, stalled = self.motion.move(velocities, self.interval)
         self.before, self.frames = self.frames, self.before
         self.frames[:-1] = poses
         self.stalled[:] = stalled
+
+    def rates(self) -> FloatArray:
+        """Return how the robots (n, 3) moved in the last step: forward, leftward [m/s], turn [rad/s]; stalled: 0."""
+        rows = self.robot_rows
+        way = between(self.before[rows][:, _PLANAR], self.frames[rows][:, _PLANAR])
+        way[:, 2] = wrap(way[:, 2])
+        return way / self.interval
+
+    def reference(self, time: float) -> Reference | None:
+        """Return what a reference measures of the robots; None: the truth."""
+        if not self.effects.referred:
+            return None
+        return self.effects.seen(time, self.robot_poses[:, _PLANAR], self.rates())
 
     def model_poses(self) -> FloatArray:
         """Return where all models are now (models, 4)."""

@@ -9,6 +9,7 @@ from typing import overload
 
 import numpy as np
 
+from kurumaisu.effects import Reference
 from kurumaisu.sim.sensors.suite import Reading
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -79,7 +80,8 @@ class Observation:
     time [s] since the reset; poses (n, 4): true x, y, z, heading in the map; odometry (n, 3): x, y, heading as the
     robots believe; velocities (n, 3): forward, leftward, turn as commanded and bounded [m/s, rad/s], also of those
     who are stalled (n,): kept from their last move; dropped: commands since the reset with numbers that are none;
-    readings: of those sensors of a sensors.yaml that were due.
+    readings: of those sensors of a sensors.yaml that were due; reference: what a reference measures of the truth, where
+    effects act on that, a row for each robot.
     """
 
     time: float
@@ -90,3 +92,4 @@ class Observation:
     scans: Scans
     dropped: int
     readings: tuple[Reading, ...]
+    reference: Reference | None

@@ -9,15 +9,11 @@ from typing import Any
 import numpy as np
 
 from kurumaisu._core import Arena
-from kurumaisu.geometry import between, wrap
 from kurumaisu.sim.machinery import Machinery
 from kurumaisu.sim.partition import build_arena
 from kurumaisu.sim.sensors.bumper import BumperSettings
 from kurumaisu.sim.sensors.settings import SensorSettings
 from kurumaisu.sim.sensors.suite import Moment, Reading, SensorSuite
-from kurumaisu.types import FloatArray
-
-_PLANAR = [0, 1, 3]
 
 
 class Sensing:
@@ -49,18 +45,10 @@ class Sensing:
 
     def _moment(self, time: float) -> Moment:
         machinery = self._machinery
-        return Moment(time, machinery.arena, self._moved_solids(), machinery.model_poses(), velocities(machinery))
+        return Moment(time, machinery.arena, self._moved_solids(), machinery.model_poses(), machinery.rates())
 
     def _moved_solids(self) -> Arena:
         machinery = self._machinery
         if self._solids is not machinery.arena:
             self._solids.set_poses(self._numbers, np.ascontiguousarray(machinery.frames[:-1]))
         return self._solids
-
-
-def velocities(machinery: Machinery) -> FloatArray:
-    """Return how the robots (n, 3) moved in the last step: forward, leftward [m/s], turn [rad/s]; stalled: zeros."""
-    rows = machinery.robot_rows
-    way = between(machinery.before[rows][:, _PLANAR], machinery.frames[rows][:, _PLANAR])
-    way[:, 2] = wrap(way[:, 2])
-    return way / machinery.interval

@@ -14,17 +14,19 @@ from kurumaisu.params import shipped
 from kurumaisu.sim import snapshot, state
 from kurumaisu.sim.drive import without_nonsense
 from kurumaisu.sim.fans import RangerFan
+from kurumaisu.sim.fleet_effects import check_names
 from kurumaisu.sim.life import checked_pose, moved, rebuilt, same_fans, stuck, with_newcomers
 from kurumaisu.sim.machinery import Machinery
 from kurumaisu.sim.observation import Observation
 from kurumaisu.sim.options import Options
+from kurumaisu.sim.partition import is_robot
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.sensing import Sensing
 from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
 from kurumaisu.sim.sensors.suite import Reading
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.types import FloatArray
-from kurumaisu.world import World
+from kurumaisu.world import World, read_snippet
 from kurumaisu.world.model import Model
 
 
@@ -37,15 +39,17 @@ class Simulator:
         Raise Error for options or sensors that do not fit the world.
         """
         self._sensors = tuple(sensors)
+        options = options.of_world(world.semantics)
         if options.scan_sweep > world.interval:
             raise Error(
                 f"scan_sweep: {options.scan_sweep:g} s is more than a step of {world.path}: {world.interval:g} s"
             )
         self._world = world
         self._options = options
-        self._late = options.timing == "consistent" or options.semantics == "physical"
+        self._late = options.timing == "consistent"
         dynamics = load_dynamics(shipped("launch/physical.yaml")) if options.semantics == "physical" else None
-        self._home = Machinery(Population.first(world.models, world.poses), options, world.interval, dynamics)
+        check_names(options.effects, [model for model in world.models if is_robot(model)])
+        self._home = Machinery(Population.first(world.models, world.poses), options, world.interval, dynamics, 0)
         what = world.models, world.poses, world.interval, replace(options, threads=1), self._sensors
         self._fingerprint = state.digest(what)
         self._sensing: Sensing | None = None
@@ -62,7 +66,7 @@ class Simulator:
         self._step = 0
         self._dropped = 0
         home.place(home.population.poses[home.bodies.heads])
-        home.begin()
+        home.begin(seed)
         home.localization.draw_errors(self._odometry_rng)
         home.rangers.start(0.0, home.frames, self._ranger_rng)
         self._power_up()
@@ -104,6 +108,7 @@ class Simulator:
             scans=machinery.rangers.scans,
             dropped=self._dropped,
             readings=self._readings,
+            reference=machinery.reference(self.time),
         )
 
     def reset_positions(self) -> None:
@@ -120,8 +125,14 @@ class Simulator:
         """
         self._have(moved(self._machinery, self._index(model), checked_pose(pose)))
 
-    def spawn(self, models: Sequence[Model], pose: FloatArray | Sequence[float]) -> None:
-        """Add a model with all that stands on it, parents first, the first one at a pose (4,) in the map."""
+    def spawn(self, models: str | Sequence[Model], pose: FloatArray | Sequence[float]) -> None:
+        """Add a model with all that stands on it, parents first, the first one at a pose (4,) in the map.
+
+        Text is read in the words of the world file, as `pioneer ( name "guest" )`. Raise Error with line and column.
+        """
+        if isinstance(models, str):
+            snippet = read_snippet(models, self._world.vocabulary)
+            models, self.warnings = snippet.models, (*self.warnings, *snippet.warnings)
         population = with_newcomers(self._machinery.population, models, checked_pose(pose), self._step)
         self._have(rebuilt(self._machinery, population))
 
@@ -140,8 +151,7 @@ class Simulator:
             raise Error(f"state: is of another world than {self._world.path}, or of other options")
         machinery = self._home
         if known["population"] is not None:
-            machinery = Machinery(known["population"], self._options, self._world.interval, self._home.dynamics)
-            machinery.begin()
+            machinery = Machinery(known["population"], self._options, self._world.interval, self._home.dynamics, 0)
         self._machinery = machinery
         self._step, self._dropped = known["step"], known["dropped"]
         snapshot.restore(machinery, known["machinery"])
@@ -233,4 +243,5 @@ class Simulator:
             machinery.localization.draw_errors(self._odometry_rng, fresh)
             machinery.rangers.start(self.time, machinery.frames, self._ranger_rng)
             machinery.rangers.take_over(old.rangers.scans, same_fans(machinery, old))
+            machinery.effects.restore(old.effects.state())
             self._power_up()

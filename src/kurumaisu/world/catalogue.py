@@ -24,7 +24,17 @@ _MODEL = {
     *("update_interval", "mass", "friction", "gui_nose", "gui_grid", "gui_outline", "gui_move"),
 }
 _HEEDED: dict[str, set[str]] = {
-    "world": {"name", "resolution", "interval_sim", "quit_time", "speedup", "unit_length", "unit_angle", "test"},
+    "world": {
+        "name",
+        "resolution",
+        "interval_sim",
+        "quit_time",
+        "speedup",
+        "unit_length",
+        "unit_angle",
+        "test",
+        "semantics",
+    },
     "block": {"points", "point", "z"},
     "sensor": {"pose", "size", "range", "fov", "samples", "noise"},
     "position": {
