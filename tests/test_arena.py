@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from kurumaisu._core import Arena
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     seed=st.integers(0, 10**6),
     bodies=st.integers(0, 12),

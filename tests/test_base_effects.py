@@ -95,7 +95,7 @@ def test_slope_depends_on_the_heading_in_the_map():
 
 
 @given(cut=st.integers(1, 49), heading=st.floats(-7, 7), seed=st.integers(0, 99))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_slope_told_the_heading_in_chunks(cut, heading, seed):
     v, w = np.random.default_rng(seed).uniform(-1, 1, (2, 50))
     values = {"climb_x": 0.02, "climb_y": -0.03}
@@ -155,7 +155,7 @@ def test_backlash_drags_and_lets_go_at_rest():
 
 
 @given(inputs=st.lists(st.floats(-1, 1), min_size=1, max_size=60), play=st.floats(0, 0.5))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_backlash_is_never_further_than_half_the_play(inputs, play):
     out = apply("base.backlash", {"play": play}, np.ones(len(inputs)), inputs).w
     assert np.abs(out - inputs).max() <= play / 2 + 1e-12

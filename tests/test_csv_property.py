@@ -18,7 +18,7 @@ ROWS = st.lists(st.tuples(NUMBER, NUMBER, NUMBER), min_size=1, max_size=20, uniq
 TEXT = st.text(alphabet=st.sampled_from('0123456789.,-+enaift \n\r"#\tx,,\n\n'), max_size=200)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(ROWS)
 def test_any_finite_numbers_survive(rows):
     table = np.array(sorted(rows))
@@ -32,7 +32,7 @@ def test_any_finite_numbers_survive(rows):
         np.testing.assert_array_equal(part.values, back.values)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.sampled_from(["t,r0,r1\n", "t,x,y,theta\n", "t,tyre\n", ""]), TEXT)
 def test_any_text_is_read_or_refused_with_the_file_named(header, text):
     with tempfile.TemporaryDirectory() as folder:

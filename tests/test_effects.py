@@ -44,7 +44,7 @@ def rates(motion: effects.Motion) -> np.ndarray:
 
 @pytest.mark.parametrize("effect", RATES, ids=lambda effect: effect.id)
 @given(cuts=st.lists(st.integers(1, 299), max_size=6, unique=True), seed=st.integers(0, 1000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_chunks_give_the_same_motion_as_the_whole(effect, cuts, seed):
     motion = drive(300, seed)
     whole = effect(TYPICAL[effect.id], context()).apply(motion)
@@ -75,7 +75,7 @@ def columns(it: effects.Volts) -> np.ndarray:
 
 @pytest.mark.parametrize("effect", VOLTS, ids=lambda effect: effect.id)
 @given(cut=st.integers(1, 99), seed=st.integers(0, 1000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_chunks_give_the_same_voltages_as_the_whole(effect, cut, seed):
     given_volts = columns(volts(100, seed))
     whole = columns(effect(TYPICAL[effect.id], context()).apply(effects.Volts(*given_volts)))

@@ -98,7 +98,7 @@ def test_spreads_at_chosen_values(name, values, more, sd):
 
 @pytest.mark.parametrize("effect", READING, ids=lambda effect: effect.id)
 @given(seed=st.integers(0, 1000), stamp=st.floats(0, 1e4))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_null_is_absent(effect, seed, stamp):
     rng = np.random.default_rng(seed)
     ranges = np.where(rng.random(50) < 0.2, np.inf, rng.uniform(0, 6, 50))

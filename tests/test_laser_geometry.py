@@ -48,7 +48,7 @@ def test_geometry_at_chosen_values():
 
 
 @given(pitch=st.floats(-0.4, 0.4), roll=st.floats(-0.4, 0.4))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_tilted_beams_are_turned_directions(pitch, roll):
     """Against rotation matrices; and a wall or the floor is met where the ray in space meets it."""
     cp, sp, cr, sr = np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
@@ -67,7 +67,7 @@ def test_tilted_beams_are_turned_directions(pitch, roll):
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_incidence_is_the_angle_to_the_walls_normal(seed):
     """A triangle round the laser: the angle of each beam against each side's normal, by the side that it meets."""
     rng = np.random.default_rng(seed)

@@ -71,7 +71,7 @@ def worst_overlap(bodies: list[Rigid], poses: FloatArray) -> float:
     return deepest
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 10**6), friction=st.floats(0.0, 0.5))
 def test_without_motors_energy_never_grows(seed: int, friction: float) -> None:
     rng = np.random.default_rng(seed)

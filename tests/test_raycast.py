@@ -52,7 +52,7 @@ def distance(segments: FloatArray, point: FloatArray) -> float:
 coordinates = st.floats(-10, 10, allow_nan=False).map(lambda x: round(x, 3))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     segments=st.integers(1, 30).flatmap(lambda m: arrays(np.float64, (m, 4), elements=coordinates)),
     poses=st.integers(1, 20).flatmap(lambda n: arrays(np.float64, (n, 3), elements=coordinates)),

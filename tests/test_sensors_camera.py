@@ -88,7 +88,7 @@ def _inside(eye: FloatArray, box: tuple[float, ...]) -> bool:
     return near and box[2] - 0.01 < eye[2] < box[2] + box[6] + 0.01
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(boxes=boxes, height=st.floats(0.05, 3), heading=st.floats(-4, 4))
 def test_any_boxes_agree_with_a_ray_per_pixel(boxes: list[tuple[float, ...]], height: float, heading: float) -> None:
     models = [make_model(i, rectangle(b[4], b[5]), (0.0, b[6])) for i, b in enumerate(boxes)]
@@ -100,7 +100,7 @@ def test_any_boxes_agree_with_a_ray_per_pixel(boxes: list[tuple[float, ...]], he
     assert share_of_differences(found.depth, expected_depth(models, poses, eye, CAMERA)) < 0.002  # edges, by rounding
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(boxes=boxes, height=st.floats(0.3, 3), heading=st.floats(-4, 4), tilt=st.floats(-1.5, 1.5))
 def test_tilted_agrees_but_for_edges(
     boxes: list[tuple[float, ...]], height: float, heading: float, tilt: float

@@ -65,7 +65,7 @@ def test_no_strips() -> None:
 
 
 @given(x=st.floats(-1, 1), y=st.floats(-1, 1), heading=st.floats(-4, 4), ends=st.tuples(*[st.floats(-1, 1)] * 4))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_any_segment_against_signed_areas(x: float, y: float, heading: float, ends: tuple[float, ...]) -> None:
     """Two segments cross if the ends of each are on different sides of the other."""
     pose = np.array([[x, y, 0.0, heading]])
@@ -151,7 +151,7 @@ targets = st.lists(st.tuples(coordinate, coordinate, st.floats(-3, 3), st.intege
 
 
 @given(targets=targets, heading=st.floats(-4, 4))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_field_of_boxes_by_the_rules_one_by_one(
     targets: list[tuple[float, float, float, int]], heading: float
 ) -> None:

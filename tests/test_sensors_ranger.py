@@ -74,7 +74,7 @@ def ring(**changes: float) -> SonarSettings:
 
 
 @given(angle=st.floats(-math.pi, math.pi), distance=st.floats(0.3, 4.0), tilt=st.floats(-1.2, 1.2))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_a_sonar_reads_the_nearest_point_of_a_wall_in_its_cone(angle: float, distance: float, tilt: float) -> None:
     facing = (
         angle + tilt

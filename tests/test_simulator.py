@@ -216,7 +216,7 @@ def crowd(tmp_path_factory: pytest.TempPathFactory) -> Simulator:
     return simulator(tmp_path_factory.mktemp("crowd"), ROOM + robots)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.lists(st.floats(allow_subnormal=True), min_size=9, max_size=9), min_size=1, max_size=5))
 def test_no_command_leads_out_of_bounds(crowd: Simulator, commands: list[list[float]]) -> None:
     before = crowd.reset(1)

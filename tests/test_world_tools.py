@@ -36,7 +36,7 @@ def read(folder: Path, text: str):
     return load_world(path)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.tuples(*[st.floats(-3, 3)] * 2),
     st.tuples(*[st.floats(0.001, 0.6)] * 2),
