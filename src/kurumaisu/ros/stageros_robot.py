@@ -17,7 +17,7 @@ from kurumaisu.ros.outlet import Outlet
 from kurumaisu.ros.stageros_plan import RobotPlan, ScanPlan
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.ros.wire import BoolWire, LaserScanWire, OdometryWire, RangeWire, Stamp
-from kurumaisu.sim.observation import Scan
+from kurumaisu.sim.scans import Scan
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Fan
 

@@ -11,8 +11,8 @@ import numpy as np
 from kurumaisu._core import Arena
 from kurumaisu.sim.fan_effects import FanEffects
 from kurumaisu.sim.fans import RangerFan, moments, spread
-from kurumaisu.sim.observation import Scans, Sweep
 from kurumaisu.sim.partition import attached
+from kurumaisu.sim.scans import Scans, Sweep
 from kurumaisu.sim.sensors.ranger_noise import RangerNoise
 from kurumaisu.types import FloatArray, IntArray
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sensors of a sensors.yaml on a simulator's robots."""
+"""All that a simulator's robots sense beside their rangers: sensors of a sensors.yaml, devices of the world file."""
 
 from __future__ import annotations
 
@@ -8,47 +8,58 @@ from typing import Any
 
 import numpy as np
 
-from kurumaisu._core import Arena
+from kurumaisu.sim.devices import Value, WorldDevices
 from kurumaisu.sim.machinery import Machinery
-from kurumaisu.sim.partition import build_arena
 from kurumaisu.sim.sensors.bumper import BumperSettings
 from kurumaisu.sim.sensors.settings import SensorSettings
 from kurumaisu.sim.sensors.suite import Moment, Reading, SensorSuite
+from kurumaisu.sim.solids import Solids
 
 
 class Sensing:
-    """Reads the sensors that are due, in every step."""
+    """Reads what is due, in every step.
+
+    readings, devices: what was due in the last one: see Observation.
+    """
 
     def __init__(
-        self, sensors: Sequence[SensorSettings], machinery: Machinery, time: float, rng: np.random.Generator
+        self,
+        sensors: Sequence[SensorSettings],
+        machinery: Machinery,
+        cell: float,
+        time: float,
+        rng: np.random.Generator,
     ) -> None:
-        """Power up the sensors at a time [s]. Raise Error for a robot that the world has not."""
-        self._machinery = machinery
-        self._solids, self._numbers = machinery.arena, machinery.numbers
-        if any(isinstance(sensor.parameters, BumperSettings) for sensor in sensors):
-            start = machinery.population
-            threads = machinery.options.threads
-            self._solids, self._numbers, _ = build_arena(start.models, start.poses, machinery.bodies, threads, True)
-        self._suite = SensorSuite(sensors, machinery.population.models, self._moment(time), rng)
+        """Power up the sensors at a time [s]; cell [m]: the world's resolution.
 
-    def read(self, time: float) -> tuple[Reading, ...]:
-        """Return the readings that are due."""
-        return self._suite.read(self._moment(time))
+        Raise Error for a robot that the world has not.
+        """
+        self._machinery = machinery
+        felt = any(isinstance(sensor.parameters, BumperSettings) for sensor in sensors)
+        self._solids = Solids(machinery) if felt else None
+        self._suite = SensorSuite(sensors, machinery.population.models, self._moment(time), rng) if sensors else None
+        types = machinery.options.devices
+        self._devices = WorldDevices(machinery, types, cell) if types else None
+        self.readings: tuple[Reading, ...] = ()
+        self.devices: dict[int, Value] = {}
+
+    def read(self, step: int, time: float) -> None:
+        """Read what is due in a step, counted from 1, which ends at a time [s]."""
+        if self._suite is not None:
+            self.readings = self._suite.read(self._moment(time))
+        if self._devices is not None:
+            self.devices = self._devices.read(step)
 
     def state(self) -> list[dict[str, Any]]:
         """Return what the next readings depend on: not copies."""
-        return self._suite.state()
+        return self._suite.state() if self._suite is not None else []
 
     def restore(self, state: Sequence[dict[str, Any]]) -> None:
         """Go back to a state of the same sensors."""
-        self._suite.restore(state)
+        if self._suite is not None:
+            self._suite.restore(state)
 
     def _moment(self, time: float) -> Moment:
         machinery = self._machinery
-        return Moment(time, machinery.arena, self._moved_solids(), machinery.model_poses(), machinery.rates())
-
-    def _moved_solids(self) -> Arena:
-        machinery = self._machinery
-        if self._solids is not machinery.arena:
-            self._solids.set_poses(self._numbers, np.ascontiguousarray(machinery.frames[:-1]))
-        return self._solids
+        solids = machinery.arena if self._solids is None else self._solids.now()
+        return Moment(time, machinery.arena, solids, machinery.model_poses(), machinery.rates())

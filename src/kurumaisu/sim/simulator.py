@@ -23,7 +23,6 @@ from kurumaisu.sim.partition import is_robot
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.sensing import Sensing
 from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
-from kurumaisu.sim.sensors.suite import Reading
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World, read_snippet
@@ -52,8 +51,6 @@ class Simulator:
         self._home = Machinery(Population.first(world.models, world.poses), options, world.interval, dynamics, 0)
         what = world.models, world.poses, world.interval, replace(options, threads=1), self._sensors
         self._fingerprint = state.digest(what)
-        self._sensing: Sensing | None = None
-        self._readings: tuple[Reading, ...] = ()
         self.reset(0)
         self.warnings = (*world.warnings, *stuck(self._home))
 
@@ -92,8 +89,7 @@ class Simulator:
         machinery.rangers.update(self._step, self.time, way, self._ranger_rng)
         if not self._late:
             machinery.move()
-        if self._sensing is not None:
-            self._readings = self._sensing.read(self.time)
+        self._sensing.read(self._step, self.time)
         return self.observe()
 
     def observe(self) -> Observation:
@@ -107,7 +103,8 @@ class Simulator:
             stalled=machinery.robots_stalled,
             scans=machinery.rangers.scans,
             dropped=self._dropped,
-            readings=self._readings,
+            readings=self._sensing.readings,
+            devices=self._sensing.devices,
             reference=machinery.reference(self.time),
         )
 
@@ -156,8 +153,7 @@ class Simulator:
         self._step, self._dropped = known["step"], known["dropped"]
         snapshot.restore(machinery, known["machinery"])
         self._power_up()
-        if self._sensing is not None:
-            self._sensing.restore(known["sensors"])
+        self._sensing.restore(known["sensors"])
         for rng, random in zip(self._rngs, known["random"], strict=True):
             rng.bit_generator.state = random
         return self.observe()
@@ -209,19 +205,15 @@ class Simulator:
             "dropped": self._dropped,
             "random": tuple(rng.bit_generator.state for rng in self._rngs),
             "machinery": snapshot.take(machinery),
-            "sensors": self._sensing.state() if self._sensing is not None else None,
+            "sensors": self._sensing.state(),
         }
 
     def _power_up(self) -> None:
-        """Start the sensors of sensors.yaml; they start anew when models come or go."""
-        self._readings = ()
+        """Start the sensors of sensors.yaml and the world's devices; they start anew when models come or go."""
         names = {robot.name for robot in self.robots} | {EVERY_ROBOT}
         home = self._machinery is self._home
         sensors = [sensor for sensor in self._sensors if home or sensor.robot in names]  # at home a wrong name is said
-        if sensors:
-            self._sensing = Sensing(sensors, self._machinery, self.time, self._sensor_rng)
-        else:
-            self._sensing = None
+        self._sensing = Sensing(sensors, self._machinery, self._world.resolution, self.time, self._sensor_rng)
 
     def _heard(self, commands: FloatArray) -> FloatArray:
         """Return commands that are numbers."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from kurumaisu.geometry import wrap
 from kurumaisu.types import FloatArray
 from kurumaisu.world.catalogue import MODELS
 from kurumaisu.world.colors import color
@@ -144,5 +145,5 @@ def global_poses(models: Sequence[Model]) -> FloatArray:
         dx, dy, dz, turn = model.pose.tolist()
         top = parent.size[2] if parent.stack_children else 0.0
         poses[model.index] = (x + c * dx - s * dy, y + s * dx + c * dy, z + dz + top, heading + turn)
-    poses[:, 3] = (poses[:, 3] + math.pi) % (2 * math.pi) - math.pi
+    poses[:, 3] = wrap(poses[:, 3])
     return poses
