@@ -103,4 +103,4 @@ class Services:
             self._requests.ask(action)
         except Error as error:
             return False, str(error)
-        return True, f"at {self._session.time:.3f} s"
+        return True, f"at {self._session.time:.3f} s, {self._session.heard} commands heard"
