@@ -6,6 +6,10 @@ setup(
     **generate_distutils_setup(
         packages=find_packages("src", include=["kurumaisu", "kurumaisu.*"]),
         package_dir={"": "src"},
-        package_data={"kurumaisu.critic": ["*.json", "*.html"], "kurumaisu": ["py.typed"]},
+        package_data={
+            "kurumaisu.bench": ["drivers/*.cpp"],
+            "kurumaisu.critic": ["*.json", "*.html"],
+            "kurumaisu": ["py.typed"],
+        },
     )
 )

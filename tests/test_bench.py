@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from kurumaisu.bench import __main__, base, chair, rays, robots, sim, ways
+from kurumaisu.bench import __main__, agreement, base, chair, peers, rays, robots, sim, ways
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
@@ -86,3 +86,22 @@ def test_table_columns_stay_in_line(capsys):
     assert lines[1] == "title"
     assert len({len(lines[2]), *(len(line) for line in lines[4:])}) == 1
     assert lines[4].endswith("1.235")
+
+
+def test_a_peers_words():
+    run = peers.read_run("[Loading]\nload 0.5\ncpu 2\nmemory 64\nmodels 3\npose 1 2 0 0.5\n")
+    assert (run.load, run.cpu, run.memory, run.models) == (0.5, 2.0, 64.0, 3)
+    np.testing.assert_array_equal(run.poses, [[1, 2, 0, 0.5]])
+    with pytest.raises(Error, match="load, cpu or memory: 'load 1"):
+        peers.read_run("load 1\n")
+
+
+def test_a_peer_that_is_not_there(tmp_path):
+    with pytest.raises(Error, match="returned"):
+        peers.Stage(tmp_path, tmp_path)
+
+
+def test_agreement_leaves_out_jumps_but_no_slopes():
+    slope = [np.array([value, value]) for value in (5.0, 4.8, 4.9, 5.1, 5.2)]  # here, right2, right, left, left2
+    slope[3][1] = 7.0
+    assert agreement._edges(slope, 0.02).tolist() == [False, True]

@@ -166,6 +166,7 @@ def test_the_chair_of_the_worlds_is_the_one_of_the_model_file():
     chassis = model.chassis
     np.testing.assert_allclose(corners.max(axis=0), [chassis.axle_to_front, chassis.width / 2], atol=1e-9)
     np.testing.assert_allclose(corners.min(axis=0)[0], chassis.axle_to_front - chassis.length, atol=1e-9)
+    assert chair.size[2] == chassis.height
     assert chair.mass == chassis.mass
     ranger = next(m for m in world.models if isinstance(m.device, Ranger))
     fan, laser = ranger.device.fans[0], model.laser

@@ -20,6 +20,7 @@ class Chassis:
 
     length: float
     width: float
+    height: float
     axle_to_front: float
     track: float
     mass: float
@@ -143,7 +144,7 @@ def _axis(axis: settings.Section) -> AxisLaw:
 
 
 def _chassis(section: settings.Section) -> Chassis:
-    names = ("length", "width", "axle_to_front", "track", "mass")
+    names = ("length", "width", "height", "axle_to_front", "track", "mass")
     chassis = Chassis(**{name: section.number(name, above=0) for name in names})
     section.end()
     if chassis.axle_to_front >= chassis.length:

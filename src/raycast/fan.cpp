@@ -116,10 +116,13 @@ void Fan::fill(std::size_t i, std::size_t k) {
   const std::int32_t segment = segments_[i];
   std::fill(segments_.begin() + static_cast<std::ptrdiff_t>(i) + 1,
             segments_.begin() + static_cast<std::ptrdiff_t>(k), segment);
-  const Segment s = segment < 0 ? Segment{} : scene_.segment(segment);
-  for (std::size_t m = i + 1; m < k; ++m) {
-    ranges_[m] = segment < 0 ? kInfinity : std::max(rangeToLine(endsOf(ray(m), s)), 0.0);
+  if (segment < 0) {
+    std::fill(ranges_.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+              ranges_.begin() + static_cast<std::ptrdiff_t>(k), kInfinity);
+    return;
   }
+  const Segment s = scene_.segment(segment);
+  for (std::size_t m = i + 1; m < k; ++m) ranges_[m] = std::max(rangeToLine(endsOf(ray(m), s)), 0.0);
 }
 
 /// How many beams from beam i, counted along the fan (sense 1) or back (-1), until its segment ends.
@@ -127,7 +130,9 @@ double Fan::beamsToEnd(std::size_t i, double sense) const {
   const Ends e = endsOf(ray(i), scene_.segment(segments_[i]));
   const double sign = increment_ > 0 ? sense : -sense;
   const bool a = e.side_a * sign > e.side_b * sign;
-  const double angle = a ? std::atan2(e.side_a, e.along_a) : std::atan2(e.side_b, e.along_b);
+  const double side = a ? e.side_a : e.side_b;
+  const double along = a ? e.along_a : e.along_b;
+  const double angle = roughAngle(static_cast<float>(along), static_cast<float>(side));
   return std::max(0.0, std::floor(sense * angle / increment_));
 }
 

@@ -95,12 +95,16 @@ Hit Scene::cast(const Ray& ray, double max_range) const {
   Hit best{max_range, -1};
   while (u.inside() && v.inside() && at * cell <= best.range + kSlack * cell) {
     const std::size_t index = grid_.index(u.at, v.at);
-    for (const std::int32_t* i = grid_.begin(index); i != grid_.end(index); ++i) {
-      const double range = rangeTo(ray, segments_[static_cast<std::size_t>(*i)]);
-      if (range < best.range || (range == max_range && best.segment < 0 && range < kInfinity))
-        best = {range, *i};
+    const int clearance = grid_.clearance(index);
+    if (clearance == 0) {
+      for (const std::int32_t* i = grid_.begin(index); i != grid_.end(index); ++i) {
+        const double range = rangeTo(ray, segments_[static_cast<std::size_t>(*i)]);
+        if (range < best.range || (range == max_range && best.segment < 0 && range < kInfinity)) {
+          best = {range, *i};
+        }
+      }
     }
-    const int reach = std::max(0, grid_.clearance(index) - 1);  // all cells within reach are empty
+    const int reach = std::max(0, clearance - 1);  // all cells within reach are empty
     const double t_u = u.leaves(reach);
     const double t_v = v.leaves(reach);
     if (t_u < t_v) {
@@ -126,8 +130,7 @@ void Scene::cast(const Pose2D* poses, bool one_pose, const double* bearings, std
 
 void Scene::castFan(const Pose2D& origin, double first, double increment, std::size_t n, double max_range,
                     Hit* hits) const {
-  // As far as a wedge hides things from its neighbours, witnesses pay: few beams, or such that are far apart, seldom
-  // meet the same wall, and a witness costs a hundredth of a ray.
+  // Beams that are few or far apart seldom meet the same wall, and a witness costs about a hundredth of a ray.
   constexpr double kFarApart = 0.1;     // [rad]
   constexpr double kTooClose = 1e-4;    // [rad] the witnesses' angles are rough
   constexpr double kAlmostATurn = 6.0;  // [rad]

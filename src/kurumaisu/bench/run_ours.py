@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import resource
 import sys
 import time
 from dataclasses import replace
@@ -28,9 +27,15 @@ def main(world: Path, seconds: float, v: float, w: float, semantics: str, thread
         observation = simulator.step(commands)
     print("cpu", time.process_time() - start)
     print("wall", time.perf_counter() - wall)
-    print("memory", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    print("memory", _peak_memory())
     for pose in observation.poses:
         print("pose", *(f"{value:.9g}" for value in pose))
+
+
+def _peak_memory() -> float:
+    """Return that of this process [MiB]; getrusage would count that of its parent too."""
+    words = Path("/proc/self/status").read_text().split()
+    return float(words[words.index("VmHWM:") + 1]) / 1024
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from kurumaisu.bench import chair, peers, rays, robots, ways
+from kurumaisu.bench import chair, peers, plots, rays, robots, ways
 from kurumaisu.bench.scenes import maps, shipped_map
 from kurumaisu.params import load_model, shipped
 from kurumaisu.world import load_world
@@ -28,6 +28,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         places = maps(options.stage_tree) if options.stage_tree else (shipped_map(),)
         rays.table(places, stage, folder, options.poses, options.repeats)
         robots.table(places, stage, folder, options.seconds, options.repeats)
+        if options.plots:
+            plots.draw(places, stage, folder, options.plots)
     if not options.stage_tree:
         print("\nno --stage-tree: the worlds are this package's own, not the cave and the hospital")
     print(f"\nlargest difference of ranges {difference:.1e} m, at most {_EXACT:.0e} m")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -12,6 +11,8 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image
 
 from kurumaisu.ros.outlet import Outlet
+from kurumaisu.ros.rotation import optical
+from kurumaisu.ros.sensor_messages import intrinsics
 from kurumaisu.ros.stageros_plan import CameraPlan, RobotPlan
 from kurumaisu.ros.stageros_rates import Pace
 from kurumaisu.ros.stageros_robot import DEPTH
@@ -21,7 +22,6 @@ from kurumaisu.sim.sensors.camera import (
     CameraSensor,
     Picture,
     Scenery,
-    camera_info,
     millimetres,
     mounted_eye,
     stage_eye,
@@ -93,12 +93,12 @@ class CameraTopics:
         self._info = Outlet(names.topic("camera_info", number), CameraInfo, DEPTH)
         self._image_wire = _image_wire(plan, "rgba8", 4)
         self._depth_wire = _image_wire(plan, *(("32FC1", 4) if settings.depth_canonical else ("16UC1", 2)))
-        self._info_wire = CameraInfoWire(_info_message(plan))
+        self._info_wire = CameraInfoWire(intrinsics(camera, plan.frame))
         self.transform = TransformsWire([(base, plan.frame)])
-        # as in 1.8.0, where the lens looks along z: turned about x, then about the robot's z
+        # as in 1.8.0, where the lens looks along z
         x, y, z, heading = plan.mount.tolist()
-        roll, yaw = -math.pi / 2 - camera.tilt, heading - math.pi / 2 - camera.pan
-        self.transform.fill(0, (x, y, z, *_quaternion(roll, yaw)))
+        turn = optical(heading, camera.pan, camera.tilt)
+        self.transform.fill(0, (x, y, z, turn.x, turn.y, turn.z, turn.w))
 
     @property
     def wanted(self) -> bool:
@@ -141,18 +141,3 @@ def _image_wire(plan: CameraPlan, encoding: str, depth: int) -> ImageWire:
     message = Image(width=width, height=height, encoding=encoding, step=width * depth)
     message.header.frame_id = plan.frame
     return ImageWire(message, width * height * depth)
-
-
-def _info_message(plan: CameraPlan) -> CameraInfo:
-    info = camera_info(plan.camera)
-    message = CameraInfo(width=info.width, height=info.height, D=[0.0] * 4)
-    message.header.frame_id = plan.frame
-    message.K, message.R, message.P = (matrix.ravel().tolist() for matrix in (info.k, info.r, info.p))
-    return message
-
-
-def _quaternion(roll: float, yaw: float) -> tuple[float, float, float, float]:
-    """Return x, y, z, w of a turn about x [rad], then about the fixed z [rad]."""
-    sr, cr = math.sin(roll / 2), math.cos(roll / 2)
-    sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
-    return cy * sr, sy * sr, sy * cr, cy * cr

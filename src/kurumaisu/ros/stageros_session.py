@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import rospy
@@ -147,26 +146,19 @@ class Session:
         self._simulator.delete(self._model(name))
         self._take(stay)
 
-    def save(self, file: Path) -> None:
-        """Write the whole state to a file, with the names that the robots have here."""
+    def save(self) -> bytes:
+        """Return the whole state, with the names that the robots have here."""
         names = sorted(self._rows, key=self._rows.__getitem__)
-        try:
-            file.write_bytes(packed_names(names, self._numbered) + self._simulator.save())
-        except OSError as error:
-            raise Error(f"{file}: {error.strerror}") from error
+        return packed_names(names, self._numbered) + self._simulator.save()
 
-    def load(self, file: Path) -> None:
+    def load(self, saved: bytes) -> None:
         """Go back to a state that was saved of this world; /clock runs on."""
-        try:
-            saved = file.read_bytes()
-        except OSError as error:
-            raise Error(f"{file}: {error.strerror}") from error
         prefixes, numbered, state = unpacked_names(saved)
         now = self._simulator.save()
         self._simulator.load(state)
         if len(set(prefixes)) != len(self._simulator.robots):
             self._simulator.load(now)
-            raise Error(f"{file}: does not name each of its robots once: {prefixes}")
+            raise Error(f"state: does not name each of its robots once: {prefixes}")
         switches = self._settings.strip_leading_slash, self._settings.relative_topics
         self._numbered = max(self._numbered, numbered)
         self._take([Names(prefix, *switches) for prefix in prefixes])

@@ -63,31 +63,31 @@ def read_settings(values: Any, where: str) -> StagerosSettings:
     path = shipped("launch/stageros.yaml")
     tree, unknown = _over(settings.load(path), Section(values, where), where)
     top = Section(tree, where)
-    filled = _flag(top, "fill_covariance")
+    filled = top.flag("fill_covariance")
     switches = ("bumper", "publish_bumpers"), ("fiducial", "publish_fiducials")
-    devices = tuple(kind for kind, switch in switches if _flag(top, switch))
+    devices = tuple(kind for kind, switch in switches if top.flag(switch))
     variances = [_variances(top, key, filled) for key in ("pose_variances", "twist_variances")]
     result = StagerosSettings(
         watchdog_timeout=top.number("base_watchdog_timeout"),
-        depth_canonical=_flag(top, "is_depth_canonical"),
+        depth_canonical=top.flag("is_depth_canonical"),
         frames=_frames(top),
-        strip_leading_slash=_flag(top, "strip_leading_slash"),
-        relative_topics=_flag(top, "relative_topics"),
+        strip_leading_slash=top.flag("strip_leading_slash"),
+        relative_topics=top.flag("relative_topics"),
         robot_prefix=top.text("robot_prefix", choices=("stage", "always", "never")),
-        publish_tf=_flag(top, "publish_tf"),
-        set_child_frame_id=_flag(top, "set_child_frame_id"),
+        publish_tf=top.flag("publish_tf"),
+        set_child_frame_id=top.flag("set_child_frame_id"),
         pose_variances=variances[0],
         twist_variances=variances[1],
-        scan_timing=_flag(top, "scan_timing"),
+        scan_timing=top.flag("scan_timing"),
         all_sensors=top.text("sensors", choices=("first", "all")) == "all",
-        sonar_as_range=_flag(top, "sonar_as_range"),
-        publish_collision=_flag(top, "publish_collision"),
+        sonar_as_range=top.flag("sonar_as_range"),
+        publish_collision=top.flag("publish_collision"),
         publish_devices=devices,
         rates=read_rates(top.section("rates")),
         headless_rate=top.number("headless_rate", at_least=0),
         seed=top.integer("seed", at_least=0),
         options=_options(_mapping(top, "simulator"), where, devices),
-        image_extents=_flag(top, "image_extents"),
+        image_extents=top.flag("image_extents"),
         parameters=_mapping(top, "parameters"),
         unknown=unknown,
     )
@@ -121,13 +121,6 @@ def _over(below: Section, above: Section, where: str) -> tuple[dict[str, Any], t
         else:
             tree[key] = value
     return tree, tuple(unknown)
-
-
-def _flag(section: Section, key: str) -> bool:
-    value = section.take(key)
-    if not isinstance(value, bool):
-        raise section.error(key, f"must be true or false: {value!r}")
-    return value
 
 
 def _mapping(section: Section, key: str) -> dict[str, Any]:

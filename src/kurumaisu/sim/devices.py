@@ -33,11 +33,10 @@ class _Alike:
 class WorldDevices:
     """Reads the devices of some types, each at its model's update_interval, as rangers."""
 
-    def __init__(self, machinery: Machinery, types: Sequence[str], cell: float) -> None:
-        """Prepare the devices of these types. Raise Error for a camera that makes no picture.
-
-        cell [m]: how far ahead strips feel, as Stage's do by its cells: of a wall beside them they would cross nothing.
-        """
+    def __init__(self, machinery: Machinery, types: Sequence[str]) -> None:
+        """Prepare the devices of these types. Raise Error for a camera that makes no picture."""
+        # Strips feel a cell ahead, as Stage's do by its cells: of a wall beside them they would cross nothing.
+        cell = machinery.resolution or 0.0
         self._machinery = machinery
         models = machinery.population.models
         groups: dict[Hashable, list[Model]] = {}

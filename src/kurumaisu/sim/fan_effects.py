@@ -12,8 +12,8 @@ import numpy as np
 from kurumaisu._core import Arena
 from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
 from kurumaisu.geometry import compose, interpolate
-from kurumaisu.sim.effect_state import memory, remember
 from kurumaisu.sim.fans import RangerFan, moments
+from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.sensors.ranger_noise import deviation
 from kurumaisu.types import FloatArray
 
@@ -99,7 +99,7 @@ class FanEffects:
     def state(self) -> dict[str, Any]:
         """Return what the next scans depend on, copies."""
         return {
-            "chain": memory(self._chain),
+            "chain": remember(self._chain),
             "random": self._rng.bit_generator.state,
             "times": np.array(self._times),
             "poses": np.array(self._poses).reshape(-1, 4),
@@ -107,7 +107,7 @@ class FanEffects:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go back to a state of a fan with the same effects."""
-        remember(self._chain, state["chain"])
+        recall(self._chain, state["chain"])
         self._rng.bit_generator.state = state["random"]
         self._times, self._poses = state["times"].tolist(), list(state["poses"].copy())
 

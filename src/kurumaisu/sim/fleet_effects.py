@@ -14,9 +14,9 @@ from kurumaisu._core import Arena, AxisLaw
 from kurumaisu.effects import Reference
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, identity_law
-from kurumaisu.sim.effect_state import memory, remember
 from kurumaisu.sim.fan_effects import FanEffects
 from kurumaisu.sim.fans import RangerFan
+from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.options import ALL_ROBOTS, Options, RobotEffects
 from kurumaisu.sim.plant import Plant
 from kurumaisu.types import FloatArray, IntArray
@@ -101,7 +101,7 @@ class FleetEffects:
     def state(self) -> dict[str, Any]:
         """Return what the effects remember, copies."""
         return {
-            "robots": {self._keys[row]: memory(plant.effects) for row, plant in self._plants.items()},
+            "robots": {self._keys[row]: remember(plant) for row, plant in self._plants.items()},
             "fans": {self._fan_keys[place]: fan.state() for place, fan in self._fans.items()},
         }
 
@@ -109,7 +109,7 @@ class FleetEffects:
         """Go back to a state, as far as its robots are still here."""
         for row, plant in self._plants.items():
             if self._keys[row] in state["robots"]:
-                remember(plant.effects, state["robots"][self._keys[row]])
+                recall(plant, state["robots"][self._keys[row]])
         for place, fan in self._fans.items():
             if self._fan_keys[place] in state["fans"]:
                 fan.restore(state["fans"][self._fan_keys[place]])

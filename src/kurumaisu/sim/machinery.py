@@ -4,25 +4,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from kurumaisu.effects import Reference
+from kurumaisu.errors import Error
 from kurumaisu.geometry import between, wrap
 from kurumaisu.sim import fans
+from kurumaisu.sim.cells import build_cells
+from kurumaisu.sim.collisions import Collisions, Crossing, SharedCells
 from kurumaisu.sim.drive import Drive, Rows
 from kurumaisu.sim.fleet_effects import FleetEffects
-from kurumaisu.sim.motion import Motion, StageMotion
+from kurumaisu.sim.motion import StageMotion
 from kurumaisu.sim.odometry import Localization
 from kurumaisu.sim.options import Options
-from kurumaisu.sim.partition import attached, build_arena, is_robot, relative, sort
+from kurumaisu.sim.partition import Distort, attached, build_arena, is_robot, relative, sort
+from kurumaisu.sim.pedestrians import Pedestrians
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.rangers import Rangers
 from kurumaisu.sim.rhythm import Rhythm, period
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
+
+if TYPE_CHECKING:
+    from kurumaisu.sim.following import Followed
 
 _PLANAR = [0, 1, 3]
 
@@ -31,31 +38,55 @@ class Machinery:
     """Built once for a population; a new one takes over from an old one when models come, go, or walls move."""
 
     def __init__(
-        self, population: Population, options: Options, interval: float, dynamics: Dynamics | None, seed: int
+        self,
+        population: Population,
+        options: Options,
+        interval: float,
+        dynamics: Dynamics | None,
+        distort: Distort | None = None,
+        resolution: float | None = None,
     ) -> None:
-        """Place all bodies where they begin; interval [s] is a step's length; dynamics: None for Stage's semantics."""
+        """Place all bodies where they begin; interval [s] is a step's length; dynamics: None for Stage's semantics.
+
+        distort: says where the walls are in truth; resolution [m]: of cells in which outlines collide, if options say
+        so. Raise Error if there would be too many cells.
+        """
         models = population.models
         self.population = population
         self.interval = interval
+        self.resolution = resolution
         self.options = options
         self.dynamics = dynamics
+        self.distort = distort
         self.bodies = sort(models, _moving(models, physical=dynamics is not None))
-        self.arena, self.numbers, self.walls = build_arena(models, population.poses, self.bodies, options.threads)
+        self.arena, self.numbers, self.walls = build_arena(
+            models, population.poses, self.bodies, options.threads, distort=distort
+        )
         self.robot_rows = np.array([i for i, head in enumerate(self.bodies.heads) if is_robot(models[head])], np.int64)
         self.robots = tuple(models[self.bodies.heads[row]] for row in self.robot_rows)
         self._everybody_drives = len(self.robot_rows) == len(self.bodies)
         self.fans = fans.find(models, population.poses, self.bodies, self.robot_rows.tolist())
+        self.collisions = self._make_collisions()
         self.motion = self._make_motion()
+        self.pedestrians = self._make_pedestrians()
         self.frames = np.zeros((len(self.bodies) + 1, 4))  # of the bodies, and of the map at the end
         self.before = self.frames.copy()  # those one step ago
         self.stalled = np.zeros(len(self.bodies), dtype=np.bool_)
         self.place(population.poses[self.bodies.heads])
         self._velocities = np.zeros((len(self.bodies), 3))
-        self.begin(seed)
+        self.begin(0)
+
+    def of(self, population: Population) -> Machinery:
+        """Return new machinery of the same kind for another population."""
+        new = Machinery(population, self.options, self.interval, self.dynamics, self.distort, self.resolution)
+        if self.seed:
+            new.begin(self.seed)
+        return new
 
     def begin(self, seed: int) -> None:
         """Make drives, odometry, rangers and effects anew, as they are before the first step; seed: of the effects."""
         self.seed = seed
+        self.pedestrians.begin()
         devices = [cast(Position, model.device) for model in self.robots]
         starts = self.robot_poses
         born = self.population.born
@@ -73,13 +104,33 @@ class Machinery:
         touched = self.effects.begin_fans(self.fans, self.population.keys, self.arena)
         self.rangers = Rangers(self.arena, self.fans, np.stack([looks, births], axis=-1), sweep, touched)
 
-    def _make_motion(self) -> Motion:
+    def _make_motion(self) -> StageMotion | Followed:
         if self.dynamics is None:
-            return StageMotion(self.arena, self.numbers, self.bodies)
-        from kurumaisu.sim.following import Followed  # loads pymunk, which Stage's semantics need not pay for
+            return StageMotion(self.collisions, self.bodies)
+        # these load pymunk, which Stage's semantics need not pay for
+        from kurumaisu.sim.bodies import assemble
+        from kurumaisu.sim.following import Followed
+        from kurumaisu.sim.physical import PhysicalMotion
+        from kurumaisu.sim.rigid import Ground
 
         start = self.population
-        return Followed(self.arena, self.numbers, start.models, start.poses, self.dynamics)
+        pieces, _ = assemble(start.models, start.poses, self.dynamics)
+        walls = self.walls
+        ground = Ground(walls.faces[walls.solid], walls.trees[walls.solid])
+        return Followed(self.arena, self.numbers, PhysicalMotion(pieces, ground, self.dynamics))
+
+    def _make_pedestrians(self) -> Pedestrians:
+        walks = [self.population.models[head].walk for head in self.bodies.heads]
+        rows = np.array([row for row, walk in enumerate(walks) if walk is not None], dtype=np.int64)
+        return Pedestrians([walk for walk in walks if walk is not None], rows, self.walls.faces[self.walls.solid])
+
+    def _make_collisions(self) -> Collisions:
+        if self.options.collision == "exact" or self.dynamics is not None or self.resolution is None:
+            return Crossing(self.arena, self.numbers)
+        layers = 2 if self.options.collision == "cells_stale" else 1
+        start = self.population
+        cells, known_as = build_cells(start.models, start.poses, self.bodies, self.resolution, layers)
+        return SharedCells(self.arena, self.numbers, cells, known_as, layers)
 
     @property
     def robot_keys(self) -> IntArray:
@@ -128,6 +179,8 @@ class Machinery:
         if not self._everybody_drives:
             self._velocities[self.robot_rows] = velocities
             velocities = self._velocities
+            now, before = self.frames[:-1], self.before[:-1]
+            velocities[self.pedestrians.rows] = self.pedestrians.velocities(now, before, self.interval)
         poses, stalled = self.motion.move(velocities, self.interval)
         self.before, self.frames = self.frames, self.before
         self.frames[:-1] = poses
@@ -146,6 +199,13 @@ class Machinery:
             return None
         return self.effects.seen(time, self.robot_poses[:, _PLANAR], self.rates())
 
+    def grip(self, robot: int, closed: bool) -> bool:
+        """Close or open a robot's gripper; return whether it holds something now. Raise Error in Stage's semantics."""
+        motion = self.motion
+        if isinstance(motion, StageMotion):
+            raise Error("grip: needs semantics physical, not stage")
+        return bool(motion.grip(int(self.robot_rows[robot]), closed))
+
     def model_poses(self) -> FloatArray:
         """Return where all models are now (models, 4)."""
         start, body = self.population.poses, self.bodies.body_of
@@ -154,7 +214,7 @@ class Machinery:
 
     def touching(self) -> BoolArray:
         """Return which robots (n,) touch something where they are."""
-        return self.arena.touches(self.numbers)[self.robot_rows]
+        return self.collisions.touching()[self.robot_rows]
 
     def _periods(self, intervals: list[float], always: bool) -> IntArray:
         return np.array([1 if always else period(i, self.interval) for i in intervals], dtype=np.int64)
@@ -163,7 +223,7 @@ class Machinery:
 def _moving(models: Sequence[Model], physical: bool) -> list[bool]:
     """Return which models (m,) have poses of their own to move."""
     if not physical:
-        return [is_robot(model) for model in models]
+        return [is_robot(model) or model.walk is not None for model in models]
     from kurumaisu.sim.bodies import movable
 
     moving = set(movable(models))

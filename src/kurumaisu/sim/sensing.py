@@ -17,38 +17,26 @@ from kurumaisu.sim.solids import Solids
 
 
 class Sensing:
-    """Reads what is due, in every step.
-
-    readings, devices: what was due in the last one: see Observation.
-    """
+    """Reads what is due, in every step."""
 
     def __init__(
-        self,
-        sensors: Sequence[SensorSettings],
-        machinery: Machinery,
-        cell: float,
-        time: float,
-        rng: np.random.Generator,
+        self, sensors: Sequence[SensorSettings], machinery: Machinery, time: float, rng: np.random.Generator
     ) -> None:
-        """Power up the sensors at a time [s]; cell [m]: the world's resolution.
-
-        Raise Error for a robot that the world has not.
-        """
+        """Power up the sensors at a time [s]. Raise Error for a robot that the world has not."""
         self._machinery = machinery
         felt = any(isinstance(sensor.parameters, BumperSettings) for sensor in sensors)
         self._solids = Solids(machinery) if felt else None
         self._suite = SensorSuite(sensors, machinery.population.models, self._moment(time), rng) if sensors else None
         types = machinery.options.devices
-        self._devices = WorldDevices(machinery, types, cell) if types else None
-        self.readings: tuple[Reading, ...] = ()
-        self.devices: dict[int, Value] = {}
+        self._devices = WorldDevices(machinery, types) if types else None
 
-    def read(self, step: int, time: float) -> None:
-        """Read what is due in a step, counted from 1, which ends at a time [s]."""
-        if self._suite is not None:
-            self.readings = self._suite.read(self._moment(time))
-        if self._devices is not None:
-            self.devices = self._devices.read(step)
+    def read(self, time: float) -> tuple[Reading, ...]:
+        """Return the readings of sensors that are due at a time [s]."""
+        return self._suite.read(self._moment(time)) if self._suite is not None else ()
+
+    def devices(self, step: int) -> dict[int, Value]:
+        """Return the readings of devices that are due in a step, counted from 1, by their models' numbers."""
+        return self._devices.read(step) if self._devices is not None else {}
 
     def state(self) -> list[dict[str, Any]]:
         """Return what the next readings depend on: not copies."""

@@ -12,10 +12,12 @@ from kurumaisu.params import Model, effects_of
 
 @dataclass(frozen=True)
 class Physics:
-    """Step [s] and contacts: slop [m]; bias: share of an overlap left after 1 s; friction, iterations [-]."""
+    """Step [s], the longest in which contacts are solved once; slop [m]; friction, iterations [-].
+
+    bias: share of an overlap left after 1 s.
+    """
 
     step: float
-    contact_substeps: int
     collision_slop: float
     collision_bias: float
     iterations: int
@@ -26,7 +28,6 @@ def read_physics(section: settings.Section) -> Physics:
     """Return the settings of a section. Raise Error naming file and key."""
     physics = Physics(
         step=section.number("step", above=0),
-        contact_substeps=section.integer("contact_substeps", at_least=1),
         collision_slop=section.number("collision_slop", at_least=0),
         collision_bias=section.number("collision_bias", above=0),
         iterations=section.integer("iterations", at_least=1),

@@ -12,6 +12,7 @@ import numpy as np
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.sim import snapshot, state
+from kurumaisu.sim.devices import Value
 from kurumaisu.sim.drive import without_nonsense
 from kurumaisu.sim.fans import RangerFan
 from kurumaisu.sim.fleet_effects import check_names
@@ -23,6 +24,7 @@ from kurumaisu.sim.partition import is_robot
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.sensing import Sensing
 from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
+from kurumaisu.sim.sensors.suite import Reading
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World, read_snippet
@@ -38,6 +40,8 @@ class Simulator:
         Raise Error for options or sensors that do not fit the world.
         """
         self._sensors = tuple(sensors)
+        self._readings: tuple[Reading, ...] = ()
+        self._devices: dict[int, Value] = {}
         options = options.of_world(world.semantics)
         if options.scan_sweep > world.interval:
             raise Error(
@@ -48,7 +52,8 @@ class Simulator:
         self._late = options.timing == "consistent"
         dynamics = load_dynamics(shipped("launch/physical.yaml")) if options.semantics == "physical" else None
         check_names(options.effects, [model for model in world.models if is_robot(model)])
-        self._home = Machinery(Population.first(world.models, world.poses), options, world.interval, dynamics, 0)
+        start = Population.first(world.models, world.poses)
+        self._home = Machinery(start, options, world.interval, dynamics, resolution=world.resolution)
         what = world.models, world.poses, world.interval, replace(options, threads=1), self._sensors
         self._fingerprint = state.digest(what)
         self.reset(0)
@@ -89,7 +94,7 @@ class Simulator:
         machinery.rangers.update(self._step, self.time, way, self._ranger_rng)
         if not self._late:
             machinery.move()
-        self._sensing.read(self._step, self.time)
+        self._readings, self._devices = self._sensing.read(self.time), self._sensing.devices(self._step)
         return self.observe()
 
     def observe(self) -> Observation:
@@ -103,8 +108,8 @@ class Simulator:
             stalled=machinery.robots_stalled,
             scans=machinery.rangers.scans,
             dropped=self._dropped,
-            readings=self._sensing.readings,
-            devices=self._sensing.devices,
+            readings=self._readings,
+            devices=self._devices,
             reference=machinery.reference(self.time),
         )
 
@@ -137,6 +142,13 @@ class Simulator:
         """Remove a model with all that stands on it. Raise Error for an unknown one."""
         self._have(rebuilt(self._machinery, self._machinery.population.without(self._index(model))))
 
+    def grip(self, robot: int, closed: bool) -> bool:
+        """Close or open the gripper of a robot, by its number; return whether it holds something now.
+
+        It takes what is between its paddles and has a gripper_return. Raise Error in Stage's semantics.
+        """
+        return self._machinery.grip(robot, closed)
+
     def save(self) -> bytes:
         """Return the whole state, from which load continues bit for bit."""
         return state.pack(self._state())
@@ -148,7 +160,7 @@ class Simulator:
             raise Error(f"state: is of another world than {self._world.path}, or of other options")
         machinery = self._home
         if known["population"] is not None:
-            machinery = Machinery(known["population"], self._options, self._world.interval, self._home.dynamics, 0)
+            machinery = self._home.of(known["population"])
         self._machinery = machinery
         self._step, self._dropped = known["step"], known["dropped"]
         snapshot.restore(machinery, known["machinery"])
@@ -213,7 +225,8 @@ class Simulator:
         names = {robot.name for robot in self.robots} | {EVERY_ROBOT}
         home = self._machinery is self._home
         sensors = [sensor for sensor in self._sensors if home or sensor.robot in names]  # at home a wrong name is said
-        self._sensing = Sensing(sensors, self._machinery, self._world.resolution, self.time, self._sensor_rng)
+        self._sensing = Sensing(sensors, self._machinery, self.time, self._sensor_rng)
+        self._readings, self._devices = (), {}
 
     def _heard(self, commands: FloatArray) -> FloatArray:
         """Return commands that are numbers."""

@@ -14,6 +14,7 @@ def take(machinery: Machinery) -> dict[str, Any]:
         "seed": machinery.seed,
         "effects": machinery.effects.state(),
         "motion": machinery.motion.state(),
+        "walks": machinery.pedestrians.state(),
         "frames": machinery.frames.copy(),
         "before": machinery.before.copy(),
         "stalled": machinery.stalled.copy(),
@@ -32,6 +33,7 @@ def restore(machinery: Machinery, values: dict[str, Any]) -> None:
     machinery.before[:] = values["before"]
     machinery.motion.place(machinery.frames[:-1])
     machinery.motion.restore(values["motion"])
+    machinery.pedestrians.restore(values["walks"])
     machinery.stalled[:] = values["stalled"]
     machinery.drive.velocities[:] = values["velocities"]
     machinery.localization.estimates[:] = values["estimates"]

@@ -15,13 +15,14 @@ MODELS = (
 _OTHERS = ("world", "window", "block", "sensor")
 _BODY_ONLY = ("blobfinder", "actuator", "blinkenlight", "lightindicator")
 
-_NUMBERED = re.compile(r"(point|bpose|blength)\[\d+\]")
+_NUMBERED = re.compile(r"(point|bpose|blength|waypoint)\[\d+\]")
 
 # Heeded. gui_* and windows are not warned of either: there is no such window, and nearly every file has them.
 _MODEL = {
     *("name", "pose", "origin", "size", "bitmap", "boundary", "noblocks", "color", "color_rgba", "hinge"),
     *("obstacle_return", "ranger_return", "fiducial_return", "fiducial_key", "gripper_return", "stack_children"),
     *("update_interval", "mass", "friction", "gui_nose", "gui_grid", "gui_outline", "gui_move"),
+    *("waypoint", "walk_speed", "walk_mode", "social"),
 }
 _HEEDED: dict[str, set[str]] = {
     "world": {

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -145,3 +145,14 @@ class Reader:
         if re.search(r"[\r\n]", value):
             raise source.error(at, f"the value of the parameter {name} has more than one line")
         return value
+
+
+def parse_values(given: Iterable[str]) -> dict[str, str]:
+    """Return values for a world's parameters, each given as NAME=VALUE. Raise Error for what is not."""
+    values = {}
+    for value in given:
+        name, equals, text = value.partition("=")
+        if not equals:
+            raise Error(f"{value!r}: a parameter is given as NAME=VALUE")
+        values[name] = text
+    return values

@@ -28,11 +28,14 @@ class Shape:
     segments: (m, 4), x and y of both ends [m]; heights: (m, 2), lowest and highest z above the base [m];
     polygons: closed polygons (k, 2) [m] of blocks and boxes, for contact and drawing, with their heights (2,) and
     colours; a bitmap has segments only.
+    edges: (k, 6), the same outlines as Stage draws them into cells, to the last bit: x and y from and to, lowest and
+    highest z [m], before the origin is applied; None: the segments, and no origin.
     """
 
     segments: FloatArray
     heights: FloatArray
     polygons: tuple[Polygon, ...]
+    edges: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -142,6 +145,20 @@ class Hinge:
 
 
 @dataclass(frozen=True)
+class Walk:
+    """An addition to Stage's language: the model walks by itself, from waypoint to waypoint (k, 2) of the map [m].
+
+    speed [m/s]; mode: loop (round and round), yoyo (there and back) or once (and stays); social: it gives way to
+    others and to walls.
+    """
+
+    waypoints: FloatArray
+    speed: float
+    mode: str
+    social: bool
+
+
+@dataclass(frozen=True)
 class Model:
     """One model of the tree, in depth-first file order.
 
@@ -150,7 +167,7 @@ class Model:
     does not stack its children); origin (4,); size (3,) [m]; name: as in the file, or None; type: Stage's word.
     ranger_return: below 0 invisible to rangers, else the intensity of a hit; obstacle_return: False: no collisions;
     mass [kg], 0: not given; friction [1], None: not given; update_interval [s].
-    device: what a typed model does; None: of a type that only has a body.
+    device: what a typed model does; None: of a type that only has a body; walk: None: goes nowhere by itself.
     """
 
     index: int
@@ -175,3 +192,4 @@ class Model:
     update_interval: float
     hinge: Hinge | None
     device: Device | None
+    walk: Walk | None = None

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from kurumaisu.geometry import wrap
 from kurumaisu.types import FloatArray
 from kurumaisu.world.catalogue import MODELS
 from kurumaisu.world.colors import color
@@ -20,6 +19,7 @@ from kurumaisu.world.notes import Notes
 from kurumaisu.world.shapes import Shaper
 from kurumaisu.world.syntax import Entity
 from kurumaisu.world.values import Units, Values
+from kurumaisu.world.walks import walk
 
 _MOST_MODELS = 100_000  # of a world
 _MOST_ENTITIES = 2_000_000  # models, blocks and sensors of a world
@@ -32,6 +32,7 @@ _SIZES = {  # [m], of types with another size if the file gives none
     "gripper": (0.2, 0.3, 0.2),
     "blinkenlight": (0.02, 0.02, 0.02),
 }
+_MANY = 1.0e4  # [rad] of a heading, more than any file says
 _INTERVAL = 100  # [ms] between updates of a model
 
 
@@ -103,6 +104,7 @@ class Builder:
             "update_interval": _interval(values),
             "hinge": _hinge(values),
             "device": device(values),
+            "walk": walk(values),
         }
 
     def _size(self, values: Values) -> FloatArray:
@@ -137,13 +139,23 @@ def global_poses(models: Sequence[Model]) -> FloatArray:
     poses = np.empty((len(models), 4))
     for model in models:
         if model.parent < 0:
-            poses[model.index] = model.pose
+            poses[model.index] = (*model.pose[:3], _normal(float(model.pose[3])))
             continue
         parent = models[model.parent]
         x, y, z, heading = poses[model.parent].tolist()
         c, s = math.cos(heading), math.sin(heading)
         dx, dy, dz, turn = model.pose.tolist()
         top = parent.size[2] if parent.stack_children else 0.0
-        poses[model.index] = (x + c * dx - s * dy, y + s * dx + c * dy, z + dz + top, heading + turn)
-    poses[:, 3] = wrap(poses[:, 3])
+        poses[model.index] = (x + c * dx - s * dy, y + s * dx + c * dy, z + dz + top, _normal(heading + turn))
     return poses
+
+
+def _normal(heading: float) -> float:
+    """Return a heading within half a turn; one that is there already keeps its last bit, as in Stage."""
+    if abs(heading) > _MANY:
+        heading = math.remainder(heading, math.tau)
+    while heading < -math.pi:
+        heading += math.tau
+    while heading > math.pi:
+        heading -= math.tau
+    return heading
