@@ -112,6 +112,7 @@ def _bare(model: Model) -> Model:
         hinge=None,
         device=None,
         walk=None,
+        slope=None,
     )
 
 

@@ -65,12 +65,13 @@ class ChairWorld:
         """
         machinery, before = self.machinery, self.pose
         machinery.drive.velocities[self.robot] = v, u, w
-        free = self.alone and self._glide()
+        wheels = machinery.wheels()
+        free = self.alone and self._glide(wheels)
         if not free:
             machinery.move()
         self._look()
         if free or not machinery.stalled[self.body]:
-            return np.array([v, u, w]), False
+            return wheels[self.robot].copy(), False
         return between(before, self.pose) / self.step, True
 
     def command(self, robot: str, velocity: FloatArray) -> None:
@@ -135,10 +136,10 @@ class ChairWorld:
         self.alone = len(machinery.bodies) == 1
         self._motion = cast(Followed, machinery.motion)
 
-    def _glide(self) -> bool:
+    def _glide(self, wheels: FloatArray) -> bool:
         """Move the chair, which alone can move, if nothing is in its way; the arena need not know: it sees no other."""
         machinery = self.machinery
-        poses = self._motion.glide(machinery.drive.velocities, self.step)
+        poses = self._motion.glide(wheels, self.step)
         if poses is None:
             return False
         machinery.before, machinery.frames = machinery.frames, machinery.before

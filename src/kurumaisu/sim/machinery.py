@@ -25,6 +25,7 @@ from kurumaisu.sim.population import Population
 from kurumaisu.sim.rangers import Rangers
 from kurumaisu.sim.rhythm import Rhythm, period
 from kurumaisu.sim.settings import Dynamics
+from kurumaisu.sim.slopes import Slopes
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
 
@@ -69,6 +70,8 @@ class Machinery:
         self.collisions = self._make_collisions()
         self.motion = self._make_motion()
         self.pedestrians = self._make_pedestrians()
+        self._slopes = self._make_slopes()
+        self._sideways = np.array([cast(Position, model.device).drive == "omni" for model in self.robots], np.bool_)
         self.frames = np.zeros((len(self.bodies) + 1, 4))  # of the bodies, and of the map at the end
         self.before = self.frames.copy()  # those one step ago
         self.stalled = np.zeros(len(self.bodies), dtype=np.bool_)
@@ -118,6 +121,12 @@ class Machinery:
         walls = self.walls
         ground = Ground(walls.faces[walls.solid], walls.trees[walls.solid])
         return Followed(self.arena, self.numbers, PhysicalMotion(pieces, ground, self.dynamics))
+
+    def _make_slopes(self) -> Slopes:
+        """Return the slopes of what stands still; Stage knows none."""
+        models, body_of = self.population.models, self.bodies.body_of
+        still = [m for m, body in zip(models, body_of, strict=True) if body < 0] if self.dynamics else []
+        return Slopes(still, self.population.poses, self.dynamics.slope_speed if self.dynamics else 0.0)
 
     def _make_pedestrians(self) -> Pedestrians:
         walks = [self.population.models[head].walk for head in self.bodies.heads]
@@ -171,14 +180,22 @@ class Machinery:
         poses = self.frames if self._everybody_drives else self.frames[self.robot_rows]
         self.localization.update(due, poses[: len(self.robots)], self.drive.velocities, rng)
 
-    def move(self) -> None:
-        """Move all bodies as the drives want, or as the effects let them."""
-        velocities = self.drive.velocities
+    def wheels(self) -> FloatArray:
+        """Return what effects and the floor there make of the drives' velocities (n, 3)."""
+        wanted = self.drive.velocities
         if self.effects.moves:
-            velocities = self.effects.driven(velocities, self.frames[self.robot_rows, 3])
-        if not self._everybody_drives:
-            self._velocities[self.robot_rows] = velocities
+            wanted = self.effects.driven(wanted, self.frames[self.robot_rows, 3])
+        if not len(self._slopes):
+            return wanted
+        return self._slopes.slowed(wanted, self.frames[self.robot_rows], self._sideways, self.interval)
+
+    def move(self) -> None:
+        """Move all bodies as the drives want, or as effects and slopes let them."""
+        if self._everybody_drives:
+            velocities = self.wheels()
+        else:
             velocities = self._velocities
+            velocities[self.robot_rows] = self.wheels()
             now, before = self.frames[:-1], self.before[:-1]
             velocities[self.pedestrians.rows] = self.pedestrians.velocities(now, before, self.interval)
         poses, stalled = self.motion.move(velocities, self.interval)

@@ -59,6 +59,7 @@ class Dynamics:
 
     wheel_friction: of a robot's wheels, which limits the force of its motors; floor_friction: of other movable bodies;
     density: of robots and doors whose file gives no mass; hinge_torque [N m]: friction of a hinge.
+    slope_speed [m/s]: what a rise of 1 m per metre along its heading takes from the speed of a robot.
     """
 
     contacts: Physics
@@ -66,6 +67,7 @@ class Dynamics:
     floor_friction: float
     density: float
     hinge_torque: float
+    slope_speed: float
     slip: bool
 
 
@@ -78,6 +80,7 @@ def load_dynamics(path: Path) -> Dynamics:
         floor_friction=top.number("floor_friction", at_least=0),
         density=top.number("density", above=0),
         hinge_torque=top.number("hinge_torque", at_least=0),
+        slope_speed=top.number("slope_speed", at_least=0),
         slip=top.text("slip", ("on", "off")) == "on",
     )
     top.end()

@@ -22,7 +22,7 @@ _MODEL = {
     *("name", "pose", "origin", "size", "bitmap", "boundary", "noblocks", "color", "color_rgba", "hinge"),
     *("obstacle_return", "ranger_return", "fiducial_return", "fiducial_key", "gripper_return", "stack_children"),
     *("update_interval", "mass", "friction", "gui_nose", "gui_grid", "gui_outline", "gui_move"),
-    *("waypoint", "walk_speed", "walk_mode", "social"),
+    *("waypoint", "walk_speed", "walk_mode", "social", "slope"),
 }
 _HEEDED: dict[str, set[str]] = {
     "world": {

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from kurumaisu.errors import Error
 from kurumaisu.maps import save_map
-from kurumaisu.world.check import contents, findings
+from kurumaisu.world.check import findings
+from kurumaisu.world.contents import contents
 from kurumaisu.world.drawing import to_svg
 from kurumaisu.world.files import parse_values
 from kurumaisu.world.occupancy import occupancy

@@ -49,7 +49,7 @@ class World:
     0 or less: as fast as possible; semantics: how the file wants to be simulated, stage or physical, an addition to
     Stage's language; vocabulary: what more text can be read with.
     For a chair alone: segments: (m, 4), x and y of both ends of all that a laser sees [m]; obstacles: (n, 4), all
-    that a chair bumps into, at any height, in both without the position models; starts: those, in file order;
+    that a chair bumps into, at any height, in both without what drives or walks; starts: those, in file order;
     bounds: smallest x, smallest y, largest x, largest y [m] of the walls.
     warnings: what the file says and this reader does not heed, in words.
     """
@@ -79,7 +79,7 @@ class World:
     @property
     def returns(self) -> FloatArray:
         """Reflectance (m,) [1] of the segments: the ranger_return of their models."""
-        seen = [m for m in self.models if m.ranger_return >= 0 and not _on_position(m, self.models)]
+        seen = [m for m in self.models if m.ranger_return >= 0 and not _travels(m, self.models)]
         return np.repeat([m.ranger_return for m in seen], [len(m.shape.segments) for m in seen])
 
     @property
@@ -150,7 +150,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values, vocabulary: Voca
     if interval < _SHORTEST:
         raise said.error("interval_sim", f"interval_sim must be at least {_SHORTEST:g} ms, not {interval:g}")
     poses = global_poses(models)
-    walls = [model for model in models if not _on_position(model, models)]
+    walls = [model for model in models if not _travels(model, models)]
     starts = (model for model in models if model.type == "position")
     return World(
         name=said.text("name", path.stem),
@@ -177,11 +177,11 @@ def _semantics(said: Values) -> str:
     return word
 
 
-def _on_position(model: Model, models: tuple[Model, ...]) -> bool:
-    """Return whether a model is a position or stands on one."""
-    while model.type != "position" and model.parent >= 0:
+def _travels(model: Model, models: tuple[Model, ...]) -> bool:
+    """Return whether a model is a position or walks, or stands on one that does."""
+    while model.type != "position" and model.walk is None and model.parent >= 0:
         model = models[model.parent]
-    return model.type == "position"
+    return model.type == "position" or model.walk is not None
 
 
 def _outlines(models: list[Model], poses: FloatArray) -> FloatArray:
