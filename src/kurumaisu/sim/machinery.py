@@ -120,7 +120,7 @@ class Machinery:
         pieces, _ = assemble(start.models, start.poses, self.dynamics)
         walls = self.walls
         ground = Ground(walls.faces[walls.solid], walls.trees[walls.solid])
-        return Followed(self.arena, self.numbers, PhysicalMotion(pieces, ground, self.dynamics))
+        return Followed(self.arena, self.numbers, PhysicalMotion(pieces, ground, self.dynamics), self.bodies.carrier)
 
     def _make_slopes(self) -> Slopes:
         """Return the slopes of what stands still; Stage knows none."""

@@ -111,6 +111,10 @@ class PhysicalMotion:
             self._grips.carry(self._poses)
         return self.poses
 
+    def shift(self, rows: IntArray, poses: FloatArray) -> None:
+        """Put driven bodies to poses (k, 4) without a change of what they are about to do."""
+        self._poses[rows] = poses
+
     def grip(self, row: int, closed: bool) -> bool:
         """Close or open the gripper of a body; return whether it holds something now."""
         if not closed:
@@ -118,6 +122,16 @@ class PhysicalMotion:
         held = closed and self._grips.close(row, self._poses)
         self._survey()
         return held
+
+    @property
+    def slips(self) -> bool:
+        """Whether wheels lag behind their commands."""
+        return self._dynamics.slip
+
+    @property
+    def driven(self) -> BoolArray:
+        """Which bodies (b,) have motors."""
+        return self._driven
 
     @property
     def poses(self) -> FloatArray:
