@@ -105,7 +105,11 @@ class Services:
             self._requests.ask(action)
         except Error as error:
             return False, str(error)
-        return True, f"at {self._simulation.time:.3f} s"
+        return True, self._done()
+
+    def _done(self) -> str:
+        """Return what is said of a thing that was done."""
+        return f"at {self._simulation.time:.3f} s"
 
 
 def _write(file: Path, saved: bytes) -> None:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from kurumaisu.ros.outlet import Outlet
 from kurumaisu.ros.rotation import optical
 from kurumaisu.ros.sensor_messages import intrinsics
 from kurumaisu.ros.stageros_plan import CameraPlan, RobotPlan
+from kurumaisu.ros.stageros_rates import Pace
 from kurumaisu.ros.stageros_robot import DEPTH
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.ros.wire import CameraInfoWire, ImageWire, Stamp, TransformsWire
@@ -32,8 +33,9 @@ from kurumaisu.world.model import Model
 class Cameras:
     """All cameras of a world; transforms go to the outlet of /tf."""
 
-    def __init__(self, settings: StagerosSettings, tf: Outlet | None) -> None:
+    def __init__(self, settings: StagerosSettings, pace: Pace, tf: Outlet | None) -> None:
         self._settings = settings
+        self._pace = pace
         self._tf = tf
         self._topics: list[CameraTopics] = []
         self._models: Sequence[Model] = ()
@@ -43,29 +45,33 @@ class Cameras:
         """Take other models and robots from now on."""
         self._models = models
         self._scenery = None  # made when the first one looks
-        there = {topics.plan.frame: topics for topics in self._topics}
+        there = {(topics.plan.frame, topics.plan.camera): topics for topics in self._topics}
+        stay = {(plan.frame, plan.camera) for robot in plans for plan in robot.cameras}
+        for likeness in [likeness for likeness in there if likeness not in stay]:
+            there.pop(likeness).close()
         self._topics = []
         for robot in plans:
             for plan in robot.cameras:
-                topics = there.pop(plan.frame, None)
+                topics = there.get((plan.frame, plan.camera))
                 if topics is None:
                     topics = CameraTopics(plan, robot.names.frame(self._settings.frames.base_link), self._settings)
+                    topics.every = self._pace.sensor("image", plan.names.topic("image", plan.number))
                 topics.plan = plan
                 self._topics.append(topics)
-        for gone in there.values():
-            gone.close()
 
     @property
     def wanted(self) -> bool:
         """Whether anybody looks."""
         return any(topics.wanted for topics in self._topics)
 
-    def publish(self, poses: FloatArray, stamp: Stamp) -> None:
-        """Take and send what is looked at; poses (m, 4) of all models."""
+    def publish(self, poses: Callable[[], FloatArray], number: int, stamp: Stamp) -> None:
+        """Take and send what is looked at and due in a step, the number-th; poses: tells those (m, 4) of all models."""
         scenery = self._scenery = self._scenery or Scenery(self._models)
-        for topics in self._topics:
-            if topics.wanted:
-                topics.publish(scenery, poses, stamp)
+        due = [topics for topics in self._topics if topics.wanted and number % topics.every == 0]
+        if due:
+            where = poses()
+            for topics in due:
+                topics.publish(scenery, where, stamp)
                 if self._tf is not None:
                     topics.transform.stamp(stamp)
                     self._tf.send(topics.transform.data)
@@ -78,6 +84,7 @@ class CameraTopics:
         """Advertise; base: the frame that the camera stands on."""
         names, number, camera = plan.names, plan.number, plan.camera
         self.plan = plan  # its model's number changes when another one goes
+        self.every = 1  # steps from picture to picture
         self._canonical = settings.depth_canonical
         self._as_stage = settings.options.semantics == "stage"
         self._sensor = CameraSensor(camera)

@@ -34,3 +34,6 @@ class StagerosServices(Services):
 
     def _delete(self, request: DeleteRequest) -> tuple[bool, str]:
         return self._outcome(lambda: self._session.delete(request.name))
+
+    def _done(self) -> str:
+        return f"{super()._done()}, {self._session.heard} commands heard"

@@ -32,6 +32,8 @@ _OPTIONS = Options(
     limit_acceleration=False,
     scan_sweep=0.0,
     odometry_walk=_STILL,
+    devices=(),
+    effects=(),
 )
 
 
@@ -53,7 +55,7 @@ class ChairWorld:
         self._have(self._home)
         machinery = self.machinery
         machinery.place(machinery.population.poses[machinery.bodies.heads])
-        machinery.begin()
+        machinery.begin(0)
         self.pose = machinery.frames[self.body, [0, 1, 3]]
 
     def drive(self, v: float, w: float, u: float) -> tuple[FloatArray, bool]:
@@ -120,9 +122,7 @@ class ChairWorld:
         self.pose = state["pose"]
 
     def _machine(self, population: Population) -> Machinery:
-        machinery = Machinery(population, _OPTIONS, self.step, self._dynamics, self._distort)
-        machinery.begin()
-        return machinery
+        return Machinery(population, _OPTIONS, self.step, self._dynamics, self._distort)
 
     def _have(self, machinery: Machinery) -> None:
         """Go on with machinery that is new, or the old one changed."""

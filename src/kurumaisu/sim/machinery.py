@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from kurumaisu.effects import Reference
 from kurumaisu.errors import Error
+from kurumaisu.geometry import between, wrap
 from kurumaisu.sim import fans
 from kurumaisu.sim.cells import build_cells
 from kurumaisu.sim.collisions import Collisions, Crossing, SharedCells
 from kurumaisu.sim.drive import Drive, Rows
+from kurumaisu.sim.fleet_effects import FleetEffects
 from kurumaisu.sim.motion import StageMotion
 from kurumaisu.sim.odometry import Localization
 from kurumaisu.sim.options import Options
@@ -28,6 +31,8 @@ from kurumaisu.world.model import Model, Position
 
 if TYPE_CHECKING:
     from kurumaisu.sim.following import Followed
+
+_PLANAR = [0, 1, 3]
 
 
 class Machinery:
@@ -72,14 +77,18 @@ class Machinery:
         self.stalled = np.zeros(len(self.bodies), dtype=np.bool_)
         self.place(population.poses[self.bodies.heads])
         self._velocities = np.zeros((len(self.bodies), 3))
-        self.begin()
+        self.begin(0)
 
     def of(self, population: Population) -> Machinery:
         """Return new machinery of the same kind for another population."""
-        return Machinery(population, self.options, self.interval, self.dynamics, self.distort, self.resolution)
+        new = Machinery(population, self.options, self.interval, self.dynamics, self.distort, self.resolution)
+        if self.seed:
+            new.begin(self.seed)
+        return new
 
-    def begin(self) -> None:
-        """Make drives, odometry and rangers anew, as they are before the first step."""
+    def begin(self, seed: int) -> None:
+        """Make drives, odometry, rangers and effects anew, as they are before the first step; seed: of the effects."""
+        self.seed = seed
         self.pedestrians.begin()
         devices = [cast(Position, model.device) for model in self.robots]
         starts = self.robot_poses
@@ -93,7 +102,10 @@ class Machinery:
         looks = self._periods([fan.model.update_interval for fan in self.fans], always=False)
         births = born[[fan.model.index for fan in self.fans]].astype(np.int64)
         sweep = self.options.scan_sweep / self.interval
-        self.rangers = Rangers(self.arena, self.fans, np.stack([looks, births], axis=-1), sweep)
+        self.effects = FleetEffects(self.options, self.robots, self.robot_keys, self.interval)
+        self.effects.begin(seed)
+        touched = self.effects.begin_fans(self.fans, self.population.keys, self.arena)
+        self.rangers = Rangers(self.arena, self.fans, np.stack([looks, births], axis=-1), sweep, touched)
 
     def _make_motion(self) -> StageMotion | Followed:
         if self.dynamics is None:
@@ -169,14 +181,16 @@ class Machinery:
         self.localization.update(due, poses[: len(self.robots)], self.drive.velocities, rng)
 
     def wheels(self) -> FloatArray:
-        """Return what the robots' wheels make of the drives' velocities (n, 3) on the floor there."""
+        """Return what effects and the floor there make of the drives' velocities (n, 3)."""
         wanted = self.drive.velocities
+        if self.effects.moves:
+            wanted = self.effects.driven(wanted, self.frames[self.robot_rows, 3])
         if not len(self._slopes):
             return wanted
         return self._slopes.slowed(wanted, self.frames[self.robot_rows], self._sideways, self.interval)
 
     def move(self) -> None:
-        """Move all bodies as the drives want."""
+        """Move all bodies as the drives want, or as effects and slopes let them."""
         if self._everybody_drives:
             velocities = self.wheels()
         else:
@@ -189,6 +203,19 @@ class Machinery:
         self.before, self.frames = self.frames, self.before
         self.frames[:-1] = poses
         self.stalled[:] = stalled
+
+    def rates(self) -> FloatArray:
+        """Return how the robots (n, 3) moved in the last step: forward, leftward [m/s], turn [rad/s]; stalled: 0."""
+        rows = self.robot_rows
+        way = between(self.before[rows][:, _PLANAR], self.frames[rows][:, _PLANAR])
+        way[:, 2] = wrap(way[:, 2])
+        return way / self.interval
+
+    def reference(self, time: float) -> Reference | None:
+        """Return what a reference measures of the robots; None: the truth."""
+        if not self.effects.referred:
+            return None
+        return self.effects.seen(time, self.robot_poses[:, _PLANAR], self.rates())
 
     def grip(self, robot: int, closed: bool) -> bool:
         """Close or open a robot's gripper; return whether it holds something now. Raise Error in Stage's semantics."""

@@ -11,6 +11,8 @@ from kurumaisu.sim.machinery import Machinery
 def take(machinery: Machinery) -> dict[str, Any]:
     """Return copies of all that changes while a population stays the same."""
     return {
+        "seed": machinery.seed,
+        "effects": machinery.effects.state(),
         "motion": machinery.motion.state(),
         "walks": machinery.pedestrians.state(),
         "frames": machinery.frames.copy(),
@@ -25,6 +27,8 @@ def take(machinery: Machinery) -> dict[str, Any]:
 
 def restore(machinery: Machinery, values: dict[str, Any]) -> None:
     """Go back to what take returned, of the same population."""
+    machinery.begin(values["seed"])
+    machinery.effects.restore(values["effects"])
     machinery.frames[:] = values["frames"]
     machinery.before[:] = values["before"]
     machinery.motion.place(machinery.frames[:-1])

@@ -25,7 +25,17 @@ _MODEL = {
     *("waypoint", "walk_speed", "walk_mode", "social", "slope"),
 }
 _HEEDED: dict[str, set[str]] = {
-    "world": {"name", "resolution", "interval_sim", "quit_time", "speedup", "unit_length", "unit_angle", "test"},
+    "world": {
+        "name",
+        "resolution",
+        "interval_sim",
+        "quit_time",
+        "speedup",
+        "unit_length",
+        "unit_angle",
+        "test",
+        "semantics",
+    },
     "block": {"points", "point", "z"},
     "sensor": {"pose", "size", "range", "fov", "samples", "noise"},
     "position": {
@@ -108,9 +118,10 @@ def _article(kind: str) -> str:
 
 def _check_properties(entity: Entity, notes: Notes) -> None:
     kinds = (entity.type, "model") if entity.type in MODELS else (entity.type,)
+    heeded = _HEEDED.get(entity.type, set[str]())
     for word, given in entity.properties.items():
         name = word.split("[")[0] if _NUMBERED.fullmatch(word) else word
-        if any(name in _HEEDED.get(kind, ()) for kind in kinds) or (len(kinds) == 2 and name in _MODEL):
+        if name in heeded or (len(kinds) == 2 and name in _MODEL):
             continue
         trap = next((traps[name] for kind in kinds if name in (traps := _TRAPS.get(kind, {}))), None)
         if trap:

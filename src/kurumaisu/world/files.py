@@ -56,9 +56,12 @@ class Reader:
     _open: int = 0  # brackets not closed yet
     _sources: dict[Path, Source] = field(default_factory=dict)
 
-    def read(self) -> list[Token]:
-        """Return the tokens of all files in the order Stage sees them, the last being END."""
-        source = self._source(self.top, None)
+    def read(self, text: Source | None = None) -> list[Token]:
+        """Return the tokens of all files in the order Stage sees them, the last being END; text: instead of the top's.
+
+        Raise Error with the place.
+        """
+        source = self._source(self.top, None) if text is None else self._fill_in(text)
         self._splice(source, depth=0)
         self.tokens.append(Token(Kind.END, "", source, len(source.text)))
         unused = sorted(set(self.values) - self.used)
