@@ -150,7 +150,7 @@ def test_a_wall_is_moved_with_what_stands_on_it(tmp_path: Path) -> None:
     assert np.isinf(drive(sim, (0.1, 0, 0), 1)[-1].scans[0].ranges).all()
     seen = drive(sim, (-0.5, 0, 0), 60)[-1]
     assert seen.stalled[0]
-    assert seen.poses[0, 0] == pytest.approx(-1.9 + 0.2, abs=0.05)
+    assert seen.poses[0, 0] == pytest.approx(-1.9 + 0.2, abs=0.05 + 0.02)  # a step, a cell
     sim.reset(0)
     assert drive(sim, (0.1, 0, 0), 1)[-1].scans[0].ranges[90] == pytest.approx(2.9)
 

@@ -109,6 +109,7 @@ void bindRaycast(py::module_& m) {
           "cast", &castQuantised, py::arg("poses"), py::arg("range_max"),
           "Ranges (n,) [m] of rays from poses (n, 3) along their headings; a miss is range_max [m] exactly.");
   bindArena(m);
+  bindCells(m);
 }
 
 }  // namespace kurumaisu

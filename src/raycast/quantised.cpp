@@ -3,47 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <stdexcept>
 #include <string>
+
+#include "raycast/walk.h"
 
 namespace kurumaisu {
 namespace {
 
 constexpr double kMostCells = 1e9;
 constexpr double kFarthest = 1e9;  // cells
-
-/// Steps to one of four neighbours along a line, so many as its ends differ in columns and rows.
-struct Walk {
-  Walk(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows)
-      : x(column),
-        y(row),
-        wide(std::abs(columns)),
-        high(std::abs(rows)),
-        left(wide + high),
-        right(columns < 0 ? -1 : 1),
-        up(rows < 0 ? -1 : 1),
-        excess(high - wide) {}
-
-  void step() {
-    if (excess < 0) {
-      x += right;
-      excess += 2 * high;
-    } else {
-      y += up;
-      excess -= 2 * wide;
-    }
-    --left;
-  }
-
-  std::int64_t x, y;
-  std::int64_t wide, high;
-  std::int64_t left;  ///< steps still to go
-
- private:
-  std::int64_t right, up;
-  std::int64_t excess;  ///< negative: the next step is along a row
-};
 
 }  // namespace
 

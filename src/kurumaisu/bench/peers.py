@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.errors import Error
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray
 
-_SOURCE = Path(__file__).parent / "drivers" / "stage.cpp"
+_DRIVERS = Path(__file__).parent / "drivers"
 
 
 @dataclass(frozen=True)
@@ -46,17 +46,19 @@ def read_run(text: str) -> Run:
 class Stage:
     """A Stage 4.3 installed under a prefix, driven by a program of ours that is compiled into a folder."""
 
-    def __init__(self, prefix: Path, folder: Path) -> None:
-        """Compile the driver. Raise Error with the compiler's words if that fails."""
+    def __init__(self, prefix: Path, folder: Path, driver: str = "stage") -> None:
+        """Compile a driver. Raise Error with the compiler's words if that fails."""
         self._folder = folder
-        self._program = folder / "stage"
+        self._program = folder / driver
         libraries = prefix / "lib"
         self._environment = {**os.environ, "STAGEPATH": str(next(libraries.glob("Stage-*"), libraries))}
         flags = self._run(
             "pkg-config", "--cflags", "stage", environment={**os.environ, "PKG_CONFIG_PATH": f"{libraries}/pkgconfig"}
         ).split()
         search = [f"-L{libraries}", "-lstage", f"-Wl,-rpath,{libraries}"]
-        self._run("g++", "-O2", "-w", "-std=c++17", *flags, str(_SOURCE), *search, "-o", str(self._program))
+        self._run(
+            "g++", "-O2", "-w", "-std=c++17", *flags, str(_DRIVERS / f"{driver}.cpp"), *search, "-o", str(self._program)
+        )
 
     def _run(self, *command: str, environment: dict[str, str] | None = None) -> str:
         done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
@@ -75,6 +77,17 @@ class Stage:
         text = self._run(*command, environment=self._environment)
         readings = np.fromfile(taken).reshape(len(poses), -1, 2)
         return readings[..., 0], readings[..., 1], read_run(text)
+
+    def drive(self, world: Path, commands: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Give commands (steps, robots, 3) to the robots of a world, a row each step, by the driver stage_drive.
+
+        Return poses (steps, robots, 4) after each step and who stalled in it (steps, robots).
+        """
+        given, taken = self._folder / "commands", self._folder / "trace"
+        np.ascontiguousarray(commands, dtype=np.float64).tofile(given)
+        self.text = self._run(str(self._program), str(world), str(given), str(taken), environment=self._environment)
+        trace = np.fromfile(taken).reshape(*commands.shape[:2], 5)
+        return trace[..., :4], trace[..., 4] != 0
 
     def run(self, world: Path, seconds: float, v: float, w: float) -> Run:
         """Run a world for so many simulated seconds, all robots at v [m/s], w [rad/s]."""

@@ -9,6 +9,8 @@ from typing import cast
 import numpy as np
 
 from kurumaisu.sim import fans
+from kurumaisu.sim.cells import build_cells
+from kurumaisu.sim.collisions import Collisions, Crossing, SharedCells
 from kurumaisu.sim.drive import Drive, Rows
 from kurumaisu.sim.motion import Motion, StageMotion
 from kurumaisu.sim.odometry import Localization
@@ -25,11 +27,22 @@ from kurumaisu.world.model import Model, Position
 class Machinery:
     """Built once for a population; a new one takes over from an old one when models come, go, or walls move."""
 
-    def __init__(self, population: Population, options: Options, interval: float, dynamics: Dynamics | None) -> None:
-        """Place all bodies where they begin; interval [s] is a step's length; dynamics: None for Stage's semantics."""
+    def __init__(
+        self,
+        population: Population,
+        options: Options,
+        interval: float,
+        resolution: float,
+        dynamics: Dynamics | None,
+    ) -> None:
+        """Place all bodies where they begin.
+
+        interval [s]: a step's length; resolution [m]: of the world; dynamics: None for Stage's semantics.
+        """
         models = population.models
         self.population = population
         self.interval = interval
+        self.resolution = resolution
         self.options = options
         self.dynamics = dynamics
         self.bodies = sort(models, _moving(models, physical=dynamics is not None))
@@ -38,6 +51,7 @@ class Machinery:
         self.robots = tuple(models[self.bodies.heads[row]] for row in self.robot_rows)
         self._everybody_drives = len(self.robot_rows) == len(self.bodies)
         self.fans = fans.find(models, population.poses, self.bodies, self.robot_rows.tolist())
+        self.collisions = self._make_collisions()
         self.motion = self._make_motion()
         self.frames = np.zeros((len(self.bodies) + 1, 4))  # of the bodies, and of the map at the end
         self.before = self.frames.copy()  # those one step ago
@@ -64,11 +78,19 @@ class Machinery:
 
     def _make_motion(self) -> Motion:
         if self.dynamics is None:
-            return StageMotion(self.arena, self.numbers, self.bodies)
+            return StageMotion(self.collisions, self.bodies)
         from kurumaisu.sim.following import Followed  # loads pymunk, which Stage's semantics need not pay for
 
         start = self.population
         return Followed(self.arena, self.numbers, start.models, start.poses, self.dynamics)
+
+    def _make_collisions(self) -> Collisions:
+        if self.options.collision == "exact" or self.dynamics is not None:
+            return Crossing(self.arena, self.numbers)
+        layers = 2 if self.options.collision == "cells_stale" else 1
+        start = self.population
+        cells, known_as = build_cells(start.models, start.poses, self.bodies, self.resolution, layers)
+        return SharedCells(self.arena, self.numbers, cells, known_as, layers)
 
     @property
     def robot_keys(self) -> IntArray:
@@ -129,7 +151,7 @@ class Machinery:
 
     def touching(self) -> BoolArray:
         """Return which robots (n,) touch something where they are."""
-        return self.arena.touches(self.numbers)[self.robot_rows]
+        return self.collisions.touching()[self.robot_rows]
 
     def _periods(self, intervals: list[float], always: bool) -> IntArray:
         return np.array([1 if always else period(i, self.interval) for i in intervals], dtype=np.int64)

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from kurumaisu._core import Arena
+from kurumaisu.sim.collisions import Collisions
 from kurumaisu.sim.partition import Bodies, attached, relative
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -42,11 +42,10 @@ class Motion(Protocol):
 class StageMotion:
     """Stage's: along the old heading, all or nothing; a body at rest keeps what was said of its last move."""
 
-    def __init__(self, arena: Arena, numbers: IntArray, bodies: Bodies) -> None:
-        """Move the bodies that the arena knows by numbers (b,)."""
+    def __init__(self, collisions: Collisions, bodies: Bodies) -> None:
+        """Move bodies as far as collisions let them."""
         count = len(bodies)
-        self._arena = arena
-        self._numbers = numbers
+        self._collisions = collisions
         self._poses = np.zeros((count, 4))
         self._stalled = np.zeros(count, dtype=np.bool_)
         self._new = np.zeros((count, 4))
@@ -61,11 +60,12 @@ class StageMotion:
         """Put all bodies at poses (b, 4), not stalled."""
         self._poses[:] = poses
         self._stalled[:] = False
-        self._arena.set_poses(self._numbers, self._poses)
+        self._collisions.place(self._poses)
 
     def move(self, velocities: FloatArray, dt: float) -> tuple[FloatArray, BoolArray]:
         """Move each body whose velocity is not zero, in order, those that carry others first; see Motion."""
         moving = velocities.any(axis=1)
+        self._collisions.begin_step()
         if moving.any():
             self._euler(velocities, dt)
             if not self._apart:
@@ -74,16 +74,18 @@ class StageMotion:
                     self._euler(velocities, dt)  # of those that were carried
                 moving &= ~self._carries
             self._settle(slice(None) if moving.all() else np.flatnonzero(moving))
+            self._collisions.end_step(self._poses)
         return self._poses, self._stalled
 
     def state(self) -> dict[str, StateArray]:
         """Return poses and stalls."""
-        return {"poses": self._poses.copy(), "stalled": self._stalled.copy()}
+        return {"poses": self._poses.copy(), "stalled": self._stalled.copy(), **self._collisions.state()}
 
     def restore(self, state: dict[str, StateArray]) -> None:
         """Go back to a state."""
         self.place(np.asarray(state["poses"], dtype=np.float64))
         self._stalled[:] = state["stalled"]
+        self._collisions.restore(state)
 
     def _euler(self, velocities: FloatArray, dt: float) -> None:
         """Leave in self._new where each body would go."""
@@ -108,7 +110,7 @@ class StageMotion:
 
     def _settle(self, which: slice | IntArray) -> None:
         """Let bodies take their steps, each on its own."""
-        stalled = self._arena.move(self._numbers[which], self._new[which])
+        stalled = self._collisions.move(which, self._new[which])
         self._stalled[which] = stalled
         if isinstance(which, slice):
             np.copyto(self._poses, self._new, where=~stalled[:, np.newaxis])
@@ -121,7 +123,7 @@ class StageMotion:
         old = self._poses[body]
         together = np.array([body, *self._riders[body]])
         new = attached(self._new[body], relative(old, self._poses[together]))
-        stalled = bool(self._arena.move(self._numbers[together], new, np.zeros(len(together), dtype=np.int64))[0])
+        stalled = bool(self._collisions.move(together, new, np.zeros(len(together), dtype=np.int64))[0])
         self._stalled[body] = stalled
         if not stalled:
             self._poses[together] = new

@@ -57,7 +57,12 @@ class Population:
         family = self.with_descendants(index)
         poses = self.poses.copy()
         poses[family] = attached(pose, relative(self.poses[index], self.poses[family]))
-        return replace(self, poses=poses)
+        models = list(self.models)
+        if (parent := models[index].parent) >= 0:
+            top = models[parent].size[2] if models[parent].stack_children else 0.0
+            on_parent = relative(poses[parent], pose) - np.array([0.0, 0.0, top, 0.0])
+            models[index] = replace(models[index], pose=on_parent)
+        return replace(self, models=tuple(models), poses=poses)
 
     def joined(self, models: Sequence[Model], poses: FloatArray, step: int) -> Population:
         """Return a population with one more tree of models, parents before children, poses (k, 4) in the map."""

@@ -45,7 +45,8 @@ class Simulator:
         self._options = options
         self._late = options.timing == "consistent" or options.semantics == "physical"
         dynamics = load_dynamics(shipped("launch/physical.yaml")) if options.semantics == "physical" else None
-        self._home = Machinery(Population.first(world.models, world.poses), options, world.interval, dynamics)
+        start = Population.first(world.models, world.poses)
+        self._home = Machinery(start, options, world.interval, world.resolution, dynamics)
         what = world.models, world.poses, world.interval, replace(options, threads=1), self._sensors
         self._fingerprint = state.digest(what)
         self._sensing: Sensing | None = None
@@ -140,7 +141,8 @@ class Simulator:
             raise Error(f"state: is of another world than {self._world.path}, or of other options")
         machinery = self._home
         if known["population"] is not None:
-            machinery = Machinery(known["population"], self._options, self._world.interval, self._home.dynamics)
+            home = self._home
+            machinery = Machinery(known["population"], home.options, home.interval, home.resolution, home.dynamics)
             machinery.begin()
         self._machinery = machinery
         self._step, self._dropped = known["step"], known["dropped"]

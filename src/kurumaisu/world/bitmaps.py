@@ -60,9 +60,12 @@ def is_map(path: Path) -> bool:
 
 
 def outline(occupied: BoolArray) -> FloatArray:
-    """Return the borders (m, 4) between wall and free pixels, straight runs joined; row 0 at the bottom."""
+    """Return the borders (m, 4) between wall and free pixels, straight runs joined; row 0 at the bottom.
+
+    As in Stage, the wall is to the right of each.
+    """
     pixels = np.pad(occupied.view(np.int8), 1)
-    y, x0, x1 = _runs(np.diff(pixels, axis=0))
+    y, x0, x1 = _runs(-np.diff(pixels, axis=0))
     x, y0, y1 = _runs(np.diff(pixels, axis=1).T)
     flat, upright = np.array([x0, y, x1, y]), np.array([x, y0, x, y1])
     return np.ascontiguousarray(np.hstack([flat, upright]).T, dtype=np.float64)
@@ -71,7 +74,7 @@ def outline(occupied: BoolArray) -> FloatArray:
 def _runs(step: NDArray[np.int8]) -> tuple[IntArray, IntArray, IntArray]:
     """Return row, first and last column of runs of one non-zero value in an array whose outer columns are 0.
 
-    step is +1 at the lower border of a wall, -1 at its upper border; borders of opposite sense are never joined.
+    A run of -1 is from its last column to its first.
     """
     changes = step[:, 1:] != step[:, :-1]
     if step.flags.c_contiguous:
@@ -80,8 +83,10 @@ def _runs(step: NDArray[np.int8]) -> tuple[IntArray, IntArray, IntArray]:
         column, row = np.divmod(np.flatnonzero(changes.T), changes.shape[0])
         order = np.lexsort((column, row))
         row, column = row[order], column[order]
-    starts = np.flatnonzero(step[row, column + 1])  # a change to nothing ends a run and begins none
-    return row[starts], column[starts], column[starts + 1]
+    sense = step[row, column + 1]
+    starts = np.flatnonzero(sense)  # a change to nothing ends a run and begins none
+    ahead, one, other = sense[starts] > 0, column[starts], column[starts + 1]
+    return row[starts], np.where(ahead, one, other), np.where(ahead, other, one)
 
 
 def _bitmap(path: Path, occupied: BoolArray) -> Bitmap:

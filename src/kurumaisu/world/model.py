@@ -28,11 +28,14 @@ class Shape:
     segments: (m, 4), x and y of both ends [m]; heights: (m, 2), lowest and highest z above the base [m];
     polygons: closed polygons (k, 2) [m] of blocks and boxes, for contact and drawing, with their heights (2,) and
     colours; a bitmap has segments only.
+    edges: (k, 6), the same outlines as Stage draws them into cells, to the last bit: x and y from and to, lowest and
+    highest z [m], before the origin is applied; None: the segments, and no origin.
     """
 
     segments: FloatArray
     heights: FloatArray
     polygons: tuple[Polygon, ...]
+    edges: FloatArray | None = None
 
 
 @dataclass(frozen=True)

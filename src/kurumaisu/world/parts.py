@@ -28,12 +28,14 @@ class Prism:
 class Parts:
     """What a body is made of.
 
-    segments (m, 4) with heights (m, 2) that belong to no prism, and prisms; box: corners (2, 3) that it fills beyond
-    its parts; fixed: it is at its place already.
+    segments (m, 4) with heights (m, 2) that belong to no prism, and prisms; the last `merged` of the segments' arrays
+    are what is seen of prisms that are not drawn; box: corners (2, 3) that it fills beyond its parts; fixed: it is at
+    its place already.
     """
 
     segments: list[FloatArray] = field(default_factory=list)
     heights: list[FloatArray] = field(default_factory=list)
+    merged: int = 0
     prisms: list[Prism] = field(default_factory=list)
     box: FloatArray | None = None
     fixed: bool = False
@@ -72,6 +74,7 @@ class Parts:
         return Parts(
             [((s.reshape(-1, 2) - middle) * scale[:2]).reshape(-1, 4) for s in self.segments],
             [h * scale[2] for h in self.heights],
+            self.merged,
             [Prism((p.corners - middle) * scale[:2], p.heights * scale[2], p.drawn) for p in self.prisms],
             None if self.box is None else (self.box - [*middle, 0.0]) * scale,
         )
@@ -92,7 +95,15 @@ class Parts:
             segments=np.asarray(np.concatenate(segments) @ turn + origin[:2]).reshape(-1, 4),
             heights=np.concatenate(heights) + origin[2],
             polygons=tuple(Polygon(p.corners @ turn + origin[:2], p.heights + origin[2], color) for p in prisms),
+            edges=self._edges(prisms),
         )
+
+    def _edges(self, prisms: list[Prism]) -> FloatArray:
+        """Return all outlines (k, 6) as Stage draws them, of prisms that cover each other too."""
+        count = len(self.segments) - self.merged
+        loops = [np.hstack(pair) for pair in zip(self.segments[:count], self.heights[:count], strict=True)]
+        loops += [np.hstack([edges(p.corners), np.tile(p.heights, (len(p.corners), 1))]) for p in prisms]
+        return np.concatenate([np.empty((0, 6)), *loops])
 
 
 def edges(corners: FloatArray) -> FloatArray:
@@ -106,11 +117,20 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
 
 
 def with_boundary(parts: Parts, size: FloatArray) -> Parts:
-    """Return the parts with a wall along the edge of the size: outline, and prisms for its four sides."""
-    (x, y), t = size[:2] / 2, _BOUNDARY
-    parts.add(edges(rectangle(-x, -y, x, y)), size[2])
-    if min(x, y) > t:
-        parts.add(edges(rectangle(-x + t, -y + t, x - t, y - t)), size[2])
-    sides = ((-x, -y, t - x, y), (-x, -y, x, t - y), (-x, y - t, x, y), (x - t, -y, x, y))
-    parts.prisms += [Prism(rectangle(*side), np.array([0.0, size[2]]), drawn=False) for side in sides]
+    """Return the parts with a wall along the edge of the size: outline, and prisms for its four sides.
+
+    The sides are reckoned as in Stage, from what the parts fill (libstage/model.cc, Load).
+    """
+    low, high = (-size / 2, size / 2) if parts.empty or parts.fixed else parts.bounds()
+    (x, y), (wide, deep), t, top = low[:2], (high - low)[:2], _BOUNDARY, size[2]
+    ends = x + wide, y + deep
+    parts.add(edges(rectangle(x, y, *ends)), top)
+    parts.merged = 1
+    if min(wide, deep) > 2 * t:
+        parts.add(edges(rectangle(x + t, y + t, *(high[:2] - t))), top)
+        parts.merged = 2
+    right, upper = high[:2] - t
+    sides = [(x, y, x + t, ends[1]), (x, y, ends[0], y + t)]
+    sides += [(x, upper, ends[0], upper + t), (right, y, right + t, ends[1])]
+    parts.prisms += [Prism(rectangle(*side), np.array([0.0, top]), drawn=False) for side in sides]
     return parts

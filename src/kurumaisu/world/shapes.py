@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +48,7 @@ class Shaper:
         if not shape.polygons or shape.polygons[0].color == color:
             return shape, size
         polygons = tuple(Polygon(polygon.corners, polygon.heights, color) for polygon in shape.polygons)
-        return Shape(shape.segments, shape.heights, polygons), size
+        return replace(shape, polygons=polygons), size
 
     def _shape(self, values: Values, size: FloatArray, origin: FloatArray, color: Color) -> tuple[Shape, FloatArray]:
         parts = self._body(values, size)
@@ -58,7 +58,8 @@ class Shaper:
         if blocks and not values.has("bitmap"):
             parts = Parts()  # the first block displaces the default body, and the boundary with it
         elif values.whole("boundary", 0):
-            parts = with_boundary(parts, size)
+            parts = with_boundary(parts.fit(size), size)
+        parts = parts.fit(size)  # as often as Stage does, or the last bits differ
         parts.prisms += [_block(Values(block, values.units, values.notes)) for block in blocks]
         if not parts.empty and not parts.fixed and ((bounds := parts.bounds())[1] - bounds[0])[:2].min() < EPSILON:
             values.notes.add(values.entity.name, f"the body of {values.entity.name.text} has no area")

@@ -31,6 +31,7 @@ _SIZES = {  # [m], of types with another size if the file gives none
     "gripper": (0.2, 0.3, 0.2),
     "blinkenlight": (0.02, 0.02, 0.02),
 }
+_MANY = 100.0  # [rad] of a heading
 _INTERVAL = 100  # [ms] between updates of a model
 
 
@@ -136,13 +137,23 @@ def global_poses(models: Sequence[Model]) -> FloatArray:
     poses = np.empty((len(models), 4))
     for model in models:
         if model.parent < 0:
-            poses[model.index] = model.pose
+            poses[model.index] = (*model.pose[:3], _normal(float(model.pose[3])))
             continue
         parent = models[model.parent]
         x, y, z, heading = poses[model.parent].tolist()
         c, s = math.cos(heading), math.sin(heading)
         dx, dy, dz, turn = model.pose.tolist()
         top = parent.size[2] if parent.stack_children else 0.0
-        poses[model.index] = (x + c * dx - s * dy, y + s * dx + c * dy, z + dz + top, heading + turn)
-    poses[:, 3] = (poses[:, 3] + math.pi) % (2 * math.pi) - math.pi
+        poses[model.index] = (x + c * dx - s * dy, y + s * dx + c * dy, z + dz + top, _normal(heading + turn))
     return poses
+
+
+def _normal(heading: float) -> float:
+    """Return a heading within half a turn; one that is there already keeps its last bit, as in Stage."""
+    if abs(heading) > _MANY:
+        heading = math.remainder(heading, math.tau)
+    while heading < -math.pi:
+        heading += math.tau
+    while heading > math.pi:
+        heading -= math.tau
+    return heading

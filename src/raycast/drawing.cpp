@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "raycast/drawing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "raycast/walk.h"
+
+namespace kurumaisu {
+namespace {
+
+constexpr double kHalfTurn = 3.14159265358979323846;  // [rad]
+constexpr double kFarthest = 1 << 30;                 // cells
+
+/// As in Stage: nothing happens to an angle that is in range.
+double normalized(double angle) {
+  constexpr double kMany = 100.0;  // [rad]
+  if (std::abs(angle) > kMany) angle = std::remainder(angle, 2 * kHalfTurn);
+  while (angle < -kHalfTurn) angle += 2 * kHalfTurn;
+  while (angle > kHalfTurn) angle -= 2 * kHalfTurn;
+  return angle;
+}
+
+bool finite(const Pose& p) {
+  return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && std::isfinite(p.heading);
+}
+
+[[noreturn]] void refuse(const char* what, std::size_t i, const char* why) {
+  throw std::invalid_argument(std::string(what) + " " + std::to_string(i) + why);
+}
+
+void requirePart(const Part& part, std::size_t i) {
+  if (part.parent < -1 || part.parent >= static_cast<int>(i))
+    refuse("part", i, ": its parent must come before it");
+  if (!finite(part.pose) || !finite(part.origin) || !std::isfinite(part.lift))
+    refuse("part", i, " is not finite");
+}
+
+void requireEdge(const Edge& edge, std::size_t i, std::size_t parts) {
+  const Segment& line = edge.line;
+  if (edge.part < 0 || static_cast<std::size_t>(edge.part) >= parts)
+    refuse("edge", i, ": there is no such part");
+  if (!std::isfinite(line.ax + line.ay + line.bx + line.by)) refuse("edge", i, " is not finite");
+  if (!(edge.z_low <= edge.z_high)) refuse("edge", i, ": z_low must not be above z_high");
+}
+
+}  // namespace
+
+Pencil::Pencil(double resolution) : cells_per_metre_(1.0 / resolution) {
+  if (!(resolution > 0) || !std::isfinite(resolution) || !std::isfinite(cells_per_metre_))
+    throw std::invalid_argument("resolution must be positive, not " + std::to_string(resolution));
+}
+
+Pencil::Extent Pencil::measure(const Outline& outline) const {
+  std::vector<double> reaches;
+  for (std::size_t i = 0; i < outline.parts.size(); ++i) {
+    const Part& part = outline.parts[i];
+    requirePart(part, i);
+    const double below = part.parent < 0 ? 0.0 : reaches[static_cast<std::size_t>(part.parent)];
+    reaches.push_back(below + std::hypot(part.pose.x, part.pose.y));
+  }
+  double farthest = 0.0;
+  double cells = 0.0;
+  for (std::size_t i = 0; i < outline.edges.size(); ++i) {
+    const Edge& edge = outline.edges[i];
+    requireEdge(edge, i, outline.parts.size());
+    const auto part = static_cast<std::size_t>(edge.part);
+    const Pose& origin = outline.parts[part].origin;
+    const Segment& line = edge.line;
+    farthest = std::max(farthest, reaches[part] + std::hypot(origin.x, origin.y) +
+                                      std::max(std::hypot(line.ax, line.ay), std::hypot(line.bx, line.by)));
+    cells += std::abs(line.bx - line.ax) + std::abs(line.by - line.ay);
+  }
+  return {farthest, cells * cells_per_metre_};
+}
+
+bool Pencil::numbered(const Pose& at, double reach) const {
+  return finite(at) && (std::max(std::abs(at.x), std::abs(at.y)) + reach) * cells_per_metre_ < kFarthest;
+}
+
+Pencil::Frame Pencil::attached(const Frame& frame, const Pose& pose) {
+  Frame out{frame.x + pose.x * frame.cos - pose.y * frame.sin,
+            frame.y + pose.x * frame.sin + pose.y * frame.cos,
+            frame.z + pose.z,
+            normalized(frame.heading + pose.heading),
+            frame.cos,
+            frame.sin};
+  if (out.heading != frame.heading) {
+    out.cos = std::cos(out.heading);
+    out.sin = std::sin(out.heading);
+  }
+  return out;
+}
+
+void Pencil::draw(const Outline& outline, const Pose& at, Drawing& drawing) {
+  drawing.cells.clear();
+  drawing.strokes.clear();
+  drawing.tiles.clear();
+  constexpr std::int32_t kMost = std::numeric_limits<std::int32_t>::max();
+  drawing.low = {kMost, kMost};
+  drawing.high = {-kMost, -kMost};
+  drawing.in_ground = false;
+  models_.clear();
+  outlines_.clear();
+  const Frame body{at.x, at.y, at.z, at.heading, std::cos(at.heading), std::sin(at.heading)};
+  for (const Part& part : outline.parts) {
+    Frame model =
+        attached(part.parent < 0 ? body : models_[static_cast<std::size_t>(part.parent)], part.pose);
+    model.z += part.lift;
+    models_.push_back(model);
+    outlines_.push_back(attached(model, part.origin));
+  }
+  for (const Edge& edge : outline.edges) {
+    const Frame& frame = outlines_[static_cast<std::size_t>(edge.part)];
+    const double low = edge.z_low + frame.z;
+    const double high = edge.z_high + frame.z;
+    drawing.in_ground = drawing.in_ground || low < 0;
+    draw(edge.line, frame, drawing);
+    if (drawing.strokes.empty() || drawing.strokes.back().z_low != low ||
+        drawing.strokes.back().z_high != high)
+      drawing.strokes.push_back({low, high, 0});
+    drawing.strokes.back().end = drawing.cells.size();
+  }
+  std::sort(drawing.tiles.begin(), drawing.tiles.end());
+  drawing.tiles.erase(std::unique(drawing.tiles.begin(), drawing.tiles.end()), drawing.tiles.end());
+}
+
+void Pencil::draw(const Segment& line, const Frame& frame, Drawing& drawing) const {
+  const auto cellOf = [&](double at) { return static_cast<std::int64_t>(std::floor(at * cells_per_metre_)); };
+  const std::int64_t ax = cellOf(frame.x + line.ax * frame.cos - line.ay * frame.sin);
+  const std::int64_t ay = cellOf(frame.y + line.ax * frame.sin + line.ay * frame.cos);
+  const std::int64_t bx = cellOf(frame.x + line.bx * frame.cos - line.by * frame.sin);
+  const std::int64_t by = cellOf(frame.y + line.bx * frame.sin + line.by * frame.cos);
+  for (Walk walk(ax, ay, bx - ax, by - ay); walk.left > 0; walk.step()) {
+    const Cell cell{static_cast<std::int32_t>(walk.x), static_cast<std::int32_t>(walk.y)};
+    drawing.cells.push_back(cell);
+    if (drawing.tiles.empty() || drawing.tiles.back() != tiles::of(cell))
+      drawing.tiles.push_back(tiles::of(cell));
+    drawing.low = {std::min(drawing.low.x, cell.x), std::min(drawing.low.y, cell.y)};
+    drawing.high = {std::max(drawing.high.x, cell.x), std::max(drawing.high.y, cell.y)};
+  }
+}
+
+}  // namespace kurumaisu
