@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from kurumaisu.sim import fans
-from kurumaisu.sim.cells import build_cells
+from kurumaisu.sim.cells import build_cell_rays, build_cells
 from kurumaisu.sim.collisions import Collisions, Crossing, SharedCells
 from kurumaisu.sim.drive import Drive, Rows
 from kurumaisu.sim.motion import Motion, StageMotion
@@ -20,6 +20,7 @@ from kurumaisu.sim.population import Population
 from kurumaisu.sim.rangers import Rangers
 from kurumaisu.sim.rhythm import Rhythm, period
 from kurumaisu.sim.settings import Dynamics
+from kurumaisu.sim.sight import CellSight, ExactSight, Sight
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
 
@@ -53,6 +54,7 @@ class Machinery:
         self.fans = fans.find(models, population.poses, self.bodies, self.robot_rows.tolist())
         self.collisions = self._make_collisions()
         self.motion = self._make_motion()
+        self._sight = self._make_sight()
         self.frames = np.zeros((len(self.bodies) + 1, 4))  # of the bodies, and of the map at the end
         self.before = self.frames.copy()  # those one step ago
         self.stalled = np.zeros(len(self.bodies), dtype=np.bool_)
@@ -74,7 +76,7 @@ class Machinery:
         looks = self._periods([fan.model.update_interval for fan in self.fans], always=False)
         births = born[[fan.model.index for fan in self.fans]].astype(np.int64)
         sweep = self.options.scan_sweep / self.interval
-        self.rangers = Rangers(self.arena, self.fans, np.stack([looks, births], axis=-1), sweep)
+        self.rangers = Rangers(self._sight, self.fans, np.stack([looks, births], axis=-1), sweep)
 
     def _make_motion(self) -> Motion:
         if self.dynamics is None:
@@ -91,6 +93,14 @@ class Machinery:
         start = self.population
         cells, known_as = build_cells(start.models, start.poses, self.bodies, self.resolution, layers)
         return SharedCells(self.arena, self.numbers, cells, known_as, layers)
+
+    def _make_sight(self) -> Sight:
+        if self.options.ray_casting == "exact" or self.dynamics is not None:
+            return ExactSight(self.arena)
+        start = self.population
+        options = self.options
+        rays, known_as = build_cell_rays(start.models, start.poses, self.bodies, self.resolution, options.threads)
+        return CellSight(rays, known_as, self.collisions.drawn, self.fans)
 
     @property
     def robot_keys(self) -> IntArray:

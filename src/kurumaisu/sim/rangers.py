@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu._core import Arena
 from kurumaisu.sim.fans import RangerFan, spread
 from kurumaisu.sim.observation import Scans, Sweep
 from kurumaisu.sim.partition import attached
 from kurumaisu.sim.sensors.ranger_noise import RangerNoise
+from kurumaisu.sim.sight import Sight
 from kurumaisu.types import FloatArray, IntArray
 
 _TURN = 2 * np.pi
@@ -21,13 +21,14 @@ _TURN = 2 * np.pi
 class Rangers:
     """Takes the scans of all fans; those of one period and birth are a cohort."""
 
-    def __init__(self, arena: Arena, fans: Sequence[RangerFan], rhythm: IntArray, sweep: float) -> None:
+    def __init__(self, sight: Sight, fans: Sequence[RangerFan], rhythm: IntArray, sweep: float) -> None:
         """Measure with fans whose rhythm (f, 2) is their period and birth [steps]; sweep: share of a step."""
+        self._sight = sight
         self._cohorts: list[_Cohort] = []
         self._places: list[tuple[int, int, int]] = [(0, 0, 0)] * len(fans)
         for number, (every, birth) in enumerate(sorted(set(map(tuple, rhythm.tolist())))):
             members = [i for i in range(len(fans)) if rhythm[i].tolist() == [every, birth]]
-            self._cohorts.append(_Cohort(arena, [fans[i] for i in members], (every, birth % every), sweep))
+            self._cohorts.append(_Cohort(sight, [fans[i] for i in members], (every, birth % every), sweep))
             ends = np.cumsum([fans[i].fan.samples for i in members]).tolist()
             for i, start, stop in zip(members, [0, *ends], ends, strict=False):
                 self._places[i] = (number, start, stop)
@@ -40,10 +41,12 @@ class Rangers:
 
     def start(self, time: float, frames: FloatArray, rng: np.random.Generator) -> None:
         """Look once with all fans, before their first update, from frames (b + 1, 4): bodies and the map."""
+        self._sight.follow(frames)
         self._scans = Scans(tuple(c.measure(time, 0, frames, frames, rng) for c in self._cohorts), self._places)
 
     def update(self, step: int, time: float, way: tuple[FloatArray, FloatArray], rng: np.random.Generator) -> None:
         """Measure with those due in a step, counted from 1, on the way between frames (b + 1, 4)."""
+        self._sight.follow(way[1])
         old = self._scans.sweeps
         new = tuple(
             c.measure(time, o.count + 1, *way, rng) if step % c.every == c.phase else o
@@ -69,9 +72,9 @@ class Rangers:
 class _Cohort:
     """Fans that are always due together."""
 
-    def __init__(self, arena: Arena, fans: Sequence[RangerFan], rhythm: tuple[int, int], sweep: float) -> None:
+    def __init__(self, sight: Sight, fans: Sequence[RangerFan], rhythm: tuple[int, int], sweep: float) -> None:
         self.every, self.phase = rhythm
-        self._arena = arena
+        self._sight = sight
         self._body = np.array([fan.body for fan in fans], dtype=np.int64)
         self._trees = np.array([fan.model.root for fan in fans], dtype=np.int64)
         self._mounts = np.array([fan.mount for fan in fans]).reshape(-1, 4)
@@ -86,7 +89,7 @@ class _Cohort:
 
     def measure(self, time: float, count: int, before: FloatArray, now: FloatArray, rng: np.random.Generator) -> Sweep:
         if self._beams is None:
-            ranges, returns = self._arena.scan(self._place(now), self._trees, self._fans)
+            ranges, returns = self._sight.scan(self._place(now), self._trees, self._fans)
         else:
             ranges, returns = self._cast(self._beams, before, now, rng)
         if self._noise.on_ranges:
@@ -119,7 +122,7 @@ class _Cohort:
         origins[:, 3] += beams.bearings
         if self._noise.on_bearings:
             origins[:, 3] += self._noise.bearings(rng)
-        ranges, returns = self._arena.cast(origins, self._trees[beams.fan], float(beams.range_max.max(initial=1.0)))
+        ranges, returns = self._sight.cast(origins, self._trees[beams.fan], float(beams.range_max.max(initial=1.0)))
         beyond = ranges > beams.range_max
         ranges[beyond], returns[beyond] = np.inf, 0.0
         return ranges, returns
