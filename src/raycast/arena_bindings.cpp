@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // kurumaisu._core.Arena. Arrays are checked here for shape and kind, and by the arena for what they say.
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -12,6 +11,7 @@
 #include "bindings.h"
 #include "raycast/arena.h"
 #include "raycast/arrays.h"
+#include "raycast/beam_arrays.h"
 
 namespace kurumaisu {
 namespace py = pybind11;
@@ -30,29 +30,6 @@ std::vector<Face> facesOf(const Array& outline, const Array& returns, const Bool
   return faces;
 }
 
-std::vector<Viewpoint> viewpointsOf(const Array& origins, const py::array& trees) {
-  const std::vector<Pose> poses = posesOf(origins, -1, "origins");
-  const std::vector<int> own = integers(trees, origins.shape(0), "trees");
-  std::vector<Viewpoint> from;
-  from.reserve(poses.size());
-  for (std::size_t i = 0; i < poses.size(); ++i) from.push_back({poses[i], own[i]});
-  return from;
-}
-
-std::vector<Beams> fansOf(const Array& array, py::ssize_t n) {
-  const double* row = rowsOf(array, n, 4, "fans");
-  std::vector<Beams> fans;
-  fans.reserve(static_cast<std::size_t>(n));
-  for (py::ssize_t i = 0; i < n; ++i, row += 4) {
-    if (!(row[2] >= 0 && row[2] < 1e9 && row[2] == std::floor(row[2]))) {
-      throw std::invalid_argument("fan " + std::to_string(i) +
-                                  ": samples must be a whole number from 0, not " + std::to_string(row[2]));
-    }
-    fans.push_back({row[0], row[1], static_cast<std::size_t>(row[2]), row[3]});
-  }
-  return fans;
-}
-
 std::unique_ptr<Arena> makeArena(const Array& walls, const Array& returns, const Bools& solid,
                                  const py::array& tree, int threads) {
   const std::vector<Face> faces = facesOf(walls, returns, solid, "walls");
@@ -61,35 +38,6 @@ std::unique_ptr<Arena> makeArena(const Array& walls, const Array& returns, const
   all.reserve(faces.size());
   for (std::size_t i = 0; i < faces.size(); ++i) all.push_back({faces[i], trees[i]});
   return std::make_unique<Arena>(std::move(all), threads);
-}
-
-py::tuple scan(Arena& arena, const Array& origins, const py::array& trees, const Array& fans) {
-  const std::vector<Viewpoint> from = viewpointsOf(origins, trees);
-  const std::vector<Beams> all = fansOf(fans, origins.shape(0));
-  std::size_t total = 0;
-  for (const Beams& fan : all) total += fan.samples;
-  Array ranges(static_cast<py::ssize_t>(total));
-  Array returns(static_cast<py::ssize_t>(total));
-  double* range = ranges.mutable_data();
-  double* value = returns.mutable_data();
-  {
-    const py::gil_scoped_release release;
-    arena.scan(from, all, range, value);
-  }
-  return py::make_tuple(ranges, returns);
-}
-
-py::tuple cast(Arena& arena, const Array& origins, const py::array& trees, double range_max) {
-  const std::vector<Viewpoint> from = viewpointsOf(origins, trees);
-  Array ranges(origins.shape(0));
-  Array returns(origins.shape(0));
-  double* range = ranges.mutable_data();
-  double* value = returns.mutable_data();
-  {
-    const py::gil_scoped_release release;
-    arena.cast(from, range_max, range, value);
-  }
-  return py::make_tuple(ranges, returns);
 }
 
 void setPoses(Arena& arena, const py::array& bodies, const Array& poses) {
@@ -152,12 +100,12 @@ void bindArena(py::module_& m) {
       .def("set_poses", &setPoses, py::arg("bodies"), py::arg("poses"),
            "Put bodies (b,) to poses (b, 4): x, y, z [m], heading [rad] of their frames in the map.")
       .def(
-          "scan", &scan, py::arg("origins"), py::arg("trees"), py::arg("fans"),
+          "scan", &scan<Arena>, py::arg("origins"), py::arg("trees"), py::arg("fans"),
           "Ranges [m] and ranger returns, (sum of samples,) each, of fans (s, 4): first bearing, increment "
           "[rad], samples,\n"
           "range_max [m], from origins (s, 4): x, y, z [m], heading [rad], blind for their own trees (s,). A "
           "miss is +inf and 0.")
-      .def("cast", &cast, py::arg("origins"), py::arg("trees"), py::arg("range_max"),
+      .def("cast", &cast<Arena>, py::arg("origins"), py::arg("trees"), py::arg("range_max"),
            "Ranges [m] and ranger returns (n,) of single rays from origins (n, 4): x, y, z [m], direction "
            "[rad].")
       .def("touches", &touches, py::arg("bodies"),

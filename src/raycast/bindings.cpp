@@ -10,7 +10,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include "raycast/quantised.h"
 #include "raycast/scene.h"
 
 namespace kurumaisu {
@@ -70,19 +69,6 @@ py::tuple castFan(const Scene& scene, const std::array<double, 3>& origin, doubl
   return py::make_tuple(ranges, segments);
 }
 
-Array castQuantised(const Quantised& cells, const Array& poses, double range_max) {
-  if (poses.ndim() != 2 || poses.shape(1) != 3) throw std::invalid_argument("poses must have shape (n, 3)");
-  Array out(poses.shape(0));
-  const double* pose = poses.data();
-  double* range = out.mutable_data();
-  {
-    const py::gil_scoped_release release;
-    for (py::ssize_t i = 0; i < poses.shape(0); ++i, pose += 3)
-      range[i] = cells.cast(pose[0], pose[1], pose[2], range_max);
-  }
-  return out;
-}
-
 }  // namespace
 
 void bindRaycast(py::module_& m) {
@@ -99,17 +85,9 @@ void bindRaycast(py::module_& m) {
            "Ranges (samples,) [m] and indices (samples,) of the segments met; +inf and -1: nothing within "
            "max_range\n"
            "[m]. Beam i leaves the origin (3,) at bearing first + i * increment [rad].");
-  py::class_<Quantised>(m, "Quantised", "Walls drawn into cells, and rays that walk over them, as in Stage.")
-      .def(py::init([](const Array& walls, double resolution) {
-             return Quantised(segmentsOf(walls), resolution);
-           }),
-           py::arg("walls"), py::arg("resolution"),
-           "From walls (m, 4): x, y of both ends [m]; resolution: edge of a cell [m].")
-      .def(
-          "cast", &castQuantised, py::arg("poses"), py::arg("range_max"),
-          "Ranges (n,) [m] of rays from poses (n, 3) along their headings; a miss is range_max [m] exactly.");
   bindArena(m);
   bindCells(m);
+  bindCellRays(m);
 }
 
 }  // namespace kurumaisu

@@ -9,8 +9,6 @@
 namespace kurumaisu {
 namespace {
 
-constexpr double kMostCells = 1e8;  // of all outlines: some hundred MB
-
 /// A cell that is drawn, and by which stroke.
 struct Trace {
   std::uint64_t cell;
@@ -63,7 +61,7 @@ Cells::Cells(double resolution, int layers)
 
 void Cells::addWalls(const Outline& outline, int tree) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  measured(outline);
+  pencil_.admit(outline);
   Drawing drawing;
   pencil_.draw(outline, {0, 0, 0, 0}, drawing);
   walls_.add(drawing, tree);
@@ -71,7 +69,7 @@ void Cells::addWalls(const Outline& outline, int tree) {
 
 int Cells::add(Outline outline, int tree) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const double reach = measured(outline);
+  const double reach = pencil_.admit(outline);
   const int number = static_cast<int>(bodies_.size());
   bodies_.push_back(
       {std::move(outline), reach, tree, true, {0, 0, 0, 0}, std::vector<Sheet>(shelves_.size())});
@@ -79,20 +77,10 @@ int Cells::add(Outline outline, int tree) {
   return number;
 }
 
-double Cells::measured(const Outline& outline) {
-  const Pencil::Extent extent = pencil_.measure(outline);
-  if (!pencil_.numbered({0, 0, 0, 0}, extent.reach))
-    throw std::invalid_argument("an outline is more than 2^30 cells from its frame");
-  if (!(cells_ + extent.cells <= kMostCells))
-    throw std::invalid_argument("outlines have more than 10^8 cells: the resolution is too fine for them");
-  cells_ += extent.cells;
-  return extent.reach;
-}
-
 void Cells::remove(int body) {
   const std::lock_guard<std::mutex> lock(mutex_);
   requireKnown({body});
-  cells_ -= pencil_.measure(at(body).outline).cells;
+  pencil_.dismiss(at(body).outline);
   for (std::size_t layer = 0; layer < shelves_.size(); ++layer) shelve(body, layer, {});
   at(body) = {{}, 0, 0, false, {}, {}};
 }

@@ -74,7 +74,6 @@ class Cells {
   void requirePoses(const std::vector<int>& bodies, const Pose* poses) const;
   void put(int body, std::size_t layer, const Pose& pose);
   void shelve(int body, std::size_t layer, const std::vector<std::uint64_t>& tiles);
-  double measured(const Outline& outline);
   bool moveGroup(const int* bodies, const Pose* poses, std::size_t count);
   bool touches(int body) const;
   bool meetsBody(int body) const;
@@ -85,7 +84,6 @@ class Cells {
   std::vector<Body> bodies_;
   std::vector<Shelf> shelves_;  ///< of each layer: bodies by the tiles they have cells in
   std::size_t layer_ = 0;       ///< of this step
-  double cells_ = 0;            ///< of all outlines, nearly
 };
 
 }  // namespace kurumaisu

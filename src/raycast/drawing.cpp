@@ -14,15 +14,7 @@ namespace {
 
 constexpr double kHalfTurn = 3.14159265358979323846;  // [rad]
 constexpr double kFarthest = 1 << 30;                 // cells
-
-/// As in Stage: nothing happens to an angle that is in range.
-double normalized(double angle) {
-  constexpr double kMany = 1e4;  // [rad] more than any file says
-  if (std::abs(angle) > kMany) angle = std::remainder(angle, 2 * kHalfTurn);
-  while (angle < -kHalfTurn) angle += 2 * kHalfTurn;
-  while (angle > kHalfTurn) angle -= 2 * kHalfTurn;
-  return angle;
-}
+constexpr double kMostCells = 1e8;                    // of all outlines: some hundred MB
 
 bool finite(const Pose& p) {
   return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && std::isfinite(p.heading);
@@ -53,9 +45,27 @@ void note(std::uint64_t tile, Drawing& drawing) {
 
 }  // namespace
 
+double normalized(double angle) {
+  constexpr double kMany = 1e4;  // [rad] more than any file says
+  if (std::abs(angle) > kMany) angle = std::remainder(angle, 2 * kHalfTurn);
+  while (angle < -kHalfTurn) angle += 2 * kHalfTurn;
+  while (angle > kHalfTurn) angle -= 2 * kHalfTurn;
+  return angle;
+}
+
 Pencil::Pencil(double resolution) : cells_per_metre_(1.0 / resolution) {
   if (!(resolution > 0) || !std::isfinite(resolution) || !std::isfinite(cells_per_metre_))
     throw std::invalid_argument("resolution must be positive, not " + std::to_string(resolution));
+}
+
+double Pencil::admit(const Outline& outline) {
+  const Extent extent = measure(outline);
+  if (!numbered({0, 0, 0, 0}, extent.reach))
+    throw std::invalid_argument("an outline is more than 2^30 cells from its frame");
+  if (!(cells_ + extent.cells <= kMostCells))
+    throw std::invalid_argument("outlines have more than 10^8 cells: the resolution is too fine for them");
+  cells_ += extent.cells;
+  return extent.reach;
 }
 
 Pencil::Extent Pencil::measure(const Outline& outline) const {
@@ -124,8 +134,8 @@ void Pencil::draw(const Outline& outline, const Pose& at, Drawing& drawing) {
     drawing.in_ground = drawing.in_ground || low < 0;
     draw(edge.line, frame, drawing);
     if (drawing.strokes.empty() || drawing.strokes.back().z_low != low ||
-        drawing.strokes.back().z_high != high)
-      drawing.strokes.push_back({low, high, 0});
+        drawing.strokes.back().z_high != high || drawing.strokes.back().part != edge.part)
+      drawing.strokes.push_back({low, high, edge.part, 0});
     drawing.strokes.back().end = drawing.cells.size();
   }
   std::sort(drawing.tiles.begin(), drawing.tiles.end());

@@ -50,10 +50,11 @@ inline std::uint64_t of(const Cell& cell) { return pair(cell.x >> kBits, cell.y 
 
 /// The cells of an outline that is somewhere.
 struct Drawing {
-  /// Cells of one range of heights.
+  /// Cells of one part, in one range of heights.
   struct Stroke {
     double z_low, z_high;  ///< [m], both belong to it
-    std::size_t end;       ///< cells of this stroke end here, those of the next begin
+    int part;
+    std::size_t end;  ///< cells of this stroke end here, those of the next begin
   };
 
   std::vector<Cell> cells;  ///< some more than once
@@ -63,19 +64,22 @@ struct Drawing {
   bool in_ground;                    ///< an edge, drawn or too short for it, begins below z = 0
 };
 
+/// An angle [rad] within half a turn, as in Stage: nothing happens to one that is in range.
+double normalized(double angle);
+
 /// Draws outlines into cells of one size. An edge within one cell leaves no trace, as in Stage.
 class Pencil {
  public:
   /// resolution: edge of a cell [m]. Throws std::invalid_argument unless it is positive.
   explicit Pencil(double resolution);
 
-  struct Extent {
-    double reach;  ///< [m] from the outline's frame, at most
-    double cells;  ///< nearly
-  };
+  /// Makes sure that an outline can be drawn, and all before it; returns its reach [m] from its frame, at most.
+  ///
+  /// Throws std::invalid_argument, naming what is wrong, for one that is not finite or has too many cells.
+  double admit(const Outline& outline);
 
-  /// Throws std::invalid_argument, naming what is wrong, for an outline that is not finite.
-  Extent measure(const Outline& outline) const;
+  /// Makes room for others.
+  void dismiss(const Outline& outline) { cells_ -= measure(outline).cells; }
 
   /// Whether an outline of such a reach [m] is among the cells that can be numbered; NaN is not.
   bool numbered(const Pose& at, double reach) const;
@@ -86,10 +90,16 @@ class Pencil {
   struct Frame {
     double x, y, z, heading, cos, sin;
   };
+  struct Extent {
+    double reach;  ///< [m] from the outline's frame, at most
+    double cells;  ///< nearly
+  };
+  Extent measure(const Outline& outline) const;
   static Frame attached(const Frame& frame, const Pose& pose);
   void draw(const Segment& line, const Frame& frame, Drawing& drawing) const;
 
   double cells_per_metre_;
+  double cells_ = 0;                      ///< of all outlines, nearly
   std::vector<Frame> models_, outlines_;  ///< of the parts
 };
 

@@ -65,14 +65,14 @@ class Stage:
             raise Error(f"{' '.join(command)}: returned {done.returncode}: {done.stderr[-1000:]}")
         return done.stdout
 
-    def scan(self, world: Path, poses: FloatArray, shift: float = 0.0) -> tuple[FloatArray, FloatArray, Run]:
-        """Scan from the first robot at poses (n, 3), everything being moved by a shift [m] along x and y.
+    def scan(self, world: Path, poses: FloatArray) -> tuple[FloatArray, FloatArray, Run]:
+        """Scan from the first robot at poses (n, 3).
 
         Return ranges [m] and numbers of the models met, 0 also for none, (n, beams), and what it cost.
         """
         given, taken = self._folder / "poses", self._folder / "ranges"
         np.ascontiguousarray(poses, dtype=np.float64).tofile(given)
-        command = (str(self._program), "scan", str(world), str(given), str(taken), f"{shift!r}")
+        command = (str(self._program), "scan", str(world), str(given), str(taken))
         text = self._run(*command, environment=self._environment)
         readings = np.fromfile(taken).reshape(len(poses), -1, 2)
         return readings[..., 0], readings[..., 1], read_run(text)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Outlines as cells, for Stage's collisions to the letter."""
+"""Outlines as cells, for Stage's collisions and ranges to the letter."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from kurumaisu._core import Cells
+from kurumaisu._core import CellRays, Cells
 from kurumaisu.errors import Error
 from kurumaisu.sim.partition import Bodies
 from kurumaisu.types import FloatArray, IntArray
@@ -25,15 +25,11 @@ def build_cells(
     """
     try:
         cells = Cells(resolution, layers)
-        for model in models:
-            if bodies.body_of[model.index] < 0 and model.obstacle_return:
-                place = np.array([[*poses[model.index], 0.0, *_origin(model)]])
-                cells.add_walls(np.array([-1]), place, *_edges([model]), model.root)
-        members: list[list[Model]] = [[] for _ in bodies.heads]
-        for model in models:
-            if bodies.body_of[model.index] >= 0:
-                members[bodies.body_of[model.index]].append(model)
-        numbers = [cells.add_body(*_body(models, those), those[0].root) for those in members]
+        for model in _ground(models, bodies):
+            cells.add_walls(*_wall(model, poses, _solid), model.root)
+        numbers = [
+            cells.add_body(*_body(models, _bearing(those), _solid), those[0].root) for those in _members(models, bodies)
+        ]
     except ValueError as error:
         raise Error(f"collision: cells of {resolution:g} m: {error}; collision: exact does without them") from error
     found = np.array(numbers, dtype=np.int64)
@@ -41,27 +37,80 @@ def build_cells(
     return cells, found
 
 
-def _body(models: Sequence[Model], members: Sequence[Model]) -> Arrays:
-    """Return a body, whose pose is that of the first of its models, as its solid models and what carries them."""
+def build_cell_rays(
+    models: Sequence[Model], poses: FloatArray, bodies: Bodies, resolution: float, threads: int
+) -> tuple[CellRays, IntArray]:
+    """Return what rangers see in cells of a size [m] with models at poses (models, 4), and the bodies' numbers (b,).
+
+    Raise Error if there would be too many cells.
+    """
+    try:
+        rays = CellRays(resolution, threads)
+        for model in _ground(models, bodies):
+            rays.add(*_wall(model, poses, _drawn), _returns([model]), model.root)
+        those = _members(models, bodies)
+        numbers = [rays.add(*_body(models, body, _drawn), _returns(body), body[0].root) for body in those]
+    except ValueError as error:
+        raise Error(f"ray_casting: cells of {resolution:g} m: {error}; ray_casting: exact does without them") from error
+    return rays, np.array(numbers, dtype=np.int64)
+
+
+def _solid(model: Model) -> bool:
+    return model.obstacle_return
+
+
+def _drawn(_model: Model) -> bool:
+    return True  # what no ray meets is drawn too: rays do not jump over it
+
+
+def _returns(models: Sequence[Model]) -> FloatArray:
+    return np.array([model.ranger_return for model in models], dtype=np.float64)
+
+
+def _ground(models: Sequence[Model], bodies: Bodies) -> list[Model]:
+    """Return the models that never move."""
+    return [model for model in models if bodies.body_of[model.index] < 0]
+
+
+def _members(models: Sequence[Model], bodies: Bodies) -> list[list[Model]]:
+    """Return the models of each body."""
+    members: list[list[Model]] = [[] for _ in bodies.heads]
+    for model in models:
+        if bodies.body_of[model.index] >= 0:
+            members[bodies.body_of[model.index]].append(model)
+    return members
+
+
+def _bearing(members: Sequence[Model]) -> list[Model]:
+    """Return of a body's models those that are solid and what carries them."""
     carrying = {members[0].index}
     for model in reversed(members):
-        if model.index in carrying or (model.obstacle_return and len(model.shape.segments)):
+        if model.index in carrying or (_solid(model) and len(model.shape.segments)):
             carrying |= {model.index, model.parent}
-    members = [model for model in members if model.index in carrying]
+    return [model for model in members if model.index in carrying]
+
+
+def _wall(model: Model, poses: FloatArray, wanted: Callable[[Model], bool]) -> Arrays:
+    """Return a model that never moves."""
+    return np.array([-1]), np.array([[*poses[model.index], 0.0, *_origin(model)]]), *_edges([model], wanted)
+
+
+def _body(models: Sequence[Model], members: Sequence[Model], wanted: Callable[[Model], bool]) -> Arrays:
+    """Return a body, whose pose is that of the first of its models, as one chain of models, parents first."""
     number = {model.index: i for i, model in enumerate(members)}
     parents, places = [-1], [np.array([0.0, 0.0, 0.0, 0.0, 0.0, *_origin(members[0])])]
     for model in members[1:]:
         below = models[model.parent]
         parents.append(number[below.index])
         places.append(np.array([*model.pose, below.size[2] if below.stack_children else 0.0, *_origin(model)]))
-    return np.array(parents, dtype=np.int64), np.array(places), *_edges(members)
+    return np.array(parents, dtype=np.int64), np.array(places), *_edges(members, wanted)
 
 
-def _edges(models: Sequence[Model]) -> tuple[FloatArray, IntArray]:
-    """Return the solid edges (k, 6) of models, and the place of each one's model among them (k,)."""
+def _edges(models: Sequence[Model], wanted: Callable[[Model], bool]) -> tuple[FloatArray, IntArray]:
+    """Return the edges (k, 6) of those wanted of models, and the place of each one's model among all of them (k,)."""
     edges, parts = [np.empty((0, 6))], [np.empty(0, dtype=np.int64)]
     for i, model in enumerate(models):
-        if model.obstacle_return:
+        if wanted(model):
             shape = model.shape
             edges.append(np.hstack([shape.segments, shape.heights]) if shape.edges is None else shape.edges)
             parts.append(np.full(len(edges[-1]), i, dtype=np.int64))

@@ -27,6 +27,7 @@ _STILL = OdometryWalk(distance=0.0, heading_per_metre=0.0, heading_per_radian=0.
 _OPTIONS = Options(
     semantics="physical",
     collision="exact",
+    ray_casting="exact",
     timing="consistent",
     threads=1,
     limit_acceleration=False,

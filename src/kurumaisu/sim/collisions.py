@@ -29,6 +29,9 @@ class Collisions(Protocol):
     def end_step(self, poses: FloatArray) -> None:
         """Say where all bodies are after a step's moves (b, 4)."""
 
+    def drawn(self) -> FloatArray | None:
+        """Return where bodies are met if not where they are (b, 4)."""
+
     def touching(self) -> BoolArray:
         """Return which bodies (b,) touch something where they are."""
 
@@ -60,6 +63,10 @@ class Crossing:
 
     def end_step(self, poses: FloatArray) -> None:
         """The arena knows."""
+
+    def drawn(self) -> FloatArray | None:
+        """Return None: bodies are met where they are."""
+        return None
 
     def touching(self) -> BoolArray:
         """Return which bodies (b,) touch something."""
@@ -100,6 +107,10 @@ class SharedCells:
     def end_step(self, poses: FloatArray) -> None:
         """Tell the arena."""
         self._arena.set_poses(self._numbers, poses)
+
+    def drawn(self) -> FloatArray | None:
+        """Return where bodies are in the layer of this step (b, 4), if there are several."""
+        return self._cells.drawn(self._known_as, 0) if self._layers else None
 
     def touching(self) -> BoolArray:
         """Return which bodies (b,) share cells with something."""

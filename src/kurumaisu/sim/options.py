@@ -12,6 +12,7 @@ from kurumaisu.params import EffectSetting, effects_of
 
 SEMANTICS = ("world", "stage", "physical")
 COLLISIONS = ("cells", "cells_stale", "exact")
+RAY_CASTING = ("exact", "cells")
 TIMINGS = ("stage", "consistent")
 DEVICES = ("bumper", "camera", "fiducial")
 ALL_ROBOTS = "*"
@@ -48,15 +49,17 @@ class Options:
 
     semantics: stage, physical, or world: what the world file says; collision: of stage semantics: cells (outlines
     collide where they share cells of the world's resolution, as in Stage), cells_stale (and robots that have not moved
-    yet in a step are met where they were a step ago, as in Stage) or exact (where they cross); timing: stage (scans and
-    odometry are from before the step's move, the truth from after it) or consistent (all from after it; physical
-    semantics are always so); threads of the ray caster; limit_acceleration: heed acceleration_bounds, which Stage does
-    not; scan_sweep [s] from a scan's first to its last beam, at most one step: beams leave from where the robot is
-    then; 0: all at once. devices: types of models whose readings are wanted; effects: on robots and their rangers.
+    yet in a step are met where they were a step ago, as in Stage) or exact (where they cross); ray_casting of rangers:
+    exact, or cells (over cells of the world's resolution, with Stage's own rounding; of stage semantics); timing: stage
+    (scans and odometry are from before the step's move, the truth from after it) or consistent (all from after it;
+    physical semantics are always so); threads of the ray caster; limit_acceleration: heed acceleration_bounds, which
+    Stage does not; scan_sweep [s] from a scan's first to its last beam, at most one step: beams leave from where the
+    robot is then; 0: all at once. devices: types of models whose readings are wanted; effects: on robots and their rangers.
     """
 
     semantics: str
     collision: str
+    ray_casting: str
     timing: str
     threads: int
     limit_acceleration: bool
@@ -76,6 +79,7 @@ def read_options(section: settings.Section) -> Options:
     options = Options(
         semantics=section.text("semantics", SEMANTICS),
         collision=section.text("collision", COLLISIONS),
+        ray_casting=section.text("ray_casting", RAY_CASTING),
         timing=section.text("timing", TIMINGS),
         threads=section.integer("threads", at_least=1),
         limit_acceleration=section.text("limit_acceleration", ("on", "off")) == "on",

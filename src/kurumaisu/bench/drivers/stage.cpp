@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Drives libstage 4.3 for the benchmarks: compiled by them, on demand, against a Stage that is built elsewhere.
 //
-//   stage scan WORLD POSES RANGES SHIFT
-//                                   with all models SHIFT [m] farther along x and y (Stage rounds towards 0), the first position model at each pose of the file POSES (x, y [m], heading [rad];
+//   stage scan WORLD POSES RANGES   the first position model at each pose of the file POSES (x, y [m], heading [rad];
 //                                   doubles), its rangers' beams into the file RANGES: range [m], number of the
 //                                   model met in depth-first order of the world file (doubles)
 //   stage run WORLD SECONDS V W     all position models at v [m/s], w [rad/s] for so many simulated seconds
@@ -74,15 +73,11 @@ void number(Stg::World& world) {
   std::cout << "models " << i << "\n";
 }
 
-void scan(Stg::World& world, const char* poses_path, const char* ranges_path, double shift) {
+void scan(Stg::World& world, const char* poses_path, const char* ranges_path) {
   number(world);
   Stg::Model* robot = all<Stg::ModelPosition>(world).at(0);
   const auto rangers = all<Stg::ModelRanger>(*robot);
   const std::vector<double> poses = readDoubles(poses_path);
-  for (Stg::Model* model : world.GetChildren()) {
-    const Stg::Pose p = model->GetPose();
-    if (shift != 0) model->SetPose(Stg::Pose(p.x + shift, p.y + shift, p.z, p.a));
-  }
   std::vector<double> readings;
   double cpu = 0;
   for (int pass = 0; pass < 2; ++pass) {  // the first one warms caches up
@@ -90,7 +85,7 @@ void scan(Stg::World& world, const char* poses_path, const char* ranges_path, do
     cpu = 0;
     for (std::size_t i = 0; i + 2 < poses.size(); i += 3) {
       const Stg::Pose old = robot->GetGlobalPose();
-      robot->SetGlobalPose(Stg::Pose(poses[i] + shift, poses[i + 1] + shift, old.z, poses[i + 2]));
+      robot->SetGlobalPose(Stg::Pose(poses[i], poses[i + 1], old.z, poses[i + 2]));
       const double start = cpuSeconds();
       for (Stg::ModelRanger* ranger : rangers) {
         for (auto& sensor : ranger->GetSensorsMutable()) sensor.Update(ranger);
@@ -133,8 +128,8 @@ void run(Stg::World& world, double seconds, double v, double w, bool print_poses
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 6) {
-    std::cerr << "usage: stage scan WORLD POSES RANGES SHIFT | stage run|poses WORLD SECONDS V W\n";
+  if (argc != 6 && !(argc == 5 && std::string(argv[1]) == "scan")) {
+    std::cerr << "usage: stage scan WORLD POSES RANGES | stage run|poses WORLD SECONDS V W\n";
     return 2;
   }
   const std::string task = argv[1];
@@ -144,7 +139,7 @@ int main(int argc, char** argv) {
   if (!world.Load(argv[2])) return 1;
   std::cout << "load " << cpuSeconds() - start << "\n";
   if (task == "scan") {
-    scan(world, argv[3], argv[4], std::atof(argv[5]));
+    scan(world, argv[3], argv[4]);
   } else {
     run(world, std::atof(argv[3]), std::atof(argv[4]), std::atof(argv[5]), task == "poses");
   }
