@@ -58,7 +58,8 @@ class Scanner:
         if time < self._complete - rounding:
             return None
         beams = self._beams
-        scan = Scan(beams.stamp, self.sight.poses(np.array([beams.stamp]))[0], self._readings(beams))
+        poses = self.sight.poses(np.append(beams.times, beams.stamp))
+        scan = Scan(beams.stamp, poses[-1], self._readings(beams, poses[:-1]))
         self._start(self._count + 1)
         self.sight.forget(min(self._beams.stamp, self._beams.times.min()))
         return scan
@@ -89,9 +90,9 @@ class Scanner:
         self._beams = self._chain.aim(Beams(stamp, said, self._mount, height, self._bearings, level))
         self._complete = max(said[-1], self._beams.times.max())
 
-    def _readings(self, beams: Beams) -> FloatArray:
+    def _readings(self, beams: Beams, poses: FloatArray) -> FloatArray:
         error = self._laser.error
-        origins = compose(self.sight.poses(beams.times), beams.mount)
+        origins = compose(poses, beams.mount)
         look = self.sight.look(beams.times, beams.height)
         level, returns = look.cast(origins, beams.bearings)
         noise = self._rng.standard_normal(len(level))
