@@ -17,6 +17,7 @@ from kurumaisu.sim.slip import turned
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _AT_REST = 1.0e-9  # [m/s, rad/s] slower is none
+_CREEP = 1.0e-6  # [m, rad] what rests at the end and is no farther has moved by the solver's first guess only
 _NEAR = 0.05  # [m] walls that are looked up beyond what the bodies can reach
 
 
@@ -71,13 +72,15 @@ class Island:
         self._space = ContactSpace(self._rigids, moving.poses, contacts, self._world.exchange)
         self._add_walls(moving.poses, reach)
         left, travelled = seconds, 0.0
-        ever = moving.hindered.copy()
+        ever, begun = moving.hindered.copy(), moving.poses
         while left > 1e-12 * seconds:
             rest = moving.poses, moving.velocities
             taken = self._advance(moving, min(left, self._longest))
             left -= taken
             ever |= moving.hindered
             if all(np.abs(change).max() < _AT_REST for change in (moving.poses - rest[0], rest[1], moving.velocities)):
+                if np.abs(moving.poses - begun).max() < _CREEP:
+                    moving.poses = begun
                 break  # the next substep would be like this one
             travelled += taken * float(np.hypot(*moving.velocities[:, :2].T).max())
             if travelled > reach - _NEAR:

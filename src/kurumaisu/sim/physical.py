@@ -15,6 +15,7 @@ from kurumaisu.sim.contact_space import Exchange
 from kurumaisu.sim.gripping import Grips
 from kurumaisu.sim.island import Island, Moving, Surroundings
 from kurumaisu.sim.joints import settled
+from kurumaisu.sim.resting import Resting
 from kurumaisu.sim.rigid import Ground, Rigid
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.sim.slip import hold, turned
@@ -44,6 +45,7 @@ class PhysicalMotion:
         self._clearance = Clearance(ground.walls, ground.trees)
         self._numbers = np.array([self._clearance.add_body(r.edges, r.tree) for r in rigids], dtype=np.int64)
         self._world = Surroundings(ground, self._clearance, dynamics, Exchange())
+        self._resting = Resting(len(rigids))
         self._grips = Grips(rigids, self._clearance, self._numbers)
         self._driven = np.array([r.driven for r in rigids], dtype=np.bool_)
         self._pivots = [r.pivot for r in rigids]
@@ -159,6 +161,7 @@ class PhysicalMotion:
     def _survey(self) -> None:
         """Note what the pieces are now, which changes as grippers close and open."""
         rigids = self._grips.rigids
+        self._resting.forget()
         self._solid = np.flatnonzero([len(r.parts) > 0 for r in rigids])
         self._holding = bool(self._grips.held.any())
         self._velocities[self._grips.held] = 0.0
@@ -206,8 +209,11 @@ class PhysicalMotion:
             commands=course.commands[rows],
             hindered=self._hindered[rows],
         )
-        island = Island(self._numbers[rows], self._grips.rigids, self._world)
-        stalled = island.run(moving, course.dt - touch)
+
+        def gather() -> Island:
+            return Island(self._numbers[rows], self._grips.rigids, self._world)
+
+        stalled = self._resting.run(rows, gather, moving, course.dt - touch)
         poses[rows] = moving.poses
         self._velocities[rows] = moving.velocities
         self._hindered[rows] = moving.hindered
