@@ -54,7 +54,8 @@ class Options:
     (scans and odometry are from before the step's move, the truth from after it) or consistent (all from after it;
     physical semantics are always so); threads of the ray caster; limit_acceleration: heed acceleration_bounds, which
     Stage does not; scan_sweep [s] from a scan's first to its last beam, at most one step: beams leave from where the
-    robot is then; 0: all at once. devices: types of models whose readings are wanted; effects: on robots and their rangers.
+    robot is then; 0: all at once. devices: types of models whose readings are wanted; effects: on robots and their
+    rangers.
     """
 
     semantics: str
