@@ -86,7 +86,17 @@ void bindModel(py::module_& m) {
       .def("rates", &ratesAlong, py::arg("volts"), py::arg("sign"),
            "Rates for volts, shape (n,); sign (n,): -1, 0, +1 as commanded, NaN where unknown. Keeps its "
            "state.")
-      .def_property_readonly("ambiguous_samples", &k::AxisInverse::ambiguousSamples);
+      .def_property_readonly("ambiguous_samples", &k::AxisInverse::ambiguousSamples)
+      .def_property(
+          "state",
+          [](const k::AxisInverse& self) {
+            const k::AxisInverse::Memory memory = self.memory();
+            return std::pair(memory.last_sign, memory.ambiguous_samples);
+          },
+          [](k::AxisInverse& self, const std::pair<int, std::uint64_t>& state) {
+            self.recall({state.first, state.second});
+          },
+          "What the next rates depend on, beside the law: the last sign, and the ambiguous samples so far.");
 
   m.def("integrate", &integrate, py::arg("v"), py::arg("w"), py::arg("dt"),
         py::arg("start") = std::array<double, 3>{0, 0, 0},

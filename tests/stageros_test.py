@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +17,8 @@ import xmlrpc.client
 from pathlib import Path
 
 import geometry_msgs.msg
+import numpy as np
+import PIL.Image
 import pytest
 import rosgraph
 import roslib.packages
@@ -24,11 +27,12 @@ import rospy
 import rostest
 import tf2_ros
 from geometry_msgs.msg import Twist
+from kurumaisu.msg import Fiducials
 from kurumaisu.srv import Delete, Seed, SetPose, Spawn, StateFile
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, LaserScan, Range
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, UInt8MultiArray
 from std_srvs.srv import Empty, SetBool, Trigger
 from tf2_msgs.msg import TFMessage
 
@@ -70,6 +74,24 @@ model ( pose [0.5 0 0 0] size [0.1 0.1 1] name "post" )
 )
 
 
+# Of `crate` metres and `mass` kilograms, with a mark; a bitmap whose black square is its middle
+PUSHED = (
+    MODELS
+    + """
+define finder fiducial ( range_max 3 range_max_id 3 fov 90 )
+define strips bumper ( pose [0 0 -0.2 0] bcount 1 bpose[0] [0.21 0 0 0] blength 0.2 )
+base ( name "ann" pose [0 0 0 0] mass 20 finder ( pose [0 0 -0.2 0] ) strips ( ) )
+base ( name "bob" pose [-3 -3 0 0] mass 20 )
+model ( name "crate" pose [1 0 0 0] size [${crate} ${crate} 1] mass ${mass} fiducial_return 7 )
+model ( name "image" pose [0 3 0 0] size [4 4 1] bitmap "square.png" )
+"""
+)
+EFFECTS = (
+    "[{robot: ann, effects: [{id: laser.offset, parameters: {offset: 0.02}}]}, "
+    "{robot: bob, effects: [{id: base.marker_x, parameters: {x: 0.3}}]}]}"
+)
+
+
 class Stageros:
     """A stageros process with a world of its own."""
 
@@ -79,6 +101,9 @@ class Stageros:
         self._folder = tempfile.TemporaryDirectory()
         self.world = Path(self._folder.name) / "a.world"
         self.world.write_text(text)
+        pixels = np.full((40, 40), 255, dtype=np.uint8)
+        pixels[10:30, 10:30] = 0
+        PIL.Image.fromarray(pixels).save(self.world.parent / "square.png")
         (program,) = roslib.packages.find_node("kurumaisu", "stageros")
         self.process = subprocess.Popen(
             [program, *arguments, str(self.world)],
@@ -108,6 +133,8 @@ class Case(unittest.TestCase):
     WORLD = ""
     ARGUMENTS: tuple[str, ...] = ("-g", "_headless_rate:=20")
     TOPICS: tuple[tuple[str, type], ...] = ()
+    HAS_TF = True
+    SLOW: tuple[str, ...] = ()  # topics that are not published in every step
 
     @classmethod
     def setUpClass(cls):
@@ -138,7 +165,8 @@ class Case(unittest.TestCase):
 
         def heard():
             cls.ask("step", Trigger)
-            return all(topic.messages for topic in (cls.clock, cls.tf, *cls.topics.values()))
+            tf = (cls.tf,) if cls.HAS_TF else ()
+            return all(topic.messages for topic in (cls.clock, *tf, *cls.topics.values()))
 
         wait_for(heard, "a message of every topic")
 
@@ -155,7 +183,7 @@ class Case(unittest.TestCase):
         return self.clock.last.clock.to_sec()
 
     def stamped(self):
-        return [t for t in self.topics.values() if hasattr(t.last, "header")]
+        return [t for name, t in self.topics.items() if hasattr(t.last, "header") and name not in self.SLOW]
 
     @staticmethod
     def stamp(topic):
@@ -171,9 +199,14 @@ class Case(unittest.TestCase):
         """Send one message, and wait until it has come."""
         publisher = rospy.Publisher(topic, type(message), queue_size=1)
         wait_for(lambda: publisher.get_num_connections(), f"a listener on {topic}")
+        before = self.heard()
         publisher.publish(message)
-        time.sleep(0.1)  # nothing tells that a command has arrived while nothing moves
+        wait_for(lambda: self.heard() > before, f"the message on {topic}")
         publisher.unregister()
+
+    def heard(self):
+        """Return how many commands and poses the node has heard."""
+        return int(re.search(r"(\d+) commands heard", self.ask("pause", SetBool, True).message)[1])
 
     def transforms(self):
         return {
@@ -380,6 +413,15 @@ class OneRobot(Case):
         assert place(truth.last) == (-1, -2, 0)
         self.step()
         assert ("/robot_1/odom", "/robot_1/base_footprint") in self.transforms()
+        with tempfile.TemporaryDirectory() as folder:
+            assert self.ask("save", StateFile, f"{folder}/state").success
+            assert self.ask("delete", Delete, "second").success
+            self.step()
+            assert len(self.transforms()) == 3
+            loaded = self.ask("load", StateFile, f"{folder}/state")
+            assert loaded.success, loaded.message
+        self.step()
+        assert ("/robot_1/odom", "/robot_1/base_footprint") in self.transforms()
         assert place(self.truth.last) == (1, 0.5, 0)
         assert self.ask("delete", Delete, "target").success
         self.step()
@@ -388,6 +430,19 @@ class OneRobot(Case):
         self.step()
         assert len(self.transforms()) == 3
         truth.close()
+
+    def test_spawn_from_text(self):
+        pose = geometry_msgs.msg.Pose(geometry_msgs.msg.Point(2, 2, 0), quaternion_of(0.0))
+        done = self.ask("spawn", Spawn, 'base ( name "guest" size [0.3 0.3 0.3] )', "", pose)
+        assert done.success, done.message
+        self.step()
+        assert len(self.transforms()) == 6
+        again = self.ask("spawn", Spawn, 'base ( name "guest" )', "", pose)
+        assert (again.success, again.message) == (False, "name 'guest': there is a model of this name")
+        bad = self.ask("spawn", Spawn, "base (\n size [1, 1] )", "other", pose).message
+        assert "text:2:9: ',' is not allowed" in bad
+        assert bad.endswith("^")
+        assert self.ask("delete", Delete, "guest").success
 
     def test_step_needs_a_pause(self):
         assert self.ask("pause", SetBool, False).success
@@ -462,7 +517,7 @@ class Switches(Case):
         *("-u", "-g", "_headless_rate:=20", "_strip_leading_slash:=true", "_set_child_frame_id:=true"),
         *("_fill_covariance:=true", "_pose_variances:=[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]", "_publish_collision:=true"),
         *("_sensors:=all", "_sonar_as_range:=true", "_frame_odom:=wheels", "_frame_ground_truth:=world"),
-        *("_rates:={odom: 5.0}", "_scan_timing:=true"),
+        *("_rates:={odom: 5.0, sensors: {base_sonar_1: 2.5}}", "_scan_timing:=true"),
     )
     TOPICS = (
         ("/ann/base_scan", LaserScan),
@@ -474,6 +529,7 @@ class Switches(Case):
         ("/ann/depth", Image),
         ("/ann/camera_info", CameraInfo),
     )
+    SLOW = ("/ann/base_sonar_1",)
 
     def setUp(self):
         self.ask("reset", Empty)
@@ -493,8 +549,16 @@ class Switches(Case):
         assert odom.last.pose.covariance[::7] == (1, 2, 3, 4, 5, 6)
         odom.close()
 
+    def test_a_sensor_has_a_rate_of_its_own(self):
+        one, two = (self.topics[f"/ann/base_sonar_{i}"].messages for i in range(2))
+        start = len(one), len(two)
+        self.step(8)
+        wait_for(lambda: len(one) == start[0] + 8, "eight readings of the first")
+        wait_for(lambda: len(two) >= start[1] + 2, "two of the second")
+        assert len(two) == start[1] + 2
+
     def test_sonars(self):
-        self.step()
+        self.step(4)  # the second one is published in every fourth
         ahead, left = (self.topics[f"/ann/base_sonar_{i}"].last for i in range(2))
         assert (ahead.range, left.range) == pytest.approx((0.45, 3.99), abs=1e-5)
         assert (ahead.radiation_type, ahead.min_range, ahead.max_range) == (Range.ULTRASOUND, 0, 4)
@@ -522,6 +586,74 @@ class Switches(Case):
         assert info.K[0] == pytest.approx(8 / (2 * math.tan(math.radians(35))))
         camera = ("ann/base_link", "ann/camera")
         assert any((t.header.frame_id, t.child_frame_id) == camera for m in self.tf.messages for t in m.transforms)
+
+
+class OtherWays(Case):
+    """What the node hands on to the simulator, all at once."""
+
+    WORLD = PUSHED
+    ARGUMENTS = (
+        *(
+            "-u",
+            "-g",
+            "_headless_rate:=20",
+            "_simulator:={semantics: physical, timing: consistent, effects: " + EFFECTS,
+        ),
+        *("_image_extents:=true", "_parameters:={crate: 0.5, mass: 2}", "_publish_tf:=false"),
+        *("_publish_bumpers:=true", "_publish_fiducials:=true"),
+    )
+    TOPICS = (
+        ("/ann/odom", Odometry),
+        ("/ann/base_scan", LaserScan),
+        ("/ann/base_pose_ground_truth", Odometry),
+        ("/bob/base_pose_ground_truth", Odometry),
+        ("/ann/bumper", UInt8MultiArray),
+        ("/ann/fiducials", Fiducials),
+    )
+    HAS_TF = False
+
+    def setUp(self):
+        self.ask("reset", Empty)
+        self.odom, self.scan, self.truth, self.bob, self.bumper, self.fiducials = self.topics.values()
+
+    def test_no_tf(self):
+        self.step()
+        assert not self.tf.messages
+        assert "/tf" not in dict(rosgraph.Master("/test").getPublishedTopics("/"))
+
+    def test_a_crate_is_pushed_and_seen_where_it_is_and_all_is_of_one_moment(self):
+        self.step()
+        far = self.scan.last.ranges[2]
+        assert far == pytest.approx(1 - 0.25 - 0.1 + 0.02, abs=1e-4)  # read 2 cm too long
+        for _ in range(15):
+            self.drive("/ann/cmd_vel", 0.5)
+            self.step()
+        at = self.truth.last.pose.pose.position.x
+        assert at == pytest.approx(0.75, abs=0.02)
+        assert self.odom.last.pose.pose.position.x == at
+        assert self.scan.last.ranges[2] == pytest.approx(0.2 - 0.1 + 0.02, abs=0.02)  # the crate goes before it
+
+    def test_the_image_has_its_own_extents(self):
+        """The black square fills a quarter of a 4 x 4 m image about (0, 3): with Stage's rule all of it."""
+        self.set_pose("ann", -3, 3, 0)
+        self.step()
+        assert self.scan.last.ranges[2] == pytest.approx(3 - 1 - 0.1 + 0.02, abs=0.01)
+
+    def test_the_truth_of_bob_is_of_his_marker(self):
+        self.step()
+        assert place(self.bob.last) == (-3 + 0.3, -3, 0)
+        assert self.stamp(self.bob) == self.now()
+
+    def test_bumper_and_fiducials(self):
+        self.step()
+        assert list(self.bumper.last.data) == [0]
+        seen = self.fiducials.last
+        assert seen.header.frame_id == "/ann/base_link"
+        assert list(seen.id) == [7]
+        assert (seen.pose[0].position.x, seen.pose[0].position.y) == pytest.approx((1, 0))
+        self.set_pose("ann", 1 - 0.25 - 0.22, 0, 0)
+        self.step()
+        assert list(self.bumper.last.data) == [1]
 
 
 class RealTime(unittest.TestCase):
@@ -561,6 +693,11 @@ class BadStarts(unittest.TestCase):
 
     def test_rate_that_does_not_divide(self):
         self.refused("rates: odom: must divide the world's 10 Hz: 3", ONE, "_rates:={odom: 3.0}")
+
+    def test_rate_of_no_sensor(self):
+        self.refused(
+            "there is no sensor of this name; there are: base_scan", ONE, "_rates:={sensors: {base_scam: 5.0}}"
+        )
 
     def test_no_world(self):
         (program,) = roslib.packages.find_node("kurumaisu", "stageros")

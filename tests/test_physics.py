@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from physics_scene import DT, DYNAMICS, SKIN, SMOOTH, box, motion, room, run, thing, walls
 
@@ -17,6 +17,7 @@ EMPTY = walls()
 rates = st.floats(-3, 3)
 
 
+@settings(deadline=None)
 @given(v=rates, leftward=rates, w=rates, heading=st.floats(-7, 7))
 def test_free_bodies_drive_exact_arcs(v: float, leftward: float, w: float, heading: float) -> None:
     last = run(motion([box()], EMPTY, [(1.0, -2.0, heading)], DYNAMICS), [(v, leftward, w)], 20)[-1, 0]
@@ -53,11 +54,10 @@ def test_a_push_at_constant_speed_moves_the_box_at_that_speed() -> None:
 
 @pytest.mark.parametrize(("friction", "moves"), [(0.79, True), (0.81, False)])
 def test_motors_push_what_is_not_held_by_more_than_their_grip(friction: float, moves: bool) -> None:
-    poses = run(
-        motion([box(), thing(1, friction=friction)], EMPTY, [(0, 0, 0), (0.5, 0, 0)], DYNAMICS), [(0.3, 0, 0)] * 2, 60
-    )
+    moved = motion([box(), thing(1, friction=friction)], EMPTY, [(0, 0, 0), (0.5, 0, 0)], DYNAMICS)
+    poses = run(moved, [(0.3, 0, 0)] * 2, 100)
     late = poses[-1, 1, 0] - poses[-30, 1, 0]
-    assert late > 0.2 if moves else abs(late) < 1e-6
+    assert late > 0.2 if moves else abs(late) < 1e-5
 
 
 @pytest.mark.parametrize("speed", [0.5, 2.0])
@@ -71,6 +71,7 @@ def test_a_released_box_slides_as_far_as_friction_lets_it(speed: float, friction
     assert not moved.state()["velocities"][1].any()  # at rest, and for good
 
 
+@settings(deadline=None, max_examples=30)
 @given(
     masses=st.tuples(st.floats(1, 100), st.floats(1, 100)),
     offset=st.floats(-0.35, 0.35),

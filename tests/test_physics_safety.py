@@ -20,7 +20,6 @@ def corners(body: Rigid, pose: FloatArray) -> FloatArray:
     return np.asarray(points @ np.array([[c, s], [-s, c]]) + pose[:2])
 
 
-@settings(deadline=None)
 @given(
     heading=st.floats(-math.pi, math.pi),
     y=st.floats(-3, 3),
@@ -37,20 +36,15 @@ def test_no_speed_takes_a_robot_through_a_wall_without_thickness(
         assert np.abs(corners(body, pose)[:, 0]).max() < 1.0 + SKIN
 
 
-@settings(deadline=None)
-@given(
-    headings=st.tuples(*[st.floats(-math.pi, math.pi)] * 3),
-    speeds=st.tuples(*[st.floats(-10, 10)] * 3),
-    turns=st.tuples(*[st.floats(-5, 5)] * 3),
-)
-def test_a_crowd_in_a_room_stays_in_it_and_apart(
-    headings: tuple[float, ...], speeds: tuple[float, ...], turns: tuple[float, ...]
-) -> None:
+@settings(max_examples=25)
+@given(seed=st.integers(0, 10**6), fastest=st.floats(0.0, 10.0))
+def test_a_crowd_in_a_room_stays_in_it_and_apart(seed: int, fastest: float) -> None:
+    rng = np.random.default_rng(seed)
     bodies = [box(0.3, 0.2, tree=i, mass=5.0 + 10 * i) for i in range(3)] + [thing(3, 8.0), thing(4, 30.0)]
     places = [(-0.6, -0.6), (0.6, -0.6), (-0.6, 0.6), (0.6, 0.6), (0.0, 0.0)]
-    starts = [(x, y, h) for (x, y), h in zip(places, [*headings, 0.0, 0.5], strict=True)]
+    starts = [(x, y, h) for (x, y), h in zip(places, [*rng.uniform(-3, 3, 3), 0.0, 0.5], strict=True)]
     moved = motion(bodies, room(1.0), starts, DYNAMICS)
-    commands = [(v, 0.0, w) for v, w in zip(speeds, turns, strict=True)] + [(0.0, 0.0, 0.0)] * 2
+    commands = [(rng.uniform(-1, 1) * fastest, 0.0, rng.uniform(-5, 5)) for _ in bodies]
     for poses in run(moved, commands, 10):
         for body, pose in zip(bodies, poses, strict=True):
             assert np.abs(corners(body, pose)).max() < 1.0 + 4 * SKIN
@@ -71,7 +65,7 @@ def worst_overlap(bodies: list[Rigid], poses: FloatArray) -> float:
     return deepest
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6), friction=st.floats(0.0, 0.5))
 def test_without_motors_energy_never_grows(seed: int, friction: float) -> None:
     rng = np.random.default_rng(seed)

@@ -179,7 +179,7 @@ def test_every_shipped_key_can_be_given():
     [
         ({"base_watchdog_timeout": "0.2"}, "base_watchdog_timeout: must be a number"),
         ({"is_depth_canonical": 1}, "is_depth_canonical: must be true or false: 1"),
-        ({"simulator": {"semantics": "real"}}, "simulator.semantics: must be one of stage, physical: 'real'"),
+        ({"simulator": {"semantics": "real"}}, "simulator.semantics: must be one of world, stage, physical: 'real'"),
         ({"simulator": {"semantic": "stage"}}, "simulator/semantic is not a parameter; is semantics meant?"),
         ({"robot_prefix": "none"}, "robot_prefix: must be one of stage, always, never: 'none'"),
         ({"frame_odom": "/odom"}, "frame_odom: must not start with a slash"),

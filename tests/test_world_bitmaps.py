@@ -34,15 +34,17 @@ def box(segments: FloatArray) -> list[float]:
     return [*points.min(axis=0), *points.max(axis=0)]
 
 
-def unit_borders(walls: BoolArray) -> set[tuple[int, int, bool]]:
-    """Return x, y and whether upright of all borders of length 1, by looking at each pixel's neighbours."""
-    rows, columns = walls.shape
-
-    def wall(y: int, x: int) -> bool:
-        return 0 <= y < rows and 0 <= x < columns and bool(walls[y, x])
-
-    flat = {(x, y, False) for y in range(rows + 1) for x in range(columns) if wall(y, x) != wall(y - 1, x)}
-    return flat | {(x, y, True) for y in range(rows) for x in range(columns + 1) if wall(y, x) != wall(y, x - 1)}
+def unit_borders(walls: BoolArray) -> set[tuple[int, int, int, int]]:
+    """Return from and to (x, y) of all borders of length 1, the wall to the right, pixel by pixel as Stage goes."""
+    borders = set()
+    for y, x in np.argwhere(walls).tolist():
+        corners = [(x, y), (x, y + 1), (x + 1, y + 1), (x + 1, y)]
+        for one, other in zip(corners, [*corners[1:], corners[0]], strict=True):
+            if (*other, *one) in borders:
+                borders.remove((*other, *one))
+            else:
+                borders.add((*one, *other))
+    return borders
 
 
 @given(arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=9)))
@@ -50,7 +52,9 @@ def test_outline_is_that_of_the_pixels(walls: BoolArray) -> None:
     cut = []
     for x0, y0, x1, y1 in outline(walls).astype(int).tolist():
         assert (x0 == x1) != (y0 == y1)
-        cut += [(x, y0, False) for x in range(x0, x1)] + [(x0, y, True) for y in range(y0, y1)]
+        dx, dy = np.sign([x1 - x0, y1 - y0]).tolist()
+        ways = [(x0 + i * dx, y0 + i * dy) for i in range(abs(x1 - x0) + abs(y1 - y0))]
+        cut += [(x, y, x + dx, y + dy) for x, y in ways]
     assert len(cut) == len(set(cut))  # nothing twice
     assert set(cut) == unit_borders(walls)
 
@@ -59,11 +63,7 @@ def test_outline_is_that_of_the_pixels(walls: BoolArray) -> None:
 def test_outline_is_of_the_longest_runs(walls: BoolArray) -> None:
     runs = outline(walls).astype(int).tolist()
     ends = {(x1, y1, x0 == x1) for x0, y0, x1, y1 in runs}
-    for x0, y0, x1, y1 in runs:
-        if (x0, y0, x0 == x1) in ends:  # only borders of opposite sense meet end to end
-            a, b = ((y0, x0 - 1), (y0, x0)) if y0 == y1 else ((y0 - 1, x0), (y0, x0))
-            padded = np.pad(walls, 1)
-            assert padded[a[0] + 1, a[1] + 1] != padded[b[0] + 1, b[1] + 1]
+    assert not any((x0, y0, x0 == x1) in ends for x0, y0, x1, y1 in runs)  # borders of opposite sense meet head on
 
 
 def test_trim_and_stretch(tmp_path: Path) -> None:
@@ -229,3 +229,20 @@ def test_damaged_images_are_read_or_refused(tmp_path_factory: pytest.TempPathFac
     path.write_bytes(content[: data.draw(st.integers(1, len(content)))])
     with contextlib.suppress(Error):  # anything else is a fault
         assert read_bitmap(path).runs.shape[1:] == (4,)
+
+
+def test_edges_are_closed_loops_before_the_origin_with_all_four_sides_of_the_boundary(tmp_path: Path) -> None:
+    walls = np.random.default_rng(2).random((12, 9)) < 0.4
+    save(tmp_path / "map.png", walls)
+    given = 'model ( bitmap "map.png" size [9 12 0.7] origin [1 2 0.3 45] boundary 1 )'
+    (model,) = read(tmp_path, given).models
+    edges = model.shape.edges
+    assert edges is not None
+    begun, ended = (sorted(map(tuple, ends.tolist())) for ends in (edges[:, :2], edges[:, 2:4]))
+    assert begun == ended  # to the last bit, or a corner would be missing
+    np.testing.assert_allclose(box(edges[:, :4]), [-4.5, -6, 4.5, 6])
+    np.testing.assert_allclose(edges[:, 4:], np.broadcast_to([0, 0.7], (len(edges), 2)))
+    sides = edges[-16:]  # 1 cm thick
+    np.testing.assert_allclose(
+        np.hypot(*(sides[:, 2:4] - sides[:, :2]).T), [0.01, 12] * 2 + [9, 0.01] * 4 + [0.01, 12] * 2
+    )

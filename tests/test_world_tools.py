@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """check-world and export-world: what they find, and maps against a point-in-polygon oracle."""
 
+import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -166,6 +167,7 @@ def test_the_chair_of_the_worlds_is_the_one_of_the_model_file():
     chassis = model.chassis
     np.testing.assert_allclose(corners.max(axis=0), [chassis.axle_to_front, chassis.width / 2], atol=1e-9)
     np.testing.assert_allclose(corners.min(axis=0)[0], chassis.axle_to_front - chassis.length, atol=1e-9)
+    assert chair.size[2] == chassis.height
     assert chair.mass == chassis.mass
     ranger = next(m for m in world.models if isinstance(m.device, Ranger))
     fan, laser = ranger.device.fans[0], model.laser
@@ -190,3 +192,14 @@ def test_a_bad_world_is_said_with_its_place(tmp_path, capsys):
 def test_export_refuses_what_makes_no_map(tmp_path, option, capsys):
     assert export_world([str(shipped("worlds/room.world")), "-o", str(tmp_path), option]) == 2
     assert "export-world: " in capsys.readouterr().err
+
+
+def test_the_manuals_examples_are_worlds_without_surprises(tmp_path):
+    manual = Path(__file__).resolve().parents[1] / "docs/worlds.md"
+    text = manual.read_text().split("## In motion")[1].split("\n## ")[0]
+    examples = re.findall(r"(?:^    .*\n)+", text, re.MULTILINE)
+    assert len(examples) == 5
+    for example in examples:
+        world = read(tmp_path, example)
+        assert world.warnings == ()
+        assert findings(world) == ()

@@ -110,6 +110,10 @@ void kurumaisu::bindContact(py::module_& m) {
           "add_body",
           [](c::Clearance& self, const Array& edges, int tree) { return self.add(edgesOf(edges), tree); },
           py::arg("edges"), py::arg("tree"), "Number of a new body of edges (k, 6) in its frame.")
+      .def(
+          "replace_body",
+          [](c::Clearance& self, int body, const Array& edges) { self.replace(body, edgesOf(edges)); },
+          py::arg("body"), py::arg("edges"), "Give a body other edges (k, 6).")
       .def("free_times", &freeTimes, py::arg("bodies"), py::arg("poses"), py::arg("twists"), py::arg("limit"),
            py::arg("distance"),
            "Times (n,) [s] until each body, all driving their arcs, is within a distance [m] of anything, or "
@@ -118,15 +122,15 @@ void kurumaisu::bindContact(py::module_& m) {
       .def(
           "first_touch",
           [](const c::Clearance& self, const Ints& bodies, const Array& poses, const Array& velocities,
-             double known, double distance, double limit) {
+             double known, double distance, double give, double limit) {
             return self.firstTouch(moversOf(self, bodies, poses, velocities, c::Frame::map),
-                                   {known, distance}, limit);
+                                   {known, distance, give}, limit);
           },
           py::arg("bodies"), py::arg("poses"), py::arg("velocities"), py::kw_only(), py::arg("known"),
-          py::arg("distance"), py::arg("limit"),
+          py::arg("distance"), py::arg("give"), py::arg("limit"),
           "First time [s] at which a corner that is farther than known [m] from an edge comes within a "
           "distance of\n"
-          "it, or limit; velocities (n, 3) are in the map's frame.")
+          "it, or a nearer one comes nearer by give; or limit. Velocities (n, 3) are in the map's frame.")
       .def(
           "near",
           [](const c::Clearance& self, const Ints& bodies, const Array& poses, double reach) {

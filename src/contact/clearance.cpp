@@ -37,6 +37,14 @@ std::vector<std::pair<int, int>> neighbours(const std::vector<Mover>& movers, do
   return found;
 }
 
+double radiusOf(const std::vector<Edge>& edges) {
+  double radius = 0;
+  for (const Edge& edge : edges) {
+    radius = std::max({radius, std::hypot(edge.a.x, edge.a.y), std::hypot(edge.b.x, edge.b.y)});
+  }
+  return radius;
+}
+
 Circle circleOf(const Mover& mover, double reach) {
   return {{mover.pose.x, mover.pose.y}, mover.outline->radius + reach};
 }
@@ -44,12 +52,15 @@ Circle circleOf(const Mover& mover, double reach) {
 }  // namespace
 
 int Clearance::add(std::vector<Edge> edges, int tree) {
-  double radius = 0;
-  for (const Edge& edge : edges) {
-    radius = std::max({radius, std::hypot(edge.a.x, edge.a.y), std::hypot(edge.b.x, edge.b.y)});
-  }
+  const double radius = radiusOf(edges);
   outlines_.push_back({std::move(edges), tree, radius});
   return static_cast<int>(outlines_.size()) - 1;
+}
+
+void Clearance::replace(int body, std::vector<Edge> edges) {
+  Outline& outline = outlines_.at(static_cast<std::size_t>(body));
+  outline.radius = radiusOf(edges);
+  outline.edges = std::move(edges);
 }
 
 Mover Clearance::mover(int body, const Pose& pose, const Twist& twist, Frame frame) const {
@@ -57,7 +68,7 @@ Mover Clearance::mover(int body, const Pose& pose, const Twist& twist, Frame fra
 }
 
 Clearance::Free Clearance::free(const std::vector<Mover>& movers, double limit, double distance) const {
-  const Touch touch{-1, distance};  // nothing is known before
+  const Touch touch{-1, distance, 0};  // nothing is known before
   Free result{std::vector<double>(movers.size(), limit), neighbours(movers, limit, distance)};
   for (std::size_t i = 0; i < movers.size(); ++i) {
     if (movers[i].speed(1) > 0) result.times[i] = wallTouch(movers[i], touch, limit);

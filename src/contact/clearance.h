@@ -17,6 +17,8 @@ class Clearance {
 
   /// Returns the body's number; numbers count from 0.
   int add(std::vector<Edge> edges, int tree);
+  /// Gives a body other edges. Throws std::out_of_range for an unknown number.
+  void replace(int body, std::vector<Edge> edges);
 
   /// A body at a pose on its way. Throws std::out_of_range for an unknown number.
   Mover mover(int body, const Pose& pose, const Twist& twist, Frame frame) const;

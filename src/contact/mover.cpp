@@ -64,11 +64,16 @@ double cornerTouch(const Mover& a, const Point& corner, const Mover& b, const Ed
                    double limit) {
   const double rise = acceleration(a, norm(corner)) + acceleration(b, std::max(norm(edge.a), norm(edge.b)));
   double time = 0;
+  double target = touch.distance;
   for (int i = 0; i < kMaxAdvances; ++i) {
     const Pose pose_b = b.at(time);
     const Gap gap = gapOf(carry(a, a.at(time), corner), carry(b, pose_b, edge.a), carry(b, pose_b, edge.b));
-    if (i == 0 && gap.distance <= touch.known) return limit;
-    const double left = gap.distance - touch.distance;
+    if (i == 0 && gap.distance <= touch.known) {
+      // A gap less than give may close and turn into an overlap, which distances do not tell from a gap.
+      if (gap.distance <= touch.give) return std::min(limit, timeToClose(touch.give, gap.closing, rise));
+      target = gap.distance - touch.give;
+    }
+    const double left = gap.distance - target;
     if (left <= kArrived * touch.distance && gap.closing > 0) return time;
     time += timeToClose(std::max(left, kArrived * touch.distance), gap.closing, rise);
     if (time >= limit) return limit;

@@ -58,10 +58,12 @@ struct Mover {
   double speed(double distance) const;
 };
 
-/// What is close already at the start is left alone; nearer than this distance [m] is touching.
+/// Nearer than this distance [m] is touching. What is nearer than known [m] already at the start may come nearer by
+/// give [m].
 struct Touch {
   double known;
   double distance;
+  double give;
 };
 
 Point toMap(const Pose& pose, const Point& point);

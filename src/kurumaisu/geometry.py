@@ -7,8 +7,9 @@ from kurumaisu.types import FloatArray
 
 
 def wrap(angle: FloatArray | float) -> FloatArray:
-    """Return angles [rad] in [-pi, pi)."""
-    return np.asarray((np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi, dtype=np.float64)
+    """Return angles [rad] in (-pi, pi]; those that are there already stay as they are, to the last bit."""
+    angle = np.asarray(angle, dtype=np.float64)
+    return np.asarray(angle - 2 * np.pi * np.ceil(angle / (2 * np.pi) - 0.5))
 
 
 def cos_sin(angles: FloatArray) -> tuple[FloatArray, FloatArray]:

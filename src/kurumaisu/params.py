@@ -20,6 +20,7 @@ class Chassis:
 
     length: float
     width: float
+    height: float
     axle_to_front: float
     track: float
     mass: float
@@ -143,7 +144,7 @@ def _axis(axis: settings.Section) -> AxisLaw:
 
 
 def _chassis(section: settings.Section) -> Chassis:
-    names = ("length", "width", "axle_to_front", "track", "mass")
+    names = ("length", "width", "height", "axle_to_front", "track", "mass")
     chassis = Chassis(**{name: section.number(name, above=0) for name in names})
     section.end()
     if chassis.axle_to_front >= chassis.length:
@@ -183,7 +184,12 @@ def _laser(section: settings.Section) -> Laser:
     return laser
 
 
+def identity_law() -> AxisLaw:
+    """Return the law of a robot that has no voltages: 1 V stands for 1 m/s or 1 rad/s, no dead zone."""
+    return AxisLaw(Branch(1.0, 0.0), Branch(1.0, 0.0))
+
+
 def follow_commands(model: Model) -> Model:
     """Return the model for a robot of another make: 1 V stands for 1 m/s and 1 rad/s, no dead zone."""
-    identity = AxisLaw(Branch(1.0, 0.0), Branch(1.0, 0.0))
+    identity = identity_law()
     return replace(model, name="velocity follows command", law_name="identity", translation=identity, steering=identity)

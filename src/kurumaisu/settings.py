@@ -65,6 +65,13 @@ class Section:
             raise self.error(key, f"must be one of {', '.join(choices)}: {value!r}")
         return value
 
+    def flag(self, key: str) -> bool:
+        """Return a required true or false."""
+        value = self.take(key)
+        if not isinstance(value, bool):
+            raise self.error(key, f"must be true or false: {value!r}")
+        return value
+
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
         """Return a required list of so many finite numbers."""
         value = self.take(key)

@@ -56,16 +56,16 @@ double AxisInverse::rate(double volts, std::optional<int> commanded_sign) {
   const auto positive = law_.positiveRate(volts);
   const auto negative = law_.negativeRate(volts);
   if (positive && negative) {
-    ++ambiguous_samples_;
+    ++memory_.ambiguous_samples;
     return choose(*positive, *negative, commanded_sign);
   }
   const double rate = positive.value_or(negative.value_or(0.0));
-  if (rate != 0) last_sign_ = signOf(rate);
+  if (rate != 0) memory_.last_sign = signOf(rate);
   return rate;
 }
 
 double AxisInverse::choose(double positive, double negative, std::optional<int> commanded_sign) const {
-  const int sign = commanded_sign.value_or(last_sign_);
+  const int sign = commanded_sign.value_or(memory_.last_sign);
   if (sign > 0) return positive;
   if (sign < 0) return negative;
   if (commanded_sign) return 0.0;  // rest is commanded

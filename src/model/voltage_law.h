@@ -51,14 +51,21 @@ class AxisInverse {
   double rate(double volts, std::optional<int> commanded_sign = std::nullopt);
 
   /// Samples so far that both branches answered.
-  std::uint64_t ambiguousSamples() const { return ambiguous_samples_; }
+  std::uint64_t ambiguousSamples() const { return memory_.ambiguous_samples; }
+
+  /// All that the next rates depend on, beside the law.
+  struct Memory {
+    int last_sign = 0;
+    std::uint64_t ambiguous_samples = 0;
+  };
+  Memory memory() const { return memory_; }
+  void recall(const Memory& memory) { memory_ = memory; }
 
  private:
   double choose(double positive, double negative, std::optional<int> commanded_sign) const;
 
   AxisLaw law_;
-  int last_sign_ = 0;
-  std::uint64_t ambiguous_samples_ = 0;
+  Memory memory_;
 };
 
 /// Equations (1) and (2) together.

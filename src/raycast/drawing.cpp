@@ -39,10 +39,14 @@ void requireEdge(const Edge& edge, std::size_t i, std::size_t parts) {
   if (!(edge.z_low <= edge.z_high)) refuse("edge", i, ": z_low must not be above z_high");
 }
 
+void note(std::uint64_t tile, Drawing& drawing) {
+  if (drawing.tiles.empty() || drawing.tiles.back() != tile) drawing.tiles.push_back(tile);
+}
+
 }  // namespace
 
 double normalized(double angle) {
-  constexpr double kMany = 100.0;  // [rad]
+  constexpr double kMany = 1e4;  // [rad] more than any file says
   if (std::abs(angle) > kMany) angle = std::remainder(angle, 2 * kHalfTurn);
   while (angle < -kHalfTurn) angle += 2 * kHalfTurn;
   while (angle > kHalfTurn) angle -= 2 * kHalfTurn;
@@ -139,18 +143,23 @@ void Pencil::draw(const Outline& outline, const Pose& at, Drawing& drawing) {
 }
 
 void Pencil::draw(const Segment& line, const Frame& frame, Drawing& drawing) const {
-  const auto cellOf = [&](double at) { return static_cast<std::int64_t>(std::floor(at * cells_per_metre_)); };
-  const std::int64_t ax = cellOf(frame.x + line.ax * frame.cos - line.ay * frame.sin);
-  const std::int64_t ay = cellOf(frame.y + line.ax * frame.sin + line.ay * frame.cos);
-  const std::int64_t bx = cellOf(frame.x + line.bx * frame.cos - line.by * frame.sin);
-  const std::int64_t by = cellOf(frame.y + line.bx * frame.sin + line.by * frame.cos);
-  for (Walk walk(ax, ay, bx - ax, by - ay); walk.left > 0; walk.step()) {
-    const Cell cell{static_cast<std::int32_t>(walk.x), static_cast<std::int32_t>(walk.y)};
-    drawing.cells.push_back(cell);
-    if (drawing.tiles.empty() || drawing.tiles.back() != tiles::of(cell))
-      drawing.tiles.push_back(tiles::of(cell));
-    drawing.low = {std::min(drawing.low.x, cell.x), std::min(drawing.low.y, cell.y)};
-    drawing.high = {std::max(drawing.high.x, cell.x), std::max(drawing.high.y, cell.y)};
+  const auto cellOf = [&](double at) { return static_cast<std::int32_t>(std::floor(at * cells_per_metre_)); };
+  const Cell a{cellOf(frame.x + line.ax * frame.cos - line.ay * frame.sin),
+               cellOf(frame.y + line.ax * frame.sin + line.ay * frame.cos)};
+  const Cell b{cellOf(frame.x + line.bx * frame.cos - line.by * frame.sin),
+               cellOf(frame.y + line.bx * frame.sin + line.by * frame.cos)};
+  Walk walk(a.x, a.y, b.x - a.x, b.y - a.y);
+  if (walk.left == 0) return;
+  drawing.low = {std::min({drawing.low.x, a.x, b.x}), std::min({drawing.low.y, a.y, b.y})};
+  drawing.high = {std::max({drawing.high.x, a.x, b.x}), std::max({drawing.high.y, a.y, b.y})};
+  const std::size_t first = drawing.cells.size();
+  drawing.cells.resize(first + static_cast<std::size_t>(walk.left));
+  for (auto cell = drawing.cells.begin() + static_cast<std::ptrdiff_t>(first); walk.left > 0; walk.step())
+    *cell++ = {static_cast<std::int32_t>(walk.x), static_cast<std::int32_t>(walk.y)};
+  if (tiles::of(a) == tiles::of(b)) {
+    note(tiles::of(a), drawing);
+  } else {
+    for (std::size_t i = first; i < drawing.cells.size(); ++i) note(tiles::of(drawing.cells[i]), drawing);
   }
 }
 

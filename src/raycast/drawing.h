@@ -59,7 +59,7 @@ struct Drawing {
 
   std::vector<Cell> cells;  ///< some more than once
   std::vector<Stroke> strokes;
-  Cell low, high;                    ///< corners of a box around them; low is above high: there are none
+  Cell low, high;                    ///< corners of a box around all; low is above high: there are none
   std::vector<std::uint64_t> tiles;  ///< that they are in, sorted
   bool in_ground;                    ///< an edge, drawn or too short for it, begins below z = 0
 };

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether the first robot of Stage's worlds sees in ours what it sees in Stage."""
+"""Whether robots of Stage's worlds see in ours what they see in Stage, and come to the same places."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kurumaisu.bench import agreement_poses
 from kurumaisu.bench.agreement_beams import Observer
 from kurumaisu.bench.peers import Stage
 from kurumaisu.bench.scenes import free_poses
@@ -51,6 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as folder:
         stage = Stage(options.stage, Path(folder))
         good = [_row(table, path, stage, options.poses) for path in [*paths, *options.world]]
+        good.append(agreement_poses.table(options.stage_tree, options.stage, Path(folder), options.world))
     return 0 if all(good) else 1
 
 

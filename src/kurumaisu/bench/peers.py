@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.errors import Error
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _DRIVERS = Path(__file__).parent / "drivers"
 
@@ -56,9 +56,8 @@ class Stage:
             "pkg-config", "--cflags", "stage", environment={**os.environ, "PKG_CONFIG_PATH": f"{libraries}/pkgconfig"}
         ).split()
         search = [f"-L{libraries}", "-lstage", f"-Wl,-rpath,{libraries}"]
-        self._run(
-            "g++", "-O2", "-w", "-std=c++17", *flags, str(_DRIVERS / f"{driver}.cpp"), *search, "-o", str(self._program)
-        )
+        source, program = str(_DRIVERS / f"{driver}.cpp"), str(self._program)
+        self._run("g++", "-O2", "-w", "-std=c++17", *flags, source, *search, "-o", program)
 
     def _run(self, *command: str, environment: dict[str, str] | None = None) -> str:
         done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
@@ -78,16 +77,19 @@ class Stage:
         readings = np.fromfile(taken).reshape(len(poses), -1, 2)
         return readings[..., 0], readings[..., 1], read_run(text)
 
-    def drive(self, world: Path, commands: FloatArray) -> tuple[FloatArray, BoolArray]:
+    def drive(self, world: Path, commands: FloatArray) -> tuple[FloatArray, BoolArray, IntArray]:
         """Give commands (steps, robots, 3) to the robots of a world, a row each step, by the driver stage_drive.
 
-        Return poses (steps, robots, 4) after each step and who stalled in it (steps, robots).
+        Return poses (steps, robots, 4) after each step, who stalled in it (steps, robots), and the order (robots,) in
+        which Stage moved them.
         """
         given, taken = self._folder / "commands", self._folder / "trace"
         np.ascontiguousarray(commands, dtype=np.float64).tofile(given)
-        self.text = self._run(str(self._program), str(world), str(given), str(taken), environment=self._environment)
+        command = (str(self._program), str(world), str(given), str(taken))
+        text = self._run(*command, environment=self._environment)
+        order = next((line for line in text.splitlines() if line.startswith("order ")), "order")
         trace = np.fromfile(taken).reshape(*commands.shape[:2], 5)
-        return trace[..., :4], trace[..., 4] != 0
+        return trace[..., :4], trace[..., 4] != 0, np.array(order.split()[1:], dtype=np.int64)
 
     def run(self, world: Path, seconds: float, v: float, w: float) -> Run:
         """Run a world for so many simulated seconds, all robots at v [m/s], w [rad/s]."""

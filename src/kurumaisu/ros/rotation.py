@@ -17,6 +17,18 @@ def quaternion_of(yaw: float) -> Quaternion:
     return Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
 
 
+def optical(heading: float, pan: float, tilt: float) -> Quaternion:
+    """Return the rotation of a frame whose z is where a camera looks, and x to the right of its picture.
+
+    heading [rad] of the camera, which is panned to the right and tilted downwards [rad]: turned about x, then about
+    the robot's z.
+    """
+    roll, yaw = -math.pi / 2 - tilt, heading - math.pi / 2 - pan
+    sr, cr = math.sin(roll / 2), math.cos(roll / 2)
+    sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
+    return Quaternion(cy * sr, sy * sr, sy * cr, cy * cr)
+
+
 def yaw_of(rotation: Quaternion) -> float:
     """Return the yaw [rad], in (-pi, pi], of a rotation about z."""
     return 2 * math.atan2(rotation.z, rotation.w) if rotation.w >= 0 else 2 * math.atan2(-rotation.z, -rotation.w)

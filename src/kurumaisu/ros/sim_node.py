@@ -3,68 +3,126 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import threading
 import time
+from collections import deque
+from functools import partial
 
 import rospy
-import tf2_ros
-from nav_msgs.msg import Odometry
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import LaserScan
-from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+from geometry_msgs.msg import Twist
 
 from kurumaisu.errors import Error, one_line
 from kurumaisu.msg import Voltages
 from kurumaisu.ros import messages
 from kurumaisu.ros.pacing import Pacer
+from kurumaisu.ros.requests import Requests
+from kurumaisu.ros.services import Services
+from kurumaisu.ros.sim_publish import SimTopics
 from kurumaisu.ros.sim_settings import SimSettings, read_settings
 from kurumaisu.sim.chair import ChairSimulator, Observation
 from kurumaisu.sim.holder import VoltageHolder
+from kurumaisu.types import FloatArray
 
 _NS = 1_000_000_000
+_GLANCE = 0.02  # [s] of wall time in which a service is noticed by who waits for voltages
 
 
 class SimNode:
-    """Steps the simulator and publishes what it observes."""
+    """Steps the simulator and publishes what it observes; the services act between steps."""
 
     def __init__(self, settings: SimSettings) -> None:
         """Advertise everything; the node must have been initialised."""
+        self.paused = False
         self._settings = settings
-        self._simulator = ChairSimulator(settings.model, settings.world, settings.physics)
+        self._seed = settings.seed
+        self._simulator = ChairSimulator(settings.model, settings.world, settings.physics, settings.sensors)
         self._epoch = round(settings.start_time * _NS)  # /clock at the simulator's time 0; reset moves it on
         self._now = self._epoch
-        self._steps = 0
-        self._lock = threading.Condition()  # over the holder and the wish to reset
+        self._lock = threading.Condition()  # over the holder
         self._holder = VoltageHolder()
-        self._reset_wanted = False
         self._given_up: int | None = None  # stamp of the voltages after which no more came in time
-        self._clock = rospy.Publisher("/clock", Clock, queue_size=100)
-        self._scan = rospy.Publisher("scan", LaserScan, queue_size=10)
-        self._truth = rospy.Publisher("ground_truth", Odometry, queue_size=10)
-        self._static = tf2_ros.StaticTransformBroadcaster()
-        laser = settings.model.laser
-        self._static.sendTransform(messages.laser_transform(messages.stamp_of(self._now), laser, settings.base_frame))
+        self._topics = SimTopics(settings, self._simulator.robot, self._now)
         self._voltages = rospy.Subscriber("voltages", Voltages, self._hear, queue_size=100)
-        self._service = rospy.Service("reset", Empty, self._serve_reset)
+        self._commands: deque[tuple[str, Twist]] = deque()  # heard since the last step, for other robots
+        self._others = [
+            rospy.Subscriber(f"{re.sub(r'[^A-Za-z0-9_]', '_', name)}/cmd_vel", Twist, partial(self._command, name))
+            for name in self._simulator.others
+        ]
+        self._requests = Requests()
+        self._services = Services(self, self._requests, "")
+
+    @property
+    def time(self) -> float:
+        """What /clock says [s]."""
+        return self._now / _NS
 
     def run(self) -> None:
         """Simulate until ROS shuts down."""
         pacer = Pacer(self._settings.speed)
-        self._restart()
+        self.reset()
         while not rospy.is_shutdown():
-            self._wait_for_voltages()
-            with self._lock:
-                reset_wanted = self._reset_wanted
-                command = self._holder.at(self._now)
-            if reset_wanted:
-                self._restart()
+            if self._requests:
+                self._requests.serve()
+            if self.paused:
+                self._requests.wait(0.1)
                 continue
-            observation = self._simulator.step(command)
-            self._steps += 1
-            self._publish(observation)
-            self._warn()
+            self._wait_for_voltages()
+            if self._requests:
+                continue
+            self._advance()
             pacer.wait(self._settings.physics.step)
+        self._requests.close()
+
+    def step(self) -> None:
+        """Go on by one step, as soon as the voltages have come that are due."""
+        self._wait_for_voltages()
+        self._advance()
+
+    def reset(self, seed: int | None = None) -> None:
+        """Put all back to the start, with the same or another seed; /clock runs on, as time must not jump back."""
+        self._seed = self._seed if seed is None else seed
+        self._start(self._simulator.reset(self._seed))
+
+    def set_pose(self, name: str, pose: FloatArray) -> None:
+        """Put a model to x, y, z [m], heading [rad]. Raise Error for an unknown one."""
+        self._simulator.set_pose(name, pose)
+
+    def save(self) -> bytes:
+        """Return the state of all but the voltages that are yet to come."""
+        return self._simulator.save()
+
+    def load(self, saved: bytes) -> None:
+        """Go back to a state of this world; /clock runs on, and the voltages are neutral until new ones come."""
+        self._start(self._simulator.load(saved))
+
+    def _start(self, observation: Observation) -> None:
+        """Go on from an observation, at what the clock says now."""
+        with self._lock:
+            self._holder.clear()
+            self._given_up = None
+        self._epoch = self._now - round(observation.time * _NS)
+        self._publish(observation)
+
+    def _command(self, robot: str, twist: Twist) -> None:
+        self._commands.append((robot, twist))
+
+    def _advance(self) -> None:
+        while self._commands:
+            robot, twist = self._commands.popleft()
+            try:
+                self._simulator.command(robot, [twist.linear.x, twist.linear.y, twist.angular.z])
+            except Error as error:
+                rospy.logwarn_throttle(5.0, f"SIM_COMMAND_DROPPED {error}")
+        with self._lock:
+            command = self._holder.at(self._now)
+        self._publish(self._simulator.step(command))
+        self._warn()
+
+    def _publish(self, observation: Observation) -> None:
+        self._now = self._epoch + round(observation.time * _NS)
+        self._topics.publish(observation, self._epoch, round(observation.time / self._settings.physics.step))
 
     def _hear(self, message: Voltages) -> None:
         with self._lock:
@@ -77,25 +135,6 @@ class SimNode:
                 rospy.logwarn_throttle(5.0, f"SIM_VOLTAGES_DROPPED {error}")
             self._lock.notify_all()
 
-    def _serve_reset(self, _request: EmptyRequest) -> EmptyResponse:
-        with self._lock:
-            self._reset_wanted = True
-            self._lock.notify_all()
-            while self._reset_wanted and not rospy.is_shutdown():
-                self._lock.wait(0.1)
-        return EmptyResponse()
-
-    def _restart(self) -> None:
-        """Put the chair back to its start with the same seed; /clock runs on, as time must not jump back."""
-        with self._lock:
-            self._holder.clear()
-            self._epoch = self._now
-            self._steps = 0
-            observation = self._simulator.reset(self._settings.seed)
-            self._reset_wanted = False
-            self._lock.notify_all()
-        self._publish(observation)
-
     def _wait_for_voltages(self) -> None:
         """Let a controller keep up: wait until its voltages are at most voltage_lead old, within patience."""
         lead = round(self._settings.voltage_lead * _NS)
@@ -103,33 +142,16 @@ class SimNode:
             return
         with self._lock:
             deadline = time.monotonic() + self._settings.voltage_patience
-            while self._behind(lead) and not self._reset_wanted:
+            while self._behind(lead) and not self._requests:
                 remaining = deadline - time.monotonic()
                 if remaining <= 0:
                     self._given_up = self._holder.newest
                     return
-                self._lock.wait(remaining)
+                self._lock.wait(min(remaining, _GLANCE))
 
     def _behind(self, lead: int) -> bool:
         newest = self._holder.newest
         return newest is not None and newest != self._given_up and self._now - newest >= lead
-
-    def _publish(self, observation: Observation) -> None:
-        """Publish the step's data, then the clock: who hears a time has been sent all before it."""
-        settings = self._settings
-        self._now = self._epoch + round(observation.time * _NS)
-        stamp = messages.stamp_of(self._now)
-        if observation.scan is not None:
-            first_beam = messages.stamp_of(self._epoch + round(observation.scan.time * _NS))
-            self._scan.publish(messages.laser_scan(first_beam, settings.model.laser, observation.scan.ranges))
-        if self._steps % settings.ground_truth_every == 0:
-            seen = observation.reference
-            measured = messages.stamp_of(self._epoch + round(float(seen.times) * _NS))
-            self._truth.publish(
-                messages.odometry(measured, settings.map_frame, settings.base_frame, seen.poses, seen.rates)
-            )
-        if self._steps % settings.clock_every == 0:
-            self._clock.publish(Clock(stamp))
 
     def _warn(self) -> None:
         newest = self._holder.newest

@@ -3,14 +3,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kurumaisu.params import Model, load_model
 from kurumaisu.settings import Section
+from kurumaisu.sim.sensors.settings import SensorSettings, load_sensors
 from kurumaisu.sim.settings import Physics, read_physics, with_effects
-from kurumaisu.world import World, load_world
+from kurumaisu.world import Start, World, load_world
+from kurumaisu.world.files import parse_values
+
+NONE = "none"  # of a file or a text that is not given
 
 
 @dataclass(frozen=True)
@@ -31,6 +37,7 @@ class SimSettings:
     voltage_lead: float
     voltage_patience: float
     physics: Physics
+    sensors: tuple[SensorSettings, ...]
 
 
 def read_settings(values: Any, where: str) -> SimSettings:
@@ -39,7 +46,7 @@ def read_settings(values: Any, where: str) -> SimSettings:
     physics = read_physics(top.section("physics"))
     settings = SimSettings(
         model=_model(top),
-        world=load_world(Path(top.text("world"))),
+        world=_world(top),
         seed=top.integer("seed", at_least=0),
         speed=top.number("speed", at_least=0),
         start_time=top.number("start_time", above=0),
@@ -52,6 +59,7 @@ def read_settings(values: Any, where: str) -> SimSettings:
         voltage_lead=top.number("voltage_lead", above=0),
         voltage_patience=top.number("voltage_patience", at_least=0),
         physics=physics,
+        sensors=_sensors(top),
     )
     top.end()
     return settings
@@ -60,7 +68,28 @@ def read_settings(values: Any, where: str) -> SimSettings:
 def _model(top: Section) -> Model:
     model = load_model(Path(top.text("model")))
     effects = top.text("effects")
-    return model if effects == "none" else with_effects(model, Path(effects))
+    return model if effects == NONE else with_effects(model, Path(effects))
+
+
+def _world(top: Section) -> World:
+    """Return the world, with values for its parameters, and the chair where `start` says if not where the file does."""
+    path, values, start = Path(top.text("world")), top.text("world_values"), top.text("start")
+    given = {} if values == NONE else parse_values(values.split())
+    world = load_world(path, image_extents=top.flag("image_extents"), values=given)
+    if start == NONE:
+        return world
+    try:
+        pose = np.array([float(number) for number in start.split()])
+    except ValueError:
+        pose = np.empty(0)
+    if pose.shape != (3,) or not np.isfinite(pose).all():
+        raise top.error("start", f"must be x y yaw [m, m, rad], or {NONE}: {start!r}")
+    return replace(world, starts=(Start("chair", pose), *world.starts[1:]))
+
+
+def _sensors(top: Section) -> tuple[SensorSettings, ...]:
+    file = top.text("sensors")
+    return () if file == NONE else load_sensors(Path(file))
 
 
 def _frame(top: Section, key: str) -> str:

@@ -14,7 +14,7 @@ import rospy
 from kurumaisu.errors import Error
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
-from kurumaisu.ros.stageros_services import Services
+from kurumaisu.ros.stageros_services import StagerosServices
 from kurumaisu.ros.stageros_session import Session
 from kurumaisu.ros.stageros_settings import StagerosSettings, read_settings
 from kurumaisu.world import World, load_world
@@ -60,7 +60,7 @@ def main() -> int:
         return 1
     rospy.set_param("/use_sim_time", True)
     requests = Requests()
-    Services(session, requests)
+    StagerosServices(session, requests)
     _run(session, requests, Pacer(speed), world, stopped)
     rospy.signal_shutdown("the simulation has ended")
     return 0

@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,10 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image
 
 from kurumaisu.ros.outlet import Outlet
+from kurumaisu.ros.rotation import optical
+from kurumaisu.ros.sensor_messages import intrinsics
 from kurumaisu.ros.stageros_plan import CameraPlan, RobotPlan
+from kurumaisu.ros.stageros_rates import Pace
 from kurumaisu.ros.stageros_robot import DEPTH
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.ros.wire import CameraInfoWire, ImageWire, Stamp, TransformsWire
@@ -20,7 +22,6 @@ from kurumaisu.sim.sensors.camera import (
     CameraSensor,
     Picture,
     Scenery,
-    camera_info,
     millimetres,
     mounted_eye,
     stage_eye,
@@ -32,8 +33,9 @@ from kurumaisu.world.model import Model
 class Cameras:
     """All cameras of a world; transforms go to the outlet of /tf."""
 
-    def __init__(self, settings: StagerosSettings, tf: Outlet | None) -> None:
+    def __init__(self, settings: StagerosSettings, pace: Pace, tf: Outlet | None) -> None:
         self._settings = settings
+        self._pace = pace
         self._tf = tf
         self._topics: list[CameraTopics] = []
         self._models: Sequence[Model] = ()
@@ -43,29 +45,33 @@ class Cameras:
         """Take other models and robots from now on."""
         self._models = models
         self._scenery = None  # made when the first one looks
-        there = {topics.plan.frame: topics for topics in self._topics}
+        there = {(topics.plan.frame, topics.plan.camera): topics for topics in self._topics}
+        stay = {(plan.frame, plan.camera) for robot in plans for plan in robot.cameras}
+        for likeness in [likeness for likeness in there if likeness not in stay]:
+            there.pop(likeness).close()
         self._topics = []
         for robot in plans:
             for plan in robot.cameras:
-                topics = there.pop(plan.frame, None)
+                topics = there.get((plan.frame, plan.camera))
                 if topics is None:
                     topics = CameraTopics(plan, robot.names.frame(self._settings.frames.base_link), self._settings)
+                    topics.every = self._pace.sensor("image", plan.names.topic("image", plan.number))
                 topics.plan = plan
                 self._topics.append(topics)
-        for gone in there.values():
-            gone.close()
 
     @property
     def wanted(self) -> bool:
         """Whether anybody looks."""
         return any(topics.wanted for topics in self._topics)
 
-    def publish(self, poses: FloatArray, stamp: Stamp) -> None:
-        """Take and send what is looked at; poses (m, 4) of all models."""
+    def publish(self, poses: Callable[[], FloatArray], number: int, stamp: Stamp) -> None:
+        """Take and send what is looked at and due in a step, the number-th; poses: tells those (m, 4) of all models."""
         scenery = self._scenery = self._scenery or Scenery(self._models)
-        for topics in self._topics:
-            if topics.wanted:
-                topics.publish(scenery, poses, stamp)
+        due = [topics for topics in self._topics if topics.wanted and number % topics.every == 0]
+        if due:
+            where = poses()
+            for topics in due:
+                topics.publish(scenery, where, stamp)
                 if self._tf is not None:
                     topics.transform.stamp(stamp)
                     self._tf.send(topics.transform.data)
@@ -78,6 +84,7 @@ class CameraTopics:
         """Advertise; base: the frame that the camera stands on."""
         names, number, camera = plan.names, plan.number, plan.camera
         self.plan = plan  # its model's number changes when another one goes
+        self.every = 1  # steps from picture to picture
         self._canonical = settings.depth_canonical
         self._as_stage = settings.options.semantics == "stage"
         self._sensor = CameraSensor(camera)
@@ -86,12 +93,12 @@ class CameraTopics:
         self._info = Outlet(names.topic("camera_info", number), CameraInfo, DEPTH)
         self._image_wire = _image_wire(plan, "rgba8", 4)
         self._depth_wire = _image_wire(plan, *(("32FC1", 4) if settings.depth_canonical else ("16UC1", 2)))
-        self._info_wire = CameraInfoWire(_info_message(plan))
+        self._info_wire = CameraInfoWire(intrinsics(camera, plan.frame))
         self.transform = TransformsWire([(base, plan.frame)])
-        # as in 1.8.0, where the lens looks along z: turned about x, then about the robot's z
+        # as in 1.8.0, where the lens looks along z
         x, y, z, heading = plan.mount.tolist()
-        roll, yaw = -math.pi / 2 - camera.tilt, heading - math.pi / 2 - camera.pan
-        self.transform.fill(0, (x, y, z, *_quaternion(roll, yaw)))
+        turn = optical(heading, camera.pan, camera.tilt)
+        self.transform.fill(0, (x, y, z, turn.x, turn.y, turn.z, turn.w))
 
     @property
     def wanted(self) -> bool:
@@ -134,18 +141,3 @@ def _image_wire(plan: CameraPlan, encoding: str, depth: int) -> ImageWire:
     message = Image(width=width, height=height, encoding=encoding, step=width * depth)
     message.header.frame_id = plan.frame
     return ImageWire(message, width * height * depth)
-
-
-def _info_message(plan: CameraPlan) -> CameraInfo:
-    info = camera_info(plan.camera)
-    message = CameraInfo(width=info.width, height=info.height, D=[0.0] * 4)
-    message.header.frame_id = plan.frame
-    message.K, message.R, message.P = (matrix.ravel().tolist() for matrix in (info.k, info.r, info.p))
-    return message
-
-
-def _quaternion(roll: float, yaw: float) -> tuple[float, float, float, float]:
-    """Return x, y, z, w of a turn about x [rad], then about the fixed z [rad]."""
-    sr, cr = math.sin(roll / 2), math.cos(roll / 2)
-    sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
-    return cy * sr, sy * sr, sy * cr, cy * cr

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from kurumaisu.errors import Error
 from kurumaisu.ros.stageros_settings import StagerosSettings
-from kurumaisu.world.model import Camera, Model, Position, Ranger
+from kurumaisu.world.model import Camera, Device, Model, Position, Ranger
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ def names_of(models: Sequence[Model], settings: StagerosSettings, use_model_name
     return [Names(prefix, settings.strip_leading_slash, settings.relative_topics) for prefix in prefixes]
 
 
-def devices_of(models: Sequence[Model], robot: Model, kind: type[Ranger] | type[Camera]) -> list[Model]:
-    """Return the rangers or cameras that stand directly on a robot; stage_ros sees no others."""
+def devices_of(models: Sequence[Model], robot: Model, kind: type[Device]) -> list[Model]:
+    """Return the rangers, cameras or others that stand directly on a robot; stage_ros sees no others."""
     return [model for model in models if model.parent == robot.index and isinstance(model.device, kind)]
 
 

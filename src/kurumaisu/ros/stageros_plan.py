@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,9 @@ from kurumaisu.geometry import compose
 from kurumaisu.ros.stageros_names import Names, devices_of, robots_of
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.types import FloatArray
-from kurumaisu.world.model import Camera, Fan, Model, Ranger
+from kurumaisu.world.model import Bumper, Camera, Device, Fan, Fiducial, Model, Ranger
+
+_DEVICES: dict[str, tuple[type[Device], str]] = {"bumper": (Bumper, "bumper"), "fiducial": (Fiducial, "fiducials")}
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,16 @@ class CameraPlan:
 
 
 @dataclass(frozen=True)
+class DevicePlan:
+    """A bumper or a fiducial finder: its type, the number of its model; mount (4,): x, y, z, heading in base_link."""
+
+    kind: str
+    model: int
+    topic: str
+    mount: FloatArray
+
+
+@dataclass(frozen=True)
 class RobotPlan:
     """A robot; row: of the observation's arrays."""
 
@@ -51,6 +63,16 @@ class RobotPlan:
     names: Names
     scans: tuple[ScanPlan, ...]
     cameras: tuple[CameraPlan, ...]
+    devices: tuple[DevicePlan, ...]
+
+    @property
+    def likeness(self) -> Hashable:
+        """What is equal for robots whose messages differ in numbers only."""
+        fans = tuple(
+            (scan.topic, scan.fan and (scan.fan.samples, scan.fan.fov, scan.fan.range_min, scan.fan.range_max))
+            for scan in self.scans
+        )
+        return self.names, fans, tuple(device.topic for device in self.devices)
 
 
 def plan_world(models: Sequence[Model], names: Sequence[Names], settings: StagerosSettings) -> tuple[RobotPlan, ...]:
@@ -62,6 +84,7 @@ def plan_world(models: Sequence[Model], names: Sequence[Names], settings: Stager
             names[row],
             _scans(models, robot, names[row], settings),
             _cameras(models, robot, names[row], settings.frames.camera),
+            tuple(_devices(models, robot, names[row], settings.publish_devices)),
         )
         for row, robot in enumerate(robots_of(models))
     )
@@ -141,3 +164,12 @@ def _cameras(models: Sequence[Model], robot: Model, names: Names, frame: str) ->
         number = i if len(cameras) > 1 else None
         plans.append(CameraPlan(model, model.device, names, number, names.frame(frame, number), model.pose + top))
     return tuple(plans)
+
+
+def _devices(models: Sequence[Model], robot: Model, names: Names, kinds: Sequence[str]) -> Iterator[DevicePlan]:
+    top = np.array([0.0, 0.0, robot.size[2], 0.0])
+    for kind in kinds:
+        found = devices_of(models, robot, _DEVICES[kind][0])
+        for number, model in enumerate(found):
+            topic = names.topic(_DEVICES[kind][1], number if len(found) > 1 else None)
+            yield DevicePlan(kind, model.index, topic, model.pose + top)

@@ -3,27 +3,25 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from collections.abc import Callable, Sequence
 
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
-from kurumaisu.errors import Error
 from kurumaisu.ros.outlet import Outlet
 from kurumaisu.ros.stageros_camera import Cameras
 from kurumaisu.ros.stageros_names import Names
 from kurumaisu.ros.stageros_plan import RobotPlan
+from kurumaisu.ros.stageros_rates import Pace
 from kurumaisu.ros.stageros_robot import DEPTH, Ears, RobotTopics, Timing, transform_of
 from kurumaisu.ros.stageros_settings import StagerosSettings
+from kurumaisu.ros.stageros_truth import Truth
 from kurumaisu.ros.wire import ClockWire, Stamp, TransformsWire, planar
 from kurumaisu.sim.observation import Observation
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Model
 
 _TF_DEPTH = 100  # as of tf2_ros
-_ROUNDING = 1e-6  # steps; of a division
 
 
 class Transforms:
@@ -68,75 +66,83 @@ class Publisher:
     def __init__(self, settings: StagerosSettings, interval: float, ears: Callable[[Names], Ears]) -> None:
         """Advertise; interval [s]: of the steps; ears: what listens to the commands for a robot of these names."""
         self._settings = settings
-        self._every = steps_between(settings, interval)
+        self._pace = Pace(settings.rates, interval)
         self._interval = interval
         self._ears = ears
-        self._timing = Timing(0.0, 0.0)
-        if settings.scan_timing:
-            self._timing = Timing(self._every["scan"] * interval, settings.options.scan_sweep)
         self._transforms = Transforms(settings) if settings.publish_tf else None
-        self._cameras = Cameras(settings, self._transforms.outlet if self._transforms else None)
+        self._cameras = Cameras(settings, self._pace, self._transforms.outlet if self._transforms else None)
         self._robots: list[RobotTopics] = []
         self._clock, self._clock_wire = Outlet("/clock", Clock, DEPTH), ClockWire()
-        self._poses: list[list[float]] = []  # the true ones of this step
-        self._before = self._poses  # and of the step before
+        self._truth = Truth(interval)
         self._kinds: dict[str, Callable[[Observation, Stamp], None]] = {
-            "tf": self._publish_transforms,
-            "scan": self._publish_scans,
             "odom": self._publish_odometry,
-            "ground_truth": self._publish_truth,
+            "base_pose_ground_truth": self._publish_truth,
             "collision": self._publish_collisions,
             "clock": self._publish_clock,  # last: who hears a time has been sent all before it
         }
 
     def change(self, models: Sequence[Model], plans: Sequence[RobotPlan]) -> None:
         """Publish these models' robots from now on; those that stay, by their names, keep their topics."""
-        there = {robot.plan.names: robot for robot in self._robots}
+        there = {robot.plan.likeness: robot for robot in self._robots}
+        stay = {plan.likeness for plan in plans}
+        for likeness in [likeness for likeness in there if likeness not in stay]:
+            there.pop(likeness).close()  # first, as another one may have the name
         self._robots = []
         for plan in plans:
-            robot = there.pop(plan.names, None)
+            robot = there.get(plan.likeness)
             if robot is None:
-                robot = RobotTopics(plan, self._settings, self._timing, self._ears(plan.names))
+                robot = RobotTopics(plan, self._settings, self._pace, self._timing, self._ears(plan.names))
             robot.plan = plan
             self._robots.append(robot)
-        for gone in there.values():
-            gone.close()
         if self._transforms:
             self._transforms.change(plans)
         self._cameras.change(models, plans)
-        self._poses = []
+        self._truth.forget()
 
     def publish(self, observation: Observation, poses: Callable[[], FloatArray], number: int, stamp: Stamp) -> None:
         """Publish a step, the number-th; poses: tells the poses (m, 4) of all models."""
-        self._before, self._poses = self._poses, observation.poses.tolist()
-        if not self._before:
-            self._before = self._poses  # the first message says zero, as in 1.8.0
-        if number % self._every["image"] == 0 and self._cameras.wanted:
-            self._cameras.publish(poses(), stamp)
+        self._truth.take(observation)
+        if self._cameras.wanted:
+            self._cameras.publish(poses, number, stamp)
+        if number % self._pace.every("tf") == 0:
+            self._publish_transforms(observation, stamp)
+        self._publish_sensors(observation, number, stamp)
         for kind, publish in self._kinds.items():
-            if number % self._every[kind] == 0:
+            if number % self._pace.every(kind) == 0:
                 publish(observation, stamp)
+
+    def check_rates(self) -> None:
+        """Raise Error for a rate of a sensor that there is not."""
+        self._pace.check(topic for robot in self._robots for topic in robot.sensors)
+
+    def _timing(self, every: int) -> Timing:
+        said = self._settings.scan_timing
+        return Timing(every * self._interval, self._settings.options.scan_sweep) if said else Timing(0.0, 0.0)
 
     def _publish_transforms(self, observation: Observation, stamp: Stamp) -> None:
         if self._transforms:
             self._transforms.publish(planar(observation.odometry.tolist()), stamp)
 
-    def _publish_scans(self, observation: Observation, stamp: Stamp) -> None:
+    def _publish_sensors(self, observation: Observation, number: int, stamp: Stamp) -> None:
         for robot in self._robots:
-            for index, topic in robot.scans:
-                scan = observation.scans[index]
-                if scan.count:  # as in 1.8.0, nothing before the ranger has looked
-                    topic.publish(scan, stamp)
+            for index, topic, every in robot.scans:
+                if number % every == 0:
+                    scan = observation.scans[index]
+                    if scan.count:  # as in 1.8.0, nothing before the ranger has looked
+                        topic.publish(scan, stamp)
+            for device in robot.devices:
+                device.take(observation.devices)
+                if number % device.every == 0:
+                    device.publish(stamp)
 
     def _publish_odometry(self, observation: Observation, stamp: Stamp) -> None:
         poses, velocities = planar(observation.odometry.tolist()), observation.velocities.tolist()
         for robot, pose, (v, sideways, w) in zip(self._robots, poses, velocities, strict=True):
             robot.odometry.publish(pose, (v, sideways, 0.0, 0.0, 0.0, w), stamp)
 
-    def _publish_truth(self, observation: Observation, stamp: Stamp) -> None:
-        poses = planar([(x, y, heading) for x, y, _, heading in self._poses])
-        for robot, pose, rates in zip(self._robots, poses, self._rates(), strict=True):
-            robot.truth.publish(pose, rates, stamp)
+    def _publish_truth(self, _observation: Observation, stamp: Stamp) -> None:
+        for robot, message in zip(self._robots, self._truth.messages(stamp), strict=True):
+            robot.truth.publish(*message)
 
     def _publish_collisions(self, observation: Observation, _stamp: Stamp) -> None:
         for robot, stalled in zip(self._robots, observation.stalled.tolist(), strict=True):
@@ -147,22 +153,3 @@ class Publisher:
         if self._clock.wanted:
             self._clock_wire.stamp(stamp)
             self._clock.send(self._clock_wire.data)
-
-    def _rates(self) -> list[tuple[float, ...]]:
-        """Return the change of the true poses since the step before, in the world's axes, as twists (6,)."""
-        dt = self._interval
-        return [
-            ((x - x0) / dt, (y - y0) / dt, (z - z0) / dt, 0.0, 0.0, math.remainder(heading - heading0, math.tau) / dt)
-            for (x, y, z, heading), (x0, y0, z0, heading0) in zip(self._poses, self._before, strict=True)
-        ]
-
-
-def steps_between(settings: StagerosSettings, interval: float) -> dict[str, int]:
-    """Return how many steps lie between two messages of a kind. Raise Error if that is no integer."""
-    result = {}
-    for kind, rate in dataclasses.asdict(settings.rates).items():
-        steps = 1.0 if rate == 0 else 1 / (rate * interval)
-        if round(steps) < 1 or abs(steps - round(steps)) > _ROUNDING:
-            raise Error(f"rates: {kind}: must divide the world's {1 / interval:g} Hz: {rate:g}")
-        result[kind] = round(steps)
-    return result

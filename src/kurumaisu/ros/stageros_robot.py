@@ -14,10 +14,12 @@ from sensor_msgs.msg import LaserScan, Range
 from std_msgs.msg import Bool
 
 from kurumaisu.ros.outlet import Outlet
+from kurumaisu.ros.stageros_devices import DeviceTopic
 from kurumaisu.ros.stageros_plan import RobotPlan, ScanPlan
+from kurumaisu.ros.stageros_rates import Pace
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.ros.wire import BoolWire, LaserScanWire, OdometryWire, RangeWire, Stamp
-from kurumaisu.sim.observation import Scan
+from kurumaisu.sim.scans import Scan
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Fan
 
@@ -135,7 +137,10 @@ class CollisionTopic:
 class RobotTopics:
     """Everything of one robot but cameras."""
 
-    def __init__(self, plan: RobotPlan, settings: StagerosSettings, timing: Timing, hear: Ears) -> None:
+    def __init__(
+        self, plan: RobotPlan, settings: StagerosSettings, pace: Pace, timing: Callable[[int], Timing], hear: Ears
+    ) -> None:
+        """timing: of a scan that is published every so many steps."""
         names, frames = plan.names, settings.frames
         child = names.frame(frames.base_footprint) if settings.set_child_frame_id else ""
         odom, truth = names.frame(frames.odom), names.frame(frames.ground_truth)
@@ -144,10 +149,16 @@ class RobotTopics:
         zeros = (0.0,) * 6  # the truth has no error
         self.truth = OdometryTopic(names.topic("base_pose_ground_truth"), OdometryWire(truth, child, zeros, zeros))
         self.collision = CollisionTopic(names.topic("collision")) if settings.publish_collision else None
-        self._scans = [
-            RangeTopic(scan, scan.fan) if scan.is_range else ScanTopic(scan, scan.fan, timing)
-            for scan in plan.scans
-            if scan.fan is not None
+        self._scans: list[tuple[ScanTopic | RangeTopic, int]] = []
+        for scan in plan.scans:
+            if scan.fan is not None:
+                every = pace.sensor("base_scan", scan.topic)
+                topic = RangeTopic(scan, scan.fan) if scan.is_range else ScanTopic(scan, scan.fan, timing(every))
+                self._scans.append((topic, every))
+        kinds = {"bumper": "bumper", "fiducial": "fiducials"}
+        base = names.frame(frames.base_link)
+        self.devices = [
+            DeviceTopic(device, base, pace.sensor(kinds[device.kind], device.topic)) for device in plan.devices
         ]
         self.plan = plan
         self._commands = [
@@ -165,13 +176,22 @@ class RobotTopics:
     def plan(self, plan: RobotPlan) -> None:
         self._plan = plan
         indices = [scan.index for scan in plan.scans if scan.fan is not None]
-        self.scans = list(zip(indices, self._scans, strict=True))
+        self.scans = [(index, *scan) for index, scan in zip(indices, self._scans, strict=True)]
+        for topic, device in zip(self.devices, plan.devices, strict=True):
+            topic.plan = device
+
+    @property
+    def sensors(self) -> list[str]:
+        """Topics that can have rates of their own."""
+        cameras = [camera.names.topic("image", camera.number) for camera in self._plan.cameras]
+        scans, devices = (plan.topic for plan in self._plan.scans), (plan.topic for plan in self._plan.devices)
+        return [*scans, *devices, *cameras]
 
     def close(self) -> None:
         """End all topics."""
         for subscriber in self._commands:
             subscriber.unregister()
-        for topic in (self.odometry, self.truth, self.collision, *self._scans):
+        for topic in (self.odometry, self.truth, self.collision, *(t for t, _ in self._scans), *self.devices):
             if topic is not None:
                 topic.close()
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import rospy
@@ -16,13 +16,15 @@ from geometry_msgs.msg import Pose, Twist
 from kurumaisu.errors import Error
 from kurumaisu.ros.rotation import pose_of
 from kurumaisu.ros.stageros_names import Names, names_of, names_of_another
+from kurumaisu.ros.stageros_newcomers import family, is_text, renumbered
 from kurumaisu.ros.stageros_plan import plan_world
 from kurumaisu.ros.stageros_publish import Publisher
 from kurumaisu.ros.stageros_robot import Ears
+from kurumaisu.ros.stageros_saved import packed_names, unpacked_names
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.sim.simulator import Simulator
 from kurumaisu.types import FloatArray
-from kurumaisu.world import World
+from kurumaisu.world import World, read_snippet
 from kurumaisu.world.model import Model
 
 _NS = 1_000_000_000
@@ -35,7 +37,9 @@ class Session:
     def __init__(self, world: World, settings: StagerosSettings, use_model_names: bool) -> None:
         """Advertise everything; the node must have been initialised."""
         self.paused = False
+        settings = replace(settings, options=settings.options.of_world(world.semantics))
         self._settings = settings
+        self._vocabulary = world.vocabulary
         self._use_model_names = use_model_names
         self._seed = settings.seed
         self._simulator = Simulator(world, settings.options)
@@ -49,6 +53,8 @@ class Session:
         self._numbered = len(self._home)  # robots that there have ever been
         self._publisher = Publisher(settings, world.interval, self._ears)
         self._take(self._home)
+        self._publisher.check_rates()
+        self.heard = 0  # commands and poses, of any robot, since the start, dropped ones included
 
     @property
     def time(self) -> float:
@@ -92,6 +98,7 @@ class Session:
             self._carried.append((names, pose_of(pose)))
         except Error as error:
             rospy.logwarn_throttle(5.0, f"STAGEROS_POSE_BAD {names.topic('cmd_pose')}: dropped: {error}")
+        self.heard += 1
 
     def hear(self, names: Names, message: Twist) -> None:
         """Take a robot's command, from any thread; the next step heeds it."""
@@ -101,6 +108,7 @@ class Session:
         else:
             topic = names.topic("cmd_vel")
             rospy.logwarn_throttle(5.0, f"STAGEROS_COMMAND_NAN {topic}: dropped, not finite: {command}")
+        self.heard += 1
 
     def reset(self, seed: int | None = None) -> None:
         """Start again as the file says, with the same or another seed; /clock runs on, as time must not jump back."""
@@ -117,11 +125,15 @@ class Session:
         self._simulator.set_pose(self._model(name), pose)
 
     def spawn(self, like: str, name: str, pose: FloatArray) -> None:
-        """Add a copy of a model with all that stands on it. Raise Error for an unknown one or a name that is taken."""
-        pattern = self._model(like)
-        if any(model.name == name for model in self._simulator.models):
-            raise Error(f"name {name!r}: there is a model of this name")
-        models = _copy(_family(self._simulator.models, pattern), name or None)
+        """Add a copy of a model with all that stands on it, or what a text in the world's words describes.
+
+        Raise Error for an unknown model, a text that makes no sense, or a name that is taken.
+        """
+        models = self._described(like) if is_text(like) else family(self._simulator.models, self._model(like))
+        models = renumbered(models, name or (models[0].name if is_text(like) else None))
+        taken = {model.name for model in self._simulator.models} & {model.name for model in models if model.name}
+        if models[0].name in taken:
+            raise Error(f"name {models[0].name!r}: there is a model of this name")
         before = set(self._rows)
         self._simulator.spawn(models, pose)
         names = sorted(before, key=self._rows.__getitem__)
@@ -129,26 +141,33 @@ class Session:
 
     def delete(self, name: str) -> None:
         """Take a model with all that stands on it away. Raise Error for an unknown one."""
-        gone = {model.index for model in _family(self._simulator.models, self._model(name))}
+        gone = {model.index for model in family(self._simulator.models, self._model(name))}
         stay = [names for names, row in self._rows.items() if self._simulator.robots[row].index not in gone]
         self._simulator.delete(self._model(name))
         self._take(stay)
 
-    def save(self, file: Path) -> None:
-        """Write the whole state to a file."""
-        try:
-            file.write_bytes(self._simulator.save())
-        except OSError as error:
-            raise Error(f"{file}: {error.strerror}") from error
+    def save(self) -> bytes:
+        """Return the whole state, with the names that the robots have here."""
+        names = sorted(self._rows, key=self._rows.__getitem__)
+        return packed_names(names, self._numbered) + self._simulator.save()
 
-    def load(self, file: Path) -> None:
+    def load(self, saved: bytes) -> None:
         """Go back to a state that was saved of this world; /clock runs on."""
-        try:
-            saved = file.read_bytes()
-        except OSError as error:
-            raise Error(f"{file}: {error.strerror}") from error
-        self._simulator.load(saved)
-        self._commands[:] = 0.0
+        prefixes, numbered, state = unpacked_names(saved)
+        now = self._simulator.save()
+        self._simulator.load(state)
+        if len(set(prefixes)) != len(self._simulator.robots):
+            self._simulator.load(now)
+            raise Error(f"state: does not name each of its robots once: {prefixes}")
+        switches = self._settings.strip_leading_slash, self._settings.relative_topics
+        self._numbered = max(self._numbered, numbered)
+        self._take([Names(prefix, *switches) for prefix in prefixes])
+
+    def _described(self, text: str) -> Sequence[Model]:
+        snippet = read_snippet(text, self._vocabulary)
+        for warning in snippet.warnings:
+            rospy.logwarn(f"STAGEROS_WORLD {warning}")
+        return snippet.models
 
     def _model_poses(self) -> FloatArray:
         return self._simulator.model_poses
@@ -177,21 +196,3 @@ class Session:
             known = ", ".join(sorted({model.name for model in self._simulator.models if model.name}))
             raise Error(f"name {name!r}: {'several models have' if found else 'no model has'} it; there are: {known}")
         return found[0]
-
-
-def _family(models: tuple[Model, ...], first: Model) -> list[Model]:
-    """Return a model and all that stand on it."""
-    family = {first.index}
-    for model in models[first.index + 1 :]:
-        if model.parent in family:
-            family.add(model.index)
-    return [model for model in models if model.index in family]
-
-
-def _copy(family: list[Model], name: str | None) -> list[Model]:
-    """Return a model and all that stand on it under another name, numbered from 0."""
-    places = {model.index: i for i, model in enumerate(family)}
-    return [
-        replace(model, index=i, parent=places.get(model.parent, -1), root=0, name=model.name if i else name)
-        for i, model in enumerate(family)
-    ]

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from kurumaisu import settings
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
+from kurumaisu.ros.stageros_rates import Rates, read_rates
 from kurumaisu.settings import Section
 from kurumaisu.sim.options import Options, read_options
 
@@ -30,19 +31,6 @@ class Frames:
 
 
 @dataclass(frozen=True)
-class Rates:
-    """How often something is published [Hz]; 0: in every step."""
-
-    clock: float
-    tf: float
-    odom: float
-    ground_truth: float
-    scan: float
-    image: float
-    collision: float
-
-
-@dataclass(frozen=True)
 class StagerosSettings:
     """What stageros needs to know; see launch/stageros.yaml for units and meaning."""
 
@@ -60,6 +48,7 @@ class StagerosSettings:
     all_sensors: bool
     sonar_as_range: bool
     publish_collision: bool
+    publish_devices: tuple[str, ...]  # types of models: bumper, fiducial
     rates: Rates
     headless_rate: float
     seed: int
@@ -74,28 +63,31 @@ def read_settings(values: Any, where: str) -> StagerosSettings:
     path = shipped("launch/stageros.yaml")
     tree, unknown = _over(settings.load(path), Section(values, where), where)
     top = Section(tree, where)
-    filled = _flag(top, "fill_covariance")
+    filled = top.flag("fill_covariance")
+    switches = ("bumper", "publish_bumpers"), ("fiducial", "publish_fiducials")
+    devices = tuple(kind for kind, switch in switches if top.flag(switch))
     variances = [_variances(top, key, filled) for key in ("pose_variances", "twist_variances")]
     result = StagerosSettings(
         watchdog_timeout=top.number("base_watchdog_timeout"),
-        depth_canonical=_flag(top, "is_depth_canonical"),
+        depth_canonical=top.flag("is_depth_canonical"),
         frames=_frames(top),
-        strip_leading_slash=_flag(top, "strip_leading_slash"),
-        relative_topics=_flag(top, "relative_topics"),
+        strip_leading_slash=top.flag("strip_leading_slash"),
+        relative_topics=top.flag("relative_topics"),
         robot_prefix=top.text("robot_prefix", choices=("stage", "always", "never")),
-        publish_tf=_flag(top, "publish_tf"),
-        set_child_frame_id=_flag(top, "set_child_frame_id"),
+        publish_tf=top.flag("publish_tf"),
+        set_child_frame_id=top.flag("set_child_frame_id"),
         pose_variances=variances[0],
         twist_variances=variances[1],
-        scan_timing=_flag(top, "scan_timing"),
+        scan_timing=top.flag("scan_timing"),
         all_sensors=top.text("sensors", choices=("first", "all")) == "all",
-        sonar_as_range=_flag(top, "sonar_as_range"),
-        publish_collision=_flag(top, "publish_collision"),
-        rates=_rates(top.section("rates")),
+        sonar_as_range=top.flag("sonar_as_range"),
+        publish_collision=top.flag("publish_collision"),
+        publish_devices=devices,
+        rates=read_rates(top.section("rates")),
         headless_rate=top.number("headless_rate", at_least=0),
         seed=top.integer("seed", at_least=0),
-        options=_options(_mapping(top, "simulator"), where),
-        image_extents=_flag(top, "image_extents"),
+        options=_options(_mapping(top, "simulator"), where, devices),
+        image_extents=top.flag("image_extents"),
         parameters=_mapping(top, "parameters"),
         unknown=unknown,
     )
@@ -103,12 +95,16 @@ def read_settings(values: Any, where: str) -> StagerosSettings:
     return result
 
 
-def _options(values: dict[str, Any], where: str) -> Options:
-    """Return the simulator's options; unlike above, a key it does not know is an error: 1.8.0 had none of them."""
+def _options(values: dict[str, Any], where: str, devices: tuple[str, ...]) -> Options:
+    """Return the simulator's options, with devices that are published, too.
+
+    Unlike above, a key it does not know is an error: 1.8.0 had none of them.
+    """
     tree, unknown = _over(settings.load(shipped("launch/simulator.yaml")), Section(values, where), f"{where}/simulator")
     if unknown:
         raise Error(unknown[0])
-    return read_options(Section(tree, where, "simulator"))
+    options = read_options(Section(tree, where, "simulator"))
+    return replace(options, devices=tuple(sorted({*options.devices, *devices})))
 
 
 def _over(below: Section, above: Section, where: str) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -125,13 +121,6 @@ def _over(below: Section, above: Section, where: str) -> tuple[dict[str, Any], t
         else:
             tree[key] = value
     return tree, tuple(unknown)
-
-
-def _flag(section: Section, key: str) -> bool:
-    value = section.take(key)
-    if not isinstance(value, bool):
-        raise section.error(key, f"must be true or false: {value!r}")
-    return value
 
 
 def _mapping(section: Section, key: str) -> dict[str, Any]:
@@ -169,17 +158,3 @@ def _frame(top: Section, key: str) -> str:
     if frame.startswith("/"):
         raise top.error(key, f"must not start with a slash, which comes with the robot's name: {frame}")
     return frame
-
-
-def _rates(section: Section) -> Rates:
-    rates = Rates(
-        clock=section.number("clock", at_least=0),
-        tf=section.number("tf", at_least=0),
-        odom=section.number("odom", at_least=0),
-        ground_truth=section.number("base_pose_ground_truth", at_least=0),
-        scan=section.number("base_scan", at_least=0),
-        image=section.number("image", at_least=0),
-        collision=section.number("collision", at_least=0),
-    )
-    section.end()
-    return rates

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.geometry import between
+from kurumaisu.sim.gripping import relative
 from kurumaisu.sim.rigid import Ground, Part, Pivot, Rigid, convex, moved, rigid
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import FloatArray
@@ -18,12 +18,8 @@ _LIGHTEST = 1.0e-3  # [kg] of what has no size to guess its mass from
 
 
 def movable(models: Sequence[Model]) -> list[int]:
-    """Return the indices of the models that are pieces: positions, what has a hinge, what has mass on the ground."""
-    return [
-        m.index
-        for m in models
-        if isinstance(m.device, Position) or m.hinge is not None or (m.parent < 0 and m.mass > 0)
-    ]
+    """Return the indices of the models that are pieces: what is driven, hangs on a hinge, or has mass on the ground."""
+    return [m.index for m in models if _driven(m) or m.hinge is not None or (m.parent < 0 and m.mass > 0)]
 
 
 def assemble(models: Sequence[Model], poses: FloatArray, dynamics: Dynamics) -> tuple[list[Rigid], Ground]:
@@ -43,6 +39,10 @@ def assemble(models: Sequence[Model], poses: FloatArray, dynamics: Dynamics) -> 
     return pieces, Ground(np.concatenate([np.empty((0, 6)), *walls]), np.concatenate([np.empty(0, np.int64), *trees]))
 
 
+def _driven(model: Model) -> bool:
+    return isinstance(model.device, Position) or model.walk is not None
+
+
 def _owners(models: Sequence[Model]) -> list[int]:
     """Return for each model the movable one it belongs to, or -1. Parents come before children."""
     pieces = set(movable(models))
@@ -53,14 +53,14 @@ def _owners(models: Sequence[Model]) -> list[int]:
 
 
 def _rigid(model: Model, members: Sequence[Model], poses: FloatArray, dynamics: Dynamics) -> Rigid:
-    driven = isinstance(model.device, Position)
+    driven = _driven(model)
     given = sum(m.mass for m in members)
     mass = given or max(_LIGHTEST, dynamics.density * float(np.prod(model.size)))
     parts: list[Part] = []
     edges = [np.empty((0, 6))]
     for m in members:
         if m.obstacle_return:
-            place = _relative(poses[model.index], poses[m.index])
+            place = relative(poses[model.index], poses[m.index])
             parts += _parts(m.shape, place)
             edges.append(_placed(m.shape, place))
     own_friction = dynamics.wheel_friction if driven else dynamics.floor_friction
@@ -72,7 +72,7 @@ def _rigid(model: Model, members: Sequence[Model], poses: FloatArray, dynamics: 
         mass=mass,
         friction=own_friction if model.friction is None else model.friction,
     )
-    jaws = [_jaws(m, _relative(poses[model.index], poses[m.index])) for m in members if isinstance(m.device, Gripper)]
+    jaws = [_jaws(m, relative(poses[model.index], poses[m.index])) for m in members if isinstance(m.device, Gripper)]
     piece = replace(piece, jaws=jaws[0] if jaws else None, grippable=model.gripper_return)
     return piece if model.hinge is None else _hung(piece, model, poses[model.index], dynamics)
 
@@ -101,12 +101,6 @@ def _jaws(model: Model, pose: FloatArray) -> Part:
 
 def _flat(pose: FloatArray) -> FloatArray:
     return np.array([pose[0], pose[1], 0.0, pose[3]])
-
-
-def _relative(base: FloatArray, pose: FloatArray) -> FloatArray:
-    """Return a pose (4,) in the frame of another."""
-    x, y, heading = between(base[[0, 1, 3]], pose[[0, 1, 3]])
-    return np.array([x, y, pose[2] - base[2], heading])
 
 
 def _placed(shape: Shape, pose: FloatArray) -> FloatArray:

@@ -3,110 +3,210 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.effects import Reference, Volts
 from kurumaisu.errors import Error
-from kurumaisu.params import Model
-from kurumaisu.sim.body import ChairBody
+from kurumaisu.params import Model, shipped
+from kurumaisu.sim import state
+from kurumaisu.sim.chair_body import seat
+from kurumaisu.sim.chair_data import NEUTRAL, Command, Observation
+from kurumaisu.sim.chair_world import ChairWorld
+from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.plant import Plant
 from kurumaisu.sim.scanner import Scan, Scanner
-from kurumaisu.sim.settings import Physics
-from kurumaisu.sim.walls import Walls
+from kurumaisu.sim.sensing import Sensing
+from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
+from kurumaisu.sim.sensors.suite import Reading
+from kurumaisu.sim.settings import Physics, load_dynamics
+from kurumaisu.sim.sight import Sight
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
+from kurumaisu.world.model import Model as WorldModel
 
-
-@dataclass(frozen=True)
-class Command:
-    """What the D/A puts out: voltages [V], and the signs of the rates they stand for, NaN where unknown."""
-
-    v_f: float
-    v_s: float
-    sign_v: float
-    sign_w: float
-
-
-NEUTRAL = Command(0.0, 0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Observation:
-    """The truth after a step, and the scan that ended in it, if one did.
-
-    time [s] since the reset; pose (3,) of base_link in the map, theta not wrapped; rates (3,) over the step:
-    forward, leftward [m/s], yaw [rad/s]; contact: an obstacle limited the motion; reference: what is measured of
-    time, pose and rates, with the effects that act on that.
-    """
-
-    time: float
-    pose: FloatArray
-    rates: FloatArray
-    contact: bool
-    scan: Scan | None
-    reference: Reference
+__all__ = ["NEUTRAL", "ChairSimulator", "Command", "Observation"]
 
 
 class ChairSimulator:
-    """One chair in one world."""
+    """One chair in one world, among all that is in it."""
 
-    def __init__(self, model: Model, world: World, physics: Physics) -> None:
+    def __init__(self, model: Model, world: World, physics: Physics, sensors: Sequence[SensorSettings] = ()) -> None:
         """Build the world; the effects that act are the model's. Call reset before step.
 
-        Raise Error for effects that are unknown or whose parameters do not fit, and if the world has no start pose or
-        the chair does not fit there.
+        Raise Error for effects that are unknown or whose parameters do not fit, for sensors of a robot that the world
+        has not, and if the world has no start pose or the chair does not fit there.
         """
         self._model = model
-        self._physics = physics
-        self._world = world
+        self._dynamics = replace(load_dynamics(shipped("launch/physical.yaml")), contacts=physics)
+        self._scene = seat(world, model.chassis)
         effects.check(model.effects)
-        self._build_walls(())
-        if self._new_body().touches():
-            raise Error(f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose")
+        self._errs = bool(effects.build_world(model.effects, np.random.default_rng(0)))
+        self._world = self._build(None)
+        if self._world.overlaps():
+            raise Error(
+                f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose, "
+                "or something else that is solid"
+            )
+        self._seed = 0
+        name = self._scene.models[self._scene.chair].name
+        own = [replace(s, robot=name) if s.robot == EVERY_ROBOT and name else s for s in sensors]
+        self._sensors = tuple(own)
+        self._fingerprint = state.digest(
+            (self._scene.models, self._scene.poses, model.chassis, model.effects, self._sensors, self._dynamics)
+        )
+        self.reset(0)
 
     def reset(self, seed: int) -> Observation:
-        """Put the chair back to its start, at rest, and start time and randomness anew."""
-        plant_rng, laser_rng, effects_rng, world_rng = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
-        self._plant = Plant(self._model, self._physics.step, plant_rng)
-        self._build_walls(effects.build_world(self._model.effects, world_rng))
+        """Put all back to the start, at rest, and start time and randomness anew."""
+        self._seed = seed
+        streams = np.random.SeedSequence(seed).spawn(5)
+        *others, world_seed = streams[0], streams[1], streams[2], streams[4], streams[3]
+        plant_rng, laser_rng, effects_rng, self._sensor_rng = map(np.random.default_rng, others)
+        self._plant = Plant(self._model, self.step_time, plant_rng)
+        if self._errs:
+            self._world = self._build(world_seed)
+        self._world.begin()
         chain = effects.build_laser(self._model.effects, effects_rng)
-        self._scanner = Scanner(self._model.laser, self._walls, chain, laser_rng)
+        self._scanner = Scanner(self._model.laser, Sight(self._world), chain, laser_rng)
         self._steps = 0
-        self._body = self._new_body()
-        return self._observe(0.0, np.zeros(3), False)
+        self._power_up()
+        return self._observe(np.zeros(3), False)
 
     def step(self, command: Command) -> Observation:
         """Advance by one physics step with the command held."""
-        motion = self._plant.from_voltages(_volts(command), float(self._body.pose[2]))
+        around = self._world
+        motion = self._plant.from_voltages(_volts(command), float(around.pose[2]))
         u = 0.0 if motion.u is None else float(motion.u[0])
-        rates, contact = self._body.move(float(motion.v[0]), float(motion.w[0]), u)
+        rates, contact = around.drive(float(motion.v[0]), float(motion.w[0]), u)
         self._steps += 1
-        time = self._steps * self._physics.step
-        return self._observe(time, rates, contact)
+        return self._observe(rates, contact)
 
-    def _observe(self, time: float, rates: FloatArray, contact: bool) -> Observation:
-        pose = self._body.pose
+    def command(self, robot: str, velocity: FloatArray | Sequence[float]) -> None:
+        """Let another robot drive on at forward, leftward [m/s], turn [rad/s], as its world file bounds it.
+
+        From a reset on it drives as its file says. Raise Error for an unknown robot, or numbers that are none.
+        """
+        self._world.command(robot, np.asarray(velocity, dtype=np.float64))
+
+    def set_pose(self, name: str, pose: FloatArray | Sequence[float]) -> None:
+        """Put a model, with all that stands on it, to a pose (4,) in the map: x, y, z [m], heading [rad].
+
+        Raise Error, with nothing changed, for an unknown one and for a pose at which the chair does not fit.
+        """
+        before = self._world.machinery
+        self._world.set_pose(name, np.asarray(pose, dtype=np.float64))
+        self._scanner.sight.restart()
+        if self._world.machinery is not before:
+            self._power_up()
+
+    def save(self) -> bytes:
+        """Return the whole state, from which load continues bit for bit."""
+        return state.pack(self._state())
+
+    def load(self, saved: bytes) -> Observation:
+        """Continue from a state that was saved of the same world, chassis, effects and sensors.
+
+        Raise Error for another one. Voltage laws and the laser's law are not compared.
+        """
+        known = state.unpack(saved)
+        if known.get("world") != self._fingerprint:
+            raise Error("state: is of another world, chassis, list of effects or of sensors")
+        self.reset(known["seed"])
+        self._steps = known["steps"]
+        self._world.restore(known["motion"])
+        self._power_up()
+        if self._sensing is not None:
+            self._sensing.restore(known["sensors"])
+        self._scanner.restore(known["scanner"])
+        recall(self._plant, known["plant"])
+        recall(self._sensor_rng, known["random"])
+        self._rates, self._contact = known["rates"], known["contact"]
+        return self._seen(None, ())
+
+    def state_hash(self) -> str:
+        """Return a digest of the whole state, randomness included."""
+        return state.digest(self._state())
+
+    def _state(self) -> dict[str, Any]:
+        return {
+            "world": self._fingerprint,
+            "seed": self._seed,
+            "steps": self._steps,
+            "rates": self._rates,
+            "contact": self._contact,
+            "motion": self._world.state(),
+            "sensors": self._sensing.state() if self._sensing is not None else None,
+            "scanner": self._scanner.state(),
+            "plant": remember(self._plant),
+            "random": remember(self._sensor_rng),
+        }
+
+    @property
+    def models(self) -> tuple[WorldModel, ...]:
+        """All models that there are, the chair among them."""
+        return self._world.machinery.population.models
+
+    @property
+    def robot(self) -> int:
+        """Number of the chair among the robots, as readings have it."""
+        return self._world.robot
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Names of the other robots that have one."""
+        robots = self._world.machinery.robots
+        return tuple(r.name for i, r in enumerate(robots) if i != self.robot and r.name is not None)
+
+    @property
+    def model_poses(self) -> FloatArray:
+        """Poses (m, 4) of all models in the map now."""
+        return self._world.machinery.model_poses()
+
+    @property
+    def chair(self) -> WorldModel:
+        """The model that the chair is."""
+        return self.models[self._world.chair]
+
+    def _observe(self, rates: FloatArray, contact: bool) -> Observation:
+        self._rates, self._contact = rates, contact
+        readings = self._sensing.read(self.time) if self._sensing is not None and self._steps else ()
+        return self._seen(self._scanner.observe(self.time, self._world.pose), readings)
+
+    def _seen(self, scan: Scan | None, readings: tuple[Reading, ...]) -> Observation:
+        time, pose, rates = self.time, self._world.pose, self._rates
         reference = self._plant.seen(Reference(np.array(time), pose, rates))
-        return Observation(time, pose, rates, contact, self._scanner.observe(time, pose), reference)
+        return Observation(time, pose, rates, self._contact, scan, reference, readings)
 
-    def _build_walls(self, errors: tuple[effects.WorldEffect, ...]) -> None:
-        """Build what is seen and what is solid, with effects on what the world file says."""
-        walls = np.concatenate([self._world.segments, self._world.obstacles])
-        for effect in errors:
-            walls = effect.apply(walls)  # both at once, as what is seen is mostly also solid
-        seen = len(self._world.segments)
-        self._walls, self._obstacles = Walls(walls[:seen], self._world.returns), walls[seen:]
+    def _build(self, seed: np.random.SeedSequence | None) -> ChairWorld:
+        """Build the world, with a seed for the effects on what its file says of walls."""
 
-    def _new_body(self) -> ChairBody:
-        return ChairBody(self._model.chassis, self._obstacles, self._physics, self._world.start)
+        def distort(walls: FloatArray) -> FloatArray:
+            for effect in effects.build_world(self._model.effects, np.random.default_rng(seed)):
+                walls = effect.apply(walls)
+            return walls
+
+        return ChairWorld(self._scene, self._model.chassis, self._dynamics, distort if seed else None)
+
+    def _power_up(self) -> None:
+        """Start the further sensors."""
+        self._sensing = None
+        if self._sensors:
+            self._sensing = Sensing(self._sensors, self._world.machinery, self.time, self._sensor_rng)
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s] since the reset."""
+        return self._steps * self.step_time
 
     @property
     def step_time(self) -> float:
         """Length of a step [s]."""
-        return self._physics.step
+        return self._dynamics.contacts.step
 
     @property
     def ambiguous_samples(self) -> int:
@@ -115,4 +215,4 @@ class ChairSimulator:
 
 
 def _volts(command: Command) -> Volts:
-    return Volts(*(np.array([value]) for value in (command.v_f, command.v_s, command.sign_v, command.sign_w)))
+    return Volts(*np.array([[command.v_f], [command.v_s], [command.sign_v], [command.sign_w]]))

@@ -58,3 +58,8 @@ def bearings(fan: Fan) -> FloatArray:
 def spread(fan: Fan) -> tuple[float, float]:
     """Return the first bearing and the increment [rad]; first and last beams are at the edges of the fan."""
     return (-fan.fov / 2, fan.fov / (fan.samples - 1)) if fan.samples > 1 else (0.0, fan.fov)
+
+
+def moments(samples: int, sweep: float) -> FloatArray:
+    """Return when in a step its beams (samples,) fire, 1 being its end; sweep: share of a step from first to last."""
+    return 1.0 - sweep * (1.0 - np.arange(samples) / max(samples - 1, 1))

@@ -7,24 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pymunk
-from pymunk.batch import BodyFields, Buffer, get_space_bodies, set_space_bodies
 
 from kurumaisu._core import Clearance
-from kurumaisu.sim.joints import Hinges, constraints
-from kurumaisu.sim.layers import Layers
+from kurumaisu.sim.contact_space import ContactSpace, Exchange
+from kurumaisu.sim.joints import Hinges
 from kurumaisu.sim.rigid import Ground, Rigid
 from kurumaisu.sim.settings import Dynamics
+from kurumaisu.sim.slip import turned
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-_STATE = (
-    BodyFields.POSITION
-    | BodyFields.ANGLE
-    | BodyFields.VELOCITY
-    | BodyFields.ANGULAR_VELOCITY
-    | BodyFields.FORCE
-    | BodyFields.TORQUE
-)
 _AT_REST = 1.0e-9  # [m/s, rad/s] slower is none
 _NEAR = 0.05  # [m] walls that are looked up beyond what the bodies can reach
 
@@ -43,51 +34,51 @@ class Moving:
     hindered: BoolArray
 
 
+@dataclass(frozen=True)
+class Surroundings:
+    """What all islands of a world have in common."""
+
+    ground: Ground
+    clearance: Clearance
+    dynamics: Dynamics
+    exchange: Exchange
+
+
 class Island:
     """Some bodies of a world, and the walls about them, in a space of their own.
 
-    A new one for every step of the world: nothing is remembered but poses and velocities. Shapes have a skin of
-    collision_slop, so that contacts act before bodies overlap; new contacts are met at 3/4 of both skins.
+    A new one for every step of the world: nothing is remembered but poses and velocities. New contacts are met at 3/4
+    of both skins.
     """
 
-    def __init__(
-        self, numbers: IntArray, rigids: Sequence[Rigid], ground: Ground, clearance: Clearance, dynamics: Dynamics
-    ) -> None:
-        """Gather bodies by their numbers, which clearance knows, too."""
+    def __init__(self, numbers: IntArray, rigids: Sequence[Rigid], world: Surroundings) -> None:
+        """Gather bodies, of all of a world, by their numbers, which clearance knows, too."""
         self._numbers = numbers
-        self._ground = ground
-        self._clearance = clearance
-        self._skin = dynamics.contacts.collision_slop
-        self._friction = dynamics.contacts.friction
-        self._substeps = dynamics.contacts.contact_substeps
+        self._world = world
+        self._skin = world.dynamics.contacts.collision_slop
+        self._longest = world.dynamics.contacts.step
         self._rigids = [rigids[n] for n in numbers.tolist()]
         self._hinges = Hinges([r.pivot for r in self._rigids])
         self._driven = np.array([r.driven for r in self._rigids])
-        self._masses = np.array([[r.mass, r.mass, r.moment] for r in self._rigids])
-        self._walls: set[int] = set()
-        self._floor = pymunk.Body(body_type=pymunk.Body.STATIC)
-        self._motors: list[pymunk.Body] = []
-        self._grips: list[tuple[pymunk.Constraint, float]] = []  # with their largest force [N] or torque [N m]
-        self._limited_for = 0.0  # [s] the substep that these are set for
-        self._space = pymunk.Space()
-        self._space.iterations = dynamics.contacts.iterations
-        self._space.collision_slop = self._skin
-        self._space.collision_bias = dynamics.contacts.collision_bias
+        self._imposed = self._driven & (not world.dynamics.slip)  # wheels that slip give all speeds by force
+        brakes = [(0.0, 0.0) if r.driven else (r.grip / r.mass, r.twist_grip / r.moment) for r in self._rigids]
+        self._brakes = np.array(brakes)  # [m/s^2], [rad/s^2] of those that the floor brakes
 
     def run(self, moving: Moving, seconds: float) -> BoolArray:
         """Move the bodies on, in place; return who was hindered meanwhile."""
-        fastest = _fastest(moving)
-        reach = 2 * fastest * seconds + _NEAR
-        self._longest = seconds / self._substeps
-        self._layers = Layers(self._rigids, moving.poses)
-        self._add_bodies(moving.poses)
+        reach = 2 * _fastest(moving) * seconds + _NEAR
+        contacts = self._world.dynamics.contacts
+        self._space = ContactSpace(self._rigids, moving.poses, contacts, self._world.exchange)
         self._add_walls(moving.poses, reach)
         left, travelled = seconds, 0.0
         ever = moving.hindered.copy()
         while left > 1e-12 * seconds:
+            rest = moving.poses, moving.velocities
             taken = self._advance(moving, min(left, self._longest))
             left -= taken
             ever |= moving.hindered
+            if all(np.abs(change).max() < _AT_REST for change in (moving.poses - rest[0], rest[1], moving.velocities)):
+                break  # the next substep would be like this one
             travelled += taken * float(np.hypot(*moving.velocities[:, :2].T).max())
             if travelled > reach - _NEAR:
                 self._add_walls(moving.poses, reach)
@@ -100,113 +91,61 @@ class Island:
         step = longest
         for _ in range(2):  # what touches earlier shortens the substep, and with it the impulses of motors and floor
             velocities, hindered, poses = self._solve(moving, step)
+            ways = self._ways(moving.velocities, velocities, step)
             limit = self._hinges.time(poses, velocities, step)
-            touch = self._clearance.first_touch(
-                self._numbers, poses, velocities, known=2 * self._skin, distance=1.5 * self._skin, limit=limit
+            touch = self._world.clearance.first_touch(
+                self._numbers,
+                poses,
+                ways,
+                known=2 * self._skin,
+                distance=1.5 * self._skin,
+                give=0.5 * self._skin,
+                limit=limit,
             )
             if touch >= step:
                 break
             step = touch
         moving.poses = poses
-        moving.poses[:, [0, 1, 3]] += velocities * step
+        moving.poses[:, [0, 1, 3]] += ways * step
         self._hinges.project(moving.poses, velocities)
         moving.velocities, moving.hindered = velocities, hindered
         return step
 
     def _solve(self, moving: Moving, step: float) -> tuple[FloatArray, BoolArray, FloatArray]:
-        """Return the velocities for a substep, who is hindered, and the poses, overlaps pushed apart.
-
-        pymunk moves bodies first and solves afterwards: it gets no velocities to move by but forces that restore them.
-        Its own step is always the same: it would scale the last impulses, which it starts from, by the steps' ratio,
-        though that of an impact is no force. The largest impulses of motors and floor go by the true step.
-        """
-        self._limit_grips(step)
+        """Return the velocities for a substep, who is hindered, and the poses, overlaps pushed apart."""
         targets = chords(moving.poses[:, 3], moving.commands, step)
-        start = np.where((self._driven & ~moving.hindered)[:, None], targets, moving.velocities)
-        state = np.zeros((len(start) + len(self._motors) + 1, 9))
-        bodies = state[: len(start)]
-        bodies[:, :3] = moving.poses[:, [0, 1, 3]]
-        bodies[:, 6:] = self._masses * start / self._longest
-        state[len(start) : -1, 3:6] = targets[self._driven]
-        self._write(state)
-        self._space.step(self._longest)
-        result = self._read()[: len(start)]
+        start = np.where((self._imposed & ~moving.hindered)[:, None], targets, moving.velocities)
+        planar, velocities = self._space.solve(moving.poses[:, [0, 1, 3]], start, targets[self._driven], step)
         poses = moving.poses.copy()
-        poses[:, [0, 1, 3]] = result[:, :3]
-        velocities = result[:, 3:6].copy()
+        poses[:, [0, 1, 3]] = planar
         hindered = self._driven & (np.abs(velocities - targets).max(axis=1) > _AT_REST)
         return velocities, hindered, poses
 
-    def _write(self, state: FloatArray) -> None:
-        buffer = Buffer()
-        buffer.set_float_buf(state)
-        set_space_bodies(self._space, _STATE, buffer)
+    def _ways(self, before: FloatArray, after: FloatArray, step: float) -> FloatArray:
+        """Return mean velocities (k, 3) over a substep: half-way, where nothing but the floor braked a body.
 
-    def _read(self) -> FloatArray:
-        buffer = Buffer()
-        get_space_bodies(self._space, _STATE, buffer)
-        return np.array(np.frombuffer(buffer.float_buf(), dtype=np.float64)).reshape(-1, 9)  # the buffer dies here
-
-    def _add_bodies(self, poses: FloatArray) -> None:
-        """Add bodies, then motors, then the floor: in this order pymunk reads and writes them."""
-        for row, rigid in enumerate(self._rigids):
-            body = pymunk.Body(rigid.mass, rigid.moment)
-            body.position, body.angle = tuple(poses[row, :2]), float(poses[row, 3])
-            self._space.add(body)
-            for part, layers in zip(rigid.parts, self._layers.parts[row], strict=True):
-                shape = _shape(body, part.corners, self._skin)
-                shape.filter = pymunk.ShapeFilter(rigid.tree + 1, layers, layers)
-                shape.friction = self._friction
-                self._space.add(shape)
-            if rigid.driven:
-                self._motors.append(pymunk.Body(body_type=pymunk.Body.KINEMATIC))
-            self._add_grip(self._motors[-1] if rigid.driven else self._floor, body, rigid)
-        self._space.add(*self._motors, self._floor)
-
-    def _add_grip(self, floor: pymunk.Body, body: pymunk.Body, rigid: Rigid) -> None:
-        """Let the floor, or a motor that moves as commanded, drag a body with limited force."""
-        for joint, most in [
-            (pymunk.PivotJoint(floor, body, (0, 0), (0, 0)), rigid.grip),
-            (pymunk.GearJoint(floor, body, 0.0, 1.0), rigid.twist_grip),
-        ]:
-            joint.max_bias = 0.0  # it drags, and never pulls back
-            self._grips.append((joint, most))
-            self._space.add(joint)
-        if rigid.pivot is not None:
-            self._space.add(*constraints(floor, body, rigid.pivot))
-
-    def _limit_grips(self, step: float) -> None:
-        if step != self._limited_for:
-            for joint, most in self._grips:
-                joint.max_force = most * step / self._longest
-            self._limited_for = step
+        Otherwise contacts were solved for, and they allow the velocity at the end only.
+        """
+        ways = after.copy()
+        for columns, brakes in ((slice(0, 2), self._brakes[:, 0]), (slice(2, 3), self._brakes[:, 1])):
+            speed = np.hypot.reduce(before[:, columns], axis=1)
+            loss = np.minimum(speed, brakes * step)
+            left = np.divide(speed - loss, speed, out=np.zeros_like(speed), where=speed > 0)
+            expected = before[:, columns] * left[:, None]
+            braked = (loss > 0) & (np.abs(after[:, columns] - expected).max(axis=1) < _AT_REST)
+            mean = np.where(speed > loss, (1 + left) / 2, speed / (2 * np.maximum(brakes * step, 1e-300)))
+            ways[:, columns][braked] = (before[:, columns] * mean[:, None])[braked]
+        return ways
 
     def _add_walls(self, poses: FloatArray, reach: float) -> None:
-        for number in self._clearance.near(self._numbers, poses, reach):
-            if number not in self._walls:
-                self._walls.add(number)
-                wall = self._ground.walls[number]
-                shape = _shape(self._floor, wall[:4].reshape(2, 2), self._skin)
-                layers = self._layers.of(wall[4], wall[5])
-                shape.filter = pymunk.ShapeFilter(int(self._ground.trees[number]) + 1, layers, layers)
-                shape.friction = self._friction
-                self._space.add(shape)
+        self._space.add_walls(self._world.clearance.near(self._numbers, poses, reach), self._world.ground)
 
 
 def chords(headings: FloatArray, commands: FloatArray, step: float) -> FloatArray:
     """Return constant velocities (n, 3) in the map that end where arcs of commands (n, 3) end after a step."""
     half = 0.5 * commands[:, 2] * step
-    direction = headings + half
-    c, s = np.cos(direction), np.sin(direction)
-    shorter = np.sinc(half / np.pi)
-    x, y = commands[:, 0] * shorter, commands[:, 1] * shorter
-    return np.stack([c * x - s * y, s * x + c * y, commands[:, 2]], axis=1)
-
-
-def _shape(body: pymunk.Body, corners: FloatArray, skin: float) -> pymunk.Shape:
-    if len(corners) == 2:
-        return pymunk.Segment(body, tuple(corners[0].tolist()), tuple(corners[1].tolist()), skin)
-    return pymunk.Poly(body, corners.tolist(), radius=skin)
+    shorter = np.stack([np.sinc(half / np.pi)] * 2 + [np.ones(len(half))], axis=1)
+    return turned(commands * shorter, headings + half)
 
 
 def _fastest(moving: Moving) -> float:

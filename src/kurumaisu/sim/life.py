@@ -58,7 +58,7 @@ def moved(old: Machinery, index: int, pose: FloatArray) -> Machinery:
 
 def rebuilt(old: Machinery, population: Population) -> Machinery:
     """Return machinery of another population, in which all that both have goes on; rangers have yet to start."""
-    new = Machinery(population, old.options, old.interval, old.resolution, old.dynamics)
+    new = old.of(population)
     into, out = _common(new, old, new.bodies.heads, old.bodies.heads)
     state, known = new.motion.state(), old.motion.state()
     new.frames[into], new.before[into] = old.frames[out], old.before[out]

@@ -4,25 +4,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from kurumaisu.effects import Reference
+from kurumaisu.errors import Error
+from kurumaisu.geometry import between, wrap
 from kurumaisu.sim import fans
 from kurumaisu.sim.cells import build_cell_rays, build_cells
 from kurumaisu.sim.collisions import Collisions, Crossing, SharedCells
 from kurumaisu.sim.drive import Drive, Rows
-from kurumaisu.sim.motion import Motion, StageMotion
+from kurumaisu.sim.eyes import CellEyes, ExactEyes, Eyes
+from kurumaisu.sim.fleet_effects import FleetEffects
+from kurumaisu.sim.motion import StageMotion
 from kurumaisu.sim.odometry import Localization
 from kurumaisu.sim.options import Options
-from kurumaisu.sim.partition import attached, build_arena, is_robot, relative, sort
+from kurumaisu.sim.partition import Distort, attached, build_arena, is_robot, relative, sort
+from kurumaisu.sim.pedestrians import Pedestrians
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.rangers import Rangers
 from kurumaisu.sim.rhythm import Rhythm, period
 from kurumaisu.sim.settings import Dynamics
-from kurumaisu.sim.sight import CellSight, ExactSight, Sight
+from kurumaisu.sim.slopes import Slopes
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
+
+if TYPE_CHECKING:
+    from kurumaisu.sim.following import Followed
+
+_PLANAR = [0, 1, 3]
 
 
 class Machinery:
@@ -33,12 +44,14 @@ class Machinery:
         population: Population,
         options: Options,
         interval: float,
-        resolution: float,
         dynamics: Dynamics | None,
+        distort: Distort | None = None,
+        resolution: float | None = None,
     ) -> None:
-        """Place all bodies where they begin.
+        """Place all bodies where they begin; interval [s] is a step's length; dynamics: None for Stage's semantics.
 
-        interval [s]: a step's length; resolution [m]: of the world; dynamics: None for Stage's semantics.
+        distort: says where the walls are in truth; resolution [m]: of cells in which outlines collide, if options say
+        so. Raise Error if there would be too many cells.
         """
         models = population.models
         self.population = population
@@ -46,24 +59,39 @@ class Machinery:
         self.resolution = resolution
         self.options = options
         self.dynamics = dynamics
+        self.distort = distort
         self.bodies = sort(models, _moving(models, physical=dynamics is not None))
-        self.arena, self.numbers, self.walls = build_arena(models, population.poses, self.bodies, options.threads)
+        self.arena, self.numbers, self.walls = build_arena(
+            models, population.poses, self.bodies, options.threads, distort=distort
+        )
         self.robot_rows = np.array([i for i, head in enumerate(self.bodies.heads) if is_robot(models[head])], np.int64)
         self.robots = tuple(models[self.bodies.heads[row]] for row in self.robot_rows)
         self._everybody_drives = len(self.robot_rows) == len(self.bodies)
         self.fans = fans.find(models, population.poses, self.bodies, self.robot_rows.tolist())
         self.collisions = self._make_collisions()
         self.motion = self._make_motion()
-        self._sight = self._make_sight()
+        self._eyes = self._make_eyes()
+        self.pedestrians = self._make_pedestrians()
+        self._slopes = self._make_slopes()
+        self._sideways = np.array([cast(Position, model.device).drive == "omni" for model in self.robots], np.bool_)
         self.frames = np.zeros((len(self.bodies) + 1, 4))  # of the bodies, and of the map at the end
         self.before = self.frames.copy()  # those one step ago
         self.stalled = np.zeros(len(self.bodies), dtype=np.bool_)
         self.place(population.poses[self.bodies.heads])
         self._velocities = np.zeros((len(self.bodies), 3))
-        self.begin()
+        self.begin(0)
 
-    def begin(self) -> None:
-        """Make drives, odometry and rangers anew, as they are before the first step."""
+    def of(self, population: Population) -> Machinery:
+        """Return new machinery of the same kind for another population."""
+        new = Machinery(population, self.options, self.interval, self.dynamics, self.distort, self.resolution)
+        if self.seed:
+            new.begin(self.seed)
+        return new
+
+    def begin(self, seed: int) -> None:
+        """Make drives, odometry, rangers and effects anew, as they are before the first step; seed: of the effects."""
+        self.seed = seed
+        self.pedestrians.begin()
         devices = [cast(Position, model.device) for model in self.robots]
         starts = self.robot_poses
         born = self.population.born
@@ -76,31 +104,52 @@ class Machinery:
         looks = self._periods([fan.model.update_interval for fan in self.fans], always=False)
         births = born[[fan.model.index for fan in self.fans]].astype(np.int64)
         sweep = self.options.scan_sweep / self.interval
-        self.rangers = Rangers(self._sight, self.fans, np.stack([looks, births], axis=-1), sweep)
+        self.effects = FleetEffects(self.options, self.robots, self.robot_keys, self.interval)
+        self.effects.begin(seed)
+        touched = self.effects.begin_fans(self.fans, self.population.keys, self.arena)
+        self.rangers = Rangers(self._eyes, self.fans, np.stack([looks, births], axis=-1), sweep, touched)
 
-    def _make_motion(self) -> Motion:
+    def _make_motion(self) -> StageMotion | Followed:
         if self.dynamics is None:
             return StageMotion(self.collisions, self.bodies)
-        from kurumaisu.sim.following import Followed  # loads pymunk, which Stage's semantics need not pay for
+        # these load pymunk, which Stage's semantics need not pay for
+        from kurumaisu.sim.bodies import assemble
+        from kurumaisu.sim.following import Followed
+        from kurumaisu.sim.physical import PhysicalMotion
+        from kurumaisu.sim.rigid import Ground
 
         start = self.population
-        return Followed(self.arena, self.numbers, start.models, start.poses, self.dynamics)
+        pieces, _ = assemble(start.models, start.poses, self.dynamics)
+        walls = self.walls
+        ground = Ground(walls.faces[walls.solid], walls.trees[walls.solid])
+        return Followed(self.arena, self.numbers, PhysicalMotion(pieces, ground, self.dynamics), self.bodies.carrier)
+
+    def _make_slopes(self) -> Slopes:
+        """Return the slopes of what stands still; Stage knows none."""
+        models, body_of = self.population.models, self.bodies.body_of
+        still = [m for m, body in zip(models, body_of, strict=True) if body < 0] if self.dynamics else []
+        return Slopes(still, self.population.poses, self.dynamics.slope_speed if self.dynamics else 0.0)
+
+    def _make_pedestrians(self) -> Pedestrians:
+        walks = [self.population.models[head].walk for head in self.bodies.heads]
+        rows = np.array([row for row, walk in enumerate(walks) if walk is not None], dtype=np.int64)
+        return Pedestrians([walk for walk in walks if walk is not None], rows, self.walls.faces[self.walls.solid])
 
     def _make_collisions(self) -> Collisions:
-        if self.options.collision == "exact" or self.dynamics is not None:
+        if self.options.collision == "exact" or self.dynamics is not None or self.resolution is None:
             return Crossing(self.arena, self.numbers)
         layers = 2 if self.options.collision == "cells_stale" else 1
         start = self.population
         cells, known_as = build_cells(start.models, start.poses, self.bodies, self.resolution, layers)
         return SharedCells(self.arena, self.numbers, cells, known_as, layers)
 
-    def _make_sight(self) -> Sight:
-        if self.options.ray_casting == "exact" or self.dynamics is not None:
-            return ExactSight(self.arena)
+    def _make_eyes(self) -> Eyes:
+        if self.options.ray_casting == "exact" or self.dynamics is not None or self.resolution is None:
+            return ExactEyes(self.arena)
         start = self.population
-        options = self.options
-        rays, known_as = build_cell_rays(start.models, start.poses, self.bodies, self.resolution, options.threads)
-        return CellSight(rays, known_as, self.collisions.drawn, self.fans)
+        threads = self.options.threads
+        rays, known_as = build_cell_rays(start.models, start.poses, self.bodies, self.resolution, threads)
+        return CellEyes(rays, known_as, self.collisions.drawn, self.fans)
 
     @property
     def robot_keys(self) -> IntArray:
@@ -141,17 +190,49 @@ class Machinery:
         poses = self.frames if self._everybody_drives else self.frames[self.robot_rows]
         self.localization.update(due, poses[: len(self.robots)], self.drive.velocities, rng)
 
+    def wheels(self) -> FloatArray:
+        """Return what effects and the floor there make of the drives' velocities (n, 3)."""
+        wanted = self.drive.velocities
+        if self.effects.moves:
+            wanted = self.effects.driven(wanted, self.frames[self.robot_rows, 3])
+        if not len(self._slopes):
+            return wanted
+        return self._slopes.slowed(wanted, self.frames[self.robot_rows], self._sideways, self.interval)
+
     def move(self) -> None:
-        """Move all bodies as the drives want."""
+        """Move all bodies as the drives want, or as effects and slopes let them."""
         if self._everybody_drives:
-            velocities = self.drive.velocities
+            velocities = self.wheels()
         else:
             velocities = self._velocities
-            velocities[self.robot_rows] = self.drive.velocities
+            velocities[self.robot_rows] = self.wheels()
+            if len(self.pedestrians.rows):
+                now, before = self.frames[:-1], self.before[:-1]
+                velocities[self.pedestrians.rows] = self.pedestrians.velocities(now, before, self.interval)
         poses, stalled = self.motion.move(velocities, self.interval)
         self.before, self.frames = self.frames, self.before
         self.frames[:-1] = poses
         self.stalled[:] = stalled
+
+    def rates(self) -> FloatArray:
+        """Return how the robots (n, 3) moved in the last step: forward, leftward [m/s], turn [rad/s]; stalled: 0."""
+        rows = self.robot_rows
+        way = between(self.before[rows][:, _PLANAR], self.frames[rows][:, _PLANAR])
+        way[:, 2] = wrap(way[:, 2])
+        return way / self.interval
+
+    def reference(self, time: float) -> Reference | None:
+        """Return what a reference measures of the robots; None: the truth."""
+        if not self.effects.referred:
+            return None
+        return self.effects.seen(time, self.robot_poses[:, _PLANAR], self.rates())
+
+    def grip(self, robot: int, closed: bool) -> bool:
+        """Close or open a robot's gripper; return whether it holds something now. Raise Error in Stage's semantics."""
+        motion = self.motion
+        if isinstance(motion, StageMotion):
+            raise Error("grip: needs semantics physical, not stage")
+        return bool(motion.grip(int(self.robot_rows[robot]), closed))
 
     def model_poses(self) -> FloatArray:
         """Return where all models are now (models, 4)."""
@@ -170,7 +251,7 @@ class Machinery:
 def _moving(models: Sequence[Model], physical: bool) -> list[bool]:
     """Return which models (m,) have poses of their own to move."""
     if not physical:
-        return [is_robot(model) for model in models]
+        return [is_robot(model) or model.walk is not None for model in models]
     from kurumaisu.sim.bodies import movable
 
     moving = set(movable(models))

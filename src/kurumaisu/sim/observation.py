@@ -3,73 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import overload
 
-import numpy as np
-
+from kurumaisu.effects import Reference
+from kurumaisu.sim.devices import Value
+from kurumaisu.sim.scans import Scans
 from kurumaisu.sim.sensors.suite import Reading
 from kurumaisu.types import BoolArray, FloatArray
-
-
-@dataclass(frozen=True)
-class Scan:
-    """Readings (samples,) [m], +inf for no return, and the ranger returns (samples,) of what was hit, 0 for nothing.
-
-    time [s] of the measurement; count: how many the ranger has made, 0 before its first update, when this is what it
-    would have seen at the start.
-    """
-
-    ranges: FloatArray
-    returns: FloatArray
-    time: float
-    count: int
-
-
-@dataclass(frozen=True)
-class Sweep:
-    """The newest scans of fans that are always due together, one after another in two arrays."""
-
-    ranges: FloatArray
-    returns: FloatArray
-    time: float
-    count: int
-
-
-class Scans(Sequence[Scan]):
-    """The newest scan of each fan, in the order of Simulator.rangers; views, made when asked for."""
-
-    __slots__ = ("_places", "sweeps")
-
-    def __init__(self, sweeps: tuple[Sweep, ...], places: Sequence[tuple[int, int, int]]) -> None:
-        """Find fan i in sweep places[i][0] from places[i][1] up to places[i][2]."""
-        self.sweeps = sweeps
-        self._places = places
-
-    def __len__(self) -> int:
-        return len(self._places)
-
-    @overload
-    def __getitem__(self, index: int) -> Scan: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Scan, ...]: ...
-    def __getitem__(self, index: int | slice) -> Scan | tuple[Scan, ...]:
-        if isinstance(index, slice):
-            return tuple(self[i] for i in range(*index.indices(len(self))))
-        which, start, stop = self._places[index]
-        sweep = self.sweeps[which]
-        return Scan(sweep.ranges[start:stop], sweep.returns[start:stop], sweep.time, sweep.count)
-
-    def __iter__(self) -> Iterator[Scan]:
-        return (self[i] for i in range(len(self)))
-
-    @property
-    def ranges(self) -> FloatArray:
-        """All fans' readings, one after another [m]; without a copy if all rangers are updated together."""
-        if len(self.sweeps) == 1:
-            return self.sweeps[0].ranges
-        return np.concatenate([np.empty(0), *(scan.ranges for scan in self)])
 
 
 @dataclass(frozen=True)
@@ -79,7 +20,9 @@ class Observation:
     time [s] since the reset; poses (n, 4): true x, y, z, heading in the map; odometry (n, 3): x, y, heading as the
     robots believe; velocities (n, 3): forward, leftward, turn as commanded and bounded [m/s, rad/s], also of those
     who are stalled (n,): kept from their last move; dropped: commands since the reset with numbers that are none;
-    readings: of those sensors of a sensors.yaml that were due.
+    readings: of those sensors of a sensors.yaml that were due; devices: of those of the world file that were asked for
+    and due, by the numbers of their models; reference: what a reference measures of the truth, where effects act on
+    that, a row for each robot.
     """
 
     time: float
@@ -90,3 +33,5 @@ class Observation:
     scans: Scans
     dropped: int
     readings: tuple[Reading, ...]
+    devices: Mapping[int, Value]
+    reference: Reference | None

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,8 @@ from kurumaisu._core import Arena
 from kurumaisu.geometry import cos_sin
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
+
+Distort = Callable[[FloatArray], FloatArray]  # both ends of walls (m, 4) [m] -> the same, changed
 
 
 @dataclass(frozen=True)
@@ -85,15 +87,22 @@ def outline(models: Sequence[Model], poses: FloatArray, members: IntArray, frame
 
 
 def build_arena(
-    models: Sequence[Model], poses: FloatArray, bodies: Bodies, threads: int, see_solids: bool = False
+    models: Sequence[Model],
+    poses: FloatArray,
+    bodies: Bodies,
+    threads: int,
+    see_solids: bool = False,
+    distort: Distort | None = None,
 ) -> tuple[Arena, IntArray, Outline]:
     """Return an arena of models at poses (models, 4), its numbers (b,) of the bodies, and the walls.
 
-    see_solids: rays see what is solid instead of what rangers see.
+    see_solids: rays see what is solid instead of what rangers see; distort: says where the walls are in truth.
     """
     if see_solids:
         models = [replace(m, ranger_return=1.0 if m.obstacle_return else -1.0) for m in models]
     walls = outline(models, poses, np.flatnonzero(bodies.body_of < 0), np.zeros(4))
+    if distort is not None:
+        walls.faces[:, :4] = distort(walls.faces[:, :4])
     arena = Arena(walls.faces, walls.returns, walls.solid, walls.trees, threads)
     numbers = np.array([_add(arena, models, poses, bodies, i) for i in range(len(bodies))], dtype=np.int64)
     arena.set_poses(numbers, np.ascontiguousarray(poses[bodies.heads]))

@@ -4,19 +4,36 @@
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 import numpy as np
 
 from kurumaisu import _core, effects
-from kurumaisu._core import AxisInverse
-from kurumaisu.params import Model
+from kurumaisu._core import AxisInverse, AxisLaw
+from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
+
+
+class Driven(Protocol):
+    """What Plant needs to know of a Model."""
+
+    @property
+    def translation(self) -> AxisLaw:
+        """Of V_f."""
+
+    @property
+    def steering(self) -> AxisLaw:
+        """Of V_s."""
+
+    @property
+    def effects(self) -> tuple[EffectSetting, ...]:
+        """Those that act."""
 
 
 class Plant:
     """Turns inputs into rates on a uniform time grid, chunk by chunk."""
 
-    def __init__(self, model: Model, dt: float, rng: np.random.Generator) -> None:
+    def __init__(self, model: Driven, dt: float, rng: np.random.Generator) -> None:
         """Start at rest, with the effects of the model; dt [s] is the grid's step.
 
         Raise Error for effects that are unknown or whose parameters do not fit.
@@ -25,7 +42,7 @@ class Plant:
         self._model = model
         self._translation = AxisInverse(model.translation)
         self._steering = AxisInverse(model.steering)
-        self._effects = effects.build(
+        self.effects = effects.build(
             model.effects, effects.Context(translation=model.translation, steering=model.steering, rng=rng)
         )
 
@@ -36,7 +53,7 @@ class Plant:
 
     def from_voltages(self, volts: effects.Volts, heading: float | None = None) -> effects.Motion:
         """Return the motion for voltages; heading [rad] of the chair before them, if somebody knows it."""
-        for effect in self._effects.volts:
+        for effect in self.effects.volts:
             volts = effect.apply(volts)
         v = self._translation.rates(volts.v_f, volts.sign_v)
         w = self._steering.rates(volts.v_s, volts.sign_w)
@@ -44,7 +61,7 @@ class Plant:
 
     def from_rates(self, v: FloatArray, w: FloatArray, heading: float | None = None) -> effects.Motion:
         """Return the motion for commanded rates, both (n,)."""
-        if not self._effects.volts:
+        if not self.effects.volts:
             return self._respond(v, w, heading)
         model = self._model
         volts = effects.Volts(model.translation.volts(v), model.steering.volts(w), np.sign(v), np.sign(w))
@@ -52,13 +69,13 @@ class Plant:
 
     def seen(self, reference: effects.Reference) -> effects.Reference:
         """Return what a reference measures where the truth is as given."""
-        for effect in self._effects.reference:
+        for effect in self.effects.reference:
             reference = effect.apply(reference)
         return reference
 
     def _respond(self, v: FloatArray, w: FloatArray, heading: float | None) -> effects.Motion:
         motion = effects.Motion(self.dt, v, w, heading=heading)
-        for effect in self._effects.rates:
+        for effect in self.effects.rates:
             motion = effect.apply(motion)
         return motion
 

@@ -62,6 +62,10 @@ class Rigid:
     jaws: Part | None = None
     grippable: bool = False
 
+    def without_body(self) -> Rigid:
+        """Return it as something that nothing touches."""
+        return replace(self, parts=(), edges=np.empty((0, 6)))
+
 
 @dataclass(frozen=True)
 class Ground:

@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
 from kurumaisu.errors import Error
-from kurumaisu.geometry import compose, interpolate
+from kurumaisu.geometry import compose
 from kurumaisu.params import Laser
-from kurumaisu.sim.walls import Walls
+from kurumaisu.sim.memory import recall, remember
+from kurumaisu.sim.sight import Sight
 from kurumaisu.types import FloatArray
 
 
@@ -30,10 +32,10 @@ class Scan:
 class Scanner:
     """Takes a scan every scan_time from the poses of the chair."""
 
-    def __init__(self, laser: Laser, walls: Walls, chain: LaserChain, rng: np.random.Generator) -> None:
+    def __init__(self, laser: Laser, sight: Sight, chain: LaserChain, rng: np.random.Generator) -> None:
         """Start a scan at time 0; chain: the laser's effects. Raise Error for a fan that outlasts scan_time."""
         self._laser = laser
-        self._walls = walls
+        self.sight = sight
         self._chain = chain
         self._rng = rng
         self._mount = np.array([laser.mount.x, laser.mount.y, laser.mount.yaw])
@@ -44,29 +46,39 @@ class Scanner:
                 f"laser: the last beam comes {self._delays[-1]:g} s after the first, "
                 f"more than scan_time = {laser.scan_time:g} s"
             )
-        self._count = 0  # of scans taken
-        self._times: list[float] = []
-        self._poses: list[FloatArray] = []
-        self._aim()
+        self._start(0)
 
     def observe(self, time: float, pose: FloatArray) -> Scan | None:
         """Note where the chair is, times increasing [s]; return the scan that is complete, if any.
 
         That is when its last beam has been fired, in truth and by its stamp.
         """
-        self._times.append(time)
-        self._poses.append(pose)
+        self.sight.note(time, pose)
         rounding = 1e-9  # [s] of multiples of the step
         if time < self._complete - rounding:
             return None
         beams = self._beams
-        times, poses = np.array(self._times), np.array(self._poses)
-        at_stamp = interpolate(times, poses, np.array([beams.stamp]))[0]
-        scan = Scan(beams.stamp, at_stamp, self._readings(beams, interpolate(times, poses, beams.times)))
-        self._count += 1
-        self._aim()
-        self._forget(min(self._beams.stamp, self._beams.times.min()))
+        scan = Scan(beams.stamp, self.sight.poses(np.array([beams.stamp]))[0], self._readings(beams))
+        self._start(self._count + 1)
+        self.sight.forget(min(self._beams.stamp, self._beams.times.min()))
         return scan
+
+    def state(self) -> dict[str, Any]:
+        """Return all that the next scans depend on."""
+        chain, random = remember(self._chain), remember(self._rng)
+        return {"count": self._count, "sight": self.sight.state(), "chain": chain, "random": random}
+
+    def restore(self, known: dict[str, Any]) -> None:
+        """Go back to a state of the same laser, as new."""
+        recall(self._chain, known["chain"])
+        recall(self._rng, known["random"])
+        self.sight.restore(known["sight"])
+        self._start(known["count"])
+
+    def _start(self, count: int) -> None:
+        """Go on as if so many scans had been taken."""
+        self._count = count
+        self._aim()
 
     def _aim(self) -> None:
         """Prepare the beams of the next scan."""
@@ -77,20 +89,22 @@ class Scanner:
         self._beams = self._chain.aim(Beams(stamp, said, self._mount, height, self._bearings, level))
         self._complete = max(said[-1], self._beams.times.max())
 
-    def _readings(self, beams: Beams, poses: FloatArray) -> FloatArray:
+    def _readings(self, beams: Beams) -> FloatArray:
         error = self._laser.error
-        origins = compose(poses, beams.mount)
-        level = self._walls.cast(origins, beams.bearings)
+        origins = compose(self.sight.poses(beams.times), beams.mount)
+        look = self.sight.look(beams.times, beams.height)
+        level, returns = look.cast(origins, beams.bearings)
         noise = self._rng.standard_normal(len(level))
         if self._chain.empty:
             return error.reading(level, noise)
         ranges = slanted(level, beams)
+        oblique = self._chain.oblique
         echoes = Echoes(
             stamp=beams.stamp,
             bearings=self._bearings,
             ranges=ranges,
-            incidence=self._incidence(origins, beams, level),
-            returns=self._walls.returns(origins, beams.bearings),
+            incidence=incidence(look.ranges, origins, beams.bearings, level) if oblique else np.zeros(len(level)),
+            returns=np.where(np.isfinite(level), returns, 1.0),
             mean=error.mean(ranges),
             sd=error.deviation(ranges),
             noise=noise,
@@ -98,13 +112,3 @@ class Scanner:
         )
         # What the law, without its noise, makes of the range that it means by a reading: rounding and gate are left.
         return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges)))
-
-    def _incidence(self, origins: FloatArray, beams: Beams, ranges: FloatArray) -> FloatArray:
-        if not self._chain.oblique:
-            return np.zeros(len(ranges))
-        return incidence(self._walls.cast, origins, beams.bearings, ranges)
-
-    def _forget(self, before: float) -> None:
-        """Drop what the next scan does not need: all but the last pose that is not after its start."""
-        keep = max(0, int(np.searchsorted(self._times, before, side="right")) - 1)
-        del self._times[:keep], self._poses[:keep]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sensors of a sensors.yaml on a simulator's robots."""
+"""All that a simulator's robots sense beside their rangers: sensors of a sensors.yaml, devices of the world file."""
 
 from __future__ import annotations
 
@@ -8,59 +8,46 @@ from typing import Any
 
 import numpy as np
 
-from kurumaisu._core import Arena
-from kurumaisu.geometry import between, wrap
+from kurumaisu.sim.devices import Value, WorldDevices
 from kurumaisu.sim.machinery import Machinery
-from kurumaisu.sim.partition import build_arena
 from kurumaisu.sim.sensors.bumper import BumperSettings
 from kurumaisu.sim.sensors.settings import SensorSettings
 from kurumaisu.sim.sensors.suite import Moment, Reading, SensorSuite
-from kurumaisu.types import FloatArray
-
-_PLANAR = [0, 1, 3]
+from kurumaisu.sim.solids import Solids
 
 
 class Sensing:
-    """Reads the sensors that are due, in every step."""
+    """Reads what is due, in every step."""
 
     def __init__(
         self, sensors: Sequence[SensorSettings], machinery: Machinery, time: float, rng: np.random.Generator
     ) -> None:
         """Power up the sensors at a time [s]. Raise Error for a robot that the world has not."""
         self._machinery = machinery
-        self._solids, self._numbers = machinery.arena, machinery.numbers
-        if any(isinstance(sensor.parameters, BumperSettings) for sensor in sensors):
-            start = machinery.population
-            threads = machinery.options.threads
-            self._solids, self._numbers, _ = build_arena(start.models, start.poses, machinery.bodies, threads, True)
-        self._suite = SensorSuite(sensors, machinery.population.models, self._moment(time), rng)
+        felt = any(isinstance(sensor.parameters, BumperSettings) for sensor in sensors)
+        self._solids = Solids(machinery) if felt else None
+        self._suite = SensorSuite(sensors, machinery.population.models, self._moment(time), rng) if sensors else None
+        types = machinery.options.devices
+        self._devices = WorldDevices(machinery, types) if types else None
 
     def read(self, time: float) -> tuple[Reading, ...]:
-        """Return the readings that are due."""
-        return self._suite.read(self._moment(time))
+        """Return the readings of sensors that are due at a time [s]."""
+        return self._suite.read(self._moment(time)) if self._suite is not None else ()
+
+    def devices(self, step: int) -> dict[int, Value]:
+        """Return the readings of devices that are due in a step, counted from 1, by their models' numbers."""
+        return self._devices.read(step) if self._devices is not None else {}
 
     def state(self) -> list[dict[str, Any]]:
         """Return what the next readings depend on: not copies."""
-        return self._suite.state()
+        return self._suite.state() if self._suite is not None else []
 
     def restore(self, state: Sequence[dict[str, Any]]) -> None:
         """Go back to a state of the same sensors."""
-        self._suite.restore(state)
+        if self._suite is not None:
+            self._suite.restore(state)
 
     def _moment(self, time: float) -> Moment:
         machinery = self._machinery
-        return Moment(time, machinery.arena, self._moved_solids(), machinery.model_poses(), velocities(machinery))
-
-    def _moved_solids(self) -> Arena:
-        machinery = self._machinery
-        if self._solids is not machinery.arena:
-            self._solids.set_poses(self._numbers, np.ascontiguousarray(machinery.frames[:-1]))
-        return self._solids
-
-
-def velocities(machinery: Machinery) -> FloatArray:
-    """Return how the robots (n, 3) moved in the last step: forward, leftward [m/s], turn [rad/s]; stalled: zeros."""
-    rows = machinery.robot_rows
-    way = between(machinery.before[rows][:, _PLANAR], machinery.frames[rows][:, _PLANAR])
-    way[:, 2] = wrap(way[:, 2])
-    return way / machinery.interval
+        solids = machinery.arena if self._solids is None else self._solids.now()
+        return Moment(time, machinery.arena, solids, machinery.model_poses(), machinery.rates())

@@ -12,10 +12,12 @@ from kurumaisu.params import Model, effects_of
 
 @dataclass(frozen=True)
 class Physics:
-    """Step [s] and contacts: slop [m]; bias: share of an overlap left after 1 s; friction, iterations [-]."""
+    """Step [s], the longest in which contacts are solved once; slop [m]; friction, iterations [-].
+
+    bias: share of an overlap left after 1 s.
+    """
 
     step: float
-    contact_substeps: int
     collision_slop: float
     collision_bias: float
     iterations: int
@@ -26,7 +28,6 @@ def read_physics(section: settings.Section) -> Physics:
     """Return the settings of a section. Raise Error naming file and key."""
     physics = Physics(
         step=section.number("step", above=0),
-        contact_substeps=section.integer("contact_substeps", at_least=1),
         collision_slop=section.number("collision_slop", at_least=0),
         collision_bias=section.number("collision_bias", above=0),
         iterations=section.integer("iterations", at_least=1),
@@ -58,6 +59,7 @@ class Dynamics:
 
     wheel_friction: of a robot's wheels, which limits the force of its motors; floor_friction: of other movable bodies;
     density: of robots and doors whose file gives no mass; hinge_torque [N m]: friction of a hinge.
+    slope_speed [m/s]: what a rise of 1 m per metre along its heading takes from the speed of a robot.
     """
 
     contacts: Physics
@@ -65,6 +67,7 @@ class Dynamics:
     floor_friction: float
     density: float
     hinge_torque: float
+    slope_speed: float
     slip: bool
 
 
@@ -77,6 +80,7 @@ def load_dynamics(path: Path) -> Dynamics:
         floor_friction=top.number("floor_friction", at_least=0),
         density=top.number("density", above=0),
         hinge_torque=top.number("hinge_torque", at_least=0),
+        slope_speed=top.number("slope_speed", at_least=0),
         slip=top.text("slip", ("on", "off")) == "on",
     )
     top.end()

@@ -12,19 +12,22 @@ import numpy as np
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.sim import snapshot, state
+from kurumaisu.sim.devices import Value
 from kurumaisu.sim.drive import without_nonsense
 from kurumaisu.sim.fans import RangerFan
+from kurumaisu.sim.fleet_effects import check_names
 from kurumaisu.sim.life import checked_pose, moved, rebuilt, same_fans, stuck, with_newcomers
 from kurumaisu.sim.machinery import Machinery
 from kurumaisu.sim.observation import Observation
 from kurumaisu.sim.options import Options
+from kurumaisu.sim.partition import is_robot
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.sensing import Sensing
 from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
 from kurumaisu.sim.sensors.suite import Reading
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.types import FloatArray
-from kurumaisu.world import World
+from kurumaisu.world import World, read_snippet
 from kurumaisu.world.model import Model
 
 
@@ -37,20 +40,22 @@ class Simulator:
         Raise Error for options or sensors that do not fit the world.
         """
         self._sensors = tuple(sensors)
+        self._readings: tuple[Reading, ...] = ()
+        self._devices: dict[int, Value] = {}
+        options = options.of_world(world.semantics)
         if options.scan_sweep > world.interval:
             raise Error(
                 f"scan_sweep: {options.scan_sweep:g} s is more than a step of {world.path}: {world.interval:g} s"
             )
         self._world = world
         self._options = options
-        self._late = options.timing == "consistent" or options.semantics == "physical"
+        self._late = options.timing == "consistent"
         dynamics = load_dynamics(shipped("launch/physical.yaml")) if options.semantics == "physical" else None
+        check_names(options.effects, [model for model in world.models if is_robot(model)])
         start = Population.first(world.models, world.poses)
-        self._home = Machinery(start, options, world.interval, world.resolution, dynamics)
+        self._home = Machinery(start, options, world.interval, dynamics, resolution=world.resolution)
         what = world.models, world.poses, world.interval, replace(options, threads=1), self._sensors
         self._fingerprint = state.digest(what)
-        self._sensing: Sensing | None = None
-        self._readings: tuple[Reading, ...] = ()
         self.reset(0)
         self.warnings = (*world.warnings, *stuck(self._home))
 
@@ -63,7 +68,7 @@ class Simulator:
         self._step = 0
         self._dropped = 0
         home.place(home.population.poses[home.bodies.heads])
-        home.begin()
+        home.begin(seed)
         home.localization.draw_errors(self._odometry_rng)
         home.rangers.start(0.0, home.frames, self._ranger_rng)
         self._power_up()
@@ -89,8 +94,7 @@ class Simulator:
         machinery.rangers.update(self._step, self.time, way, self._ranger_rng)
         if not self._late:
             machinery.move()
-        if self._sensing is not None:
-            self._readings = self._sensing.read(self.time)
+        self._readings, self._devices = self._sensing.read(self.time), self._sensing.devices(self._step)
         return self.observe()
 
     def observe(self) -> Observation:
@@ -105,6 +109,8 @@ class Simulator:
             scans=machinery.rangers.scans,
             dropped=self._dropped,
             readings=self._readings,
+            devices=self._devices,
+            reference=machinery.reference(self.time),
         )
 
     def reset_positions(self) -> None:
@@ -121,14 +127,27 @@ class Simulator:
         """
         self._have(moved(self._machinery, self._index(model), checked_pose(pose)))
 
-    def spawn(self, models: Sequence[Model], pose: FloatArray | Sequence[float]) -> None:
-        """Add a model with all that stands on it, parents first, the first one at a pose (4,) in the map."""
+    def spawn(self, models: str | Sequence[Model], pose: FloatArray | Sequence[float]) -> None:
+        """Add a model with all that stands on it, parents first, the first one at a pose (4,) in the map.
+
+        Text is read in the words of the world file, as `pioneer ( name "guest" )`. Raise Error with line and column.
+        """
+        if isinstance(models, str):
+            snippet = read_snippet(models, self._world.vocabulary)
+            models, self.warnings = snippet.models, (*self.warnings, *snippet.warnings)
         population = with_newcomers(self._machinery.population, models, checked_pose(pose), self._step)
         self._have(rebuilt(self._machinery, population))
 
     def delete(self, model: str | int | Model) -> None:
         """Remove a model with all that stands on it. Raise Error for an unknown one."""
         self._have(rebuilt(self._machinery, self._machinery.population.without(self._index(model))))
+
+    def grip(self, robot: int, closed: bool) -> bool:
+        """Close or open the gripper of a robot, by its number; return whether it holds something now.
+
+        It takes what is between its paddles and has a gripper_return. Raise Error in Stage's semantics.
+        """
+        return self._machinery.grip(robot, closed)
 
     def save(self) -> bytes:
         """Return the whole state, from which load continues bit for bit."""
@@ -141,15 +160,12 @@ class Simulator:
             raise Error(f"state: is of another world than {self._world.path}, or of other options")
         machinery = self._home
         if known["population"] is not None:
-            home = self._home
-            machinery = Machinery(known["population"], home.options, home.interval, home.resolution, home.dynamics)
-            machinery.begin()
+            machinery = self._home.of(known["population"])
         self._machinery = machinery
         self._step, self._dropped = known["step"], known["dropped"]
         snapshot.restore(machinery, known["machinery"])
         self._power_up()
-        if self._sensing is not None:
-            self._sensing.restore(known["sensors"])
+        self._sensing.restore(known["sensors"])
         for rng, random in zip(self._rngs, known["random"], strict=True):
             rng.bit_generator.state = random
         return self.observe()
@@ -201,19 +217,16 @@ class Simulator:
             "dropped": self._dropped,
             "random": tuple(rng.bit_generator.state for rng in self._rngs),
             "machinery": snapshot.take(machinery),
-            "sensors": self._sensing.state() if self._sensing is not None else None,
+            "sensors": self._sensing.state(),
         }
 
     def _power_up(self) -> None:
-        """Start the sensors of sensors.yaml; they start anew when models come or go."""
-        self._readings = ()
+        """Start the sensors of sensors.yaml and the world's devices; they start anew when models come or go."""
         names = {robot.name for robot in self.robots} | {EVERY_ROBOT}
         home = self._machinery is self._home
         sensors = [sensor for sensor in self._sensors if home or sensor.robot in names]  # at home a wrong name is said
-        if sensors:
-            self._sensing = Sensing(sensors, self._machinery, self.time, self._sensor_rng)
-        else:
-            self._sensing = None
+        self._sensing = Sensing(sensors, self._machinery, self.time, self._sensor_rng)
+        self._readings, self._devices = (), {}
 
     def _heard(self, commands: FloatArray) -> FloatArray:
         """Return commands that are numbers."""
@@ -235,4 +248,5 @@ class Simulator:
             machinery.localization.draw_errors(self._odometry_rng, fresh)
             machinery.rangers.start(self.time, machinery.frames, self._ranger_rng)
             machinery.rangers.take_over(old.rangers.scans, same_fans(machinery, old))
+            machinery.effects.restore(old.effects.state())
             self._power_up()

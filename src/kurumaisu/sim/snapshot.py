@@ -11,7 +11,10 @@ from kurumaisu.sim.machinery import Machinery
 def take(machinery: Machinery) -> dict[str, Any]:
     """Return copies of all that changes while a population stays the same."""
     return {
+        "seed": machinery.seed,
+        "effects": machinery.effects.state(),
         "motion": machinery.motion.state(),
+        "walks": machinery.pedestrians.state(),
         "frames": machinery.frames.copy(),
         "before": machinery.before.copy(),
         "stalled": machinery.stalled.copy(),
@@ -24,10 +27,13 @@ def take(machinery: Machinery) -> dict[str, Any]:
 
 def restore(machinery: Machinery, values: dict[str, Any]) -> None:
     """Go back to what take returned, of the same population."""
+    machinery.begin(values["seed"])
+    machinery.effects.restore(values["effects"])
     machinery.frames[:] = values["frames"]
     machinery.before[:] = values["before"]
     machinery.motion.place(machinery.frames[:-1])
     machinery.motion.restore(values["motion"])
+    machinery.pedestrians.restore(values["walks"])
     machinery.stalled[:] = values["stalled"]
     machinery.drive.velocities[:] = values["velocities"]
     machinery.localization.estimates[:] = values["estimates"]

@@ -15,16 +15,27 @@ MODELS = (
 _OTHERS = ("world", "window", "block", "sensor")
 _BODY_ONLY = ("blobfinder", "actuator", "blinkenlight", "lightindicator")
 
-_NUMBERED = re.compile(r"(point|bpose|blength)\[\d+\]")
+_NUMBERED = re.compile(r"(point|bpose|blength|waypoint)\[\d+\]")
 
 # Heeded. gui_* and windows are not warned of either: there is no such window, and nearly every file has them.
 _MODEL = {
     *("name", "pose", "origin", "size", "bitmap", "boundary", "noblocks", "color", "color_rgba", "hinge"),
     *("obstacle_return", "ranger_return", "fiducial_return", "fiducial_key", "gripper_return", "stack_children"),
     *("update_interval", "mass", "friction", "gui_nose", "gui_grid", "gui_outline", "gui_move"),
+    *("waypoint", "walk_speed", "walk_mode", "social", "slope"),
 }
 _HEEDED: dict[str, set[str]] = {
-    "world": {"name", "resolution", "interval_sim", "quit_time", "speedup", "unit_length", "unit_angle", "test"},
+    "world": {
+        "name",
+        "resolution",
+        "interval_sim",
+        "quit_time",
+        "speedup",
+        "unit_length",
+        "unit_angle",
+        "test",
+        "semantics",
+    },
     "block": {"points", "point", "z"},
     "sensor": {"pose", "size", "range", "fov", "samples", "noise"},
     "position": {
@@ -107,9 +118,10 @@ def _article(kind: str) -> str:
 
 def _check_properties(entity: Entity, notes: Notes) -> None:
     kinds = (entity.type, "model") if entity.type in MODELS else (entity.type,)
+    heeded = _HEEDED.get(entity.type, set[str]())
     for word, given in entity.properties.items():
         name = word.split("[")[0] if _NUMBERED.fullmatch(word) else word
-        if any(name in _HEEDED.get(kind, ()) for kind in kinds) or (len(kinds) == 2 and name in _MODEL):
+        if name in heeded or (len(kinds) == 2 and name in _MODEL):
             continue
         trap = next((traps[name] for kind in kinds if name in (traps := _TRAPS.get(kind, {}))), None)
         if trap:

@@ -4,19 +4,15 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from kurumaisu._core import Arena
-from kurumaisu.types import FloatArray
 from kurumaisu.world.layout import beam_height, moves, outline_in_map
 from kurumaisu.world.model import Model, Place, Position, Ranger
 from kurumaisu.world.world import World
-
-_MOST_ROBOTS = 10  # that contents() tells of one by one
 
 
 @dataclass(frozen=True)
@@ -148,9 +144,25 @@ def _intangible(world: World) -> Iterator[Finding]:
             continue
         if model.ranger_return < 0 and model.obstacle_return:
             yield Finding(model.place, f"{_name(model)} stops robots but lasers do not see it (ranger_return below 0)")
-        if model.ranger_return >= 0 and not model.obstacle_return:
+        if model.ranger_return >= 0 and not model.obstacle_return and model.slope is None:
             yield Finding(
                 model.place, f"{_name(model)} is seen by lasers but robots drive through it (obstacle_return 0)"
+            )
+
+
+def _slopes(world: World) -> Iterator[Finding]:
+    beams = [beam_height(world, m, fan) for m in world.models if isinstance(m.device, Ranger) for fan in m.device.fans]
+    for model in world.models:
+        if model.slope is None:
+            continue
+        if moves(world, model) or model.mass > 0 or model.hinge is not None:
+            yield Finding(model.place, f"{_name(model)}: slope has no effect on what can move")
+        if model.obstacle_return:
+            yield Finding(model.place, f"{_name(model)} has a slope, but stops robots: it wants obstacle_return 0")
+        low, high = (model.shape.heights + world.poses[model.index, 2]).T
+        if model.ranger_return >= 0 and any(((low <= z) & (z <= high)).any() for z in beams):
+            yield Finding(
+                model.place, f"{_name(model)} has a slope, but is a wall to lasers: it wants ranger_return -1"
             )
 
 
@@ -183,41 +195,6 @@ _RULES: tuple[Callable[[World], Iterator[Finding]], ...] = (
     _sensorless,
     _rangers,
     _intangible,
+    _slopes,
     _own_tree,
 )
-
-
-def contents(world: World) -> Iterator[str]:
-    """Yield lines that say what the world consists of."""
-    x0, y0, x1, y1 = world.bounds
-    yield f"{world.name}: {x1 - x0:.2f} x {y1 - y0:.2f} m, x {x0:.2f} to {x1:.2f}, y {y0:.2f} to {y1:.2f}"
-    yield f"step {1000 * world.interval:g} ms, resolution {world.resolution:g} m, {len(world.segments)} wall segments"
-    kinds = {kind: sum(model.type == kind for model in world.models) for kind in {m.type for m in world.models}}
-    yield "models: " + ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
-    robots = list(_positions(world))
-    for model, position in robots[:_MOST_ROBOTS]:
-        yield _robot(world, model, position)
-        for other in world.models:
-            if isinstance(other.device, Ranger) and other.parent == model.index:
-                yield from _fans(world, other, other.device)
-    if len(robots) > _MOST_ROBOTS:
-        yield f"... and {len(robots) - _MOST_ROBOTS} more robots"
-
-
-def _fans(world: World, model: Model, ranger: Ranger) -> Iterator[str]:
-    alike = Counter(
-        f"{fan.samples} beam{'s' if fan.samples > 1 else ''} over {math.degrees(fan.fov):g} deg, {fan.range_max:g} m, "
-        f"{beam_height(world, model, fan):.2f} m high"
-        for fan in ranger.fans
-    )
-    for text, count in alike.items():
-        yield f"  ranger: {f'{count} x ' if count > 1 else ''}{text}"
-
-
-def _robot(world: World, model: Model, position: Position) -> str:
-    x, y, _, heading = world.poses[model.index]
-    size: FloatArray = model.size
-    return (
-        f"robot {_name(model)}: at {x:.2f} {y:.2f}, {math.degrees(heading):.0f} deg; {size[0]:.2f} x {size[1]:.2f} m, "
-        f"{position.drive}, {position.localization}"
-    )

@@ -9,8 +9,10 @@ from pathlib import Path
 
 from kurumaisu.errors import Error
 from kurumaisu.maps import save_map
-from kurumaisu.world.check import contents, findings
+from kurumaisu.world.check import findings
+from kurumaisu.world.contents import contents
 from kurumaisu.world.drawing import to_svg
+from kurumaisu.world.files import parse_values
 from kurumaisu.world.occupancy import occupancy
 from kurumaisu.world.world import World, load_world
 
@@ -78,10 +80,4 @@ def _add_world(parser: argparse.ArgumentParser) -> None:
 
 
 def _load(options: argparse.Namespace) -> World:
-    values = {}
-    for value in options.values:
-        name, equals, text = value.partition("=")
-        if not equals:
-            raise Error(f"{value!r}: a parameter is given as NAME=VALUE")
-        values[name] = text
-    return load_world(options.world, image_extents=options.image_extents, values=values)
+    return load_world(options.world, image_extents=options.image_extents, values=parse_values(options.values))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -56,9 +56,12 @@ class Reader:
     _open: int = 0  # brackets not closed yet
     _sources: dict[Path, Source] = field(default_factory=dict)
 
-    def read(self) -> list[Token]:
-        """Return the tokens of all files in the order Stage sees them, the last being END."""
-        source = self._source(self.top, None)
+    def read(self, text: Source | None = None) -> list[Token]:
+        """Return the tokens of all files in the order Stage sees them, the last being END; text: instead of the top's.
+
+        Raise Error with the place.
+        """
+        source = self._source(self.top, None) if text is None else self._fill_in(text)
         self._splice(source, depth=0)
         self.tokens.append(Token(Kind.END, "", source, len(source.text)))
         unused = sorted(set(self.values) - self.used)
@@ -142,3 +145,14 @@ class Reader:
         if re.search(r"[\r\n]", value):
             raise source.error(at, f"the value of the parameter {name} has more than one line")
         return value
+
+
+def parse_values(given: Iterable[str]) -> dict[str, str]:
+    """Return values for a world's parameters, each given as NAME=VALUE. Raise Error for what is not."""
+    values = {}
+    for value in given:
+        name, equals, text = value.partition("=")
+        if not equals:
+            raise Error(f"{value!r}: a parameter is given as NAME=VALUE")
+        values[name] = text
+    return values

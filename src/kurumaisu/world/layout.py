@@ -11,8 +11,8 @@ from kurumaisu.world.world import World
 
 
 def moves(world: World, model: Model) -> bool:
-    """Return whether a model is a robot or stands on one."""
-    while not isinstance(model.device, Position):
+    """Return whether a model is a robot or walks, or stands on one that does."""
+    while not isinstance(model.device, Position) and model.walk is None:
         if model.parent < 0:
             return False
         model = world.models[model.parent]

@@ -145,6 +145,20 @@ class Hinge:
 
 
 @dataclass(frozen=True)
+class Walk:
+    """An addition to Stage's language: the model walks by itself, from waypoint to waypoint (k, 2) of the map [m].
+
+    speed [m/s]; mode: loop (round and round), yoyo (there and back) or once (and stays); social: it gives way to
+    others and to walls.
+    """
+
+    waypoints: FloatArray
+    speed: float
+    mode: str
+    social: bool
+
+
+@dataclass(frozen=True)
 class Model:
     """One model of the tree, in depth-first file order.
 
@@ -153,7 +167,8 @@ class Model:
     does not stack its children); origin (4,); size (3,) [m]; name: as in the file, or None; type: Stage's word.
     ranger_return: below 0 invisible to rangers, else the intensity of a hit; obstacle_return: False: no collisions;
     mass [kg], 0: not given; friction [1], None: not given; update_interval [s].
-    device: what a typed model does; None: of a type that only has a body.
+    device: what a typed model does; None: of a type that only has a body; walk: None: goes nowhere by itself.
+    slope (2,): an addition to Stage's language: rise per metre along x and y of the pose's frame [1], in the outline.
     """
 
     index: int
@@ -178,3 +193,5 @@ class Model:
     update_interval: float
     hinge: Hinge | None
     device: Device | None
+    walk: Walk | None = None
+    slope: FloatArray | None = None

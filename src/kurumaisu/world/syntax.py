@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from kurumaisu.world.files import Reader
@@ -46,23 +46,47 @@ class _Macro:
     known: int = 0  # how many macros were known when the template was made: a later one may change it
 
 
-def parse(top: Path, values: Mapping[str, str], notes: Notes) -> Entity:
-    """Return the world entity of a file, parameters filled in. Raise Error with the place of what does not parse."""
-    return _Parser(Reader(top, values, notes).read(), top, notes).world()
+@dataclass(frozen=True)
+class Macros:
+    """What a file defines, and the tokens that it stands in."""
+
+    tokens: tuple[Token, ...]
+    known: Mapping[str, _Macro]
+
+
+NO_MACROS = Macros((), {})
+
+
+def parse(top: Path, values: Mapping[str, str], notes: Notes) -> tuple[Entity, Macros]:
+    """Return the world entity of a file, parameters filled in, and its macros.
+
+    Raise Error with the place of what does not parse.
+    """
+    tokens = Reader(top, values, notes).read()
+    parser = _Parser(tokens, top, notes, {})
+    return parser.world(0), Macros(tuple(tokens[:-1]), parser.macros)
+
+
+def parse_more(text: Source, top: Path, macros: Macros, notes: Notes) -> Entity:
+    """Return the world entity of a text that knows the macros of a file at top. Raise Error with the place."""
+    tokens = Reader(top, {}, notes).read(text)
+    known = {name: replace(macro, template=None) for name, macro in macros.known.items()}
+    return _Parser([*macros.tokens, *tokens], top, notes, known).world(len(macros.tokens))
 
 
 class _Parser:
     """All tokens, and the macros known so far. Methods take and return places among the tokens."""
 
-    def __init__(self, tokens: list[Token], top: Path, notes: Notes) -> None:
+    def __init__(self, tokens: list[Token], top: Path, notes: Notes, macros: dict[str, _Macro]) -> None:
         self._tokens = tokens
         self._notes = notes
-        self._macros: dict[str, _Macro] = {}
+        self.macros = macros
         self._steps = 0
         self._world = Entity("world", Token(Kind.WORD, "world", Source(top, tokens[-1].source.text), 0))
 
-    def world(self) -> Entity:
-        at, tokens = 0, self._tokens
+    def world(self, at: int) -> Entity:
+        """Return the world entity of the tokens from a place on."""
+        tokens = self._tokens
         while (token := tokens[at]).kind is not Kind.END:
             if token.kind is Kind.LINE_END:
                 at += 1
@@ -82,8 +106,8 @@ class _Parser:
                 raise self._tokens[at].error(f"define needs a name, a type and '(', not {self._tokens[at]}")
             parts.append(self._tokens[at])
         name, base, _ = parts
-        if name.text not in self._macros:  # the first definition wins, as in Stage
-            self._macros[name.text] = _Macro(base, at + 1)
+        if name.text not in self.macros:  # the first definition wins, as in Stage
+            self.macros[name.text] = _Macro(base, at + 1)
         return self._closing(at, define) + 1
 
     def _closing(self, opening: int, define: Token) -> int:
@@ -137,7 +161,7 @@ class _Parser:
         """Read an entity whose opening bracket is just behind."""
         if depth > _DEEPEST:
             raise word.error(f"more than {_DEEPEST} levels of entities")
-        macro = self._macros.get(word.text)
+        macro = self.macros.get(word.text)
         child = self._instance(self._template(macro, word, depth), word) if macro else Entity(word.text, word)
         parent.children.append(child)
         return self._body(child, at, depth)
@@ -166,7 +190,7 @@ class _Parser:
         """
         self._notes.add(bracket, "a '(' without a name: is this meant?")
         self._count(bracket, 1)
-        if entity.name.text in self._macros:
+        if entity.name.text in self.macros:
             return entity
         entity.children.append(Entity(entity.name.text, entity.name))
         return entity.children[-1]
@@ -175,14 +199,14 @@ class _Parser:
         """Return what a macro comes to, read once for all its instances."""
         if depth > _DEEPEST:
             raise macro.base.error(f"macro {word.text} never ends")
-        if macro.template is None or macro.known != len(self._macros):
-            known = self._macros.get(macro.base.text)
+        if macro.template is None or macro.known != len(self.macros):
+            known = self.macros.get(macro.base.text)
             name = macro.base
             template = (
                 self._instance(self._template(known, word, depth + 1), name) if known else Entity(name.text, name)
             )
             self._body(template, macro.start, depth)
-            macro.template, macro.known = template, len(self._macros)
+            macro.template, macro.known = template, len(self.macros)
         return macro.template
 
     def _tuple(self, entity: Entity, name: Token, at: int) -> int:

@@ -19,6 +19,7 @@ from kurumaisu.world.notes import Notes
 from kurumaisu.world.shapes import Shaper
 from kurumaisu.world.syntax import Entity
 from kurumaisu.world.values import Units, Values
+from kurumaisu.world.walks import walk
 
 _MOST_MODELS = 100_000  # of a world
 _MOST_ENTITIES = 2_000_000  # models, blocks and sensors of a world
@@ -31,7 +32,8 @@ _SIZES = {  # [m], of types with another size if the file gives none
     "gripper": (0.2, 0.3, 0.2),
     "blinkenlight": (0.02, 0.02, 0.02),
 }
-_MANY = 100.0  # [rad] of a heading
+_MANY = 1.0e4  # [rad] of a heading, more than any file says
+_STEEPEST = 1.0  # rise per metre: 45 degrees; nothing on wheels climbs it
 _INTERVAL = 100  # [ms] between updates of a model
 
 
@@ -103,6 +105,8 @@ class Builder:
             "update_interval": _interval(values),
             "hinge": _hinge(values),
             "device": device(values),
+            "walk": walk(values),
+            "slope": _slope(values),
         }
 
     def _size(self, values: Values) -> FloatArray:
@@ -130,6 +134,18 @@ def _hinge(values: Values) -> Hinge | None:
     if lowest > highest:
         raise values.error("hinge", "hinge must be [X Y LOWEST HIGHEST], the angles ascending")
     return Hinge(np.array([x, y]), lowest, highest)
+
+
+def _slope(values: Values) -> FloatArray | None:
+    """Read `slope [gx gy]`, rise per metre, an addition to Stage's language."""
+    if not values.has("slope"):
+        return None
+    if values.entity.type != "model":
+        raise values.error("slope", f"a slope belongs to a model, not to a {values.entity.type}")
+    rise = np.array(values.several("slope", "ff", ()))
+    if np.hypot(*rise) > _STEEPEST:
+        raise values.error("slope", f"slope must be of at most {_STEEPEST:g} m per metre, not {np.hypot(*rise):g}")
+    return rise
 
 
 def global_poses(models: Sequence[Model]) -> FloatArray:

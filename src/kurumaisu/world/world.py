@@ -16,7 +16,8 @@ from kurumaisu.world.bitmaps import is_map
 from kurumaisu.world.model import Model
 from kurumaisu.world.notes import Notes
 from kurumaisu.world.shapes import Shaper
-from kurumaisu.world.syntax import Entity, Property, parse
+from kurumaisu.world.snippet import Vocabulary
+from kurumaisu.world.syntax import NO_MACROS, Entity, Property, parse
 from kurumaisu.world.tokens import Kind, Source, Token
 from kurumaisu.world.tree import Builder, global_poses
 from kurumaisu.world.values import Units, Values
@@ -26,6 +27,7 @@ _INTERVAL = 100.0  # [ms], as in Stage
 _FINEST = 1e-5  # [m]
 _SHORTEST = 1e-3  # [ms]
 _WALL_HEIGHT = 2.5  # [m] of a map's walls if nothing says how high they are: that of a room
+_SEMANTICS = ("stage", "physical")
 _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _ANGLES = {"degrees": np.pi / 180, "radians": 1.0}
 
@@ -44,9 +46,10 @@ class World:
 
     models: in depth-first file order; poses: (n, 4), their global start poses x, y, z [m], heading [rad];
     resolution: edge of Stage's cells [m]; interval: of a step [s]; quit_time [s], 0: never; speedup: of the clock,
-    0 or less: as fast as possible.
+    0 or less: as fast as possible; semantics: how the file wants to be simulated, stage or physical, an addition to
+    Stage's language; vocabulary: what more text can be read with.
     For a chair alone: segments: (m, 4), x and y of both ends of all that a laser sees [m]; obstacles: (n, 4), all
-    that a chair bumps into, at any height, in both without the position models; starts: those, in file order;
+    that a chair bumps into, at any height, in both without what drives or walks; starts: those, in file order;
     bounds: smallest x, smallest y, largest x, largest y [m] of the walls.
     warnings: what the file says and this reader does not heed, in words.
     """
@@ -59,6 +62,8 @@ class World:
     interval: float
     quit_time: float
     speedup: float
+    semantics: str
+    vocabulary: Vocabulary
     segments: FloatArray
     obstacles: FloatArray
     starts: tuple[Start, ...]
@@ -70,12 +75,6 @@ class World:
         if not self.starts:
             raise Error(f"{self.path}: has no position model, so the chair has no start pose")
         return self.starts[0].pose
-
-    @property
-    def returns(self) -> FloatArray:
-        """Reflectance (m,) [1] of the segments: the ranger_return of their models."""
-        seen = [m for m in self.models if m.ranger_return >= 0 and not _on_position(m, self.models)]
-        return np.repeat([m.ranger_return for m in seen], [len(m.shape.segments) for m in seen])
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -98,13 +97,13 @@ def load_world(path: Path, *, image_extents: bool = False, values: Mapping[str, 
     if is_map(path):
         if values:
             raise Error(f"{path}: a map has no parameters, as {next(iter(values))}")
-        top, image_extents = _map_alone(path), True
+        top, macros, image_extents = _map_alone(path), NO_MACROS, True
     else:
-        top = parse(path, values or {}, notes)
+        top, macros = parse(path, values or {}, notes)
     said = Values(top, _units(top, notes), notes)
     catalogue.check(top, notes)
     models = Builder(said.units, notes, Shaper(path, image_extents)).build(top)
-    return _world(path, models, said)
+    return _world(path, models, said, Vocabulary(path, macros, said.units, image_extents))
 
 
 def _map_alone(path: Path) -> Entity:
@@ -137,7 +136,7 @@ def _units(top: Entity, notes: Notes) -> Units:
     return Units(*chosen)
 
 
-def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
+def _world(path: Path, models: tuple[Model, ...], said: Values, vocabulary: Vocabulary) -> World:
     resolution = said.number("resolution", _RESOLUTION)
     if resolution < _FINEST:
         raise said.error("resolution", f"resolution must be at least {_FINEST:g} m, not {resolution:g}")
@@ -145,7 +144,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
     if interval < _SHORTEST:
         raise said.error("interval_sim", f"interval_sim must be at least {_SHORTEST:g} ms, not {interval:g}")
     poses = global_poses(models)
-    walls = [model for model in models if not _on_position(model, models)]
+    walls = [model for model in models if not _travels(model, models)]
     starts = (model for model in models if model.type == "position")
     return World(
         name=said.text("name", path.stem),
@@ -156,6 +155,8 @@ def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
         interval=interval / 1000,
         quit_time=max(said.number("quit_time", 0.0), 0.0),
         speedup=said.number("speedup", 1.0),
+        semantics=_semantics(said),
+        vocabulary=vocabulary,
         segments=_outlines([model for model in walls if model.ranger_return >= 0], poses),
         obstacles=_outlines([model for model in walls if model.obstacle_return], poses),
         starts=tuple(Start(m.name or "chair", poses[m.index, [0, 1, 3]]) for m in starts),
@@ -163,11 +164,18 @@ def _world(path: Path, models: tuple[Model, ...], said: Values) -> World:
     )
 
 
-def _on_position(model: Model, models: tuple[Model, ...]) -> bool:
-    """Return whether a model is a position or stands on one."""
-    while model.type != "position" and model.parent >= 0:
+def _semantics(said: Values) -> str:
+    word = said.text("semantics", _SEMANTICS[0])
+    if word not in _SEMANTICS:
+        raise said.error("semantics", f"semantics must be one of {', '.join(_SEMANTICS)}, not {word!r}")
+    return word
+
+
+def _travels(model: Model, models: tuple[Model, ...]) -> bool:
+    """Return whether a model is a position or walks, or stands on one that does."""
+    while model.type != "position" and model.walk is None and model.parent >= 0:
         model = models[model.parent]
-    return model.type == "position"
+    return model.type == "position" or model.walk is not None
 
 
 def _outlines(models: list[Model], poses: FloatArray) -> FloatArray:

@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from kurumaisu.geometry import wrap
+from kurumaisu.geometry import cos_sin, wrap
 from kurumaisu.sim.sensors.rays import Rays
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Fiducial, Model
@@ -28,6 +28,12 @@ class Sightings:
     range: FloatArray
     bearing: FloatArray
     heading: FloatArray
+
+    def of(self, finder: int) -> Sightings:
+        """Return what one finder saw, as if it were the only one."""
+        rows = self.finder == finder
+        seen = Sightings(*(getattr(self, field.name)[rows] for field in fields(self)))
+        return replace(seen, finder=np.zeros_like(seen.finder))
 
 
 class FiducialFinder:
@@ -59,7 +65,7 @@ class FiducialFinder:
         finder, target = np.nonzero(close & (self._roots[None] != trees[:, None]))
         offset = targets[target, :2] - finders[finder, :2]
         ranges = np.hypot(offset[:, 0], offset[:, 1])
-        bearings = wrap(np.arctan2(offset[:, 1], offset[:, 0]) - finders[finder, 3])
+        bearings = wrap(np.arctan2(*np.ascontiguousarray(offset.T[::-1])) - finders[finder, 3])
         near = (ranges < f.range_max) & (np.abs(bearings) <= f.fov / 2)
         finder, target, ranges, bearings = finder[near], target[near], ranges[near], bearings[near]
         lines = finders[finder].copy()
@@ -108,7 +114,7 @@ class FiducialFinder:
 
 def _seen_from(ray: FloatArray, pose: FloatArray, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return points (x, y) of bodies at poses along and beside rays."""
-    c, s = np.cos(pose[:, 3]), np.sin(pose[:, 3])
+    c, s = cos_sin(pose[:, 3])
     dx, dy = pose[:, 0] + c * x - s * y - ray[:, 0], pose[:, 1] + s * x + c * y - ray[:, 1]
-    c, s = np.cos(ray[:, 3]), np.sin(ray[:, 3])
+    c, s = cos_sin(ray[:, 3])
     return c * dx + s * dy, c * dy - s * dx

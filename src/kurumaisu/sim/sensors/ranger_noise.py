@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -48,6 +49,14 @@ class RangerNoise:
         noise = true * self._share * _uniform(len(ranges), rng)
         noise += np.sqrt(self._variance) * rng.standard_normal(len(ranges))
         return np.where(hit, true + noise, ranges)
+
+
+def deviation(fan: Fan, ranges: FloatArray) -> FloatArray:
+    """Return standard deviations (n,) [m] of the readings of ranges (n,) [m]; 0 for a miss."""
+    constant, share, _ = fan.noise
+    spread = math.sqrt((1 - _LEVELS**-2) / 3)  # of U
+    true = np.where(np.isfinite(ranges), ranges, 0.0)
+    return np.asarray(np.hypot(math.sqrt(constant), share * spread * true))
 
 
 def _uniform(n: int, rng: np.random.Generator) -> FloatArray:

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from kurumaisu.geometry import cos_sin
 from kurumaisu.types import FloatArray, IntArray
 
 
@@ -27,7 +28,7 @@ class Rays(Protocol):
 
 def place(poses: FloatArray, mounts: FloatArray) -> FloatArray:
     """Return map_from_mount (..., 4) of x, y, z, heading for poses (..., 4) and mounts (..., 4) relative to them."""
-    c, s = np.cos(poses[..., 3]), np.sin(poses[..., 3])
+    c, s = cos_sin(poses[..., 3])
     return np.stack(
         [
             poses[..., 0] + c * mounts[..., 0] - s * mounts[..., 1],

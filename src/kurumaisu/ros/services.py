@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Services that any simulation behind ROS has: what they do is done between two of its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import rospy
+from std_srvs.srv import (
+    Empty,
+    EmptyRequest,
+    EmptyResponse,
+    SetBool,
+    SetBoolRequest,
+    SetBoolResponse,
+    Trigger,
+    TriggerRequest,
+    TriggerResponse,
+)
+
+from kurumaisu.errors import Error
+from kurumaisu.ros.requests import Requests
+from kurumaisu.ros.rotation import pose_of
+from kurumaisu.srv import Seed, SeedRequest, SetPose, SetPoseRequest, StateFile, StateFileRequest
+from kurumaisu.types import FloatArray
+
+
+class Simulation(Protocol):
+    """What the services act on, all by the thread that steps it. Every method may raise Error."""
+
+    paused: bool
+
+    @property
+    def time(self) -> float:
+        """What its clock says [s]."""
+
+    def step(self) -> None:
+        """Go on by one step."""
+
+    def reset(self, seed: int | None = None) -> None:
+        """Start again, with the same or another seed; the clock runs on."""
+
+    def set_pose(self, name: str, pose: FloatArray) -> None:
+        """Put a model to a pose (4,)."""
+
+    def save(self) -> bytes:
+        """Return the whole state."""
+
+    def load(self, saved: bytes) -> None:
+        """Go back to a state; the clock runs on."""
+
+
+class Services:
+    """Advertises reset, pause, step, seed, set_pose, save and load."""
+
+    def __init__(self, simulation: Simulation, requests: Requests, prefix: str) -> None:
+        """prefix: of the names, `~` for private ones."""
+        self._simulation = simulation
+        self._requests = requests
+        self._services = [
+            rospy.Service(prefix + "reset", Empty, self._reset),
+            rospy.Service(prefix + "pause", SetBool, self._pause),
+            rospy.Service(prefix + "step", Trigger, self._step),
+            rospy.Service(prefix + "seed", Seed, self._seed),
+            rospy.Service(prefix + "set_pose", SetPose, self._set_pose),
+            rospy.Service(prefix + "save", StateFile, self._save),
+            rospy.Service(prefix + "load", StateFile, self._load),
+        ]
+
+    def _reset(self, _request: EmptyRequest) -> EmptyResponse:
+        self._requests.ask(self._simulation.reset)
+        return EmptyResponse()
+
+    def _pause(self, request: SetBoolRequest) -> SetBoolResponse:
+        def pause() -> None:
+            self._simulation.paused = request.data
+
+        return SetBoolResponse(*self._outcome(pause))
+
+    def _step(self, _request: TriggerRequest) -> TriggerResponse:
+        def step() -> None:
+            if not self._simulation.paused:
+                raise Error("step: goes on from a pause, but nothing is paused")
+            self._simulation.step()
+
+        return TriggerResponse(*self._outcome(step))
+
+    def _seed(self, request: SeedRequest) -> tuple[bool, str]:
+        return self._outcome(lambda: self._simulation.reset(request.seed))
+
+    def _set_pose(self, request: SetPoseRequest) -> tuple[bool, str]:
+        return self._outcome(lambda: self._simulation.set_pose(request.name, pose_of(request.pose)))
+
+    def _save(self, request: StateFileRequest) -> tuple[bool, str]:
+        return self._outcome(lambda: _write(Path(request.file), self._simulation.save()))
+
+    def _load(self, request: StateFileRequest) -> tuple[bool, str]:
+        return self._outcome(lambda: self._simulation.load(_read(Path(request.file))))
+
+    def _outcome(self, action: Callable[[], Any]) -> tuple[bool, str]:
+        """Return whether it was done, and when or why not."""
+        try:
+            self._requests.ask(action)
+        except Error as error:
+            return False, str(error)
+        return True, self._done()
+
+    def _done(self) -> str:
+        """Return what is said of a thing that was done."""
+        return f"at {self._simulation.time:.3f} s"
+
+
+def _write(file: Path, saved: bytes) -> None:
+    try:
+        file.write_bytes(saved)
+    except OSError as error:
+        raise Error(f"{file}: {error.strerror}") from error
+
+
+def _read(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise Error(f"{file}: {error.strerror}") from error

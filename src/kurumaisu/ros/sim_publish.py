@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Everything that sim_node publishes of a step."""
+
+from __future__ import annotations
+
+import rospy
+import tf2_ros
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
+
+from kurumaisu.ros import messages
+from kurumaisu.ros.sim_sensors import SensorTopics
+from kurumaisu.ros.sim_settings import SimSettings
+from kurumaisu.ros.stageros_robot import CollisionTopic
+from kurumaisu.sim.chair import Observation
+
+_NS = 1_000_000_000
+
+
+class SimTopics:
+    """The topics, and the frames of laser and further sensors."""
+
+    def __init__(self, settings: SimSettings, robot: int, now: int) -> None:
+        """Advertise at a time [ns]; robot: the chair's number among the robots."""
+        self._settings = settings
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=100)
+        self._scan = rospy.Publisher("scan", LaserScan, queue_size=10)
+        self._truth = rospy.Publisher("ground_truth", Odometry, queue_size=10)
+        self._collision = CollisionTopic("collision")
+        self._sensors = SensorTopics(settings.sensors, robot, settings.base_frame)
+        self._static = tf2_ros.StaticTransformBroadcaster()
+        stamp = messages.stamp_of(now)
+        laser = messages.laser_transform(stamp, settings.model.laser, settings.base_frame)
+        self._static.sendTransform([laser, *self._sensors.transforms(stamp)])
+        self._touched = False
+
+    def publish(self, observation: Observation, epoch: int, steps: int) -> None:
+        """Publish a step's data, then the clock: who hears a time has been sent all before it.
+
+        epoch [ns]: what the clock said at the simulation's time 0; steps since then.
+        """
+        settings = self._settings
+        stamp = messages.stamp_of(epoch + round(observation.time * _NS))
+        if observation.scan is not None:
+            first_beam = messages.stamp_of(epoch + round(observation.scan.time * _NS))
+            self._scan.publish(messages.laser_scan(first_beam, settings.model.laser, observation.scan.ranges))
+        self._sensors.publish(observation.readings, stamp)
+        self._touched |= observation.contact
+        if steps % settings.ground_truth_every == 0:
+            seen = observation.reference
+            measured = messages.stamp_of(epoch + round(float(seen.times) * _NS))
+            self._truth.publish(
+                messages.odometry(measured, settings.map_frame, settings.base_frame, seen.poses, seen.rates)
+            )
+            self._collision.publish(self._touched)
+            self._touched = False
+        if steps % settings.clock_every == 0:
+            self._clock.publish(Clock(stamp))

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Models that come to a world that runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from kurumaisu.world.model import Model
+
+
+def family(models: Sequence[Model], first: Model) -> list[Model]:
+    """Return a model and all that stand on it."""
+    members = {first.index}
+    for model in models[first.index + 1 :]:
+        if model.parent in members:
+            members.add(model.index)
+    return [model for model in models if model.index in members]
+
+
+def is_text(like: str) -> bool:
+    """Return whether this describes a model instead of naming one."""
+    return "(" in like
+
+
+def renumbered(models: Sequence[Model], name: str | None) -> list[Model]:
+    """Return models, the first of them under another name, numbered from 0."""
+    places = {model.index: i for i, model in enumerate(models)}
+    return [
+        replace(model, index=i, parent=places.get(model.parent, -1), root=0, name=model.name if i else name)
+        for i, model in enumerate(models)
+    ]

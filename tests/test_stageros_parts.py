@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Parts of stageros that need no master: rates, the truth with its stamps, names in saved states, newcomers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sim_worlds import ROOM, drive, robot, simulator
+
+from kurumaisu.effects import Reference
+from kurumaisu.errors import Error
+from kurumaisu.ros.stageros_names import Names
+from kurumaisu.ros.stageros_newcomers import family, renumbered
+from kurumaisu.ros.stageros_rates import Pace
+from kurumaisu.ros.stageros_saved import packed_names, unpacked_names
+from kurumaisu.ros.stageros_settings import read_settings
+from kurumaisu.ros.stageros_truth import Truth
+
+
+def pace(interval=0.1, **rates):
+    return Pace(read_settings({"rates": rates}, "/stageros").rates, interval)
+
+
+def test_a_sensor_may_have_a_rate_of_its_own():
+    one = pace(base_scan=5.0, image=2.0, sensors={"base_scan_1": 2.5, "/robot_1/base_scan_1": 1.0})
+    assert one.every("odom") == 1
+    assert one.every("base_scan") == 2
+    topics = ("base_scan", "/base_scan_0", "/robot_0/base_scan_1", "robot_1/base_scan_1")
+    assert [one.sensor("base_scan", topic) for topic in topics] == [2, 2, 4, 10]
+    assert one.sensor("image", "/robot_0/image_1") == 5
+
+
+@pytest.mark.parametrize(("rates", "message"), [
+    ({"odom": 3.0}, "rates: odom: must divide the world's 10 Hz: 3"),
+    ({"sensors": {"base_scan_0": 20.0}}, "rates: sensors.base_scan_0: must divide the world's 10 Hz: 20"),
+    ({"sensors": {"base_scan_0": -1.0}}, "rates.sensors.base_scan_0: must be a finite number"),
+    ({"sensors": 3}, "rates.sensors: must be a mapping"),
+])  # fmt: skip
+def test_bad_rates_are_named(rates, message):
+    with pytest.raises(Error, match=message):
+        pace(**rates)
+
+
+def test_a_rate_of_no_sensor_is_named():
+    one = pace(sensors={"base_scan_1": 5.0})
+    one.check(["/robot_0/base_scan_0", "/robot_0/base_scan_1"])
+    with pytest.raises(Error, match="base_scan_1: there is no sensor of this name; there are: base_scan"):
+        one.check(["base_scan"])
+
+
+def test_bumpers_and_finders_are_asked_of_the_simulator():
+    assert read_settings({}, "/s").options.devices == ()
+    both = read_settings({"publish_bumpers": True, "publish_fiducials": True}, "/s")
+    assert both.options.devices == ("bumper", "fiducial")
+
+
+def test_the_truth_is_as_in_stage_ros(tmp_path):
+    truth = Truth(0.1)
+    first, second = drive(simulator(tmp_path, ROOM + robot("", "0 0 0 90")), (0.5, 0, 1.0), 2)
+    truth.take(first)
+    ((pose, rates, stamp),) = truth.messages((3, 5))
+    assert rates == (0.0,) * 6
+    assert stamp == (3, 5)
+    truth.take(second)
+    ((pose, rates, _),) = truth.messages((3, 5))
+    assert pose[:2] == pytest.approx(second.poses[0, :2])
+    assert rates[:2] == pytest.approx((second.poses - first.poses)[0, :2] / 0.1)
+    assert rates[5] == pytest.approx(1.0)
+
+
+def test_a_reference_has_its_own_place_and_time(tmp_path):
+    truth = Truth(0.1)
+    for seen in drive(simulator(tmp_path, robot()), (0.5, 0, 0), 20):
+        poses = seen.poses[:, [0, 1, 3]] + [0.0, 0.3, 0.0]
+        truth.take(replace(seen, reference=Reference(np.array([1.5 * seen.time]), poses, np.zeros((1, 3)))))
+    ((pose, rates, stamp),) = truth.messages((7, 0))
+    assert pose[:2] == pytest.approx((1.0, 0.3))
+    assert rates[0] == pytest.approx(0.5 / 1.5)
+    assert stamp == (8, 0)  # a second fast after two
+
+
+def test_names_are_saved():
+    names = [Names(None, False, False), Names("robot_4", True, False)]
+    line = packed_names(names, 5)
+    assert unpacked_names(line + b"state\n") == ([None, "robot_4"], 5, b"state\n")
+
+
+@pytest.mark.parametrize("damage", [
+    *(b"", b"kurumaisu state 1\n", b"kurumaisu stageros 1 \n", b"kurumaisu stageros 1 {}\n"),
+    *(b'kurumaisu stageros 1 {"robots": [1], "numbered": 1}\n', b'kurumaisu stageros 1 {"robots": 3, "numbered": 1}\n'),
+])  # fmt: skip
+def test_other_files_are_refused(damage):
+    with pytest.raises(Error, match="state: is not one that stageros saved"):
+        unpacked_names(damage + b"state")
+
+
+def test_a_copy_is_numbered_from_0(tmp_path):
+    models = simulator(tmp_path, robot() + robot("model ( model ( ) ) model ( )")).models
+    copy = renumbered(family(models, models[1]), "twin")
+    assert [(m.index, m.parent, m.root, m.name) for m in copy] == [
+        *((0, -1, 0, "twin"), (1, 0, 0, None), (2, 1, 0, None), (3, 0, 0, None))
+    ]
