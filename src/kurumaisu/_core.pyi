@@ -81,6 +81,8 @@ class Scene:
         self, origin: FloatArray | Sequence[float], first: float, increment: float, samples: int, max_range: float
     ) -> tuple[FloatArray, IntArray]: ...
 
+def step(poses: FloatArray, velocities: FloatArray, dt: float) -> FloatArray: ...
+
 class Arena:
     def __init__(
         self, walls: FloatArray, returns: FloatArray, solid: BoolArray, tree: IntArray, threads: int

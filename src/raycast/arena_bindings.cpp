@@ -12,6 +12,7 @@
 #include "raycast/arena.h"
 #include "raycast/arrays.h"
 #include "raycast/beam_arrays.h"
+#include "raycast/step.h"
 
 namespace kurumaisu {
 namespace py = pybind11;
@@ -72,9 +73,24 @@ Bools move(Arena& arena, const py::array& bodies, const Array& poses, const py::
   return out;
 }
 
+Array stepAll(const Array& poses, const Array& velocities, double dt) {
+  const double* p = rowsOf(poses, -1, 4, "poses");
+  const double* v = rowsOf(velocities, poses.shape(0), 3, "velocities");
+  Array out({poses.shape(0), py::ssize_t{4}});
+  double* row = out.mutable_data();
+  for (py::ssize_t i = 0; i < poses.shape(0); ++i, p += 4, v += 3) {
+    const Pose to = stepped({p[0], p[1], p[2], p[3]}, {v[0], v[1], v[2]}, dt);
+    for (const double value : {to.x, to.y, to.z, to.heading}) *row++ = value;
+  }
+  return out;
+}
+
 }  // namespace
 
 void bindArena(py::module_& m) {
+  m.def("step", &stepAll, py::arg("poses"), py::arg("velocities"), py::arg("dt"),
+        "Poses (b, 4) that bodies would have after dt [s] from poses (b, 4) with velocities (b, 3): forward, "
+        "leftward [m/s], turn [rad/s], along the old headings, as in Stage.");
   py::class_<Arena>(
       m, "Arena",
       "Walls that stay and bodies that move, for many sensors. Results are the same for any number "

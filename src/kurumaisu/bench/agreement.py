@@ -19,8 +19,11 @@ from kurumaisu.errors import Error
 from kurumaisu.types import BoolArray, FloatArray
 from kurumaisu.world import load_world
 
-_STAGE_WORLDS = ("simple", "benchmark/cave", "benchmark/hospital", "mbicp", "uoa_robotics_lab", "fasr", "lsp_test")
-_STAGE_ROS_WORLDS = ("willow-erratic", "intense")
+_STAGE_WORLDS = (
+    *("simple", "benchmark/cave", "benchmark/hospital", "mbicp", "uoa_robotics_lab", "fasr", "fasr2", "lsp_test"),
+    *("autolab", "pioneer_walle", "pioneer_flocking"),
+)
+_STAGE_ROS_WORLDS = ("willow-erratic", "willow-four-erratics", "intense")
 _LIMITS = (0.5, 1.5, 0.5)  # median and p95 of differences [cells], share of beams that meet another model [%]
 _SAME = 1e-6  # [cells]
 _BEYOND, _FEW = 2.0, 100  # [m] around a world of so few segments, which is not closed

@@ -47,7 +47,6 @@ class Observer:
         """Return ranges [m] over cells and the models met (n, beams) from poses (n, 3)."""
         world = self._world
         rays, numbers = build_cell_rays(self._models, world.poses, self._bodies, world.resolution, 1)
-        rays.set_poses(numbers, np.ascontiguousarray(world.poses[self._bodies.heads]))
         heads = self._frames(poses)
         layout = np.array([[*fans.spread(f.fan), f.fan.samples, f.fan.range_max] for f in self._fans])
         ranges, models = [], []

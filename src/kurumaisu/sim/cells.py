@@ -13,6 +13,7 @@ from kurumaisu.sim.partition import Bodies
 from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world.model import Model
 
+Wanted = Callable[[Model], bool]
 Arrays = tuple[IntArray, FloatArray, FloatArray, IntArray]
 
 
@@ -25,11 +26,12 @@ def build_cells(
     """
     try:
         cells = Cells(resolution, layers)
-        for model in _ground(models, bodies):
-            cells.add_walls(*_wall(model, poses, _solid), model.root)
-        numbers = [
-            cells.add_body(*_body(models, _bearing(those), _solid), those[0].root) for those in _members(models, bodies)
-        ]
+        for model in _still(models, bodies, _solid):
+            cells.add_walls(*_wall(model, poses), model.root)
+        numbers = []
+        for members in _members(models, bodies):
+            outline, _ = _body(models, members, _solid)
+            numbers.append(cells.add_body(*outline, members[0].root))
     except ValueError as error:
         raise Error(f"collision: cells of {resolution:g} m: {error}; collision: exact does without them") from error
     found = np.array(numbers, dtype=np.int64)
@@ -40,19 +42,24 @@ def build_cells(
 def build_cell_rays(
     models: Sequence[Model], poses: FloatArray, bodies: Bodies, resolution: float, threads: int
 ) -> tuple[CellRays, IntArray]:
-    """Return what rangers see in cells of a size [m] with models at poses (models, 4), and the bodies' numbers (b,).
+    """Return what rangers see in cells of a size [m], and the bodies' numbers (b,), models being at poses (models, 4).
 
     Raise Error if there would be too many cells.
     """
     try:
         rays = CellRays(resolution, threads)
-        for model in _ground(models, bodies):
-            rays.add(*_wall(model, poses, _drawn), _returns([model]), model.root)
-        those = _members(models, bodies)
-        numbers = [rays.add(*_body(models, body, _drawn), _returns(body), body[0].root) for body in those]
+        for model in _still(models, bodies, _drawn):
+            rays.add(*_wall(model, poses), np.array([model.ranger_return]), model.root)
+        numbers = []
+        for members in _members(models, bodies):
+            outline, kept = _body(models, members, _drawn)
+            returns = np.array([model.ranger_return for model in kept], dtype=np.float64)
+            numbers.append(rays.add(*outline, returns, members[0].root))
+        found = np.array(numbers, dtype=np.int64)
+        rays.set_poses(found, np.ascontiguousarray(poses[bodies.heads]))
     except ValueError as error:
         raise Error(f"ray_casting: cells of {resolution:g} m: {error}; ray_casting: exact does without them") from error
-    return rays, np.array(numbers, dtype=np.int64)
+    return rays, found
 
 
 def _solid(model: Model) -> bool:
@@ -63,13 +70,9 @@ def _drawn(_model: Model) -> bool:
     return True  # what no ray meets is drawn too: rays do not jump over it
 
 
-def _returns(models: Sequence[Model]) -> FloatArray:
-    return np.array([model.ranger_return for model in models], dtype=np.float64)
-
-
-def _ground(models: Sequence[Model], bodies: Bodies) -> list[Model]:
+def _still(models: Sequence[Model], bodies: Bodies, wanted: Wanted) -> list[Model]:
     """Return the models that never move."""
-    return [model for model in models if bodies.body_of[model.index] < 0]
+    return [model for model in models if bodies.body_of[model.index] < 0 and wanted(model)]
 
 
 def _members(models: Sequence[Model], bodies: Bodies) -> list[list[Model]]:
@@ -81,33 +84,28 @@ def _members(models: Sequence[Model], bodies: Bodies) -> list[list[Model]]:
     return members
 
 
-def _bearing(members: Sequence[Model]) -> list[Model]:
-    """Return of a body's models those that are solid and what carries them."""
+def _wall(model: Model, poses: FloatArray) -> Arrays:
+    return np.array([-1]), np.array([[*poses[model.index], 0.0, *_origin(model)]]), *_edges([model], _drawn)
+
+
+def _body(models: Sequence[Model], members: Sequence[Model], wanted: Wanted) -> tuple[Arrays, list[Model]]:
+    """Return a body, whose pose is that of the first of its models, as those wanted and what carries them."""
     carrying = {members[0].index}
     for model in reversed(members):
-        if model.index in carrying or (_solid(model) and len(model.shape.segments)):
+        if model.index in carrying or (wanted(model) and len(model.shape.segments)):
             carrying |= {model.index, model.parent}
-    return [model for model in members if model.index in carrying]
-
-
-def _wall(model: Model, poses: FloatArray, wanted: Callable[[Model], bool]) -> Arrays:
-    """Return a model that never moves."""
-    return np.array([-1]), np.array([[*poses[model.index], 0.0, *_origin(model)]]), *_edges([model], wanted)
-
-
-def _body(models: Sequence[Model], members: Sequence[Model], wanted: Callable[[Model], bool]) -> Arrays:
-    """Return a body, whose pose is that of the first of its models, as one chain of models, parents first."""
+    members = [model for model in members if model.index in carrying]
     number = {model.index: i for i, model in enumerate(members)}
     parents, places = [-1], [np.array([0.0, 0.0, 0.0, 0.0, 0.0, *_origin(members[0])])]
     for model in members[1:]:
         below = models[model.parent]
         parents.append(number[below.index])
         places.append(np.array([*model.pose, below.size[2] if below.stack_children else 0.0, *_origin(model)]))
-    return np.array(parents, dtype=np.int64), np.array(places), *_edges(members, wanted)
+    return (np.array(parents, dtype=np.int64), np.array(places), *_edges(members, wanted)), members
 
 
-def _edges(models: Sequence[Model], wanted: Callable[[Model], bool]) -> tuple[FloatArray, IntArray]:
-    """Return the edges (k, 6) of those wanted of models, and the place of each one's model among all of them (k,)."""
+def _edges(models: Sequence[Model], wanted: Wanted) -> tuple[FloatArray, IntArray]:
+    """Return the edges (k, 6) of those wanted, and the place of each one's model among all of them (k,)."""
     edges, parts = [np.empty((0, 6))], [np.empty(0, dtype=np.int64)]
     for i, model in enumerate(models):
         if wanted(model):

@@ -15,6 +15,7 @@ from kurumaisu.sim import fans
 from kurumaisu.sim.cells import build_cell_rays, build_cells
 from kurumaisu.sim.collisions import Collisions, Crossing, SharedCells
 from kurumaisu.sim.drive import Drive, Rows
+from kurumaisu.sim.eyes import CellEyes, ExactEyes, Eyes
 from kurumaisu.sim.fleet_effects import FleetEffects
 from kurumaisu.sim.motion import StageMotion
 from kurumaisu.sim.odometry import Localization
@@ -23,7 +24,6 @@ from kurumaisu.sim.partition import Distort, attached, build_arena, is_robot, re
 from kurumaisu.sim.pedestrians import Pedestrians
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.rangers import Rangers
-from kurumaisu.sim.ray_casting import Caster, CellCaster, ExactCaster
 from kurumaisu.sim.rhythm import Rhythm, period
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.sim.slopes import Slopes
@@ -70,10 +70,10 @@ class Machinery:
         self.fans = fans.find(models, population.poses, self.bodies, self.robot_rows.tolist())
         self.collisions = self._make_collisions()
         self.motion = self._make_motion()
+        self._eyes = self._make_eyes()
         self.pedestrians = self._make_pedestrians()
         self._slopes = self._make_slopes()
         self._sideways = np.array([cast(Position, model.device).drive == "omni" for model in self.robots], np.bool_)
-        self._caster = self._make_caster()
         self.frames = np.zeros((len(self.bodies) + 1, 4))  # of the bodies, and of the map at the end
         self.before = self.frames.copy()  # those one step ago
         self.stalled = np.zeros(len(self.bodies), dtype=np.bool_)
@@ -107,7 +107,7 @@ class Machinery:
         self.effects = FleetEffects(self.options, self.robots, self.robot_keys, self.interval)
         self.effects.begin(seed)
         touched = self.effects.begin_fans(self.fans, self.population.keys, self.arena)
-        self.rangers = Rangers(self._caster, self.fans, np.stack([looks, births], axis=-1), sweep, touched)
+        self.rangers = Rangers(self._eyes, self.fans, np.stack([looks, births], axis=-1), sweep, touched)
 
     def _make_motion(self) -> StageMotion | Followed:
         if self.dynamics is None:
@@ -143,13 +143,13 @@ class Machinery:
         cells, known_as = build_cells(start.models, start.poses, self.bodies, self.resolution, layers)
         return SharedCells(self.arena, self.numbers, cells, known_as, layers)
 
-    def _make_caster(self) -> Caster:
+    def _make_eyes(self) -> Eyes:
         if self.options.ray_casting == "exact" or self.dynamics is not None or self.resolution is None:
-            return ExactCaster(self.arena)
+            return ExactEyes(self.arena)
         start = self.population
-        options = self.options
-        rays, known_as = build_cell_rays(start.models, start.poses, self.bodies, self.resolution, options.threads)
-        return CellCaster(rays, known_as, self.collisions.drawn, self.fans)
+        threads = self.options.threads
+        rays, known_as = build_cell_rays(start.models, start.poses, self.bodies, self.resolution, threads)
+        return CellEyes(rays, known_as, self.collisions.drawn, self.fans)
 
     @property
     def robot_keys(self) -> IntArray:

@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import Protocol
 
 import numpy as np
 
+from kurumaisu._core import step
 from kurumaisu.sim.collisions import Collisions
 from kurumaisu.sim.partition import Bodies, attached, relative
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 StateArray = FloatArray | BoolArray
-_TURN = 2 * math.pi  # [rad]
 
 
 class Motion(Protocol):
@@ -49,8 +48,6 @@ class StageMotion:
         self._poses = np.zeros((count, 4))
         self._stalled = np.zeros(count, dtype=np.bool_)
         self._new = np.zeros((count, 4))
-        self._steps, self._across = np.zeros((count, 3)), np.zeros((count, 2))
-        self._headings, self._cos, self._sin, self._turns = (np.zeros((count, 1)) for _ in range(4))
         carriers = set(bodies.carrier.tolist())
         self._riders = [_riders(bodies, body) if body in carriers else [] for body in range(count)]
         self._carries = np.array([len(riders) > 0 for riders in self._riders], dtype=np.bool_)
@@ -67,11 +64,11 @@ class StageMotion:
         moving = velocities.any(axis=1)
         self._collisions.begin_step()
         if moving.any():
-            self._euler(velocities, dt)
+            self._new = step(self._poses, velocities, dt)
             if not self._apart:
                 for body in np.flatnonzero(moving & self._carries):
                     self._settle_stack(int(body))
-                    self._euler(velocities, dt)  # of those that were carried
+                    self._new = step(self._poses, velocities, dt)  # of those that were carried
                 moving &= ~self._carries
             self._settle(slice(None) if moving.all() else np.flatnonzero(moving))
             self._collisions.end_step(self._poses)
@@ -86,27 +83,6 @@ class StageMotion:
         self.place(np.asarray(state["poses"], dtype=np.float64))
         self._stalled[:] = state["stalled"]
         self._collisions.restore(state)
-
-    def _euler(self, velocities: FloatArray, dt: float) -> None:
-        """Leave in self._new where each body would go."""
-        steps, across, new = self._steps, self._across, self._new
-        np.multiply(velocities, dt, out=steps)
-        np.negative(steps[:, 1], out=across[:, 0])  # steps turned by a quarter
-        across[:, 1] = steps[:, 0]
-        self._headings[:] = self._poses[:, 3:]  # in one piece: see geometry.cos_sin
-        np.cos(self._headings, out=self._cos)
-        np.sin(self._headings, out=self._sin)
-        new[:] = self._poses
-        new[:, 3] += steps[:, 2]
-        along = steps[:, :2]
-        np.multiply(along, self._cos, out=along)
-        np.multiply(across, self._sin, out=across)
-        np.add(along, across, out=along)
-        new[:, :2] += along
-        np.multiply(new[:, 3:], 1 / _TURN, out=self._turns)
-        np.rint(self._turns, out=self._turns)
-        np.multiply(self._turns, _TURN, out=self._turns)
-        new[:, 3:] -= self._turns
 
     def _settle(self, which: slice | IntArray) -> None:
         """Let bodies take their steps, each on its own."""

@@ -48,14 +48,14 @@ class Options:
     """What a world file does not say.
 
     semantics: stage, physical, or world: what the world file says; collision: of stage semantics: cells (outlines
-    collide where they share cells of the world's resolution, as in Stage), cells_stale (and robots that have not moved
-    yet in a step are met where they were a step ago, as in Stage) or exact (where they cross); ray_casting of rangers:
-    exact, or cells (over cells of the world's resolution, with Stage's own rounding; of stage semantics); timing: stage
-    (scans and odometry are from before the step's move, the truth from after it) or consistent (all from after it;
-    physical semantics are always so); threads of the ray caster; limit_acceleration: heed acceleration_bounds, which
-    Stage does not; scan_sweep [s] from a scan's first to its last beam, at most one step: beams leave from where the
-    robot is then; 0: all at once. devices: types of models whose readings are wanted; effects: on robots and their
-    rangers.
+    collide where they share cells of the world's resolution, as in Stage), cells_stale (and robots that have not
+    moved yet in a step are met where they were a step ago, as in Stage) or exact (where they cross); ray_casting: of
+    stage semantics: exact, or cells (over cells of the world's resolution, by Stage's own arithmetic; rangers with
+    effects see exactly); timing: stage (scans and odometry are from before the step's move, the truth from after it)
+    or consistent (all from after it; physical semantics are always so); threads of the ray caster;
+    limit_acceleration: heed acceleration_bounds, which Stage does not; scan_sweep [s] from a scan's first to its last
+    beam, at most one step: beams leave from where the robot is then; 0: all at once. devices: types of models whose
+    readings are wanted; effects: on robots and their rangers.
     """
 
     semantics: str

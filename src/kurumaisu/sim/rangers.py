@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from kurumaisu.sim.eyes import Eyes
 from kurumaisu.sim.fan_effects import FanEffects
 from kurumaisu.sim.fans import RangerFan, moments, spread
 from kurumaisu.sim.partition import attached
-from kurumaisu.sim.ray_casting import Caster
 from kurumaisu.sim.scans import Scans, Sweep
 from kurumaisu.sim.sensors.ranger_noise import RangerNoise
 from kurumaisu.types import FloatArray, IntArray
@@ -25,7 +25,7 @@ class Rangers:
 
     def __init__(
         self,
-        caster: Caster,
+        eyes: Eyes,
         fans: Sequence[RangerFan],
         rhythm: IntArray,
         sweep: float,
@@ -35,14 +35,14 @@ class Rangers:
 
         sweep: share of a step; touched: effects on fans, by their places.
         """
-        self._caster = caster
         self._touched = [(fan.body, touched[i]) for i, fan in enumerate(fans) if i in touched]
+        self._eyes = eyes
         self._cohorts: list[_Cohort] = []
         self._places: list[tuple[int, int, int]] = [(0, 0, 0)] * len(fans)
         for number, (every, birth) in enumerate(sorted(set(map(tuple, rhythm.tolist())))):
             members = [i for i in range(len(fans)) if rhythm[i].tolist() == [every, birth]]
             effects = {k: touched[i] for k, i in enumerate(members) if i in touched}
-            self._cohorts.append(_Cohort(caster, [fans[i] for i in members], (every, birth % every), sweep, effects))
+            self._cohorts.append(_Cohort(eyes, [fans[i] for i in members], (every, birth % every), sweep, effects))
             ends = np.cumsum([fans[i].fan.samples for i in members]).tolist()
             for i, start, stop in zip(members, [0, *ends], ends, strict=False):
                 self._places[i] = (number, start, stop)
@@ -55,14 +55,14 @@ class Rangers:
 
     def start(self, time: float, frames: FloatArray, rng: np.random.Generator) -> None:
         """Look once with all fans, before their first update, from frames (b + 1, 4): bodies and the map."""
+        self._eyes.follow(frames)
         self._note(time, frames, frames)
-        self._caster.follow(frames)
         self._scans = Scans(tuple(c.measure(time, 0, frames, frames, rng) for c in self._cohorts), self._places)
 
     def update(self, step: int, time: float, way: tuple[FloatArray, FloatArray], rng: np.random.Generator) -> None:
         """Measure with those due in a step, counted from 1, on the way between frames (b + 1, 4)."""
+        self._eyes.follow(way[1])
         self._note(time, *way)
-        self._caster.follow(way[1])
         old = self._scans.sweeps
         new = tuple(
             c.measure(time, o.count + 1, *way, rng) if step % c.every == c.phase else o
@@ -94,14 +94,14 @@ class _Cohort:
 
     def __init__(
         self,
-        caster: Caster,
+        eyes: Eyes,
         fans: Sequence[RangerFan],
         rhythm: tuple[int, int],
         sweep: float,
         touched: Mapping[int, FanEffects],
     ) -> None:
         self.every, self.phase = rhythm
-        self._caster = caster
+        self._eyes = eyes
         self._body = np.array([fan.body for fan in fans], dtype=np.int64)
         self._trees = np.array([fan.model.root for fan in fans], dtype=np.int64)
         self._mounts = np.array([fan.mount for fan in fans]).reshape(-1, 4)
@@ -120,7 +120,7 @@ class _Cohort:
     def measure(self, time: float, count: int, before: FloatArray, now: FloatArray, rng: np.random.Generator) -> Sweep:
         off = self._noise.bearings(rng) if self._noise.on_bearings else None
         if self._beams is None:
-            ranges, returns = self._caster.scan(self._place(now), self._trees, self._fans)
+            ranges, returns = self._eyes.scan(self._place(now), self._trees, self._fans)
         else:
             ranges, returns = self._cast(self._beams, before, now, off)
         looks = [fan.look(time, off if off is None else off[part]) for part, fan in self._touched]
@@ -158,7 +158,7 @@ class _Cohort:
         origins[:, 3] += beams.bearings
         if off is not None:
             origins[:, 3] += off
-        ranges, returns = self._caster.cast(origins, self._trees[beams.fan], float(beams.range_max.max(initial=1.0)))
+        ranges, returns = self._eyes.cast(origins, self._trees[beams.fan], float(beams.range_max.max(initial=1.0)))
         beyond = ranges > beams.range_max
         ranges[beyond], returns[beyond] = np.inf, 0.0
         return ranges, returns

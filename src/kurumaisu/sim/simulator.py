@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -54,8 +55,6 @@ class Simulator:
         check_names(options.effects, [model for model in world.models if is_robot(model)])
         start = Population.first(world.models, world.poses)
         self._home = Machinery(start, options, world.interval, dynamics, resolution=world.resolution)
-        what = world.models, world.poses, world.interval, replace(options, threads=1), self._sensors
-        self._fingerprint = state.digest(what)
         self.reset(0)
         self.warnings = (*world.warnings, *stuck(self._home))
 
@@ -203,6 +202,13 @@ class Simulator:
     def model_poses(self) -> FloatArray:
         """Poses (m, 4) of all models in the map now."""
         return self._machinery.model_poses()
+
+    @cached_property
+    def _fingerprint(self) -> str:
+        """Tells worlds and options apart; takes a while to make, and most runs never need it."""
+        world = self._world
+        what = world.models, world.poses, world.interval, replace(self._options, threads=1), self._sensors
+        return state.digest(what)
 
     @property
     def _rngs(self) -> tuple[np.random.Generator, ...]:

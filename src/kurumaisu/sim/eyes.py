@@ -14,7 +14,7 @@ from kurumaisu.sim.fans import RangerFan
 from kurumaisu.types import FloatArray, IntArray
 
 
-class Caster(Protocol):
+class Eyes(Protocol):
     """Casts rays; scan and cast as in Arena."""
 
     def follow(self, frames: FloatArray) -> None:
@@ -27,7 +27,7 @@ class Caster(Protocol):
         """Return ranges and ranger returns of single rays."""
 
 
-class ExactCaster:
+class ExactEyes:
     """Sees by the arena, which the motion keeps up to date."""
 
     def __init__(self, arena: Arena) -> None:
@@ -38,7 +38,7 @@ class ExactCaster:
         """Nothing to do."""
 
 
-class CellCaster:
+class CellEyes:
     """Sees by cells, which have their own bodies."""
 
     def __init__(
