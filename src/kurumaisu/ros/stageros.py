@@ -32,8 +32,8 @@ class Arguments:
 
 
 def parse(arguments: Sequence[str]) -> Arguments | None:
-    """Return what the arguments say; None if there are none. As in 1.8.0 the last is the file, come what may."""
-    if not arguments:
+    """Return what the arguments say; None without a file, which is the last of them, as in 1.8.0."""
+    if not arguments or arguments[-1] in ("-g", "-u"):
         return None
     return Arguments(Path(arguments[-1]), "-g" in arguments[:-1], "-u" in arguments[:-1])
 
