@@ -8,6 +8,7 @@ import pytest
 from arenas import ROOM, Everything, add, arena, box, faces, in_map, random_arena
 from shapely.geometry import LineString
 
+from kurumaisu import _core
 from kurumaisu._core import Arena
 from kurumaisu.types import FloatArray
 
@@ -226,3 +227,23 @@ def test_motion_agrees_with_shapely(seed: int) -> None:
             for i, face in zip(np.flatnonzero(owner == number), moved, strict=True):
                 oracle.lines[i] = LineString(face[:4].reshape(2, 2))
     assert {True, False} == set(stalls)
+
+
+def test_a_step_and_what_is_mounted_follow_the_old_heading() -> None:
+    poses = np.array([[1.0, 2.0, 0.5, math.pi / 2], [0.0, 0.0, 0.0, 3.1]])
+    moved = _core.step(poses, np.array([[2.0, 1.0, 0.3], [0.0, 0.0, 1.0]]), 0.1)
+    np.testing.assert_allclose(
+        moved, [[0.9, 2.2, 0.5, math.pi / 2 + 0.03], [0.0, 0.0, 0.0, 3.2 - math.tau]], atol=1e-15
+    )
+    mounts = np.array([[0.3, 0.1, 0.2, 1.0], [0.0, 0.0, 0.0, 0.0]])
+    there = _core.mounted(poses, np.array([0, -1]), mounts)
+    np.testing.assert_allclose(there, [[0.9, 2.3, 0.7, math.pi / 2 + 1.0], poses[1]], atol=1e-15)
+
+
+def test_steps_and_mounts_of_other_shapes_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"velocities must have shape \(2, 3\)"):
+        _core.step(np.zeros((2, 4)), np.zeros((1, 3)), 0.1)
+    with pytest.raises(ValueError, match="there is no frame 2"):
+        _core.mounted(np.zeros((2, 4)), np.array([2]), np.zeros((1, 4)))
+    with pytest.raises(ValueError, match="there is no frame -3"):
+        _core.mounted(np.zeros((2, 4)), np.array([-3]), np.zeros((1, 4)))

@@ -73,14 +73,34 @@ Bools move(Arena& arena, const py::array& bodies, const Array& poses, const py::
   return out;
 }
 
+double* put(const Pose& pose, double* row) {
+  for (const double value : {pose.x, pose.y, pose.z, pose.heading}) *row++ = value;
+  return row;
+}
+
 Array stepAll(const Array& poses, const Array& velocities, double dt) {
   const double* p = rowsOf(poses, -1, 4, "poses");
   const double* v = rowsOf(velocities, poses.shape(0), 3, "velocities");
   Array out({poses.shape(0), py::ssize_t{4}});
   double* row = out.mutable_data();
-  for (py::ssize_t i = 0; i < poses.shape(0); ++i, p += 4, v += 3) {
-    const Pose to = stepped({p[0], p[1], p[2], p[3]}, {v[0], v[1], v[2]}, dt);
-    for (const double value : {to.x, to.y, to.z, to.heading}) *row++ = value;
+  for (py::ssize_t i = 0; i < poses.shape(0); ++i, p += 4, v += 3)
+    row = put(stepped({p[0], p[1], p[2], p[3]}, {v[0], v[1], v[2]}, dt), row);
+  return out;
+}
+
+Array mountAll(const Array& frames, const py::array& bodies, const Array& mounts) {
+  const std::vector<Pose> bases = posesOf(frames, -1, "frames");
+  const std::vector<int> below = integers(bodies, -1, "bodies");
+  const double* m = rowsOf(mounts, bodies.size(), 4, "mounts");
+  Array out({bodies.size(), py::ssize_t{4}});
+  double* row = out.mutable_data();
+  const auto count = static_cast<int>(bases.size());
+  for (const int body : below) {
+    if (body < -count || body >= count)
+      throw std::invalid_argument("there is no frame " + std::to_string(body));
+    const int place = body < 0 ? body + count : body;
+    row = put(mounted(bases[static_cast<std::size_t>(place)], {m[0], m[1], m[2], m[3]}), row);
+    m += 4;
   }
   return out;
 }
@@ -88,6 +108,9 @@ Array stepAll(const Array& poses, const Array& velocities, double dt) {
 }  // namespace
 
 void bindArena(py::module_& m) {
+  m.def("mounted", &mountAll, py::arg("frames"), py::arg("bodies"), py::arg("mounts"),
+        "Poses (f, 4) in the map of what is at mounts (f, 4) in frames (b, 4), by their rows bodies (f,); -1 "
+        "is the last.");
   m.def("step", &stepAll, py::arg("poses"), py::arg("velocities"), py::arg("dt"),
         "Poses (b, 4) that bodies would have after dt [s] from poses (b, 4) with velocities (b, 3): forward, "
         "leftward [m/s], turn [rad/s], along the old headings, as in Stage.");

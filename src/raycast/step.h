@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Stage's rule of motion: one Euler step along the old heading.
+// Where bodies come to by Stage's rule of motion, and what is mounted on them.
 #pragma once
 
 #include <cmath>
@@ -15,7 +15,15 @@ struct Velocity {
   double turn;               ///< [rad/s]
 };
 
-/// Where a body would be dt [s] later, its heading from -pi to pi.
+/// In the map, what is at a pose in a frame; the heading is not wrapped.
+inline Pose mounted(const Pose& frame, const Pose& pose) {
+  const double c = std::cos(frame.heading);
+  const double s = std::sin(frame.heading);
+  return {frame.x + pose.x * c - pose.y * s, frame.y + pose.y * c + pose.x * s, frame.z + pose.z,
+          frame.heading + pose.heading};
+}
+
+/// Where a body would be dt [s] later, by one Euler step along its old heading; the new one from -pi to pi.
 inline Pose stepped(const Pose& from, const Velocity& velocity, double dt) {
   const double c = std::cos(from.heading);
   const double s = std::sin(from.heading);

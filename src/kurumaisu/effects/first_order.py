@@ -2,7 +2,6 @@
 """A first-order lag, which more than one effect has."""
 
 import numpy as np
-from scipy.signal import lfilter
 
 from kurumaisu.types import FloatArray
 
@@ -20,6 +19,8 @@ class FirstOrder:
         if self._tau < 1e-6:  # [s]; no lag, and the limit below would divide by it
             return target
         decay = np.exp(-dt / self._tau)
+        from scipy.signal import lfilter  # half a second to load, for those who have no lag or noise
+
         ends = lfilter([1 - decay], [1, -decay], target, zi=[decay * self._level])[0]
         starts = np.concatenate([[self._level], ends[:-1]])
         self._level = float(ends[-1])

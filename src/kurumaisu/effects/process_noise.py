@@ -4,7 +4,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 
@@ -32,6 +31,8 @@ class ProcessNoise(Effect):
         """Add noise to v and w where either is not 0."""
         decay = np.exp(-motion.dt / self.values["tau"])
         draws = np.sqrt(1 - decay**2) * self.context.rng.standard_normal((len(motion.v), 2))
+        from scipy.signal import lfilter  # half a second to load, for those who have no lag or noise
+
         noise = [lfilter([1], [1, -decay], draws[:, i], zi=[decay * self._level[i]])[0] for i in range(2)]
         self._level = (float(noise[0][-1]), float(noise[1][-1]))
         moving = (motion.v != 0) | (motion.w != 0)

@@ -63,14 +63,14 @@ class StageMotion:
         """Move each body whose velocity is not zero, in order, those that carry others first; see Motion."""
         moving = velocities.any(axis=1)
         self._collisions.begin_step()
-        if moving.any():
+        if np.count_nonzero(moving):  # faster than any()
             self._new = step(self._poses, velocities, dt)
             if not self._apart:
                 for body in np.flatnonzero(moving & self._carries):
                     self._settle_stack(int(body))
                     self._new = step(self._poses, velocities, dt)  # of those that were carried
                 moving &= ~self._carries
-            self._settle(slice(None) if moving.all() else np.flatnonzero(moving))
+            self._settle(slice(None) if np.count_nonzero(moving) == len(moving) else np.flatnonzero(moving))
             self._collisions.end_step(self._poses)
         return self._poses, self._stalled
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kurumaisu._core import mounted
 from kurumaisu.sim.eyes import Eyes
 from kurumaisu.sim.fan_effects import FanEffects
 from kurumaisu.sim.fans import RangerFan, moments, spread
@@ -107,11 +108,6 @@ class _Cohort:
         self._mounts = np.array([fan.mount for fan in fans]).reshape(-1, 4)
         self._fans = np.array([[*spread(f.fan), f.fan.samples, f.fan.range_max] for f in fans]).reshape(-1, 4)
         self._noise = RangerNoise([fan.fan for fan in fans])
-        self._ahead = np.ascontiguousarray(self._mounts[:, :2])
-        self._aside = np.stack([-self._ahead[:, 1], self._ahead[:, 0]], axis=-1)  # turned by a quarter
-        self._origins = np.empty((len(fans), 4))
-        self._part = np.empty((len(fans), 2))
-        self._headings, self._cos, self._sin = (np.empty((len(fans), 1)) for _ in range(3))
         self._beams = _Beams(fans, sweep) if sweep or self._noise.on_bearings else None
         ends = np.cumsum([fan.fan.samples for fan in fans]).tolist()
         self._touched = [(slice(ends[k] - fans[k].fan.samples, ends[k]), touched[k]) for k in touched]
@@ -120,7 +116,7 @@ class _Cohort:
     def measure(self, time: float, count: int, before: FloatArray, now: FloatArray, rng: np.random.Generator) -> Sweep:
         off = self._noise.bearings(rng) if self._noise.on_bearings else None
         if self._beams is None:
-            ranges, returns = self._eyes.scan(self._place(now), self._trees, self._fans)
+            ranges, returns = self._eyes.scan(mounted(now, self._body, self._mounts), self._trees, self._fans)
         else:
             ranges, returns = self._cast(self._beams, before, now, off)
         looks = [fan.look(time, off if off is None else off[part]) for part, fan in self._touched]
@@ -131,20 +127,6 @@ class _Cohort:
         for (part, effects), look in zip(self._touched, looks, strict=True):
             ranges[part], returns[part] = effects.read(look, ranges[part])
         return Sweep(ranges, returns, time, count)
-
-    def _place(self, frames: FloatArray) -> FloatArray:
-        """Return where the fans are (f, 4)."""
-        origins = self._origins
-        np.take(frames, self._body, axis=0, out=origins, mode="wrap")  # with a buffer, numpy wants a mode
-        self._headings[:] = origins[:, 3:]  # in one piece: see geometry.cos_sin
-        np.cos(self._headings, out=self._cos)
-        np.sin(self._headings, out=self._sin)
-        np.multiply(self._ahead, self._cos, out=self._part)
-        origins[:, :2] += self._part
-        np.multiply(self._aside, self._sin, out=self._part)
-        origins[:, :2] += self._part
-        origins[:, 2:] += self._mounts[:, 2:]
-        return origins
 
     def _cast(
         self, beams: _Beams, before: FloatArray, now: FloatArray, off: FloatArray | None

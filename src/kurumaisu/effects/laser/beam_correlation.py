@@ -4,7 +4,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from kurumaisu.effects.laser.base import Echoes, LaserStage, ReadingEffect
 from kurumaisu.effects.mechanism import Parameter
@@ -26,4 +25,6 @@ class BeamCorrelation(ReadingEffect):
         rho = self.values["rho"]
         innovations = np.sqrt(1 - rho**2) * echoes.noise
         innovations[:1] = echoes.noise[:1]  # stationary from the first beam on
+        from scipy.signal import lfilter  # half a second to load, for those who have no lag or noise
+
         return replace(echoes, noise=np.asarray(lfilter([1.0], [1.0, -rho], innovations)))
