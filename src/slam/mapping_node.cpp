@@ -24,8 +24,9 @@ namespace {
 
 constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
 constexpr double kPollPeriod = 0.02;    // [s] between looks whether transforms have come
-constexpr double kTimeJump = 1.0;  // [s] a scan or a clock that much behind the last scan is a new beginning
-constexpr double kLevel = 0.99;    // cosine of the tilt beyond which a laser does not measure in the plane
+constexpr double kTimeJump =
+    1.0;  // [s] a scan that much behind the last one, or a clock behind itself, is a new beginning
+constexpr double kLevel = 0.99;      // cosine of the tilt beyond which a laser does not measure in the plane
 constexpr std::size_t kQueue = 100;  // scans that may wait for their transforms
 
 struct Planar {
@@ -102,6 +103,7 @@ class MappingNode {
   bool map_changed_ = false;
   std::uint64_t dropped_ = 0;
   ros::Time last_scan_;
+  ros::Time last_clock_;  // scans may be ahead of the clock: it comes on a connection of its own
   ros::Time last_transform_;
   ros::SteadyTime last_map_;
   tf2_ros::Buffer buffer_;
@@ -144,7 +146,8 @@ void MappingNode::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) {
 
 void MappingNode::work() {
   const ros::Time now = ros::Time::now();
-  if (last_scan_ > now + ros::Duration(kTimeJump)) reset("time ran backwards");
+  if (now + ros::Duration(kTimeJump) < last_clock_) reset("time ran backwards");
+  last_clock_ = now;
   while (!waiting_.empty() && take(waiting_.front())) waiting_.pop_front();
   const ros::SteadyTime steady = ros::SteadyTime::now();
   if (map_changed_ && (steady - last_map_).toSec() >= settings_.map_period) {
