@@ -172,7 +172,7 @@ def test_the_chair_of_the_worlds_is_the_one_of_the_model_file():
     ranger = next(m for m in world.models if isinstance(m.device, Ranger))
     fan, laser = ranger.device.fans[0], model.laser
     assert (fan.samples, fan.range_min, fan.range_max) == (laser.beams, laser.range_min, laser.range_max)
-    assert beam_height(world, ranger, fan) == pytest.approx(laser.mount.z)
+    assert beam_height(ranger, world.poses[ranger.index], fan) == pytest.approx(laser.mount.z)
     first, last = ranger.pose[3] - fan.fov / 2, ranger.pose[3] + fan.fov / 2
     np.testing.assert_allclose([first, last], laser.mount.yaw + laser.bearings[[0, -1]], atol=2e-5)
     np.testing.assert_allclose(ranger.pose[:2], [laser.mount.x, laser.mount.y])

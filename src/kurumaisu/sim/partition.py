@@ -11,6 +11,7 @@ import numpy as np
 from kurumaisu._core import Arena
 from kurumaisu.geometry import cos_sin
 from kurumaisu.types import BoolArray, FloatArray, IntArray
+from kurumaisu.world.layout import outline as placed_outline
 from kurumaisu.world.model import Model, Position
 
 Distort = Callable[[FloatArray], FloatArray]  # both ends of walls (m, 4) [m] -> the same, changed
@@ -74,7 +75,7 @@ def outline(models: Sequence[Model], poses: FloatArray, members: IntArray, frame
         count = len(model.shape.segments)
         if not count or (model.ranger_return < 0 and not model.obstacle_return):
             continue
-        faces.append(_in_frame(model, relative(frame, poses[model.index])))
+        faces.append(placed_outline(model, relative(frame, poses[model.index])))
         returns.append(np.full(count, model.ranger_return))
         solid.append(np.full(count, model.obstacle_return))
         trees.append(np.full(count, model.root, dtype=np.int64))
@@ -135,11 +136,3 @@ def _add(arena: Arena, models: Sequence[Model], poses: FloatArray, bodies: Bodie
     head = int(bodies.heads[body])
     shape = outline(models, poses, np.flatnonzero(bodies.body_of == body), poses[head])
     return arena.add_body(shape.faces, shape.returns, shape.solid, models[head].root)
-
-
-def _in_frame(model: Model, pose: FloatArray) -> FloatArray:
-    """Return the model's segments with their z range (k, 6), its pose (4,) being given in the frame."""
-    ends = model.shape.segments.reshape(-1, 2)
-    c, s = np.cos(pose[3]), np.sin(pose[3])
-    turned = ends @ np.array([[c, s], [-s, c]]) + pose[:2]
-    return np.concatenate([turned.reshape(-1, 4), model.shape.heights + pose[2]], axis=1)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu._core import Arena
-from kurumaisu.world.layout import beam_height, moves, outline_in_map
+from kurumaisu.world.layout import beam_height, outline, travels
 from kurumaisu.world.model import Model, Place, Position, Ranger
 from kurumaisu.world.world import World
 
@@ -34,7 +34,7 @@ def findings(world: World) -> tuple[Finding, ...]:
 
 def _beams(world: World) -> Iterator[Finding]:
     """Lasers whose plane misses every wall."""
-    walls = [model for model in world.models if not moves(world, model) and model.ranger_return >= 0]
+    walls = [model for model in world.models if not travels(model, world.models) and model.ranger_return >= 0]
     heights = [model.shape.heights + world.poses[model.index, 2] for model in walls if len(model.shape.segments)]
     if not heights:
         return
@@ -43,7 +43,7 @@ def _beams(world: World) -> Iterator[Finding]:
         if not isinstance(model.device, Ranger):
             continue
         for fan in model.device.fans:
-            z = beam_height(world, model, fan)
+            z = beam_height(model, world.poses[model.index], fan)
             if not ((spans[:, 0] <= z) & (z <= spans[:, 1])).any():
                 where = "above" if z > spans[:, 1].max() else "below" if z < spans[:, 0].min() else "between"
                 yield Finding(fan.place, f"the beams, {z:.2f} m above the ground, pass {where} all walls")
@@ -66,17 +66,17 @@ def _thin(world: World) -> Iterator[Finding]:
 def _in_walls(world: World) -> Iterator[Finding]:
     """Robots that touch something solid at their start."""
     solid = [model for model in world.models if model.obstacle_return and len(model.shape.segments)]
-    fixed = [model for model in solid if not moves(world, model)]
-    outlines = [outline_in_map(world, model) for model in fixed]
+    fixed = [model for model in solid if not travels(model, world.models)]
+    outlines = [outline(model, world.poses[model.index]) for model in fixed]
     walls = np.concatenate([np.empty((0, 6)), *outlines])
-    tree = np.repeat([model.root for model in fixed], [len(outline) for outline in outlines]).astype(np.int64)
+    tree = np.repeat([model.root for model in fixed], [len(faces) for faces in outlines]).astype(np.int64)
     arena = Arena(walls, np.ones(len(walls)), np.ones(len(walls), dtype=np.bool_), tree, 1)
     bodies = {}
     for model in solid:
-        if moves(world, model):
-            outline = outline_in_map(world, model)
-            number = len(outline)
-            body = arena.add_body(outline, np.ones(number), np.ones(number, dtype=np.bool_), model.root)
+        if travels(model, world.models):
+            faces = outline(model, world.poses[model.index])
+            number = len(faces)
+            body = arena.add_body(faces, np.ones(number), np.ones(number, dtype=np.bool_), model.root)
             arena.set_poses(np.array([body]), np.zeros((1, 4)))
             bodies[body] = model
     if bodies:
@@ -140,7 +140,7 @@ def _rangers(world: World) -> Iterator[Finding]:
 
 def _intangible(world: World) -> Iterator[Finding]:
     for model in world.models:
-        if moves(world, model) or not len(model.shape.segments):
+        if travels(model, world.models) or not len(model.shape.segments):
             continue
         if model.ranger_return < 0 and model.obstacle_return:
             yield Finding(model.place, f"{_name(model)} stops robots but lasers do not see it (ranger_return below 0)")
@@ -151,11 +151,12 @@ def _intangible(world: World) -> Iterator[Finding]:
 
 
 def _slopes(world: World) -> Iterator[Finding]:
-    beams = [beam_height(world, m, fan) for m in world.models if isinstance(m.device, Ranger) for fan in m.device.fans]
+    rangers = [(m, m.device) for m in world.models if isinstance(m.device, Ranger)]
+    beams = [beam_height(m, world.poses[m.index], fan) for m, device in rangers for fan in device.fans]
     for model in world.models:
         if model.slope is None:
             continue
-        if moves(world, model) or model.mass > 0 or model.hinge is not None:
+        if travels(model, world.models) or model.mass > 0 or model.hinge is not None:
             yield Finding(model.place, f"{_name(model)}: slope has no effect on what can move")
         if model.obstacle_return:
             yield Finding(model.place, f"{_name(model)} has a slope, but stops robots: it wants obstacle_return 0")

@@ -35,7 +35,7 @@ def contents(world: World) -> Iterator[str]:
 def _fans(world: World, model: Model, ranger: Ranger) -> Iterator[str]:
     alike = Counter(
         f"{fan.samples} beam{'s' if fan.samples > 1 else ''} over {math.degrees(fan.fov):g} deg, {fan.range_max:g} m, "
-        f"{beam_height(world, model, fan):.2f} m high"
+        f"{beam_height(model, world.poses[model.index], fan):.2f} m high"
         for fan in ranger.fans
     )
     for text, count in alike.items():

@@ -10,7 +10,7 @@ import numpy as np
 from kurumaisu.errors import Error
 from kurumaisu.maps import Grid
 from kurumaisu.types import BoolArray, FloatArray
-from kurumaisu.world.layout import in_map, moves
+from kurumaisu.world.layout import placed, travels
 from kurumaisu.world.model import Shape
 from kurumaisu.world.parts import edges
 from kurumaisu.world.world import World
@@ -72,10 +72,10 @@ def occupancy(world: World, resolution: float, height: float) -> Grid:
     """
     outlines = []
     for model in world.models:
-        if moves(world, model) or model.ranger_return < 0:
+        if travels(model, world.models) or model.ranger_return < 0:
             continue
         pose = world.poses[model.index]
-        outlines += [in_map(solid, pose) for solid in _solids(model.shape, height - float(pose[2]))]
+        outlines += [placed(solid, pose) for solid in _solids(model.shape, height - float(pose[2]))]
     if not any(map(len, outlines)):
         raise Error(f"{world.path}: nothing is {height:g} m above the ground, so its map would be empty")
     return rasterise(outlines, world.bounds, resolution, _MARGIN)

@@ -13,6 +13,7 @@ from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 from kurumaisu.world import catalogue
 from kurumaisu.world.bitmaps import is_map
+from kurumaisu.world.layout import placed, travels
 from kurumaisu.world.model import Model
 from kurumaisu.world.notes import Notes
 from kurumaisu.world.shapes import Shaper
@@ -144,7 +145,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values, vocabulary: Voca
     if interval < _SHORTEST:
         raise said.error("interval_sim", f"interval_sim must be at least {_SHORTEST:g} ms, not {interval:g}")
     poses = global_poses(models)
-    walls = [model for model in models if not _travels(model, models)]
+    walls = [model for model in models if not travels(model, models)]
     starts = (model for model in models if model.type == "position")
     return World(
         name=said.text("name", path.stem),
@@ -171,19 +172,6 @@ def _semantics(said: Values) -> str:
     return word
 
 
-def _travels(model: Model, models: tuple[Model, ...]) -> bool:
-    """Return whether a model is a position or walks, or stands on one that does."""
-    while model.type != "position" and model.walk is None and model.parent >= 0:
-        model = models[model.parent]
-    return model.type == "position" or model.walk is not None
-
-
 def _outlines(models: list[Model], poses: FloatArray) -> FloatArray:
     """Return the outlines (m, 4) of models in the map."""
-    parts = [np.empty((0, 4))]
-    for model in models:
-        x, y, _, heading = poses[model.index]
-        c, s = np.cos(heading), np.sin(heading)
-        points = model.shape.segments.reshape(-1, 2) @ np.array([[c, s], [-s, c]]) + [x, y]
-        parts.append(points.reshape(-1, 4))
-    return np.concatenate(parts)
+    return np.concatenate([np.empty((0, 4)), *(placed(m.shape.segments, poses[m.index]) for m in models)])
