@@ -12,6 +12,7 @@
 #include "raycast/arena.h"
 #include "raycast/arrays.h"
 #include "raycast/beam_arrays.h"
+#include "raycast/mover_arrays.h"
 #include "raycast/step.h"
 
 namespace kurumaisu {
@@ -39,38 +40,6 @@ std::unique_ptr<Arena> makeArena(const Array& walls, const Array& returns, const
   all.reserve(faces.size());
   for (std::size_t i = 0; i < faces.size(); ++i) all.push_back({faces[i], trees[i]});
   return std::make_unique<Arena>(std::move(all), threads);
-}
-
-void setPoses(Arena& arena, const py::array& bodies, const Array& poses) {
-  const std::vector<int> which = integers(bodies, -1, "bodies");
-  const std::vector<Pose> where = posesOf(poses, bodies.size(), "poses");
-  const py::gil_scoped_release release;
-  arena.setPoses(which, where.data());
-}
-
-Bools touches(Arena& arena, const py::array& bodies) {
-  const std::vector<int> which = integers(bodies, -1, "bodies");
-  Bools out(bodies.size());
-  bool* touching = out.mutable_data();
-  {
-    const py::gil_scoped_release release;
-    arena.touches(which, touching);
-  }
-  return out;
-}
-
-Bools move(Arena& arena, const py::array& bodies, const Array& poses, const py::object& groups) {
-  const std::vector<int> which = integers(bodies, -1, "bodies");
-  const std::vector<Pose> where = posesOf(poses, bodies.size(), "poses");
-  std::vector<int> together;
-  if (!groups.is_none()) together = integers(py::array(groups), bodies.size(), "groups");
-  Bools out(bodies.size());
-  bool* stalled = out.mutable_data();
-  {
-    const py::gil_scoped_release release;
-    arena.move(which, where.data(), together, stalled);
-  }
-  return out;
 }
 
 double* put(const Pose& pose, double* row) {
@@ -136,7 +105,7 @@ void bindArena(py::module_& m) {
       .def(
           "remove_body", [](Arena& arena, std::int64_t body) { arena.remove(asInt(body, "body")); },
           py::arg("body"), "Take a body away; its number stays unused.")
-      .def("set_poses", &setPoses, py::arg("bodies"), py::arg("poses"),
+      .def("set_poses", &setPoses<Arena>, py::arg("bodies"), py::arg("poses"),
            "Put bodies (b,) to poses (b, 4): x, y, z [m], heading [rad] of their frames in the map.")
       .def(
           "scan", &scan<Arena>, py::arg("origins"), py::arg("trees"), py::arg("fans"),
@@ -147,11 +116,11 @@ void bindArena(py::module_& m) {
       .def("cast", &cast<Arena>, py::arg("origins"), py::arg("trees"), py::arg("range_max"),
            "Ranges [m] and ranger returns (n,) of single rays from origins (n, 4): x, y, z [m], direction "
            "[rad].")
-      .def("touches", &touches, py::arg("bodies"),
+      .def("touches", &touches<Arena>, py::arg("bodies"),
            "Whether solid outlines of bodies (b,) touch solid outlines of other trees at common heights, or "
            "the "
            "ground.")
-      .def("move", &move, py::arg("bodies"), py::arg("poses"), py::arg("groups") = py::none(),
+      .def("move", &move<Arena>, py::arg("bodies"), py::arg("poses"), py::arg("groups") = py::none(),
            "Move bodies (b,) in this order to poses (b, 4), each as a whole or not at all; return which "
            "stalled "
            "(b,).\n"

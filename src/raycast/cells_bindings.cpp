@@ -8,6 +8,7 @@
 #include "bindings.h"
 #include "raycast/arrays.h"
 #include "raycast/cells.h"
+#include "raycast/mover_arrays.h"
 #include "raycast/outline_arrays.h"
 
 namespace kurumaisu {
@@ -21,38 +22,6 @@ void addWalls(Cells& cells, const py::array& parents, const Array& places, const
 int addBody(Cells& cells, const py::array& parents, const Array& places, const Array& edges,
             const py::array& parts, std::int64_t tree) {
   return cells.add(outlineOf(parents, places, edges, parts), asInt(tree, "tree"));
-}
-
-void setPoses(Cells& cells, const py::array& bodies, const Array& poses) {
-  const std::vector<int> which = integers(bodies, -1, "bodies");
-  const std::vector<Pose> where = posesOf(poses, bodies.size(), "poses");
-  const py::gil_scoped_release release;
-  cells.setPoses(which, where.data());
-}
-
-Bools touches(Cells& cells, const py::array& bodies) {
-  const std::vector<int> which = integers(bodies, -1, "bodies");
-  Bools out(bodies.size());
-  bool* touching = out.mutable_data();
-  {
-    const py::gil_scoped_release release;
-    cells.touches(which, touching);
-  }
-  return out;
-}
-
-Bools move(Cells& cells, const py::array& bodies, const Array& poses, const py::object& groups) {
-  const std::vector<int> which = integers(bodies, -1, "bodies");
-  const std::vector<Pose> where = posesOf(poses, bodies.size(), "poses");
-  std::vector<int> together;
-  if (!groups.is_none()) together = integers(py::array(groups), bodies.size(), "groups");
-  Bools out(bodies.size());
-  bool* stalled = out.mutable_data();
-  {
-    const py::gil_scoped_release release;
-    cells.move(which, where.data(), together, stalled);
-  }
-  return out;
 }
 
 Array drawn(Cells& cells, const py::array& bodies, std::int64_t layer) {
@@ -97,12 +66,12 @@ void bindCells(py::module_& m) {
       .def(
           "remove_body", [](Cells& cells, std::int64_t body) { cells.remove(asInt(body, "body")); },
           py::arg("body"), "Take a body away; its number stays unused.")
-      .def("set_poses", &setPoses, py::arg("bodies"), py::arg("poses"),
+      .def("set_poses", &setPoses<Cells>, py::arg("bodies"), py::arg("poses"),
            "Put bodies (b,) to poses (b, 4): x, y, z [m], heading [rad] of their frames in the map.")
       .def("turn", &Cells::turn, "Begin a step: moves draw to the other layer from now on.")
-      .def("touches", &touches, py::arg("bodies"),
+      .def("touches", &touches<Cells>, py::arg("bodies"),
            "Whether bodies (b,) touch others, walls or the ground in the layer of this step.")
-      .def("move", &move, py::arg("bodies"), py::arg("poses"), py::arg("groups") = py::none(),
+      .def("move", &move<Cells>, py::arg("bodies"), py::arg("poses"), py::arg("groups") = py::none(),
            "Move bodies (b,) in this order to poses (b, 4), each as a whole or not at all, neighbours of one "
            "group "
            "(b,) together;\n"
