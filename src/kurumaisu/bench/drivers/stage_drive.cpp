@@ -11,9 +11,8 @@
 #include <fstream>
 #include <iostream>
 #include <map>
-#include <vector>
-
 #include <stage.hh>
+#include <vector>
 
 namespace {
 
@@ -27,7 +26,8 @@ std::vector<double> readDoubles(const char* path) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   std::vector<double> values(static_cast<std::size_t>(file.tellg()) / sizeof(double));
   file.seekg(0);
-  file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(double)));
+  file.read(reinterpret_cast<char*>(values.data()),
+            static_cast<std::streamsize>(values.size() * sizeof(double)));
   return values;
 }
 
