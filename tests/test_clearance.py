@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from kurumaisu._core import Clearance, arcs
@@ -36,8 +36,9 @@ def gap(a: FloatArray, b: FloatArray) -> float:
     return float(min(found))
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 10**6))
+@example(seed=539041)  # begins within NEAR and opens
 def test_touches_are_found_in_time_and_not_before(seed: int) -> None:
     rng = np.random.default_rng(seed)
     wall = np.array([[*rng.uniform(-3, 3, 4), 0.0, 1.0]])
@@ -55,7 +56,7 @@ def test_touches_are_found_in_time_and_not_before(seed: int) -> None:
 
     for body, time in enumerate(times):
         before = [gaps(t)[body] for t in np.linspace(0, float(time), 60)]
-        assert min(before) >= NEAR * (1 - 1e-6) or time == 0
+        assert min(before) >= min(NEAR, before[0]) * (1 - 1e-6)  # what is near at the start may go away from it
         if 0 < time < LIMIT:
             assert before[-1] <= NEAR * 1.02
 
