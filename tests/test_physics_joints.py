@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from physics_scene import DT, DYNAMICS, box, motion, run, walls
 
-from kurumaisu.sim.bodies import assemble, movable
+from kurumaisu.sim.bodies import assemble, ground, movable
+from kurumaisu.sim.partition import build_arena, sort
 from kurumaisu.sim.physical import PhysicalMotion
 from kurumaisu.sim.rigid import GRAVITY
 from kurumaisu.sim.settings import Dynamics
@@ -29,8 +30,11 @@ def loaded(folder: Path, text: str, dynamics: Dynamics = DYNAMICS) -> PhysicalMo
     path = folder / "t.world"
     path.write_text(text)
     world = load_world(path)
-    moved = PhysicalMotion(*assemble(world.models, world.poses, dynamics), dynamics)
-    moved.place(world.poses[movable(world.models)])
+    moving = movable(world.models)
+    bodies = sort(world.models, [model.index in moving for model in world.models])
+    _, _, walls = build_arena(world.models, world.poses, bodies, threads=1)
+    moved = PhysicalMotion(assemble(world.models, world.poses, dynamics), ground(walls), dynamics)
+    moved.place(world.poses[moving])
     return moved
 
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from physics_scene import DYNAMICS
 from sim_worlds import OPTIONS, simulator
 
+from kurumaisu.geometry import relative
 from kurumaisu.sim import Simulator
 from kurumaisu.sim.machinery import Machinery
-from kurumaisu.sim.partition import relative
 from kurumaisu.sim.population import Population
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world

@@ -6,9 +6,10 @@ import pytest
 from sensing import BruteRays, make_model, rectangle
 
 from kurumaisu._core import Arena
+from kurumaisu.geometry import attached
 from kurumaisu.sim.sensors.bumper import BumperSensor, BumperSettings
 from kurumaisu.sim.sensors.fiducial import FiducialFinder
-from kurumaisu.sim.sensors.rays import Rays, place
+from kurumaisu.sim.sensors.rays import Rays
 from kurumaisu.sim.sensors.sonar import Sonar, SonarSettings
 from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world.model import Bumper, Fiducial, Model
@@ -34,7 +35,7 @@ def random_scene(request: pytest.FixtureRequest) -> tuple[Rays, Rays, FloatArray
     bodies = [arena.add_body(faces, np.ones(4), np.ones(4, dtype=bool), i) for i in range(ROBOTS)]
     arena.set_poses(np.array(bodies), poses)
     ends = [faces[:, [0, 1]], faces[:, [2, 3]]]
-    placed = [place(pose, np.hstack([end, np.zeros((4, 2))]))[:, :2].reshape(4, 2) for pose in poses for end in ends]
+    placed = [attached(pose, np.hstack([end, np.zeros((4, 2))]))[:, :2].reshape(4, 2) for pose in poses for end in ends]
     moved = np.hstack([np.concatenate(placed[0::2]), np.concatenate(placed[1::2]), np.tile(faces[:, 4:], (ROBOTS, 1))])
     trees: IntArray = np.concatenate([np.full(60, -1), np.repeat(np.arange(ROBOTS), 4)])
     return arena, BruteRays(np.concatenate([walls, moved]), trees=trees), poses, models

@@ -10,13 +10,12 @@ import pytest
 from sim_worlds import LASER, ROOM, drive, robot, simulator
 
 from kurumaisu.errors import Error
-from kurumaisu.geometry import wrap
+from kurumaisu.geometry import attached, wrap
 from kurumaisu.params import shipped
 from kurumaisu.settings import load
 from kurumaisu.sim import Simulator
 from kurumaisu.sim.options import read_options
 from kurumaisu.sim.sensors.camera import CameraSensor, Scenery, mounted_eye, stage_eye
-from kurumaisu.sim.sensors.rays import place
 from kurumaisu.types import FloatArray
 
 # Strips 0.01 m ahead of the robot's front and rear, 0.1 m above the ground
@@ -134,8 +133,8 @@ def layouts(poses: FloatArray) -> list[FloatArray]:
 def test_where_a_sensor_is_does_not_depend_on_the_layout_of_memory() -> None:
     poses = np.random.default_rng(2).uniform(-3, 3, (997, 4))
     mount = np.array([0.3, -0.2, 0.1, 0.7])
-    first, *others = (place(layout, mount) for layout in layouts(poses))
+    first, *others = (attached(layout, mount) for layout in layouts(poses))
     for other in others:
         np.testing.assert_array_equal(first, other)
     for one in range(0, 997, 83):  # nor on how many there are
-        np.testing.assert_array_equal(place(poses[one : one + 1], mount)[0], first[one])
+        np.testing.assert_array_equal(attached(poses[one : one + 1], mount)[0], first[one])

@@ -10,11 +10,12 @@ from sim_worlds import ROOM, drive, robot, simulator
 from kurumaisu.effects import Reference
 from kurumaisu.errors import Error
 from kurumaisu.ros.stageros_names import Names
-from kurumaisu.ros.stageros_newcomers import family, renumbered
+from kurumaisu.ros.stageros_newcomers import renumbered
 from kurumaisu.ros.stageros_rates import Pace
 from kurumaisu.ros.stageros_saved import packed_names, unpacked_names
 from kurumaisu.ros.stageros_settings import read_settings
 from kurumaisu.ros.stageros_truth import Truth
+from kurumaisu.world.layout import family
 
 
 def pace(interval=0.1, **rates):
@@ -96,7 +97,7 @@ def test_other_files_are_refused(damage):
 
 def test_a_copy_is_numbered_from_0(tmp_path):
     models = simulator(tmp_path, robot() + robot("model ( model ( ) ) model ( )")).models
-    copy = renumbered(family(models, models[1]), "twin")
+    copy = renumbered([models[index] for index in family(models, 1)], "twin")
     assert [(m.index, m.parent, m.root, m.name) for m in copy] == [
         *((0, -1, 0, "twin"), (1, 0, 0, None), (2, 1, 0, None), (3, 0, 0, None))
     ]

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Poses in the plane: arrays (..., 3) of x [m], y [m], theta [rad]."""
+"""Poses in the plane: arrays (..., 3) of x [m], y [m], theta [rad]; and, with z, (..., 4) of x, y, z, heading."""
 
 import numpy as np
 
 from kurumaisu.types import FloatArray
+
+PLANAR = [0, 1, 3]  # of a pose (..., 4)
 
 
 def wrap(angle: FloatArray | float) -> FloatArray:
@@ -39,6 +41,28 @@ def between(a: FloatArray, b: FloatArray) -> FloatArray:
     c, s = cos_sin(a[..., 2])
     dx, dy = b[..., 0] - a[..., 0], b[..., 1] - a[..., 1]
     return np.stack([c * dx + s * dy, -s * dx + c * dy, b[..., 2] - a[..., 2]], axis=-1)
+
+
+def relative(frame: FloatArray, pose: FloatArray) -> FloatArray:
+    """Return a pose (..., 4) of the map as seen in a frame (..., 4) of the map."""
+    c, s = cos_sin(frame[..., 3])
+    d = pose - frame
+    return np.stack([c * d[..., 0] + s * d[..., 1], c * d[..., 1] - s * d[..., 0], d[..., 2], d[..., 3]], axis=-1)
+
+
+def attached(frame: FloatArray, pose: FloatArray) -> FloatArray:
+    """Return in the map what is a pose (..., 4) in a frame (..., 4); the heading is not wrapped."""
+    c, s = cos_sin(frame[..., 3])
+    x, y = pose[..., 0], pose[..., 1]
+    return np.stack(
+        [
+            frame[..., 0] + c * x - s * y,
+            frame[..., 1] + s * x + c * y,
+            frame[..., 2] + pose[..., 2],
+            frame[..., 3] + pose[..., 3],
+        ],
+        axis=-1,
+    )
 
 
 def interpolate(times: FloatArray, poses: FloatArray, at: FloatArray) -> FloatArray:

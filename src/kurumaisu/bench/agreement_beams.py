@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kurumaisu.geometry import attached
 from kurumaisu.sim import fans, partition
 from kurumaisu.sim.cells import build_cell_rays
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -52,7 +53,7 @@ class Observer:
         ranges, models = [], []
         for frame in heads:
             rays.set_poses(numbers[self._body : self._body + 1], frame[np.newaxis])
-            origins = np.array([partition.attached(frame, fan.mount) for fan in self._fans])
+            origins = np.array([attached(frame, fan.mount) for fan in self._fans])
             distances, met = rays.scan(origins, self._trees(len(origins)), layout)
             ranges.append(np.where(np.isinf(distances), self._reach, distances))
             models.append(met)
@@ -64,7 +65,7 @@ class Observer:
         arena, numbers, _ = partition.build_arena(self._models, world.poses, self._bodies, 1)
         rays = []
         for fan in self._fans:
-            origins = partition.attached(frames, fan.mount)[:, np.newaxis].repeat(fan.fan.samples, axis=1)
+            origins = attached(frames, fan.mount)[:, np.newaxis].repeat(fan.fan.samples, axis=1)
             origins[..., 3] += fan.bearings
             rays.append(origins)
         eyes, reach = np.concatenate(rays, axis=1), self._reach

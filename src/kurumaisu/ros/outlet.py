@@ -9,6 +9,8 @@ from typing import Any
 
 import rospy
 
+DEPTH = 10  # messages kept for a slow subscriber, on every topic but /tf, as in stage_ros
+
 
 class Outlet:
     """Advertises as rospy.Publisher does, then hands bytes to the sockets itself.
@@ -91,3 +93,14 @@ class Outlet:
         connection.stat_bytes += taken
         connection.stat_num_msg += 1
         return taken
+
+
+class OutletTopic:
+    """What publishes on one outlet."""
+
+    def __init__(self, name: str, kind: type) -> None:
+        self._outlet = Outlet(name, kind, DEPTH)
+
+    def close(self) -> None:
+        """End the topic."""
+        self._outlet.close()

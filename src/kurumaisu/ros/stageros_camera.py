@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image
 
-from kurumaisu.ros.outlet import Outlet
+from kurumaisu.ros.outlet import DEPTH, Outlet
 from kurumaisu.ros.rotation import optical
 from kurumaisu.ros.sensor_messages import intrinsics
 from kurumaisu.ros.stageros_plan import CameraPlan, RobotPlan
 from kurumaisu.ros.stageros_rates import Pace
-from kurumaisu.ros.stageros_robot import DEPTH
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.ros.wire import CameraInfoWire, ImageWire, Stamp, TransformsWire
 from kurumaisu.sim.sensors.camera import (

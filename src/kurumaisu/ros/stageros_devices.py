@@ -11,19 +11,17 @@ import rospy
 from geometry_msgs.msg import Point, Pose
 from std_msgs.msg import UInt8MultiArray
 
-from kurumaisu.geometry import compose
+from kurumaisu.geometry import PLANAR, compose
 from kurumaisu.msg import Fiducials
-from kurumaisu.ros.outlet import Outlet
+from kurumaisu.ros.outlet import OutletTopic
 from kurumaisu.ros.rotation import quaternion_of
 from kurumaisu.ros.stageros_plan import DevicePlan
 from kurumaisu.ros.wire import Stamp, packed
 from kurumaisu.sim.devices import Value
 from kurumaisu.sim.sensors.fiducial import Sightings
 
-_DEPTH = 10  # messages kept for a slow subscriber
 
-
-class DeviceTopic:
+class DeviceTopic(OutletTopic):
     """A bumper as std_msgs/UInt8MultiArray, or a finder as kurumaisu/Fiducials in base_link."""
 
     def __init__(self, plan: DevicePlan, frame: str, every: int) -> None:
@@ -32,7 +30,7 @@ class DeviceTopic:
         self.every = every
         self._frame = frame
         self._newest: Value | None = None
-        self._outlet = Outlet(plan.topic, UInt8MultiArray if plan.kind == "bumper" else Fiducials, _DEPTH)
+        super().__init__(plan.topic, UInt8MultiArray if plan.kind == "bumper" else Fiducials)
 
     def take(self, readings: Mapping[int, Value]) -> None:
         """Note the reading of this step, if there is one."""
@@ -46,10 +44,6 @@ class DeviceTopic:
         if self._outlet.wanted:
             self._outlet.send(packed(self._message(self._newest, seq, stamp)))
 
-    def close(self) -> None:
-        """End the topic."""
-        self._outlet.close()
-
     def _message(self, value: Value, seq: int, stamp: Stamp) -> Any:
         if not isinstance(value, Sightings):
             return UInt8MultiArray(data=np.asarray(value, dtype=np.uint8).tobytes())
@@ -61,5 +55,5 @@ class DeviceTopic:
     def _poses(self, seen: Sightings) -> list[Pose]:
         mount = self.plan.mount
         ahead, aside = seen.range * np.cos(seen.bearing), seen.range * np.sin(seen.bearing)
-        places = compose(mount[[0, 1, 3]], np.stack([ahead, aside, seen.heading], axis=-1))
+        places = compose(mount[PLANAR], np.stack([ahead, aside, seen.heading], axis=-1))
         return [Pose(Point(x, y, float(mount[2])), quaternion_of(heading)) for x, y, heading in places.tolist()]

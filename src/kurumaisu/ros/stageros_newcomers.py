@@ -9,15 +9,6 @@ from dataclasses import replace
 from kurumaisu.world.model import Model
 
 
-def family(models: Sequence[Model], first: Model) -> list[Model]:
-    """Return a model and all that stand on it."""
-    members = {first.index}
-    for model in models[first.index + 1 :]:
-        if model.parent in members:
-            members.add(model.index)
-    return [model for model in models if model.index in members]
-
-
 def is_text(like: str) -> bool:
     """Return whether this describes a model instead of naming one."""
     return "(" in like

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.geometry import compose
 from kurumaisu.ros.stageros_names import Names, devices_of, robots_of
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.types import FloatArray
+from kurumaisu.world.layout import beam_place
 from kurumaisu.world.model import Bumper, Camera, Device, Fan, Fiducial, Model, Ranger
 
 _DEVICES: dict[str, tuple[type[Device], str]] = {"bumper": (Bumper, "bumper"), "fiducial": (Fiducial, "fiducials")}
@@ -126,18 +126,7 @@ def _sensors(models: Sequence[Model], robot: Model, ranger: Model, every: bool) 
     top = np.array([0.0, 0.0, robot.size[2], 0.0])
     if not every or not fans:  # stage_ros' frame leaves out the ranger's origin and the sensor's pose
         return [_Sensor(ranger.pose + top, fans[0] if fans else None, first)]
-    return [_Sensor(_beam_plane(ranger, fan) + top, fan, first + number) for number, fan in enumerate(fans)]
-
-
-def _beam_plane(ranger: Model, fan: Fan) -> FloatArray:
-    """Return where a sensor's beams start, (4,), from the robot's top."""
-    planar = compose(compose(_planar(ranger.pose), _planar(ranger.origin)), _planar(fan.pose))
-    z = ranger.pose[2] + ranger.origin[2] + fan.pose[2] + fan.height / 2
-    return np.array([planar[0], planar[1], z, planar[2]])
-
-
-def _planar(pose: FloatArray) -> FloatArray:
-    return pose[[0, 1, 3]]
+    return [_Sensor(beam_place(ranger, ranger.pose, fan) + top, fan, first + number) for number, fan in enumerate(fans)]
 
 
 def _readings_before(models: Sequence[Model], device: Model) -> int:

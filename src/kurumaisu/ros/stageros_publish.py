@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
-from kurumaisu.ros.outlet import Outlet
+from kurumaisu.ros.outlet import DEPTH, Outlet
 from kurumaisu.ros.stageros_camera import Cameras
 from kurumaisu.ros.stageros_names import Names
 from kurumaisu.ros.stageros_plan import RobotPlan
 from kurumaisu.ros.stageros_rates import Pace
-from kurumaisu.ros.stageros_robot import DEPTH, Ears, RobotTopics, Timing, transform_of
+from kurumaisu.ros.stageros_robot import Ears, RobotTopics, Timing, transform_of
 from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.ros.stageros_truth import Truth
 from kurumaisu.ros.wire import ClockWire, Stamp, TransformsWire, planar

@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan, Range
 from std_msgs.msg import Bool
 
-from kurumaisu.ros.outlet import Outlet
+from kurumaisu.ros.outlet import OutletTopic
 from kurumaisu.ros.stageros_devices import DeviceTopic
 from kurumaisu.ros.stageros_plan import RobotPlan, ScanPlan
 from kurumaisu.ros.stageros_rates import Pace
@@ -22,8 +22,6 @@ from kurumaisu.ros.wire import BoolWire, LaserScanWire, OdometryWire, RangeWire,
 from kurumaisu.sim.scans import Scan
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Fan
-
-DEPTH = 10  # messages kept for a slow subscriber, on every topic, as in stage_ros
 
 
 @dataclass(frozen=True)
@@ -42,11 +40,11 @@ class Ears:
     pose: Callable[[Pose], None]
 
 
-class ScanTopic:
+class ScanTopic(OutletTopic):
     """A sensor as sensor_msgs/LaserScan."""
 
     def __init__(self, plan: ScanPlan, fan: Fan, timing: Timing) -> None:
-        self._outlet = Outlet(plan.topic, LaserScan, DEPTH)
+        super().__init__(plan.topic, LaserScan)
         self._wire = LaserScanWire(_fan_message(plan, fan, timing), fan.samples)
         self._miss = fan.range_max
         self._is_noisy = bool(fan.noise.any())
@@ -60,10 +58,6 @@ class ScanTopic:
             self._wire.intensities[:] = reading.returns
             self._outlet.send(self._wire.data)
 
-    def close(self) -> None:
-        """End the topic."""
-        self._outlet.close()
-
     def _write(self, ranges: FloatArray) -> None:
         """Write ranges, a miss as range_max; noise may lift others above it, as in Stage."""
         if self._is_noisy:
@@ -72,11 +66,11 @@ class ScanTopic:
             np.minimum(ranges, self._miss, out=self._wire.ranges, casting="same_kind")
 
 
-class RangeTopic:
+class RangeTopic(OutletTopic):
     """A sensor of one beam as sensor_msgs/Range."""
 
     def __init__(self, plan: ScanPlan, fan: Fan) -> None:
-        self._outlet = Outlet(plan.topic, Range, DEPTH)
+        super().__init__(plan.topic, Range)
         message = Range(radiation_type=Range.ULTRASOUND, field_of_view=fan.fov)
         message.min_range, message.max_range = fan.range_min, fan.range_max
         message.header.frame_id = plan.frame
@@ -91,16 +85,12 @@ class RangeTopic:
             self._wire.fill(min(float(reading.ranges[0]), self._miss))
             self._outlet.send(self._wire.data)
 
-    def close(self) -> None:
-        """End the topic."""
-        self._outlet.close()
 
-
-class OdometryTopic:
+class OdometryTopic(OutletTopic):
     """Poses and rates as nav_msgs/Odometry."""
 
     def __init__(self, topic: str, wire: OdometryWire) -> None:
-        self._outlet = Outlet(topic, Odometry, DEPTH)
+        super().__init__(topic, Odometry)
         self._wire = wire
 
     def publish(self, pose: Sequence[float], twist: Sequence[float], stamp: Stamp) -> None:
@@ -111,16 +101,12 @@ class OdometryTopic:
             self._wire.fill(pose, twist)
             self._outlet.send(self._wire.data)
 
-    def close(self) -> None:
-        """End the topic."""
-        self._outlet.close()
 
-
-class CollisionTopic:
+class CollisionTopic(OutletTopic):
     """Whether the robot pushes against something, as std_msgs/Bool."""
 
     def __init__(self, topic: str) -> None:
-        self._outlet = Outlet(topic, Bool, DEPTH)
+        super().__init__(topic, Bool)
         self._wire = BoolWire()
 
     def publish(self, stalled: bool) -> None:
@@ -128,10 +114,6 @@ class CollisionTopic:
         if self._outlet.wanted:
             self._wire.fill(stalled)
             self._outlet.send(self._wire.data)
-
-    def close(self) -> None:
-        """End the topic."""
-        self._outlet.close()
 
 
 class RobotTopics:

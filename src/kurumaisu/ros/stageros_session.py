@@ -16,7 +16,7 @@ from geometry_msgs.msg import Pose, Twist
 from kurumaisu.errors import Error
 from kurumaisu.ros.rotation import pose_of
 from kurumaisu.ros.stageros_names import Names, names_of, names_of_another
-from kurumaisu.ros.stageros_newcomers import family, is_text, renumbered
+from kurumaisu.ros.stageros_newcomers import is_text, renumbered
 from kurumaisu.ros.stageros_plan import plan_world
 from kurumaisu.ros.stageros_publish import Publisher
 from kurumaisu.ros.stageros_robot import Ears
@@ -25,6 +25,7 @@ from kurumaisu.ros.stageros_settings import StagerosSettings
 from kurumaisu.sim.simulator import Simulator
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World, read_snippet
+from kurumaisu.world.layout import family
 from kurumaisu.world.model import Model
 
 _NS = 1_000_000_000
@@ -129,7 +130,7 @@ class Session:
 
         Raise Error for an unknown model, a text that makes no sense, or a name that is taken.
         """
-        models = self._described(like) if is_text(like) else family(self._simulator.models, self._model(like))
+        models = self._described(like) if is_text(like) else self._with_all_on_it(like)
         models = renumbered(models, name or (models[0].name if is_text(like) else None))
         taken = {model.name for model in self._simulator.models} & {model.name for model in models if model.name}
         if models[0].name in taken:
@@ -141,7 +142,7 @@ class Session:
 
     def delete(self, name: str) -> None:
         """Take a model with all that stands on it away. Raise Error for an unknown one."""
-        gone = {model.index for model in family(self._simulator.models, self._model(name))}
+        gone = {model.index for model in self._with_all_on_it(name)}
         stay = [names for names, row in self._rows.items() if self._simulator.robots[row].index not in gone]
         self._simulator.delete(self._model(name))
         self._take(stay)
@@ -168,6 +169,10 @@ class Session:
         for warning in snippet.warnings:
             rospy.logwarn(f"STAGEROS_WORLD {warning}")
         return snippet.models
+
+    def _with_all_on_it(self, name: str) -> Sequence[Model]:
+        models = self._simulator.models
+        return [models[index] for index in family(models, self._model(name).index)]
 
     def _model_poses(self) -> FloatArray:
         return self._simulator.model_poses

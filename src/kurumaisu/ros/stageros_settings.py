@@ -14,8 +14,6 @@ from kurumaisu.ros.stageros_rates import Rates, read_rates
 from kurumaisu.settings import Section
 from kurumaisu.sim.options import Options, read_options
 
-FRAMES = ("odom", "base_footprint", "base_link", "base_laser_link", "base_sonar_link", "camera")
-
 
 @dataclass(frozen=True)
 class Frames:

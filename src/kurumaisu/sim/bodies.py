@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What moves as one piece, and what never moves, from the models of a world."""
+"""What moves as one piece, from the models of a world, and what never moves, from its walls."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.sim.gripping import relative
+from kurumaisu.geometry import relative
+from kurumaisu.sim.partition import Outline
 from kurumaisu.sim.rigid import Ground, Part, Pivot, Rigid, convex, moved, rigid
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import FloatArray
+from kurumaisu.world.layout import outline
 from kurumaisu.world.model import Gripper, Model, Position, Shape
 
 _LIGHTEST = 1.0e-3  # [kg] of what has no size to guess its mass from
@@ -22,8 +24,8 @@ def movable(models: Sequence[Model]) -> list[int]:
     return [m.index for m in models if _driven(m) or m.hinge is not None or (m.parent < 0 and m.mass > 0)]
 
 
-def assemble(models: Sequence[Model], poses: FloatArray, dynamics: Dynamics) -> tuple[list[Rigid], Ground]:
-    """Return a piece for each movable model, in their order, and the ground; poses (n, 4) are the models' in the map.
+def assemble(models: Sequence[Model], poses: FloatArray, dynamics: Dynamics) -> list[Rigid]:
+    """Return a piece for each movable model, in their order; poses (n, 4) are the models' in the map.
 
     A model that is not movable belongs to the nearest ancestor that is, or to the ground. A piece's mass is the sum
     of its models' masses; a robot without any has dynamics.density times its size.
@@ -33,10 +35,12 @@ def assemble(models: Sequence[Model], poses: FloatArray, dynamics: Dynamics) -> 
     for index in movable(models):
         members = [m for m in models if owners[m.index] == index]
         pieces.append(_rigid(models[index], members, poses, dynamics))
-    still = [m for m in models if owners[m.index] < 0 and m.obstacle_return]
-    walls = [_placed(m.shape, poses[m.index]) for m in still]
-    trees = [np.full(len(w), m.root) for m, w in zip(still, walls, strict=True)]
-    return pieces, Ground(np.concatenate([np.empty((0, 6)), *walls]), np.concatenate([np.empty(0, np.int64), *trees]))
+    return pieces
+
+
+def ground(walls: Outline) -> Ground:
+    """Return what is solid of walls."""
+    return Ground(walls.faces[walls.solid], walls.trees[walls.solid])
 
 
 def _driven(model: Model) -> bool:
@@ -62,7 +66,7 @@ def _rigid(model: Model, members: Sequence[Model], poses: FloatArray, dynamics: 
         if m.obstacle_return:
             place = relative(poses[model.index], poses[m.index])
             parts += _parts(m.shape, place)
-            edges.append(_placed(m.shape, place))
+            edges.append(outline(m, place))
     own_friction = dynamics.wheel_friction if driven else dynamics.floor_friction
     piece = rigid(
         parts,
@@ -101,12 +105,6 @@ def _jaws(model: Model, pose: FloatArray) -> Part:
 
 def _flat(pose: FloatArray) -> FloatArray:
     return np.array([pose[0], pose[1], 0.0, pose[3]])
-
-
-def _placed(shape: Shape, pose: FloatArray) -> FloatArray:
-    """Return a shape's segments and heights, (m, 6), at a pose (4,)."""
-    ends = moved(shape.segments.reshape(-1, 2), pose).reshape(-1, 4)
-    return np.concatenate([ends, shape.heights + pose[2]], axis=1)
 
 
 def _parts(shape: Shape, pose: FloatArray) -> list[Part]:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from kurumaisu.params import Chassis
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
+from kurumaisu.world.layout import family
 from kurumaisu.world.model import Model, Place, Polygon, Position, Shape
 
 _BLUE = (0.2, 0.3, 0.6, 1.0)
@@ -37,7 +37,7 @@ def seat(world: World, chassis: Chassis) -> Scene:
     index = len(models) if first is None else first.index
     z = 0.0 if first is None else float(world.poses[index, 2])
     pose = np.array([x, y, z, heading])
-    for rider in _riders(models, index):
+    for rider in family(models, index)[1:]:
         models[rider] = _bare(models[rider])
     models[index : index + 1] = [_chair(world, first, index, pose, chassis)]
     poses = np.concatenate([world.poses, np.zeros((len(models) - len(world.poses), 4))])
@@ -114,12 +114,3 @@ def _bare(model: Model) -> Model:
         walk=None,
         slope=None,
     )
-
-
-def _riders(models: Sequence[Model], index: int) -> list[int]:
-    """Return the models that stand on one, directly or not."""
-    riders: list[int] = []
-    for model in models:
-        if model.parent == index or model.parent in riders:
-            riders.append(model.index)
-    return riders

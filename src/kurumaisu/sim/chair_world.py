@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from kurumaisu.errors import Error
-from kurumaisu.geometry import between
+from kurumaisu.geometry import PLANAR, attached, between, relative
 from kurumaisu.params import Chassis
 from kurumaisu.sim import snapshot
 from kurumaisu.sim.chair_body import Scene, outline
@@ -17,7 +17,7 @@ from kurumaisu.sim.following import Followed
 from kurumaisu.sim.life import checked_pose, moved
 from kurumaisu.sim.machinery import Machinery
 from kurumaisu.sim.options import OdometryWalk, Options
-from kurumaisu.sim.partition import Distort, attached, relative
+from kurumaisu.sim.partition import Distort
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import FloatArray
@@ -57,7 +57,7 @@ class ChairWorld:
         machinery = self.machinery
         machinery.place(machinery.population.poses[machinery.bodies.heads])
         machinery.begin(0)
-        self.pose = machinery.frames[self.body, [0, 1, 3]]
+        self.pose = machinery.frames[self.body, PLANAR]
 
     def drive(self, v: float, w: float, u: float) -> tuple[FloatArray, bool]:
         """Move all for a step; the motors want v forward, u leftward [m/s], w [rad/s].
@@ -102,7 +102,7 @@ class ChairWorld:
             if self.overlaps():
                 moved(self.machinery, index, before)
                 raise Error(f"{name}: does not fit at {np.asarray(pose).tolist()}")
-            self.pose = self.machinery.frames[self.body, [0, 1, 3]]
+            self.pose = self.machinery.frames[self.body, PLANAR]
 
     def overlaps(self) -> bool:
         """Return whether the chair touches something solid, or something solid is inside of it."""

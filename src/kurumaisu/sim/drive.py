@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kurumaisu.geometry import PLANAR
 from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world.model import Position
 
-_PLANAR = [0, 1, 3]  # of Stage's x, y, z, heading
 Rows = slice | IntArray
 
 
@@ -20,8 +20,8 @@ class Drive:
     def __init__(self, robots: Sequence[Position], spans: FloatArray, limit_acceleration: bool) -> None:
         """Start with the velocities of the world file; spans (n,) [s] lie between a robot's updates."""
         n = len(robots)
-        self.velocities = _rows([robot.velocity[_PLANAR] for robot in robots])
-        bounds = [robot.velocity_bounds[_PLANAR] for robot in robots]
+        self.velocities = _rows([robot.velocity[PLANAR] for robot in robots])
+        bounds = [robot.velocity_bounds[PLANAR] for robot in robots]
         self._lowest, self._highest = (_rows([b[:, side] for b in bounds]) for side in (0, 1))
         self._axes = _rows([np.array([1.0, float(robot.drive == "omni"), 1.0]) for robot in robots])
         self._cars = np.array([i for i in range(n) if robots[i].drive == "car"], dtype=np.int64)
@@ -58,7 +58,7 @@ def _gains(robots: Sequence[Position], spans: FloatArray) -> tuple[FloatArray, F
     """Return the largest loss and gain of velocity (n, 3) from one update to the next."""
     free = np.array([[-np.inf, np.inf]] * 4)
     given = [free if robot.acceleration_bounds is None else robot.acceleration_bounds for robot in robots]
-    low, high = (_rows([b[_PLANAR, side] for b in given]) * spans[:, np.newaxis] for side in (0, 1))
+    low, high = (_rows([b[PLANAR, side] for b in given]) * spans[:, np.newaxis] for side in (0, 1))
     return low, high
 
 

@@ -11,13 +11,11 @@ import numpy as np
 
 from kurumaisu._core import Arena
 from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
-from kurumaisu.geometry import compose, interpolate
+from kurumaisu.geometry import PLANAR, compose, interpolate
 from kurumaisu.sim.fans import RangerFan, moments
 from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.sensors.ranger_noise import deviation
 from kurumaisu.types import FloatArray
-
-_PLANAR = [0, 1, 3]
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class FanEffects:
         self._rng = rng
         self._arena = arena
         self._step = step
-        self._mount = fan.mount[_PLANAR]
+        self._mount = fan.mount[PLANAR]
         self._times: list[float] = []  # of the poses below [s]
         self._poses: list[FloatArray] = []  # (4,) of the body, as far back as the next scan may need them
 
@@ -117,7 +115,7 @@ class FanEffects:
 
     def _at(self, times: FloatArray) -> FloatArray:
         """Return where the body is (n, 3) at times (n,); after the last one it goes on as before."""
-        known = np.array(self._poses)[:, _PLANAR]
+        known = np.array(self._poses)[:, PLANAR]
         known[:, 2] = np.unwrap(known[:, 2])
         ahead = np.maximum(times - self._times[-1], 0.0) / self._step
         way = known[-1] - known[-2]

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.sim.partition import Bodies, attached, relative
+from kurumaisu.geometry import relative
+from kurumaisu.sim.partition import Bodies
 from kurumaisu.types import FloatArray
+from kurumaisu.world.layout import beam_place
 from kurumaisu.world.model import Fan, Model, Ranger
 
 
@@ -39,8 +41,7 @@ def find(models: Sequence[Model], poses: FloatArray, bodies: Bodies, robots: Seq
         if isinstance(model.device, Ranger):
             body = int(bodies.body_of[model.index])
             for number, fan in enumerate(model.device.fans):
-                eye = fan.pose + np.array([0.0, 0.0, fan.height / 2, 0.0])
-                place = attached(attached(poses[model.index], model.origin), eye)
+                place = beam_place(model, poses[model.index], fan)
                 found.append(
                     RangerFan(
                         model, number, robot_of.get(body, -1), body, fan, relative(frames[body], place), bearings(fan)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kurumaisu._core import Clearance
-from kurumaisu.geometry import between, compose
+from kurumaisu.geometry import PLANAR, compose, relative
 from kurumaisu.sim.rigid import Part, Rigid, joined, moved
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -64,7 +64,7 @@ class Grips:
         """Put what is held where its holder has taken it, in place."""
         rows = np.flatnonzero(self.held)
         carriers = poses[self.holders[rows]]
-        x, y, heading = compose(carriers[:, [0, 1, 3]], self.offsets[rows][:, [0, 1, 3]]).T
+        x, y, heading = compose(carriers[:, PLANAR], self.offsets[rows][:, PLANAR]).T
         poses[rows, 0], poses[rows, 1], poses[rows, 3] = x, y, heading
         poses[rows, 2] = carriers[:, 2] + self.offsets[rows, 2]
 
@@ -99,12 +99,6 @@ class Grips:
             piece = joined(piece, held) if held else piece
         self.rigids[row] = piece
         self._clearance.replace_body(int(self._numbers[row]), piece.edges)
-
-
-def relative(base: FloatArray, pose: FloatArray) -> FloatArray:
-    """Return a pose (4,) in the frame of another."""
-    x, y, heading = between(base[[0, 1, 3]], pose[[0, 1, 3]])
-    return np.array([x, y, pose[2] - base[2], heading])
 
 
 def _overlap(a: Part, b: Part) -> bool:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu._core import Clearance
+from kurumaisu.geometry import PLANAR
 from kurumaisu.sim.contact_space import ContactSpace, Exchange
 from kurumaisu.sim.joints import Hinges
 from kurumaisu.sim.rigid import Ground, Rigid
@@ -109,7 +110,7 @@ class Island:
                 break
             step = touch
         moving.poses = poses
-        moving.poses[:, [0, 1, 3]] += ways * step
+        moving.poses[:, PLANAR] += ways * step
         self._hinges.project(moving.poses, velocities)
         moving.velocities, moving.hindered = velocities, hindered
         return step
@@ -118,9 +119,9 @@ class Island:
         """Return the velocities for a substep, who is hindered, and the poses, overlaps pushed apart."""
         targets = chords(moving.poses[:, 3], moving.commands, step)
         start = np.where((self._imposed & ~moving.hindered)[:, None], targets, moving.velocities)
-        planar, velocities = self._space.solve(moving.poses[:, [0, 1, 3]], start, targets[self._driven], step)
+        planar, velocities = self._space.solve(moving.poses[:, PLANAR], start, targets[self._driven], step)
         poses = moving.poses.copy()
-        poses[:, [0, 1, 3]] = planar
+        poses[:, PLANAR] = planar
         hindered = self._driven & (np.abs(velocities - targets).max(axis=1) > _AT_REST)
         return velocities, hindered, poses
 

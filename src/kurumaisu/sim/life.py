@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from kurumaisu.errors import Error
+from kurumaisu.geometry import attached, relative
 from kurumaisu.sim.machinery import Machinery
-from kurumaisu.sim.partition import attached, relative
 from kurumaisu.sim.population import Population
 from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world.model import Model

@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu.effects import Reference
 from kurumaisu.errors import Error
-from kurumaisu.geometry import between, wrap
+from kurumaisu.geometry import PLANAR, attached, between, relative, wrap
 from kurumaisu.sim import fans
 from kurumaisu.sim.cells import build_cell_rays, build_cells
 from kurumaisu.sim.collisions import Collisions, Crossing, SharedCells
@@ -20,7 +20,7 @@ from kurumaisu.sim.fleet_effects import FleetEffects
 from kurumaisu.sim.motion import StageMotion
 from kurumaisu.sim.odometry import Localization
 from kurumaisu.sim.options import Options
-from kurumaisu.sim.partition import Distort, attached, build_arena, is_robot, relative, sort
+from kurumaisu.sim.partition import Distort, build_arena, is_robot, sort
 from kurumaisu.sim.pedestrians import Pedestrians
 from kurumaisu.sim.population import Population
 from kurumaisu.sim.rangers import Rangers
@@ -32,8 +32,6 @@ from kurumaisu.world.model import Model, Position
 
 if TYPE_CHECKING:
     from kurumaisu.sim.following import Followed
-
-_PLANAR = [0, 1, 3]
 
 
 class Machinery:
@@ -113,16 +111,14 @@ class Machinery:
         if self.dynamics is None:
             return StageMotion(self.collisions, self.bodies)
         # these load pymunk, which Stage's semantics need not pay for
-        from kurumaisu.sim.bodies import assemble
+        from kurumaisu.sim.bodies import assemble, ground
         from kurumaisu.sim.following import Followed
         from kurumaisu.sim.physical import PhysicalMotion
-        from kurumaisu.sim.rigid import Ground
 
         start = self.population
-        pieces, _ = assemble(start.models, start.poses, self.dynamics)
-        walls = self.walls
-        ground = Ground(walls.faces[walls.solid], walls.trees[walls.solid])
-        return Followed(self.arena, self.numbers, PhysicalMotion(pieces, ground, self.dynamics), self.bodies.carrier)
+        pieces = assemble(start.models, start.poses, self.dynamics)
+        motion = PhysicalMotion(pieces, ground(self.walls), self.dynamics)
+        return Followed(self.arena, self.numbers, motion, self.bodies.carrier)
 
     def _make_slopes(self) -> Slopes:
         """Return the slopes of what stands still; Stage knows none."""
@@ -217,7 +213,7 @@ class Machinery:
     def rates(self) -> FloatArray:
         """Return how the robots (n, 3) moved in the last step: forward, leftward [m/s], turn [rad/s]; stalled: 0."""
         rows = self.robot_rows
-        way = between(self.before[rows][:, _PLANAR], self.frames[rows][:, _PLANAR])
+        way = between(self.before[rows][:, PLANAR], self.frames[rows][:, PLANAR])
         way[:, 2] = wrap(way[:, 2])
         return way / self.interval
 
@@ -225,7 +221,7 @@ class Machinery:
         """Return what a reference measures of the robots; None: the truth."""
         if not self.effects.referred:
             return None
-        return self.effects.seen(time, self.robot_poses[:, _PLANAR], self.rates())
+        return self.effects.seen(time, self.robot_poses[:, PLANAR], self.rates())
 
     def grip(self, robot: int, closed: bool) -> bool:
         """Close or open a robot's gripper; return whether it holds something now. Raise Error in Stage's semantics."""

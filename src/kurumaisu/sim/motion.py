@@ -8,8 +8,9 @@ from typing import Protocol
 import numpy as np
 
 from kurumaisu._core import step
+from kurumaisu.geometry import attached, relative
 from kurumaisu.sim.collisions import Collisions
-from kurumaisu.sim.partition import Bodies, attached, relative
+from kurumaisu.sim.partition import Bodies
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 StateArray = FloatArray | BoolArray

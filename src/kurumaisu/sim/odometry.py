@@ -7,13 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kurumaisu.geometry import between, compose, wrap
+from kurumaisu.geometry import PLANAR, between, compose, wrap
 from kurumaisu.sim.drive import Rows
 from kurumaisu.sim.options import OdometryWalk
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Position
 
-_PLANAR = [0, 1, 3]
 # Largest shares of x, y and heading that Stage draws where the world file gives no odom_error; drawn within +-half.
 _DEFAULT_ERROR = np.array([0.03, 0.03, 0.05])
 
@@ -35,20 +34,20 @@ class Localization:
         """
         self._interval = interval
         self._advance = advance_on_arc if exact else advance
-        origins = starts[:, _PLANAR].copy()
+        origins = starts[:, PLANAR].copy()
         for i, robot in enumerate(robots):
             if robot.localization_origin is not None:
-                origins[i] = robot.localization_origin[_PLANAR]
-        self.estimates = between(origins, starts[:, _PLANAR])
+                origins[i] = robot.localization_origin[PLANAR]
+        self.estimates = between(origins, starts[:, PLANAR])
         self.estimates[:, 2] = wrap(self.estimates[:, 2])
         self.shares = np.zeros((len(robots), 3))
         self._given = np.array([robot.odom_error is not None for robot in robots], dtype=np.bool_)
         for i, robot in enumerate(robots):
             if robot.odom_error is not None:
-                self.shares[i] = robot.odom_error[_PLANAR]
+                self.shares[i] = robot.odom_error[PLANAR]
         self._odom = np.array([robot.localization == "odom" for robot in robots], dtype=np.bool_)
         if exact:
-            self.estimates[~self._odom] = starts[~self._odom][:, _PLANAR]
+            self.estimates[~self._odom] = starts[~self._odom][:, PLANAR]
         self.all_gps = bool(not self._odom.any())
         self._walk = walk
 
@@ -70,7 +69,7 @@ class Localization:
         is_due = np.zeros(len(self._odom), dtype=np.bool_)
         is_due[due] = True
         gps, odom = np.flatnonzero(is_due & ~self._odom), np.flatnonzero(is_due & self._odom)
-        self.estimates[gps] = poses[gps][:, _PLANAR]
+        self.estimates[gps] = poses[gps][:, PLANAR]
         if len(odom):
             self._integrate(odom, velocities[odom] * self._interval, rng)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu._core import Arena
-from kurumaisu.geometry import cos_sin
+from kurumaisu.geometry import relative
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.layout import outline as placed_outline
 from kurumaisu.world.model import Model, Position
@@ -108,28 +108,6 @@ def build_arena(
     numbers = np.array([_add(arena, models, poses, bodies, i) for i in range(len(bodies))], dtype=np.int64)
     arena.set_poses(numbers, np.ascontiguousarray(poses[bodies.heads]))
     return arena, numbers, walls
-
-
-def relative(frame: FloatArray, pose: FloatArray) -> FloatArray:
-    """Return a pose (..., 4) of the map as seen in a frame (..., 4) of the map."""
-    c, s = cos_sin(frame[..., 3])
-    d = pose - frame
-    return np.stack([c * d[..., 0] + s * d[..., 1], c * d[..., 1] - s * d[..., 0], d[..., 2], d[..., 3]], axis=-1)
-
-
-def attached(frame: FloatArray, pose: FloatArray) -> FloatArray:
-    """Return in the map what is a pose (..., 4) in a frame (..., 4); the heading is not wrapped."""
-    c, s = cos_sin(frame[..., 3])
-    x, y = pose[..., 0], pose[..., 1]
-    return np.stack(
-        [
-            frame[..., 0] + c * x - s * y,
-            frame[..., 1] + s * x + c * y,
-            frame[..., 2] + pose[..., 2],
-            frame[..., 3] + pose[..., 3],
-        ],
-        axis=-1,
-    )
 
 
 def _add(arena: Arena, models: Sequence[Model], poses: FloatArray, bodies: Bodies, body: int) -> int:

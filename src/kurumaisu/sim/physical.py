@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu._core import Clearance, arcs
 from kurumaisu.errors import Error
-from kurumaisu.geometry import compose
+from kurumaisu.geometry import PLANAR, compose
 from kurumaisu.sim.contact_space import Exchange
 from kurumaisu.sim.gripping import Grips
 from kurumaisu.sim.island import Island, Moving, Surroundings
@@ -237,7 +237,7 @@ def _islands(pairs: IntArray, seeds: BoolArray) -> list[IntArray]:
 def _shifted(poses: FloatArray, by: FloatArray) -> FloatArray:
     """Return poses (b, 4) moved in their own frames."""
     moved = poses.copy()
-    moved[:, [0, 1, 3]] = compose(poses[:, [0, 1, 3]], by)
+    moved[:, PLANAR] = compose(poses[:, PLANAR], by)
     return moved
 
 

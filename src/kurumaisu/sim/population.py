@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.errors import Error
-from kurumaisu.sim.partition import attached, relative
+from kurumaisu.geometry import attached, relative
 from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.world.layout import family
 from kurumaisu.world.model import Model
 
 
@@ -46,17 +47,13 @@ class Population:
 
     def with_descendants(self, index: int) -> IntArray:
         """Return the places of a model and of all that stand on it."""
-        family = {index}
-        for model in self.models[index + 1 :]:
-            if model.parent in family:
-                family.add(model.index)
-        return np.array(sorted(family), dtype=np.int64)
+        return np.array(family(self.models, index), dtype=np.int64)
 
     def moved(self, index: int, pose: FloatArray) -> Population:
         """Return a population in which a model, with all on it, began at a pose (4,)."""
-        family = self.with_descendants(index)
+        those = self.with_descendants(index)
         poses = self.poses.copy()
-        poses[family] = attached(pose, relative(self.poses[index], self.poses[family]))
+        poses[those] = attached(pose, relative(self.poses[index], self.poses[those]))
         models = list(self.models)
         if (parent := models[index].parent) >= 0:
             top = models[parent].size[2] if models[parent].stack_children else 0.0

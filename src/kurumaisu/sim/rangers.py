@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu._core import mounted
+from kurumaisu.geometry import attached
 from kurumaisu.sim.eyes import Eyes
 from kurumaisu.sim.fan_effects import FanEffects
 from kurumaisu.sim.fans import RangerFan, moments, spread
-from kurumaisu.sim.partition import attached
 from kurumaisu.sim.scans import Scans, Sweep
 from kurumaisu.sim.sensors.ranger_noise import RangerNoise
 from kurumaisu.types import FloatArray, IntArray

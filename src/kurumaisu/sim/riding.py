@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu._core import arcs
-from kurumaisu.sim.partition import attached, relative
+from kurumaisu.geometry import attached, relative
 from kurumaisu.sim.slip import turned
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 

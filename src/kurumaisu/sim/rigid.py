@@ -11,7 +11,7 @@ import numpy as np
 import pymunk
 from pymunk.autogeometry import convex_decomposition
 
-from kurumaisu.geometry import compose
+from kurumaisu.geometry import PLANAR, compose
 from kurumaisu.types import FloatArray, IntArray
 
 GRAVITY = 9.81  # [m/s^2]
@@ -114,7 +114,7 @@ def joined(holder: Rigid, held: Sequence[tuple[Rigid, FloatArray]]) -> Rigid:
 def moved(points: FloatArray, pose: FloatArray) -> FloatArray:
     """Return points (k, 2) of a frame at a pose (4,) in the frame that the pose is in."""
     corners = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
-    return compose(np.broadcast_to(pose[[0, 1, 3]], corners.shape), corners)[:, :2]
+    return compose(np.broadcast_to(pose[PLANAR], corners.shape), corners)[:, :2]
 
 
 def convex(corners: FloatArray) -> list[FloatArray]:

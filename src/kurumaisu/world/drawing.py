@@ -8,6 +8,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
+from kurumaisu.geometry import PLANAR
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Model, Polygon, Position
 from kurumaisu.world.world import World
@@ -38,7 +39,7 @@ def to_svg(world: World) -> str:
 
 def _model(world: World, model: Model) -> Iterator[str]:
     """Yield the elements of one model, in map coordinates, y upwards."""
-    x, y, theta = world.poses[model.index][[0, 1, 3]]
+    x, y, theta = world.poses[model.index][PLANAR]
     place = f'<g transform="translate({x:.4f},{y:.4f}) rotate({np.degrees(theta):.4f})"'
     parts = [_polygon(polygon) for polygon in model.shape.polygons]
     if not parts and len(model.shape.segments):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kurumaisu.geometry import attached
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Fan, Model, Position
 
@@ -20,9 +21,23 @@ def travels(model: Model, models: Sequence[Model]) -> bool:
     return True
 
 
+def family(models: Sequence[Model], index: int) -> list[int]:
+    """Return the places of a model and of all that stand on it, directly or not, in order."""
+    members = {index}
+    for model in models[index + 1 :]:
+        if model.parent in members:
+            members.add(model.index)
+    return sorted(members)
+
+
+def beam_place(ranger: Model, pose: FloatArray, fan: Fan) -> FloatArray:
+    """Return where the beams of a ranger at a pose (4,) start (4,): half way up its sensor."""
+    return attached(attached(pose, ranger.origin), fan.pose + np.array([0.0, 0.0, fan.height / 2, 0.0]))
+
+
 def beam_height(ranger: Model, pose: FloatArray, fan: Fan) -> float:
-    """Return the height above the ground [m] of the beams of a ranger at a pose (4,): half way up its sensor."""
-    return float(pose[2] + ranger.origin[2] + fan.pose[2] + fan.height / 2)
+    """Return the height above the ground [m] of the beams of a ranger at a pose (4,)."""
+    return float(beam_place(ranger, pose, fan)[2])
 
 
 def placed(segments: FloatArray, pose: FloatArray) -> FloatArray:

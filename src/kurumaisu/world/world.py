@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.errors import Error
+from kurumaisu.geometry import PLANAR
 from kurumaisu.types import FloatArray
 from kurumaisu.world import catalogue
 from kurumaisu.world.bitmaps import is_map
@@ -160,7 +161,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values, vocabulary: Voca
         vocabulary=vocabulary,
         segments=_outlines([model for model in walls if model.ranger_return >= 0], poses),
         obstacles=_outlines([model for model in walls if model.obstacle_return], poses),
-        starts=tuple(Start(m.name or "chair", poses[m.index, [0, 1, 3]]) for m in starts),
+        starts=tuple(Start(m.name or "chair", poses[m.index, PLANAR]) for m in starts),
         warnings=tuple(said.notes.texts),
     )
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.sim.sensors.rays import Rays, place
+from kurumaisu.geometry import attached
+from kurumaisu.sim.sensors.rays import Rays
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Bumper
 
@@ -34,7 +35,7 @@ class BumperSensor:
             lines += [(ahead, -half, turned, bumper.lengths)]
             lines += [(zero, side, straight, ahead) for side in (-half, zero, half)]
         starts = np.array([[x, y, zero, heading] for x, y, heading, _ in lines]).transpose(2, 0, 1)
-        self._origins = place(bumper.poses[:, None, :], starts)  # (n, lines, 4) in the model's frame
+        self._origins = attached(bumper.poses[:, None, :], starts)  # (n, lines, 4) in the model's frame
         self._lengths = np.array([length for *_, length in lines]).T
 
     def read(self, rays: Rays, poses: FloatArray, trees: IntArray) -> BoolArray:
@@ -45,6 +46,6 @@ class BumperSensor:
         k, (n, lines) = len(poses), self._lengths.shape
         if not n:
             return np.zeros((k, 0), dtype=bool)
-        origins = place(poses[:, None, None, :], self._origins[None]).reshape(-1, 4)
+        origins = attached(poses[:, None, None, :], self._origins[None]).reshape(-1, 4)
         ranges, _ = rays.cast(origins, np.repeat(trees, n * lines), float(self._lengths.max()))
         return np.asarray((ranges.reshape(k, n, lines) <= self._lengths).any(axis=-1))

@@ -9,12 +9,12 @@ from collections.abc import Callable
 import numpy as np
 
 from kurumaisu import settings
+from kurumaisu.geometry import attached
 from kurumaisu.sim.sensors.battery import BatterySettings, Load
 from kurumaisu.sim.sensors.bumper import BumperSettings
 from kurumaisu.sim.sensors.camera import build
 from kurumaisu.sim.sensors.imu import ImuSettings
 from kurumaisu.sim.sensors.inertial_error import InertialErrorSettings
-from kurumaisu.sim.sensors.rays import place
 from kurumaisu.sim.sensors.sonar import SonarSettings
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Bumper, Camera, Fiducial
@@ -97,7 +97,7 @@ def _sonar(section: settings.Section, mount: FloatArray) -> SonarSettings:
     if not mounts:
         raise section.error("mounts", "must name one sonar at least")
     sonar = SonarSettings(
-        mounts=place(mount, np.array(mounts)),
+        mounts=attached(mount, np.array(mounts)),
         field_of_view=_angle(section, "field_of_view", _TURN),
         rays=section.integer("rays", at_least=1),
         range_min=section.number("range_min", at_least=0),
@@ -138,7 +138,7 @@ def _bumper(section: settings.Section, mount: FloatArray) -> BumperSettings:
     items = section.items("strips")
     lengths = np.array([item.number("length", above=0) for item in items])
     poses = np.array([read_place(item) for item in items]).reshape(-1, 4)
-    return BumperSettings(Bumper(place(mount, poses), lengths), section.number("travel", at_least=0))
+    return BumperSettings(Bumper(attached(mount, poses), lengths), section.number("travel", at_least=0))
 
 
 def _fiducial(section: settings.Section, _mount: FloatArray) -> Fiducial:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.sim.sensors.rays import Rays, place
+from kurumaisu.geometry import attached
+from kurumaisu.sim.sensors.rays import Rays
 from kurumaisu.types import FloatArray, IntArray
 
 
@@ -44,7 +45,7 @@ class Sonar:
         """
         s = self.settings
         k, n = len(poses), len(s.mounts)
-        origins = place(poses[:, None, :], s.mounts[None, :, :]).reshape(-1, 4)
+        origins = attached(poses[:, None, :], s.mounts[None, :, :]).reshape(-1, 4)
         ranges, _ = rays.scan(origins, np.repeat(trees, n), np.tile(self._fan, (k * n, 1)))
         nearest = ranges.reshape(k, n, s.rays).min(axis=-1)
         readings: FloatArray = nearest + s.deviation * rng.standard_normal((k, n))

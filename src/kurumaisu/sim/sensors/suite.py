@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from kurumaisu.errors import Error
+from kurumaisu.geometry import attached
 from kurumaisu.sim.sensors.battery import Battery, BatterySettings
 from kurumaisu.sim.sensors.bumper import BumperSensor, BumperSettings
 from kurumaisu.sim.sensors.camera import CameraSensor, Scenery, mounted_eye
 from kurumaisu.sim.sensors.fiducial import FiducialFinder
 from kurumaisu.sim.sensors.imu import Imu, ImuSettings
-from kurumaisu.sim.sensors.rays import Rays, place
+from kurumaisu.sim.sensors.rays import Rays
 from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
 from kurumaisu.sim.sensors.sonar import Sonar, SonarSettings
 from kurumaisu.types import FloatArray, IntArray
@@ -120,7 +121,7 @@ class SensorSuite:
         dt, running.time = moment.time - running.time, moment.time
         parameters = running.settings.parameters
         if isinstance(parameters, Camera):
-            eyes = place(moment.poses[running.models], running.settings.mount)
+            eyes = attached(moment.poses[running.models], running.settings.mount)
             return tuple(
                 running.sensor.take(self._scenery, moment.poses, mounted_eye(parameters, eye), int(root))
                 for eye, root in zip(eyes, running.roots, strict=True)
@@ -161,5 +162,5 @@ _READ: dict[type, Callable[[_Running, Moment, float], Any]] = {
     BatterySettings: lambda r, m, dt: r.sensor.read(m.velocities[r.robots], dt),
     SonarSettings: lambda r, m, dt: r.sensor.read(m.rays, m.poses[r.models], r.roots, r.rng),
     BumperSettings: lambda r, m, dt: r.sensor.read(m.solids, m.poses[r.models], r.roots),
-    Fiducial: lambda r, m, dt: r.sensor.find(m.rays, place(m.poses[r.models], r.settings.mount), r.roots, m.poses),
+    Fiducial: lambda r, m, dt: r.sensor.find(m.rays, attached(m.poses[r.models], r.settings.mount), r.roots, m.poses),
 }
