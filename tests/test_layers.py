@@ -58,6 +58,9 @@ CPP_RULES = [
     Rule(r"(?!.*bindings\.(cpp|h))", r"<pybind11/", "pybind11 only in bindings"),
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
     Rule(r"follow/", r'"(?!follow/|bindings\.h)', "following rests on nothing"),
+    Rule(r"scip/", r'"(?!scip/)', "the protocol rests on nothing"),
+    Rule(r"virtual_urg/", r'"(?!scip/|virtual_urg/|bindings\.h)', "the virtual sensor shares the protocol only"),
+    Rule(r"laser/", r'"(?!scip/|laser/|params\.h)', "the driver rests on the protocol only"),
     Rule(r"(kalman|raycast)/", r'"(?!model/|kalman/|raycast/|bindings\.h)', "numerics rest on the equations at most"),
 ]
 
