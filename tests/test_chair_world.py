@@ -16,11 +16,11 @@ from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
 from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command, Observation
 from kurumaisu.sim.sensors.settings import load_sensors
-from kurumaisu.sim.settings import load_physics
+from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.world import load_world
 
 MODEL = load_model(shipped("launch/md100.yaml"))
-PHYSICS = load_physics(shipped("launch/sim_node.yaml"))
+DYNAMICS = load_dynamics(shipped("launch/physical.yaml"))
 FRONT, WIDTH, MASS = MODEL.chassis.axle_to_front, MODEL.chassis.width, MODEL.chassis.mass
 GRAVITY, FLOOR, WHEELS = 9.81, 0.5, 0.8  # the frictions of launch/physical.yaml
 LAW = type(MODEL.laser.error)(
@@ -34,7 +34,7 @@ def among(folder: Path, things: str, model: Model = MODEL, sensors: Sequence = (
     """The chair at the origin, looking east, among things."""
     path = folder / "t.world"
     path.write_text(f'position ( name "chair" pose [0 0 0 0] )\n{things}\n')
-    simulator = ChairSimulator(model, load_world(path), PHYSICS, sensors)
+    simulator = ChairSimulator(model, load_world(path), DYNAMICS, sensors)
     simulator.reset(1)
     return simulator
 
@@ -81,7 +81,7 @@ def test_a_box_that_takes_a_second_to_get_going_slows_the_chair_meanwhile(tmp_pa
     first = next(i for i, o in enumerate(observations) if o.contact)
     together = MASS * 1.0 / (MASS + box)
     surplus = (WHEELS * MASS - FLOOR * box) * GRAVITY / (MASS + box)
-    times = PHYSICS.step * np.arange(1, 31)
+    times = DYNAMICS.contacts.step * np.arange(1, 31)
     assert speeds[first + 1] < 0.7
     np.testing.assert_allclose(speeds[first + 1 : first + 31], together + surplus * times, atol=0.03)
     assert speeds[-1] == pytest.approx(1.0)
@@ -197,7 +197,7 @@ def test_of_the_table_in_the_flat_the_laser_sees_the_legs(tmp_path):
     world = load_world(shipped("worlds/flat.world"))
     table = next(m for m in world.models if m.name == "table")
     x, y, _, _ = world.poses[table.index]
-    simulator = ChairSimulator(EXACT, world, PHYSICS)
+    simulator = ChairSimulator(EXACT, world, DYNAMICS)
     simulator.reset(1)
     simulator.set_pose("chair", (x - 1.6, y - 0.4, 0.0, 0.0))
     (scan,) = (o.scan for o in (simulator.step(NEUTRAL) for _ in range(10)) if o.scan is not None)
@@ -219,7 +219,7 @@ def test_the_shape_of_the_world_file_does_not_count(tmp_path):
         "position ( pose [0 0 0 0] size [9 9 9] mass 1 model ( pose [3 0 0 0] ) ranger ( pose [2 0 0 0] ) )\n"
         "model ( pose [2 0 0 0] size [0.2 9 1] )"
     )
-    simulator = ChairSimulator(EXACT, load_world(path), PHYSICS)
+    simulator = ChairSimulator(EXACT, load_world(path), DYNAMICS)
     observations = [simulator.reset(1), *drive(simulator, 0.5, 0.0, 3.0)]
     assert observations[-1].pose[0] == pytest.approx(1.9 - FRONT, abs=0.005)
     first = next(o.scan for o in observations if o.scan is not None)

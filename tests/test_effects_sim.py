@@ -9,7 +9,7 @@ import pytest
 from kurumaisu import effects
 from kurumaisu.params import load_model, shipped
 from kurumaisu.sim.chair import ChairSimulator, Command
-from kurumaisu.sim.settings import load_physics, with_effects
+from kurumaisu.sim.settings import load_dynamics, with_effects
 from kurumaisu.world import load_world
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -54,8 +54,8 @@ def run(folder: Path, listed: str, command: Command, seconds: float):
     world, file = folder / "free.world", folder / "effects.yaml"
     world.write_text("model ( pose [500 0 0 0] )\nposition ( pose [0 0 0 90] )")
     file.write_text(f"effects: [{listed}]")
-    physics = load_physics(shipped("launch/sim_node.yaml"))
-    simulator = ChairSimulator(with_effects(MODEL, file), load_world(world), physics)
+    dynamics = load_dynamics(shipped("launch/physical.yaml"))
+    simulator = ChairSimulator(with_effects(MODEL, file), load_world(world), dynamics)
     simulator.reset(1)
     for _ in range(round(seconds / simulator.step_time)):
         observation = simulator.step(command)

@@ -12,11 +12,11 @@ from kurumaisu import effects
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, load_model, shipped
 from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
-from kurumaisu.sim.settings import load_physics, with_effects
+from kurumaisu.sim.settings import load_dynamics, with_effects
 from kurumaisu.world import load_world
 
 MODEL = load_model(shipped("launch/md100.yaml"))
-PHYSICS = load_physics(shipped("launch/sim_node.yaml"))
+DYNAMICS = load_dynamics(shipped("launch/physical.yaml"))
 LASER = MODEL.laser
 BEARINGS = LASER.bearings
 DELAYS = LASER.time_increment * np.arange(LASER.beams)
@@ -35,7 +35,7 @@ def simulator(folder: Path, model: Model, listed: dict, wall: str = "") -> Chair
     world.write_text(f"model ( pose [9 0 0 0] size [2 999 1] {wall} )\nposition ( pose [0 0 0 0] )")
     items = [{"id": name, "parameters": {**NULLS[name], **values}} for name, values in listed.items()]
     file.write_text(yaml.safe_dump({"effects": items}))
-    it = ChairSimulator(with_effects(model, file), load_world(world), PHYSICS)
+    it = ChairSimulator(with_effects(model, file), load_world(world), DYNAMICS)
     it.reset(5)
     return it
 
@@ -120,7 +120,7 @@ def run(folder: Path, listed: dict) -> list[np.ndarray]:
     )
     items = [{"id": name, "parameters": dict(values)} for name, values in listed.items()]
     file.write_text(yaml.safe_dump({"effects": items}))
-    it = ChairSimulator(with_effects(MODEL, file), load_world(world), PHYSICS)
+    it = ChairSimulator(with_effects(MODEL, file), load_world(world), DYNAMICS)
     observations = [it.reset(9)]
     for v, w in [(0.7, 0.3), (-0.3, -0.2)]:
         observations += [it.step(moving(v, w)) for _ in range(75)]
@@ -168,4 +168,4 @@ def test_bad_effects_are_refused(tmp_path, text, message):
     file = tmp_path / "effects.yaml"
     file.write_text(f"effects: [{text}]")
     with pytest.raises(Error, match=message):
-        ChairSimulator(with_effects(MODEL, file), load_world(shipped("worlds/room.world")), PHYSICS)
+        ChairSimulator(with_effects(MODEL, file), load_world(shipped("worlds/room.world")), DYNAMICS)

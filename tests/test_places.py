@@ -12,7 +12,7 @@ from shapely import geometry as shapely
 from kurumaisu.params import load_model, shipped
 from kurumaisu.sim import Simulator, load_options
 from kurumaisu.sim.chair import ChairSimulator, Command
-from kurumaisu.sim.settings import load_dynamics, load_physics
+from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World, load_world
 from kurumaisu.world.model import Model
@@ -21,7 +21,6 @@ OPTIONS = load_options(shipped("launch/simulator.yaml"))
 WORLDS = sorted(shipped("worlds/room.world").parent.glob("*.world"))
 PEOPLED = [shipped(f"worlds/{name}.world") for name in ("corridor", "plaza")]
 MODEL = load_model(shipped("launch/md100.yaml"))
-PHYSICS = load_physics(shipped("launch/sim_node.yaml"))
 DYNAMICS = load_dynamics(shipped("launch/physical.yaml"))
 STEP = 0.1  # [s] of all worlds here
 
@@ -115,7 +114,7 @@ DOORS = {"bedroom_door": (3.0, -1), "bath_door": (5.3, 1)}  # x of the doorway's
 @pytest.mark.parametrize("name", DOORS)
 def test_the_chair_pushes_a_door_open_goes_in_and_comes_out_again(name: str) -> None:
     world = load_world(shipped("worlds/flat.world"))
-    sim = ChairSimulator(MODEL, world, PHYSICS)
+    sim = ChairSimulator(MODEL, world, DYNAMICS)
     x, sense = DOORS[name]
     door = find(world, name).index
     sim.set_pose("chair", (x, 4.1, 0.0, -np.pi / 2))
@@ -144,16 +143,16 @@ def test_a_robot_of_the_fleet_pushes_a_door_open_and_in_stages_semantics_it_cann
 
 def test_the_chair_goes_up_to_the_balcony() -> None:
     world = load_world(shipped("worlds/flat.world"))
-    sim = ChairSimulator(MODEL, world, PHYSICS)
+    sim = ChairSimulator(MODEL, world, DYNAMICS)
     sim.set_pose("chair", (9.6, 6.0, 0.0, 0.0))
     rises = np.array([sim.step(moving(0.4)).rates[0] for _ in range(600)])
     slow = 0.4 - 0.075 * DYNAMICS.slope_speed
     np.testing.assert_allclose(np.unique(np.round(rises, 6)), [slow, 0.4], atol=1e-6)
-    assert (rises < 0.4 - 1e-6).sum() * PHYSICS.step == pytest.approx(0.8 / slow, abs=0.02)
+    assert (rises < 0.4 - 1e-6).sum() * DYNAMICS.contacts.step == pytest.approx(0.8 / slow, abs=0.02)
 
 
 def test_the_ramp_of_the_plaza_leads_past_its_steps() -> None:
-    sim = ChairSimulator(MODEL, load_world(shipped("worlds/plaza.world")), PHYSICS)
+    sim = ChairSimulator(MODEL, load_world(shipped("worlds/plaza.world")), DYNAMICS)
     sim.set_pose("chair", (13.5, 3.75, 0.0, 0.0))
     observations = [sim.step(moving(0.6)) for _ in range(1000)]
     assert not any(o.contact for o in observations)

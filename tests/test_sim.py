@@ -16,7 +16,7 @@ from kurumaisu.geometry import compose, wrap
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
 from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command, Observation
 from kurumaisu.sim.holder import VoltageHolder
-from kurumaisu.sim.settings import Physics, load_physics, with_effects
+from kurumaisu.sim.settings import Dynamics, load_dynamics, with_effects
 from kurumaisu.types import FloatArray
 from kurumaisu.urdf import robot_description
 from kurumaisu.world import World, load_world
@@ -32,8 +32,8 @@ def model() -> Model:
 
 
 @pytest.fixture(scope="module")
-def physics() -> Physics:
-    return load_physics(shipped("launch/sim_node.yaml"))
+def dynamics() -> Dynamics:
+    return load_dynamics(shipped("launch/physical.yaml"))
 
 
 def rates_command(model: Model, v: float, w: float) -> Command:
@@ -58,9 +58,9 @@ def drive(simulator: ChairSimulator, command: Command, seconds: float) -> Iterat
 
 @pytest.mark.parametrize(("v", "w"), [(0.5, 0.3), (-0.4, 0.7), (0.8, 0.0), (0.0, -0.9), (0.6, -0.05)])
 def test_free_motion_is_the_arc_of_equation_3(
-    model: Model, physics: Physics, tmp_path: Path, v: float, w: float
+    model: Model, dynamics: Dynamics, tmp_path: Path, v: float, w: float
 ) -> None:
-    simulator = ChairSimulator(model, free(tmp_path), physics)
+    simulator = ChairSimulator(model, free(tmp_path), dynamics)
     simulator.reset(1)
     last = list(drive(simulator, rates_command(model, v, w), 10.0))[-1]
     arc = (v / w * math.sin(10 * w), v / w * (1 - math.cos(10 * w))) if w else (10 * v, 0.0)
@@ -70,18 +70,18 @@ def test_free_motion_is_the_arc_of_equation_3(
     assert not last.contact
 
 
-def test_effects_of_the_model_and_of_a_file_act(model: Model, physics: Physics, tmp_path: Path) -> None:
+def test_effects_of_the_model_and_of_a_file_act(model: Model, dynamics: Dynamics, tmp_path: Path) -> None:
     path = tmp_path / "effects.yaml"
     path.write_text("effects: [{id: base.veer, parameters: {curvature: 0.1}}]")
     slow = replace(model, effects=(EffectSetting("base.gain_v", {"gain": -0.5}),))
-    simulator = ChairSimulator(with_effects(slow, path), free(tmp_path), physics)
+    simulator = ChairSimulator(with_effects(slow, path), free(tmp_path), dynamics)
     simulator.reset(1)
     last = list(drive(simulator, rates_command(model, 0.6, 0.0), 1.0))[-1]
     assert last.rates[0] == pytest.approx(0.3)
     assert last.rates[2] == pytest.approx(0.03)  # veer after the gain, as in the catalogue
 
 
-def test_bad_effects_are_refused(model: Model, physics: Physics, tmp_path: Path) -> None:
+def test_bad_effects_are_refused(model: Model, dynamics: Dynamics, tmp_path: Path) -> None:
     path = tmp_path / "effects.yaml"
     path.write_text("effects: [{id: base.veer, parameters: {curvature: x}}]")
     with pytest.raises(Error, match=r"effects\.yaml: effects\[0\]\.parameters\.curvature: must be a number"):
@@ -91,12 +91,12 @@ def test_bad_effects_are_refused(model: Model, physics: Physics, tmp_path: Path)
         with_effects(model, path)
     unknown = replace(model, effects=(EffectSetting("base.nonsense", {}),))
     with pytest.raises(Error, match=r"'base\.nonsense' is not in the catalogue"):
-        ChairSimulator(unknown, free(tmp_path), physics).reset(1)
+        ChairSimulator(unknown, free(tmp_path), dynamics).reset(1)
 
 
-def run_hash(model: Model, physics: Physics, seed: int) -> str:
+def run_hash(model: Model, dynamics: Dynamics, seed: int) -> str:
     noisy = with_effects(model, shipped("launch/uneven_floor.yaml"))
-    simulator = ChairSimulator(noisy, load_world(shipped("worlds/room.world")), physics)
+    simulator = ChairSimulator(noisy, load_world(shipped("worlds/room.world")), dynamics)
     digest = hashlib.sha256()
     observations = [simulator.reset(seed)]
     for v, w in [(0.5, 0.2), (0.3, -0.5), (1.0, 0.0), (-0.3, 0.4)]:  # the third drives against a wall
@@ -110,13 +110,13 @@ def run_hash(model: Model, physics: Physics, seed: int) -> str:
     return digest.hexdigest()
 
 
-def test_a_seed_is_a_run_bit_for_bit(model: Model, physics: Physics) -> None:
-    assert run_hash(model, physics, 7) == run_hash(model, physics, 7)
-    assert run_hash(model, physics, 7) != run_hash(model, physics, 8)
+def test_a_seed_is_a_run_bit_for_bit(model: Model, dynamics: Dynamics) -> None:
+    assert run_hash(model, dynamics, 7) == run_hash(model, dynamics, 7)
+    assert run_hash(model, dynamics, 7) != run_hash(model, dynamics, 8)
 
 
-def test_reset_forgets_everything(model: Model, physics: Physics) -> None:
-    simulator = ChairSimulator(model, load_world(shipped("worlds/room.world")), physics)
+def test_reset_forgets_everything(model: Model, dynamics: Dynamics) -> None:
+    simulator = ChairSimulator(model, load_world(shipped("worlds/room.world")), dynamics)
     command = rates_command(model, 0.9, 0.3)
     simulator.reset(3)
     first = [o.pose.tolist() for o in drive(simulator, command, 8.0)]
@@ -138,10 +138,10 @@ def depth_in_wall(model: Model, pose: FloatArray, wall_x: float) -> float:
 @pytest.mark.parametrize("speed", [0.3, 1.5])
 @pytest.mark.parametrize("thickness", [0.001, 0.1])
 def test_a_wall_stops_the_chair(
-    model: Model, physics: Physics, tmp_path: Path, degrees: float, speed: float, thickness: float
+    model: Model, dynamics: Dynamics, tmp_path: Path, degrees: float, speed: float, thickness: float
 ) -> None:
     wall = f"model ( pose [{1.2 + thickness / 2} 0 0 0] size [{thickness} 200 1] )"
-    simulator = ChairSimulator(model, walled(tmp_path, wall, f"0 0 0 {degrees}"), physics)
+    simulator = ChairSimulator(model, walled(tmp_path, wall, f"0 0 0 {degrees}"), dynamics)
     simulator.reset(1)
     v = speed if degrees < 90 else -speed
     observations = list(drive(simulator, rates_command(model, v, 0.0), 12.0))
@@ -150,25 +150,25 @@ def test_a_wall_stops_the_chair(
 
 
 @pytest.mark.parametrize("w", [0.5, -0.5])
-def test_turning_into_a_wall(model: Model, physics: Physics, tmp_path: Path, w: float) -> None:
+def test_turning_into_a_wall(model: Model, dynamics: Dynamics, tmp_path: Path, w: float) -> None:
     wall = "model ( pose [0.9 0 0 0] size [0.2 200 1] )"
-    simulator = ChairSimulator(model, walled(tmp_path, wall, "0.35 0 0 90"), physics)
+    simulator = ChairSimulator(model, walled(tmp_path, wall, "0.35 0 0 90"), dynamics)
     simulator.reset(1)
     observations = list(drive(simulator, rates_command(model, 0.0, w), 10.0))
     assert max(depth_in_wall(model, o.pose, 0.8) for o in observations) < 0.005
 
 
-def test_a_grazed_wall_is_slid_along(model: Model, physics: Physics, tmp_path: Path) -> None:
+def test_a_grazed_wall_is_slid_along(model: Model, dynamics: Dynamics, tmp_path: Path) -> None:
     wall = "model ( pose [0 0.75 0 0] size [200 0.5 1] )"
-    simulator = ChairSimulator(model, walled(tmp_path, wall, "0 0 0 10"), physics)
+    simulator = ChairSimulator(model, walled(tmp_path, wall, "0 0 0 10"), dynamics)
     simulator.reset(1)
     last = list(drive(simulator, rates_command(model, 0.5, 0.0), 20.0))[-1]
     assert last.pose[0] > 7.0  # of 10 m
     assert abs(wrap(last.pose[2])) < 0.05  # the wall turned it
 
 
-def test_a_chair_leaves_a_wall(model: Model, physics: Physics, tmp_path: Path) -> None:
-    simulator = ChairSimulator(model, walled(tmp_path, "model ( pose [1.5 0 0 0] size [1 9 1] )"), physics)
+def test_a_chair_leaves_a_wall(model: Model, dynamics: Dynamics, tmp_path: Path) -> None:
+    simulator = ChairSimulator(model, walled(tmp_path, "model ( pose [1.5 0 0 0] size [1 9 1] )"), dynamics)
     simulator.reset(1)
     blocked = list(drive(simulator, rates_command(model, 0.5, 0.0), 2.0))[-1]
     assert blocked.contact
@@ -187,10 +187,10 @@ def scans(simulator: ChairSimulator, command: Command, count: int) -> Iterator[t
             yield scan.ranges, scan.pose, scan.time
 
 
-def test_a_flat_wall_reads_as_equation_4(model: Model, physics: Physics, tmp_path: Path) -> None:
+def test_a_flat_wall_reads_as_equation_4(model: Model, dynamics: Dynamics, tmp_path: Path) -> None:
     # 1 m before the laser, whose mount is 0.3 m before base_link; figure 7's wall.
     wall = "model ( pose [1.35 0 0 0] size [0.1 20 1] )"
-    simulator = ChairSimulator(model, walled(tmp_path, wall), physics)
+    simulator = ChairSimulator(model, walled(tmp_path, wall), dynamics)
     simulator.reset(11)
     readings = np.array([r for r, _, _ in scans(simulator, NEUTRAL, 400)])
     bearings = model.laser.bearings
@@ -220,10 +220,10 @@ def exact(model: Model) -> Model:
 
 @pytest.mark.parametrize(("v", "w"), [(0.6, 0.0), (0.0, 0.9), (0.5, -0.7)])
 def test_every_beam_leaves_from_where_the_laser_is_then(
-    model: Model, physics: Physics, tmp_path: Path, v: float, w: float
+    model: Model, dynamics: Dynamics, tmp_path: Path, v: float, w: float
 ) -> None:
     """The wall is flat, so the true pose at each beam's own time predicts its range in closed form."""
-    simulator = ChairSimulator(exact(model), walled(tmp_path, "model ( pose [9 0 0 0] size [2 9999 1] )"), physics)
+    simulator = ChairSimulator(exact(model), walled(tmp_path, "model ( pose [9 0 0 0] size [2 9999 1] )"), dynamics)
     simulator.reset(1)
     seen = 0
     for ranges, pose, t0 in scans(simulator, rates_command(model, v, w), 12):
@@ -239,34 +239,34 @@ def test_every_beam_leaves_from_where_the_laser_is_then(
     assert seen > 1000
 
 
-def test_scans_come_every_scan_time(model: Model, physics: Physics) -> None:
-    simulator = ChairSimulator(model, load_world(shipped("worlds/room.world")), physics)
+def test_scans_come_every_scan_time(model: Model, dynamics: Dynamics) -> None:
+    simulator = ChairSimulator(model, load_world(shipped("worlds/room.world")), dynamics)
     simulator.reset(1)
     times = [time for _, _, time in scans(simulator, NEUTRAL, 50)]
     np.testing.assert_allclose(times, 0.1 * np.arange(50), atol=1e-12)
 
 
-def test_a_fan_longer_than_its_scan_is_refused(model: Model, physics: Physics) -> None:
+def test_a_fan_longer_than_its_scan_is_refused(model: Model, dynamics: Dynamics) -> None:
     slow = replace(model, laser=replace(model.laser, time_increment=0.001))
     with pytest.raises(Error, match=r"0\.681 s after the first, more than scan_time = 0\.1 s"):
-        ChairSimulator(slow, load_world(WORLDS[0]), physics).reset(1)
+        ChairSimulator(slow, load_world(WORLDS[0]), dynamics).reset(1)
 
 
 @pytest.mark.parametrize("path", WORLDS, ids=lambda path: path.stem)
-def test_shipped_worlds_hold_the_chair(model: Model, physics: Physics, path: Path) -> None:
-    simulator = ChairSimulator(model, load_world(path), physics)
+def test_shipped_worlds_hold_the_chair(model: Model, dynamics: Dynamics, path: Path) -> None:
+    simulator = ChairSimulator(model, load_world(path), dynamics)
     simulator.reset(1)
     assert not any(o.contact for o in drive(simulator, rates_command(model, 0.3, 0.0), 1.0))
 
 
-def test_a_start_in_a_wall_is_refused(model: Model, physics: Physics, tmp_path: Path) -> None:
+def test_a_start_in_a_wall_is_refused(model: Model, dynamics: Dynamics, tmp_path: Path) -> None:
     with pytest.raises(Error, match=r"t\.world: the chair, .* overlaps a wall at its start pose"):
-        ChairSimulator(model, walled(tmp_path, "model ( pose [0.7 0 0 0] size [0.1 9 1] )"), physics)
+        ChairSimulator(model, walled(tmp_path, "model ( pose [0.7 0 0 0] size [0.1 9 1] )"), dynamics)
 
 
-def test_the_building_can_be_driven_round(model: Model, physics: Physics) -> None:
+def test_the_building_can_be_driven_round(model: Model, dynamics: Dynamics) -> None:
     """Corners are turned on the spot, legs driven at 0.55 m/s; walls stay within 4 m of the laser."""
-    simulator = ChairSimulator(model, load_world(shipped("worlds/building.world")), physics)
+    simulator = ChairSimulator(model, load_world(shipped("worlds/building.world")), dynamics)
     observation = simulator.reset(1)
     seen: list[int] = []
     for target in ROUND:

@@ -18,16 +18,16 @@ WORLD = {"world": shipped("worlds/room.world"), "world_values": "none", "start":
 
 def settings(**changes: object) -> SimSettings:
     values = yaml.safe_load(shipped("launch/sim_node.yaml").read_text()) | CHOSEN | WORLD
-    values |= {"model": shipped("launch/md100.yaml")} | changes
+    values |= {"dynamics": shipped("launch/physical.yaml"), "model": shipped("launch/md100.yaml")} | changes
     return read_settings({key: str(v) if isinstance(v, Path) else v for key, v in values.items()}, "/sim_node")
 
 
 def test_a_map_is_a_world_with_a_start() -> None:
     chosen = settings(world=shipped("worlds/maps/room.yaml"), start="1.5 2.0 0.5")
-    simulator = ChairSimulator(chosen.model, chosen.world, chosen.physics)
+    simulator = ChairSimulator(chosen.model, chosen.world, chosen.dynamics)
     np.testing.assert_array_equal(simulator.reset(1).pose, [1.5, 2.0, 0.5])
     scans = [o.scan for o in (simulator.step(NEUTRAL) for _ in range(10)) if o.scan is not None]
-    same = ChairSimulator(chosen.model, settings(start="1.5 2.0 0.5").world, chosen.physics)
+    same = ChairSimulator(chosen.model, settings(start="1.5 2.0 0.5").world, chosen.dynamics)
     same.reset(1)
     truth = [o.scan for o in (same.step(NEUTRAL) for _ in range(10)) if o.scan is not None]
     both = np.isfinite(scans[0].ranges) & np.isfinite(truth[0].ranges)
@@ -37,7 +37,7 @@ def test_a_map_is_a_world_with_a_start() -> None:
 def test_a_map_without_a_start_is_refused() -> None:
     chosen = settings(world=shipped("worlds/maps/room.yaml"))
     with pytest.raises(Error, match=r"room\.yaml: has no position model"):
-        ChairSimulator(chosen.model, chosen.world, chosen.physics)
+        ChairSimulator(chosen.model, chosen.world, chosen.dynamics)
 
 
 @pytest.mark.parametrize("start", ["1 2", "1 2 x", "1 2 nan", "1 2 3 4"])

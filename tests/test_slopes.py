@@ -16,7 +16,7 @@ from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
 from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
 from kurumaisu.sim.plant import Plant
-from kurumaisu.sim.settings import load_dynamics, load_physics
+from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.sim.slopes import Slopes
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
@@ -94,7 +94,7 @@ def test_a_ramp_that_is_moved_takes_its_slope_along(tmp_path: Path) -> None:
 def chair(folder: Path, text: str) -> ChairSimulator:
     path = folder / "t.world"
     path.write_text('position ( name "chair" pose [0 0 0 0] )\n' + text)
-    return ChairSimulator(MODEL, load_world(path), load_physics(shipped("launch/sim_node.yaml")))
+    return ChairSimulator(MODEL, load_world(path), load_dynamics(shipped("launch/physical.yaml")))
 
 
 @pytest.mark.parametrize("others", ["", "model ( pose [0 5 0 0] mass 3 )\nposition ( pose [0 9 0 0] )\n"])

@@ -13,7 +13,7 @@ from kurumaisu.bench.turns import in_turn
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, shipped
 from kurumaisu.sim.chair import ChairSimulator, Command
-from kurumaisu.sim.settings import load_physics, with_effects
+from kurumaisu.sim.settings import load_dynamics, with_effects
 from kurumaisu.world import Start, World
 
 _CIRCLE = (0.2, 0.5)  # v [m/s], w [rad/s]: a radius of 0.4 m
@@ -39,7 +39,7 @@ def simulated_time(model: Model, world: World, seconds: float, repeats: int) -> 
 
 def _on_circle(model: Model, world: World) -> ChairSimulator:
     return ChairSimulator(
-        model, replace(world, starts=(Start("circle", _START),)), load_physics(shipped("launch/sim_node.yaml"))
+        model, replace(world, starts=(Start("circle", _START),)), load_dynamics(shipped("launch/physical.yaml"))
     )
 
 

@@ -17,7 +17,7 @@ from kurumaisu.driving import Driver, load_route
 from kurumaisu.params import Laser, load_model, shipped
 from kurumaisu.sim.chair import ChairSimulator, Command
 from kurumaisu.sim.scanner import Scan
-from kurumaisu.sim.settings import load_physics, with_effects
+from kurumaisu.sim.settings import load_dynamics, with_effects
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World, load_world
 
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def drive(world: World, seed: int, seconds: float) -> tuple[slam.ScanLog, FloatArray]:
     """Return the scans and odometry of the scripted round (or its first seconds), and the true poses (n, 3)."""
     model = with_effects(load_model(shipped("launch/md100.yaml")), shipped("launch/uneven_floor.yaml"))
-    simulator = ChairSimulator(model, world, load_physics(shipped("launch/sim_node.yaml")))
+    simulator = ChairSimulator(model, world, load_dynamics(shipped("launch/physical.yaml")))
     driver = Driver(load_route(shipped("launch/round.yaml")))
     observation = simulator.reset(seed)
     commands: list[tuple[float, float]] = []

@@ -16,7 +16,7 @@ from kurumaisu.critic.write_csv import write_csv_run
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
 from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
 from kurumaisu.sim.joystick import joystick
-from kurumaisu.sim.settings import load_physics, with_effects
+from kurumaisu.sim.settings import load_dynamics, with_effects
 from kurumaisu.world import load_world
 
 _DRIVES, _SECONDS = 3, 45.0
@@ -51,8 +51,8 @@ def record(folder: Path, secret: EffectSetting, rng: np.random.Generator) -> Non
     """Simulate drives of a chair with the secret effect on an uneven floor, and write them as a recording."""
     model = with_effects(load_model(shipped("launch/md100.yaml")), shipped("launch/uneven_floor.yaml"))
     model = replace(model, effects=(*model.effects, secret))
-    physics = load_physics(shipped("launch/sim_node.yaml"))
-    simulator = ChairSimulator(model, load_world(shipped("worlds/hall.world")), physics)
+    dynamics = load_dynamics(shipped("launch/physical.yaml"))
+    simulator = ChairSimulator(model, load_world(shipped("worlds/hall.world")), dynamics)
     for i in range(_DRIVES):
         print(f"  driving {i + 1} of {_DRIVES} ...", flush=True)
         write_csv_run(folder / f"drive_{i + 1}", _drive(f"drive_{i + 1}", simulator, model, rng))

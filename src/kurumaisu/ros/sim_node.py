@@ -37,7 +37,7 @@ class SimNode:
         self.paused = False
         self._settings = settings
         self._seed = settings.seed
-        self._simulator = ChairSimulator(settings.model, settings.world, settings.physics, settings.sensors)
+        self._simulator = ChairSimulator(settings.model, settings.world, settings.dynamics, settings.sensors)
         self._epoch = round(settings.start_time * _NS)  # /clock at the simulator's time 0; reset moves it on
         self._now = self._epoch
         self._lock = threading.Condition()  # over the holder
@@ -72,7 +72,7 @@ class SimNode:
             if self._requests:
                 continue
             self._advance()
-            pacer.wait(self._settings.physics.step)
+            pacer.wait(self._simulator.step_time)
         self._requests.close()
 
     def step(self) -> None:
@@ -122,7 +122,7 @@ class SimNode:
 
     def _publish(self, observation: Observation) -> None:
         self._now = self._epoch + round(observation.time * _NS)
-        self._topics.publish(observation, self._epoch, round(observation.time / self._settings.physics.step))
+        self._topics.publish(observation, self._epoch, round(observation.time / self._simulator.step_time))
 
     def _hear(self, message: Voltages) -> None:
         with self._lock:

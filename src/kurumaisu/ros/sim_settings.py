@@ -12,7 +12,7 @@ import numpy as np
 from kurumaisu.params import Model, load_model
 from kurumaisu.settings import Section
 from kurumaisu.sim.sensors.settings import SensorSettings, load_sensors
-from kurumaisu.sim.settings import Physics, read_physics, with_effects
+from kurumaisu.sim.settings import Dynamics, load_dynamics, with_effects
 from kurumaisu.world import Start, World, load_world
 from kurumaisu.world.files import parse_values
 
@@ -36,29 +36,30 @@ class SimSettings:
     voltage_horizon: float
     voltage_lead: float
     voltage_patience: float
-    physics: Physics
+    dynamics: Dynamics
     sensors: tuple[SensorSettings, ...]
 
 
 def read_settings(values: Any, where: str) -> SimSettings:
     """Return the settings of a parameter tree. Raise Error naming the file or key for anything wrong."""
     top = Section(values, where)
-    physics = read_physics(top.section("physics"))
+    dynamics = load_dynamics(Path(top.text("dynamics")))
+    step = dynamics.contacts.step
     settings = SimSettings(
         model=_model(top),
         world=_world(top),
         seed=top.integer("seed", at_least=0),
         speed=top.number("speed", at_least=0),
         start_time=top.number("start_time", above=0),
-        clock_every=_every(top, "clock_rate", physics.step),
-        ground_truth_every=_every(top, "ground_truth_rate", physics.step),
+        clock_every=_every(top, "clock_rate", step),
+        ground_truth_every=_every(top, "ground_truth_rate", step),
         map_frame=_frame(top, "map_frame"),
         base_frame=_frame(top, "base_frame"),
         voltage_timeout=top.number("voltage_timeout", above=0),
         voltage_horizon=top.number("voltage_horizon", at_least=0),
         voltage_lead=top.number("voltage_lead", above=0),
         voltage_patience=top.number("voltage_patience", at_least=0),
-        physics=physics,
+        dynamics=dynamics,
         sensors=_sensors(top),
     )
     top.end()

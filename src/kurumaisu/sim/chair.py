@@ -12,7 +12,7 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.effects import Reference, Volts
 from kurumaisu.errors import Error
-from kurumaisu.params import Model, shipped
+from kurumaisu.params import Model
 from kurumaisu.sim import state
 from kurumaisu.sim.chair_body import seat
 from kurumaisu.sim.chair_data import NEUTRAL, Command, Observation
@@ -23,7 +23,7 @@ from kurumaisu.sim.scanner import Scan, Scanner
 from kurumaisu.sim.sensing import Sensing
 from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
 from kurumaisu.sim.sensors.suite import Reading
-from kurumaisu.sim.settings import Physics, load_dynamics
+from kurumaisu.sim.settings import Dynamics
 from kurumaisu.sim.sight import Sight
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
@@ -35,14 +35,14 @@ __all__ = ["NEUTRAL", "ChairSimulator", "Command", "Observation"]
 class ChairSimulator:
     """One chair in one world, among all that is in it."""
 
-    def __init__(self, model: Model, world: World, physics: Physics, sensors: Sequence[SensorSettings] = ()) -> None:
+    def __init__(self, model: Model, world: World, dynamics: Dynamics, sensors: Sequence[SensorSettings] = ()) -> None:
         """Build the world; the effects that act are the model's. Call reset before step.
 
         Raise Error for effects that are unknown or whose parameters do not fit, for sensors of a robot that the world
         has not, and if the world has no start pose or the chair does not fit there.
         """
         self._model = model
-        self._dynamics = replace(load_dynamics(shipped("launch/physical.yaml")), contacts=physics)
+        self._dynamics = dynamics
         self._scene = seat(world, model.chassis)
         effects.check(model.effects)
         self._errs = bool(effects.build_world(model.effects, np.random.default_rng(0)))

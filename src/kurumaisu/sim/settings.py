@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How the simulator behaves: the section `physics` of launch/sim_node.yaml, and files of further effects."""
+"""How bodies behave, launch/physical.yaml, and files of further effects."""
 
 from __future__ import annotations
 
@@ -24,8 +24,7 @@ class Physics:
     friction: float
 
 
-def read_physics(section: settings.Section) -> Physics:
-    """Return the settings of a section. Raise Error naming file and key."""
+def _physics(section: settings.Section) -> Physics:
     physics = Physics(
         step=section.number("step", above=0),
         collision_slop=section.number("collision_slop", at_least=0),
@@ -35,11 +34,6 @@ def read_physics(section: settings.Section) -> Physics:
     )
     section.end()
     return physics
-
-
-def load_physics(path: Path) -> Physics:
-    """Read the section `physics` of a sim_node.yaml, for a simulation without ROS."""
-    return read_physics(settings.load(path).section("physics"))
 
 
 def with_effects(model: Model, path: Path) -> Model:
@@ -75,7 +69,7 @@ def load_dynamics(path: Path) -> Dynamics:
     """Read a physical.yaml. Raise Error naming file and key."""
     top = settings.load(path)
     dynamics = Dynamics(
-        contacts=read_physics(top.section("physics")),
+        contacts=_physics(top.section("physics")),
         wheel_friction=top.number("wheel_friction", above=0),
         floor_friction=top.number("floor_friction", at_least=0),
         density=top.number("density", above=0),
