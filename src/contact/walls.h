@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Walls in a grid of square cells, to find those near a circle.
+// Walls, and those of them that are near a circle.
 #pragma once
 
 #include <cstddef>
 #include <vector>
 
 #include "contact/mover.h"
+#include "raycast/grid.h"
 
 namespace kurumaisu::contact {
 
@@ -29,26 +30,8 @@ class Walls {
   const Wall& operator[](int index) const { return walls_[static_cast<std::size_t>(index)]; }
 
  private:
-  struct Range {
-    int first;
-    int last;
-  };
-  Range columns(double low, double high) const;
-  Range rows(double low, double high) const;
-  template <class Visit>
-  void visitCells(const Edge& edge, Visit&& visit) const;
-  std::size_t cell(int column, int row) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-           static_cast<std::size_t>(column);
-  }
-
   std::vector<Wall> walls_;
-  Point origin_{0, 0};
-  double cell_ = 1;  // [m]
-  int columns_ = 0;
-  int rows_ = 0;
-  std::vector<std::size_t> starts_;  // of each cell's walls in members_
-  std::vector<int> members_;
+  Grid grid_;
 };
 
 }  // namespace kurumaisu::contact
