@@ -7,7 +7,9 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -71,20 +73,26 @@ class Server {
   int baud() const;
 
  private:
+  static constexpr std::size_t kReply = 4096;  // [bytes] of room that replies need before more is read
+  static constexpr double kBitsOfByte = 10;    // on a serial line: start, 8 data, stop
+
   void run();
   void serve();
-  double wait();
   void checkAlive() const;
 
+  double wakeAt(double now);
   double deviceTime() const;
   void turn(double now);
+  void begin(double now);
   void heed();
   void flush(double now);
+  std::optional<std::size_t> send(std::string_view bytes);
   bool post(Output output, int baud, bool is_scan);
   void apply(const Output& output);
   void gone();
 
   const Options options_;
+  const std::size_t steps_;  // of a measurement
   mutable std::mutex mutex_;
   std::condition_variable room_;  // the outbox is empty, or there is nobody to read it
   Device device_;
@@ -92,10 +100,10 @@ class Server {
   Outbox outbox_;
   Counters counters_;
   Measurement shown_;
-  double fed_time_ = 0;      // [s]
-  double turn_start_;        // [s] steady, of the turn that is under way
-  double back_at_;           // [s] steady, when the device is plugged in again
-  bool full_ = false;        // the client's system takes no more for now
+  double fed_time_ = 0;  // [s]
+  double turn_start_;    // [s] steady, of the turn that is measured next
+  double back_at_;       // [s] steady, when the device is plugged in again
+  bool full_ = false;    // the client's system takes no more for now
   bool stopping_ = false;
   std::exception_ptr failure_;  // that ended the thread
   Wake wake_;
