@@ -73,4 +73,12 @@ def _recorded(log: Path) -> list[bytes]:
 
 
 def _commands() -> list[bytes]:
-    return []
+    """Return stories for the virtual sensor: two bytes choose it and its fault, 1 to 8 are events (1 a rotation)."""
+    asked = [
+        b"VV\nPP\nII\n",
+        b"BM\nGD0003004001\n\1GS0000004505\n\1",
+        b"TM0\nTM1\nTM2\n",
+        b"SS115200\nCR05\nHS1\nDB03\n",
+    ]
+    asked += [b"MD0003004001000;a\n\1\1\1QT\n", b"MS0010003003103\n" + 8 * b"\1", b"ME0003004007000\n\1\2\6\1RS\n\3\1"]
+    return [bytes([kind, fault]) + b"SCIP2.0\n" + asked[fault % len(asked)] for fault in range(28) for kind in (1, 12)]
