@@ -11,6 +11,9 @@ namespace kurumaisu::scip {
 namespace {
 
 constexpr std::size_t kLongest = 1U << 16U;  // [bytes] of a message; 1081 beams with intensity are 6.7 kB
+constexpr std::size_t kLongestEcho = 64;     // [bytes], with a string; a longer first line is noise
+constexpr std::size_t kLongestString = 16;   // after the semicolon of a command
+constexpr std::size_t kLongestMeasurement = 15 + 1 + kLongestString;
 
 std::vector<std::string_view> linesOf(std::string_view block) {
   std::vector<std::string_view> lines;
@@ -31,16 +34,21 @@ std::optional<std::string> statusOf(std::string_view line) {
 
 /// The echo of a measurement, with its string if it has one, at a line's end; empty if there is none.
 std::string_view measurementAtEnd(std::string_view line) {
-  for (std::size_t start = line.find_first_of("MG"); start != std::string_view::npos;
-       start = line.find_first_of("MG", start + 1)) {
-    const std::string_view rest = line.substr(start);
-    if (request(rest.substr(0, rest.find(';')))) return rest;
+  if (line.size() > kLongestMeasurement) line.remove_prefix(line.size() - kLongestMeasurement);
+  for (; !line.empty(); line.remove_prefix(1)) {
+    if (request(line.substr(0, line.find(';')))) return line;
   }
   return {};
 }
 
 bool endsWith(std::string_view line, std::string_view end) {
   return !end.empty() && line.size() >= end.size() && line.substr(line.size() - end.size()) == end;
+}
+
+/// Could a reply's first line be some command's echo, rather than noise?
+bool isEcho(std::string_view line) {
+  const auto is_printable = [](char c) { return c >= ' ' && c <= '~'; };
+  return !line.empty() && line.size() <= kLongestEcho && std::all_of(line.begin(), line.end(), is_printable);
 }
 
 /// VV, PP and II end their lines by a semicolon that is not in the sum.
@@ -60,37 +68,40 @@ bool isGood(std::string_view line, bool keyed) {
 
 void Assembler::add(std::string_view bytes, double time) {
   if (bytes.empty()) return;
-  arrivals_.emplace_back(buffer_.size(), time);
+  arrivals_.emplace_back(dropped_ + buffer_.size(), time);
   buffer_ += bytes;
 }
 
 std::optional<Message> Assembler::next() {
   for (;;) {
-    const std::size_t end = buffer_.find("\n\n", searched_);
-    if (end == std::string::npos) {
-      searched_ = buffer_.empty() ? 0 : buffer_.size() - 1;
-      if (buffer_.size() <= kLongest) return std::nullopt;
-      ++counts_.unreadable;
-      clear();
-      return std::nullopt;
-    }
-    std::optional<Message> message = parse(std::string_view(buffer_).substr(0, end));
-    discard(end + 2);
-    if (message) {
+    while (taken_ < buffer_.size() && buffer_[taken_] == '\n') drop(1);
+    const std::string_view window = std::string_view(buffer_).substr(taken_, kLongest + 2);
+    const std::size_t end = window.find("\n\n", searched_);
+    if (end != std::string_view::npos) {
+      std::optional<Message> message = parse(window.substr(0, end));
+      drop(end + 2);
+      if (!message) continue;
       ++counts_.messages;
       return message;
     }
+    if (window.size() < kLongest + 2) {
+      searched_ = window.empty() ? 0 : window.size() - 1;
+      return std::nullopt;
+    }
+    ++counts_.unreadable;
+    drop(kLongest);
   }
 }
 
 void Assembler::clear() {
+  dropped_ += buffer_.size();
   buffer_.clear();
   arrivals_.clear();
+  taken_ = 0;
   searched_ = 0;
 }
 
 std::optional<Message> Assembler::parse(std::string_view block) {
-  if (block.empty() || block == "\n") return std::nullopt;
   const std::vector<std::string_view> lines = linesOf(block);
   // Backwards: where a reply's end was lost, the next one is whole.
   for (std::size_t i = lines.size() - 1; i-- > 0;) {
@@ -98,7 +109,7 @@ std::optional<Message> Assembler::parse(std::string_view block) {
     if (!status) continue;
     std::string_view echo = measurementAtEnd(lines[i]);
     if (echo.empty() && endsWith(lines[i], expected_)) echo = expected_;
-    if (echo.empty() && i == 0) echo = lines[0];
+    if (echo.empty() && i == 0 && isEcho(lines[0])) echo = lines[0];
     if (echo.empty()) continue;
     if (i > 0 && statusOf(lines[1])) ++counts_.cut;
     const auto start =
@@ -118,20 +129,20 @@ std::optional<Message> Assembler::parse(std::string_view block) {
 }
 
 double Assembler::timeOf(std::size_t position) const {
-  const auto later = [](std::size_t at, const auto& arrival) { return at < arrival.first; };
-  return std::prev(std::upper_bound(arrivals_.begin(), arrivals_.end(), position, later))->second;
+  const auto later = [](std::uint64_t at, const auto& arrival) { return at < arrival.first; };
+  const std::uint64_t at = dropped_ + taken_ + position;
+  return std::prev(std::upper_bound(arrivals_.begin(), arrivals_.end(), at, later))->second;
 }
 
-void Assembler::discard(std::size_t bytes) {
-  const double last = timeOf(bytes - 1);
-  buffer_.erase(0, bytes);
+void Assembler::drop(std::size_t bytes) {
+  taken_ += bytes;
   searched_ = 0;
-  while (!arrivals_.empty() && arrivals_.front().first < bytes) {
-    arrivals_.pop_front();
-  }
-  for (auto& arrival : arrivals_) arrival.first -= bytes;
-  if (!buffer_.empty() && (arrivals_.empty() || arrivals_.front().first > 0))
-    arrivals_.emplace_front(0, last);
+  while (arrivals_.size() > 1 && arrivals_[1].first <= dropped_ + taken_) arrivals_.pop_front();
+  if (2 * taken_ < buffer_.size())
+    return;  // to move the rest for every short message would take quadratic time
+  buffer_.erase(0, taken_);
+  dropped_ += taken_;
+  taken_ = 0;
 }
 
 }  // namespace kurumaisu::scip

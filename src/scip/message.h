@@ -12,7 +12,7 @@
 
 namespace kurumaisu::scip {
 
-/// A reply: what stands between two empty lines.
+/// A reply: what stands between empty lines.
 struct Message {
   std::string command;             ///< the echo
   std::string status;              ///< two characters; in SCIP 1.1 one
@@ -21,7 +21,8 @@ struct Message {
   double first_byte = 0;           ///< [s] host's time at which the echo began to come
 };
 
-/// Cuts a stream of bytes into messages, whatever stands between them.
+/// Cuts a stream of bytes into messages, whatever stands between them. The messages depend on the bytes alone, not on
+/// the pieces in which they come; time is linear in their number, memory bounded if next() is called until it has none.
 class Assembler {
  public:
   struct Counts {
@@ -49,12 +50,14 @@ class Assembler {
  private:
   std::optional<Message> parse(std::string_view block);
   double timeOf(std::size_t position) const;
-  void discard(std::size_t bytes);
+  void drop(std::size_t bytes);
 
   std::string expected_;
   std::string buffer_;
-  std::size_t searched_ = 0;                             // bytes in which no end has been found
-  std::deque<std::pair<std::size_t, double>> arrivals_;  // from a byte in the buffer on, time [s]
+  std::uint64_t dropped_ = 0;                              // bytes that came before the buffer's
+  std::size_t taken_ = 0;                                  // the buffer's, already done with
+  std::size_t searched_ = 0;                               // bytes after them in which no end has been found
+  std::deque<std::pair<std::uint64_t, double>> arrivals_;  // from a byte of the stream on, time [s]
   Counts counts_;
 };
 

@@ -7,11 +7,20 @@ namespace kurumaisu::scip {
 namespace {
 
 constexpr std::size_t kClockWidth = 4;
+constexpr std::size_t kLineWidth = 64;     // of data, without the sum
 constexpr std::size_t kDistanceWidth = 3;  // of a beam with intensity
 
+/// Every line but the last is full: where characters went from one to another, six bits of sum may not tell.
 std::string bodyOf(const Message& message) {
   std::string data;
-  for (std::size_t i = 1; i < message.lines.size(); ++i) data += message.lines[i];
+  for (std::size_t i = 1; i < message.lines.size(); ++i) {
+    const std::string& line = message.lines[i];
+    if (line.size() > kLineWidth || (line.size() < kLineWidth && i + 1 < message.lines.size())) {
+      throw BadFrame("line " + std::to_string(i) + " of the data has " + std::to_string(line.size()) +
+                     " characters, not 64");
+    }
+    data += line;
+  }
   return data;
 }
 

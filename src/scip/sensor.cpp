@@ -11,19 +11,33 @@ namespace {
 
 using Values = std::map<std::string, std::string>;
 
+struct Limits {
+  int least;
+  int most;
+};
+
+// What the protocol itself can say: a distance has three characters of six bits, a step of a command four digits, and
+// the clock ticks in milliseconds.
+constexpr Limits kNearest{0, (1 << 18) - 1};   // [mm]
+constexpr Limits kFarthest{1, (1 << 18) - 1};  // [mm]
+constexpr Limits kStep{0, 9999};
+constexpr Limits kSteps{1, 10000};  // of a turn
+constexpr Limits kSpeed{1, 60000};  // [1/min]
+
 std::string textOf(const Values& values, const std::string& key) {
   const auto found = values.find(key);
   if (found == values.end()) throw BadFrame("PP: " + key + " is missing");
   return found->second;
 }
 
-int numberOf(const Values& values, const std::string& key, int at_least) {
+int numberOf(const Values& values, const std::string& key, const Limits& limits) {
   const std::string text = textOf(values, key);
   int value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || value < at_least) {
-    throw BadFrame("PP: " + key + " must be a whole number of at least " + std::to_string(at_least) + ": " +
-                   text);
+  const bool is_number = error == std::errc() && end == text.data() + text.size();
+  if (!is_number || value < limits.least || value > limits.most) {
+    throw BadFrame("PP: " + key + " must be a whole number from " + std::to_string(limits.least) + " to " +
+                   std::to_string(limits.most) + ": " + text);
   }
   return value;
 }
@@ -57,13 +71,13 @@ Parameters parameters(const Message& message) {
   const Values values = keyed(message);
   Parameters result;
   result.model = textOf(values, "MODL");
-  result.distance_min = numberOf(values, "DMIN", 0);
-  result.distance_max = numberOf(values, "DMAX", 1);
-  result.steps_per_turn = numberOf(values, "ARES", 1);
-  result.first = numberOf(values, "AMIN", 0);
-  result.last = numberOf(values, "AMAX", 0);
-  result.front = numberOf(values, "AFRT", 0);
-  result.rpm = numberOf(values, "SCAN", 1);
+  result.distance_min = numberOf(values, "DMIN", kNearest);
+  result.distance_max = numberOf(values, "DMAX", kFarthest);
+  result.steps_per_turn = numberOf(values, "ARES", kSteps);
+  result.first = numberOf(values, "AMIN", kStep);
+  result.last = numberOf(values, "AMAX", kStep);
+  result.front = numberOf(values, "AFRT", kStep);
+  result.rpm = numberOf(values, "SCAN", kSpeed);
   require(result.first <= result.last,
           "AMIN " + std::to_string(result.first) + " is above AMAX " + std::to_string(result.last));
   require(
@@ -71,7 +85,9 @@ Parameters parameters(const Message& message) {
       "AMIN to AMAX are more than the " + std::to_string(result.steps_per_turn) + " steps of a turn (ARES)");
   require(result.front <= result.steps_per_turn,
           "AFRT " + std::to_string(result.front) + " lies beyond a turn");
-  require(result.distance_min < result.distance_max, "DMIN is not below DMAX");
+  require(result.distance_min < result.distance_max, "DMIN " + std::to_string(result.distance_min) +
+                                                         " is not below DMAX " +
+                                                         std::to_string(result.distance_max));
   return result;
 }
 

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What libFuzzer's targets share: an oracle that stops the program, pieces of bytes, and a mutator that knows sums.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+
+#include "scip/request.h"
+#include "scip/scan.h"
+#include "scip_frames.h"
+
+extern "C" {
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t most);
+std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most, unsigned seed);
+}
+
+namespace fuzzing {
+
+inline void require(bool holds, const char* what) {
+  if (holds) return;
+  std::fprintf(stderr, "FUZZ: %s\n", what);
+  std::abort();
+}
+
+/// Small numbers from a seed, the same on every machine.
+class Dice {
+ public:
+  explicit Dice(std::uint32_t seed) : state_(seed) {}
+
+  /// From 0 to n - 1.
+  std::uint32_t roll(std::uint32_t n) {
+    state_ = 1664525U * state_ + 1013904223U;
+    return (state_ >> 8U) % n;
+  }
+
+ private:
+  std::uint32_t state_;
+};
+
+/// Scans that were decoded, against the bytes from which they were: each must stand there, byte for byte, as the
+/// specification writes it, in order and without overlap. Written without src/scip.
+class Oracle {
+ public:
+  explicit Oracle(std::string bytes) : bytes_(std::move(bytes)) {}
+
+  void check(const std::string& echo, const kurumaisu::scip::Rotation& rotation) {
+    frames::Scan scan{rotation.clock, {}};
+    for (std::size_t k = 0; k < rotation.distances.size(); ++k) {
+      scan.numbers.push_back(static_cast<std::uint32_t>(rotation.distances[k]));
+      if (!rotation.intensities.empty())
+        scan.numbers.push_back(static_cast<std::uint32_t>(rotation.intensities.at(k)));
+    }
+    const std::string frame = frames::scan(echo, scan);
+    const std::size_t at = bytes_.find(frame, from_);
+    require(at != std::string::npos, "a scan that was not sent");
+    require(frames::read(bytes_.substr(at, frame.size()), echo, scan.numbers.size()) == scan,
+            "the oracle does not agree with itself");
+    from_ = at + frame.size();
+  }
+
+ private:
+  std::string bytes_;
+  std::size_t from_ = 0;
+};
+
+/// Mutates, and half the time makes each line's sum right: by chance it would be once in 64, and a frame's never.
+inline std::size_t mutateWithSums(std::uint8_t* data, std::size_t size, std::size_t most, unsigned seed) {
+  Dice dice(seed);
+  size = LLVMFuzzerMutate(data, size, most);
+  if (dice.roll(2) == 0) return size;
+  unsigned sum = 0;
+  std::size_t length = 0;
+  for (std::size_t at = 0; at < size; ++at) {
+    if (data[at] != '\n') {
+      sum += data[at];
+      ++length;
+      continue;
+    }
+    const bool is_first = at < length + 2 || data[at - length - 2] == '\n';  // a reply's, an echo
+    if (length > 1 && !is_first) data[at - 1] = static_cast<std::uint8_t>('0' + (sum - data[at - 1]) % 64);
+    sum = 0;
+    length = 0;
+  }
+  return size;
+}
+
+}  // namespace fuzzing
