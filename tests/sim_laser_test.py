@@ -29,7 +29,11 @@ class SimLaserTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.model = load_model(Path(rospy.get_param("~model")))
-        cls.clock, cls.fed, cls.scan = Topic("/clock", Clock), Topic("sim_node/scan", LaserScan), Topic("scan", LaserScan)
+        cls.clock, cls.fed, cls.scan = (
+            Topic("/clock", Clock),
+            Topic("sim_node/scan", LaserScan),
+            Topic("scan", LaserScan),
+        )
         cls.voltages = rospy.Publisher("voltages", Voltages, queue_size=10)
         for name in SERVICES:
             rospy.wait_for_service(name, timeout=20)

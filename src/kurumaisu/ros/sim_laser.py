@@ -13,8 +13,10 @@ from sensor_msgs.msg import LaserScan
 
 from kurumaisu.params import Laser
 from kurumaisu.ros import messages
+from kurumaisu.ros.sim_settings import SimSettings
 from kurumaisu.sim.scanner import Scan
-from kurumaisu.sim.virtual_laser import VirtualLaser
+from kurumaisu.sim.virtual_laser import VirtualLaser, check_fan, remainder
+from kurumaisu.virtual_urg import load_sensor
 
 _NS = 1_000_000_000
 _GLANCE = 0.02  # [s] of wall time in which a service is noticed by who waits for a scan
@@ -62,7 +64,7 @@ class DrivenLaser:
     """The virtual URG; `scan` is heard, to know that its driver keeps up. What it is fed goes out on `~scan`."""
 
     def __init__(self, laser: Laser, device: VirtualLaser, patience: float) -> None:
-        """patience [s] of wall time: how long simulated time waits for a scan."""
+        """Advertise; patience [s] of wall time: how long simulated time waits for a scan."""
         self._direct = DirectLaser(laser, "~scan")
         self._device = device
         self._patience = patience
@@ -112,3 +114,19 @@ class DrivenLaser:
         with self._news:
             self._owed, self._given_up = None, False
             self._news.notify_all()
+
+
+def laser_output(settings: SimSettings) -> DirectLaser | DrivenLaser:
+    """Return what is chosen. Raise Error naming model and sensor where they contradict each other."""
+    laser, driver = settings.model.laser, settings.driver
+    if driver is None:
+        return DirectLaser(laser, "scan")
+    sensor = load_sensor(driver.sensor)
+    check_fan(laser, sensor, driver.model)
+    device = VirtualLaser(sensor, laser, driver.port, driver.faults, driver.intensity)
+    late = remainder(sensor, round(settings.start_time * _NS))
+    rospy.loginfo(
+        f"SIM_LASER_PORT {sensor.model.name} at {device.address}; SIM_LASER_REMAINDER its clock of milliseconds makes "
+        f"stamps late by {late:.9f} s"
+    )
+    return DrivenLaser(laser, device, driver.patience)

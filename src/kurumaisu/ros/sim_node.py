@@ -44,7 +44,7 @@ class SimNode:
         self._lock = threading.Condition()  # over the holder
         self._holder = VoltageHolder()
         self._given_up: int | None = None  # stamp of the voltages after which no more came in time
-        self._laser: LaserOutput = laser_output(settings, self._now)
+        self._laser: LaserOutput = laser_output(settings)
         self._topics = SimTopics(settings, self._laser, self._simulator.robot, self._now)
         self._voltages = rospy.Subscriber("voltages", Voltages, self._hear, queue_size=100)
         self._commands: deque[tuple[str, Twist]] = deque()  # heard since the last step, for other robots
@@ -62,6 +62,13 @@ class SimNode:
 
     def run(self) -> None:
         """Simulate until ROS shuts down."""
+        try:
+            self._loop()
+        finally:
+            self._requests.close()
+            self._laser.close()
+
+    def _loop(self) -> None:
         pacer = Pacer(self._settings.speed)
         self.reset()
         while not rospy.is_shutdown():
@@ -76,8 +83,6 @@ class SimNode:
                 continue
             self._advance()
             pacer.wait(self._settings.physics.step)
-        self._requests.close()
-        self._laser.close()
 
     def step(self) -> None:
         """Go on by one step, as soon as the voltages have come that are due, and the scan that a driver makes."""

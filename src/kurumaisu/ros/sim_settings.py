@@ -28,6 +28,7 @@ class DriverSettings:
     port: str
     faults: tuple[str, ...]
     patience: float  # [s] of wall time
+    intensity: float  # of reflectance 1
 
 
 @dataclass(frozen=True)
@@ -114,6 +115,7 @@ def _driver(top: Section, model: Path) -> DriverSettings | None:
         port=top.text("laser_port"),
         faults=() if faults == NONE else tuple(faults.split()),
         patience=top.number("laser_patience", at_least=0),
+        intensity=top.number("laser_intensity", at_least=0),
     )
     return settings if chosen == "driver" else None
 
