@@ -2,28 +2,18 @@
 // The laser's driver: finds the sensor, keeps it streaming, says how it does. No ROS: time and sink are given.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <string>
-#include <thread>
 
+#include "laser/fan.h"
+#include "laser/scan.h"
 #include "laser/status.h"
 
 namespace kurumaisu::laser {
 
-struct Scan;  // laser/scan.h
-
 /// What may change while the driver runs.
-struct LiveSettings {
-  double angle_min;  ///< [rad] counter-clockwise from the front
-  double angle_max;  ///< [rad]
-  int cluster;       ///< steps joined into a beam, at least 1
-  int skip;          ///< scans left out between two, 0 to 9
-  bool intensity;    ///< asked for; without it where the sensor has none
-};
+using LiveSettings = Window;
 
 struct DriverSettings {
   std::string serial_port;  ///< a tty; empty with ip_address
@@ -31,8 +21,8 @@ struct DriverSettings {
   std::string ip_address;   ///< in numbers; empty with serial_port
   int ip_port;
   LiveSettings live;
-  bool calibrate_time;     ///< ask the sensor's clock (TM) at each start; its laser is off meanwhile
-  bool device_time;        ///< the sensor's clock is the host's, modulo 2^24 ms
+  bool calibrate_time;  ///< ask the sensor's clock (TM) at each start; its laser is off meanwhile
+  TimeMode time_mode;
   double stale_timeout;    ///< [s] of the host's time without a scan: the sensor is sought anew
   int error_limit;         ///< damaged scans and errors in a row: the sensor is sought anew
   double connect_timeout;  ///< [s] for a TCP connection

@@ -19,6 +19,11 @@ struct Refused : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// It has no intensities.
+struct NoIntensity : Refused {
+  using Refused::Refused;
+};
+
 /// What is told on the way.
 using Tell = std::function<void(Report::Level, const std::string&)>;
 

@@ -29,6 +29,7 @@ using kurumaisu::LaserConfig;
 using Trigger = std_srvs::Trigger;
 
 constexpr double kLongestWait = 0.02;    // [s] for a callback, so that a stop is soon noticed
+constexpr double kWarningPeriod = 1.0;   // [s] between two equal warnings
 constexpr double kSelfTestPatience = 5;  // [s] for scans after a restart
 constexpr std::uint64_t kSelfTestScans = 3;
 constexpr std::uint32_t kQueue = 20;  // scans, urg_node's
@@ -90,13 +91,12 @@ LaserConfig configOf(const k::NodeSettings& settings) {
 }
 
 void say(const k::Report& report) {
-  switch (report.level) {
-    case k::Report::Level::kInfo:
-      return ROS_INFO("%s", report.text.c_str());
-    case k::Report::Level::kWarning:
-      return ROS_WARN("%s", report.text.c_str());
-    default:
-      return ROS_ERROR("%s", report.text.c_str());
+  if (report.level == k::Report::Level::kInfo) {
+    ROS_INFO("%s", report.text.c_str());
+  } else if (report.level == k::Report::Level::kWarning) {
+    ROS_WARN("%s", report.text.c_str());
+  } else {
+    ROS_ERROR("%s", report.text.c_str());
   }
 }
 
@@ -143,7 +143,8 @@ LaserNode::LaserNode(ros::NodeHandle& nh, const k::NodeSettings& settings, const
       rhythm_(settings.diagnostics_window_time),
       scan_(nh.advertise<sensor_msgs::LaserScan>("scan", kQueue)),
       status_(nh.advertise<diagnostic_msgs::DiagnosticStatus>("laser_status", 1, true)),
-      driver_(settings.driver, [this](const k::Scan& scan) { publish(scan); }, now, say) {
+      driver_(
+          settings.driver, [this](const k::Scan& scan) { publish(scan); }, now, say) {
   serve(nh, "update_laser_status", &LaserNode::updateStatus);
   serve(private_nh_, "restart", &LaserNode::restart);
   serve(private_nh_, "self_test", &LaserNode::selfTest);
@@ -186,12 +187,18 @@ void LaserNode::run() {
 
 void LaserNode::publish(const k::Scan& scan) {
   sensor_msgs::LaserScan message = messageOf(scan);
+  double stamp = scan.stamp;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     message.header.frame_id = settings_.frame_id;
-    message.header.stamp = ros::Time(scan.stamp + settings_.time_offset);
+    stamp += settings_.time_offset;
     rhythm_.add(now());
   }
+  if (stamp < 0) {  // at the start of simulated time; ROS has no such time
+    ROS_WARN_THROTTLE(kWarningPeriod, "LASER_STAMP: a scan of %g s, before time began, is dropped", stamp);
+    return;
+  }
+  message.header.stamp = ros::Time(stamp);
   scan_.publish(message);
 }
 
@@ -281,7 +288,8 @@ void LaserNode::selfTest(Answer& answer) {
     if (!begun && status.counts.reconnects > reconnects) begun = status.counts;
     if (begun && status.counts.scans >= begun->scans + kSelfTestScans) break;
   } while (ros::ok() && ros::SteadyTime::now() < deadline);
-  const k::Diagnosis diagnosis = k::diagnoseDevice(status, begun.value_or(status.counts), settings_.driver, 0);
+  const k::Diagnosis diagnosis =
+      k::diagnoseDevice(status, begun.value_or(status.counts), settings_.driver, 0);
   const bool scans = begun && status.counts.scans >= begun->scans + kSelfTestScans;
   answer.success = scans && diagnosis.level == k::Level::kOk;
   answer.message = (scans ? "" : "no scans within the self test; ") + diagnosis.summary;

@@ -20,7 +20,8 @@ Link::Link(std::unique_ptr<Port> port, Now now, Interrupted interrupted)
     : port_(std::move(port)),
       now_(std::move(now)),
       interrupted_(std::move(interrupted)),
-      last_byte_(steadyTime()) {}
+      last_byte_(steadyTime()),
+      last_arrival_(now_()) {}
 
 void Link::send(const std::string& command) {
   assembler_.expect(command);
@@ -32,8 +33,9 @@ void Link::receive(double timeout) {
   std::array<char, kChunk> bytes;
   const std::size_t count = port_->read(bytes.data(), bytes.size(), std::clamp(timeout, 0.0, kSlice));
   if (count == 0) return;
-  assembler_.add({bytes.data(), count}, now_());
+  last_arrival_ = now_();
   last_byte_ = steadyTime();
+  assembler_.add({bytes.data(), count}, last_arrival_);
 }
 
 std::optional<scip::Message> Link::next(double timeout) {

@@ -41,6 +41,9 @@ class Link {
   /// Time of the last byte, of no one's clock: steadyTime() [s].
   double lastByte() const { return last_byte_; }
 
+  /// The same in the host's time [s].
+  double lastArrival() const { return last_arrival_; }
+
   const scip::Assembler::Counts& counts() const { return assembler_.counts(); }
 
  private:
@@ -51,6 +54,7 @@ class Link {
   Interrupted interrupted_;
   scip::Assembler assembler_;
   double last_byte_;
+  double last_arrival_;
 };
 
 }  // namespace kurumaisu::laser

@@ -13,10 +13,10 @@ namespace kurumaisu::laser {
 struct NodeSettings {
   DriverSettings driver;
   std::string frame_id;
-  double time_offset;              ///< [s] added to every stamp
-  double diagnostic_period;        ///< [s]
-  double diagnostics_tolerance;    ///< of the rate
-  double diagnostics_window_time;  ///< [s]
+  double time_offset;                 ///< [s] added to every stamp
+  double diagnostic_period;           ///< [s]
+  double diagnostics_tolerance;       ///< of the rate
+  double diagnostics_window_time;     ///< [s]
   std::vector<std::string> warnings;  ///< of parameters that were understood but not obeyed; code first
 };
 

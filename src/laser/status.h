@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "laser/clock.h"
 #include "scip/sensor.h"
 
 namespace kurumaisu::laser {
@@ -61,9 +62,7 @@ struct Status {
   double last_error_time = 0;  ///< [s] host's
   double last_scan_time = 0;   ///< [s] host's, when it was given to the sink
   double latency = 0;          ///< [s] from the last scan's last byte until the sink had it
-  double clock_offset = 0;     ///< [s] host's minus sensor's
-  double clock_drift = 0;      ///< of the sensor's clock, 1e-3 = it gains 1 ms a second
-  std::string clock_state;     ///< in words
+  DeviceClock::State clock;    ///< the sensor's, as of the last scan
   double scan_period = 0;      ///< [s] from scan to scan, as asked for
 };
 

@@ -26,7 +26,8 @@ std::optional<Arrival> ScipStream::await(double timeout) {
   const std::optional<scip::Message> message = link_.next(timeout);
   if (!message) return std::nullopt;
   const bool is_scan = message->status == "99";
-  if (!is_scan && !scip::answers(message->command, request_)) return std::nullopt;  // a late answer
+  const bool is_late = !scip::answers(message->command, request_) || message->status == "00";
+  if (!is_scan && is_late) return std::nullopt;  // an answer to what was asked before
   if (!is_scan) return Arrival{Arrival::Kind::kStatus, {}, message->first_byte, message->status};
   try {
     Arrival arrival{Arrival::Kind::kScan, scip::decodeScan(*message, request_), message->first_byte, {}};
@@ -86,6 +87,10 @@ void ScipStream::answer(const std::string& command) {
 void ScipStream::start(const std::string& command) {
   const std::string asked = scip::command(request_);
   const std::string status = link_.ask(asked, answer_timeout_).status;
+  if (request_.form == scip::Form::kIntensity && status[0] == '0' && status != "00") {
+    throw NoIntensity("LASER_NO_INTENSITY: " + asked + " is answered by status " + status +
+                      "; scans come without");
+  }
   if (status != "00") throw Refused("LASER_REFUSED: " + asked + " is answered by status " + status);
   started_ = command;
   put(command, status, {});
