@@ -89,7 +89,7 @@ class DrivenLaser:
         """Wait until the driver has published the scan that was fed last, within patience."""
         with self._news:
             deadline = time.monotonic() + self._patience
-            while self._owed is not None and not hurry():
+            while self._owed is not None and self._driver.get_num_connections() and not hurry():
                 remaining = deadline - time.monotonic()
                 if remaining <= 0:
                     self._give_up(self._owed)
