@@ -13,11 +13,13 @@ from kurumaisu.ros.sim_settings import SimSettings, read_settings
 from kurumaisu.sim.chair import NEUTRAL, ChairSimulator
 
 CHOSEN = {"seed": 1, "speed": 1.0, "effects": "none", "sensors": "none", "image_extents": False}
+LASER = {"laser": "direct", "laser_port": "urg", "laser_faults": "none"}
 WORLD = {"world": shipped("worlds/room.world"), "world_values": "none", "start": "none"}
 
 
 def settings(**changes: object) -> SimSettings:
     values = yaml.safe_load(shipped("launch/sim_node.yaml").read_text()) | CHOSEN | WORLD
+    values |= LASER | {"laser_sensor": shipped("launch/urg/urg_04lx.yaml")}
     values |= {"dynamics": shipped("launch/physical.yaml"), "model": shipped("launch/md100.yaml")} | changes
     return read_settings({key: str(v) if isinstance(v, Path) else v for key, v in values.items()}, "/sim_node")
 
@@ -63,3 +65,12 @@ def test_sensors_and_flags() -> None:
     assert len(settings(sensors=shipped("launch/sensors.yaml")).sensors) == 6
     with pytest.raises(Error, match="image_extents: must be true or false: 'no'"):
         settings(image_extents="no")
+
+
+def test_the_scan_goes_through_a_driver_where_that_is_chosen() -> None:
+    assert settings().driver is None
+    driver = settings(laser="driver", laser_faults="corrupt@5 dup@7").driver
+    assert driver is not None
+    assert driver.faults == ("corrupt@5", "dup@7")
+    with pytest.raises(Error, match="/sim_node: laser: must be one of direct, driver: 'drivr'"):
+        settings(laser="drivr")

@@ -19,6 +19,7 @@ from kurumaisu.ros import messages
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.services import Services
+from kurumaisu.ros.sim_laser import LaserOutput, laser_output
 from kurumaisu.ros.sim_publish import SimTopics
 from kurumaisu.ros.sim_settings import SimSettings, read_settings
 from kurumaisu.sim.chair import ChairSimulator, Observation
@@ -43,7 +44,8 @@ class SimNode:
         self._lock = threading.Condition()  # over the holder
         self._holder = VoltageHolder()
         self._given_up: int | None = None  # stamp of the voltages after which no more came in time
-        self._topics = SimTopics(settings, self._simulator.robot, self._now)
+        self._laser: LaserOutput = laser_output(settings)
+        self._topics = SimTopics(settings, self._laser, self._simulator.robot, self._now)
         self._voltages = rospy.Subscriber("voltages", Voltages, self._hear, queue_size=100)
         self._commands: deque[tuple[str, Twist]] = deque()  # heard since the last step, for other robots
         self._others = [
@@ -60,6 +62,13 @@ class SimNode:
 
     def run(self) -> None:
         """Simulate until ROS shuts down."""
+        try:
+            self._loop()
+        finally:
+            self._requests.close()
+            self._laser.close()
+
+    def _loop(self) -> None:
         pacer = Pacer(self._settings.speed)
         self.reset()
         while not rospy.is_shutdown():
@@ -69,15 +78,16 @@ class SimNode:
                 self._requests.wait(0.1)
                 continue
             self._wait_for_voltages()
+            self._laser.wait(self._has_requests)
             if self._requests:
                 continue
             self._advance()
             pacer.wait(self._simulator.step_time)
-        self._requests.close()
 
     def step(self) -> None:
-        """Go on by one step, as soon as the voltages have come that are due."""
+        """Go on by one step, as soon as the voltages have come that are due, and the scan that a driver makes."""
         self._wait_for_voltages()
+        self._laser.wait(self._has_requests)
         self._advance()
 
     def reset(self, seed: int | None = None) -> None:
@@ -104,6 +114,9 @@ class SimNode:
             self._given_up = None
         self._epoch = self._now - round(observation.time * _NS)
         self._publish(observation)
+
+    def _has_requests(self) -> bool:
+        return bool(self._requests)
 
     def _command(self, robot: str, twist: Twist) -> None:
         self._commands.append((robot, twist))

@@ -7,9 +7,9 @@ import rospy
 import tf2_ros
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import LaserScan
 
 from kurumaisu.ros import messages
+from kurumaisu.ros.sim_laser import LaserOutput
 from kurumaisu.ros.sim_sensors import SensorTopics
 from kurumaisu.ros.sim_settings import SimSettings
 from kurumaisu.ros.stageros_robot import CollisionTopic
@@ -21,30 +21,31 @@ _NS = 1_000_000_000
 class SimTopics:
     """The topics, and the frames of laser and further sensors."""
 
-    def __init__(self, settings: SimSettings, robot: int, now: int) -> None:
-        """Advertise at a time [ns]; robot: the chair's number among the robots."""
+    def __init__(self, settings: SimSettings, laser: LaserOutput, robot: int, now: int) -> None:
+        """Advertise at a time [ns]; laser: where scans go; robot: the chair's number among the robots."""
         self._settings = settings
+        self._laser = laser
         self._clock = rospy.Publisher("/clock", Clock, queue_size=100)
-        self._scan = rospy.Publisher("scan", LaserScan, queue_size=10)
         self._truth = rospy.Publisher("ground_truth", Odometry, queue_size=10)
         self._collision = CollisionTopic("collision")
         self._sensors = SensorTopics(settings.sensors, robot, settings.base_frame)
         self._static = tf2_ros.StaticTransformBroadcaster()
         stamp = messages.stamp_of(now)
-        laser = messages.laser_transform(stamp, settings.model.laser, settings.base_frame)
-        self._static.sendTransform([laser, *self._sensors.transforms(stamp)])
+        mount = messages.laser_transform(stamp, settings.model.laser, settings.base_frame)
+        self._static.sendTransform([mount, *self._sensors.transforms(stamp)])
         self._touched = False
 
     def publish(self, observation: Observation, epoch: int, steps: int) -> None:
         """Publish a step's data, then the clock: who hears a time has been sent all before it.
 
+        But for a scan that a driver makes: the clock goes before what the driver is to stamp by it.
         epoch [ns]: what the clock said at the simulation's time 0; steps since then.
         """
         settings = self._settings
-        stamp = messages.stamp_of(epoch + round(observation.time * _NS))
+        now = epoch + round(observation.time * _NS)
+        stamp = messages.stamp_of(now)
         if observation.scan is not None:
-            first_beam = messages.stamp_of(epoch + round(observation.scan.time * _NS))
-            self._scan.publish(messages.laser_scan(first_beam, settings.model.laser, observation.scan.ranges))
+            self._laser.publish(observation.scan, epoch)
         self._sensors.publish(observation.readings, stamp)
         self._touched |= observation.contact
         if steps % settings.ground_truth_every == 0:
@@ -57,3 +58,4 @@ class SimTopics:
             self._touched = False
         if steps % settings.clock_every == 0:
             self._clock.publish(Clock(stamp))
+        self._laser.advance(now, observation.scan, epoch)

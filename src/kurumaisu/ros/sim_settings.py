@@ -20,6 +20,18 @@ NONE = "none"  # of a file or a text that is not given
 
 
 @dataclass(frozen=True)
+class DriverSettings:
+    """The virtual URG that a driver reads, if it is to: files of model and sensor, where it is, what it does wrong."""
+
+    model: Path
+    sensor: Path
+    port: str
+    faults: tuple[str, ...]
+    patience: float  # [s] of wall time
+    intensity: float  # of reflectance 1
+
+
+@dataclass(frozen=True)
 class SimSettings:
     """What sim_node needs to know; see launch/sim_node.yaml for units and meaning."""
 
@@ -38,6 +50,7 @@ class SimSettings:
     voltage_patience: float
     dynamics: Dynamics
     sensors: tuple[SensorSettings, ...]
+    driver: DriverSettings | None  # None: the simulator publishes the scan itself
 
 
 def read_settings(values: Any, where: str) -> SimSettings:
@@ -45,8 +58,9 @@ def read_settings(values: Any, where: str) -> SimSettings:
     top = Section(values, where)
     dynamics = load_dynamics(Path(top.text("dynamics")))
     step = dynamics.contacts.step
+    model = Path(top.text("model"))
     settings = SimSettings(
-        model=_model(top),
+        model=_model(top, model),
         world=_world(top),
         seed=top.integer("seed", at_least=0),
         speed=top.number("speed", at_least=0),
@@ -61,13 +75,14 @@ def read_settings(values: Any, where: str) -> SimSettings:
         voltage_patience=top.number("voltage_patience", at_least=0),
         dynamics=dynamics,
         sensors=_sensors(top),
+        driver=_driver(top, model),
     )
     top.end()
     return settings
 
 
-def _model(top: Section) -> Model:
-    model = load_model(Path(top.text("model")))
+def _model(top: Section, path: Path) -> Model:
+    model = load_model(path)
     effects = top.text("effects")
     return model if effects == NONE else with_effects(model, Path(effects))
 
@@ -91,6 +106,19 @@ def _world(top: Section) -> World:
 def _sensors(top: Section) -> tuple[SensorSettings, ...]:
     file = top.text("sensors")
     return () if file == NONE else load_sensors(Path(file))
+
+
+def _driver(top: Section, model: Path) -> DriverSettings | None:
+    chosen, faults = top.text("laser", choices=("direct", "driver")), top.text("laser_faults")
+    settings = DriverSettings(
+        model=model,
+        sensor=Path(top.text("laser_sensor")),
+        port=top.text("laser_port"),
+        faults=() if faults == NONE else tuple(faults.split()),
+        patience=top.number("laser_patience", at_least=0),
+        intensity=top.number("laser_intensity", at_least=0),
+    )
+    return settings if chosen == "driver" else None
 
 
 def _frame(top: Section, key: str) -> str:

@@ -21,12 +21,14 @@ from kurumaisu.types import FloatArray
 class Scan:
     """Readings (beams,) [m]: +inf no return, NaN no valid reading, as one below range_min.
 
-    time [s] on the scan's stamp, which is that of the first beam; pose (3,): base_link in the map at that time.
+    time [s] on the scan's stamp, which is that of the first beam; pose (3,): base_link in the map at that time;
+    returns (beams,): reflectance of what the beams met, 0 where that is nothing.
     """
 
     time: float
     pose: FloatArray
     ranges: FloatArray
+    returns: FloatArray
 
 
 class Scanner:
@@ -59,7 +61,7 @@ class Scanner:
             return None
         beams = self._beams
         poses = self.sight.poses(np.append(beams.times, beams.stamp))
-        scan = Scan(beams.stamp, poses[-1], self._readings(beams, poses[:-1]))
+        scan = Scan(beams.stamp, poses[-1], *self._readings(beams, poses[:-1]))
         self._start(self._count + 1)
         self.sight.forget(min(self._beams.stamp, self._beams.times.min()))
         return scan
@@ -90,14 +92,14 @@ class Scanner:
         self._beams = self._chain.aim(Beams(stamp, said, self._mount, height, self._bearings, level))
         self._complete = max(said[-1], self._beams.times.max())
 
-    def _readings(self, beams: Beams, poses: FloatArray) -> FloatArray:
+    def _readings(self, beams: Beams, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
         error = self._laser.error
         origins = compose(poses, beams.mount)
         look = self.sight.look(beams.times, beams.height)
         level, returns = look.cast(origins, beams.bearings)
         noise = self._rng.standard_normal(len(level))
         if self._chain.empty:
-            return error.reading(level, noise)
+            return error.reading(level, noise), returns
         ranges = slanted(level, beams)
         oblique = self._chain.oblique
         echoes = Echoes(
@@ -112,4 +114,4 @@ class Scanner:
             readings=ranges,
         )
         # What the law, without its noise, makes of the range that it means by a reading: rounding and gate are left.
-        return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges)))
+        return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges))), returns
