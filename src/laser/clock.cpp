@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "laser/clock.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kurumaisu::laser {
+namespace {
+
+constexpr std::int64_t kWrap = std::int64_t{1} << 24U;  // [ms]
+constexpr double kMillisecond = 1e-3;                   // [s]
+constexpr double kEarly = 0.02;         // [s] below the line: no delay, one of the clocks was set
+constexpr double kDriftMax = 0.005;     // of a sensor's clock, while it was not heard
+constexpr double kLate = 0.05;          // [s] above the line: a stall, or a clock was set
+constexpr double kPatience = 2;         // [s] after which it is no stall
+constexpr double kDeviceApart = 1;      // [s] from the host's time: the sensor's clock is not the host's
+constexpr double kCalibrationAge = 40;  // [s] after which drift spoils it
+
+/// The time [s] nearest to the host's at which a clock that counts the host's milliseconds has a reading.
+double nearest(std::uint32_t clock, double host) {
+  const double turns = std::round((host / kMillisecond - clock) / static_cast<double>(kWrap));
+  return (clock + turns * static_cast<double>(kWrap)) * kMillisecond;
+}
+
+}  // namespace
+
+double DeviceClock::stamp(std::uint32_t clock, double first_byte, double least_delay) {
+  const bool went_back = last_ && first_byte < last_->host;
+  const double latest = first_byte - least_delay;
+  const double device = follow(clock, first_byte, least_delay, went_back);
+  double time = std::min(device + envelope_.at(device) - state_.send_delay, latest);
+  if (mode_ == TimeMode::kDevice) {
+    const double own = nearest(clock, first_byte);
+    state_.fallback = std::abs(own - first_byte) > kDeviceApart;
+    if (!state_.fallback) time = own;
+  }
+  if (last_stamp_ && !went_back) time = std::max(time, *last_stamp_);
+  last_stamp_ = time;
+  state_.offset = time - device;
+  state_.drift = envelope_.slope();
+  state_.latency = latest - time;
+  state_.span = envelope_.span();
+  return time;
+}
+
+/// Brings the envelope up to a scan; returns the sensor's time [s] of it.
+double DeviceClock::follow(std::uint32_t clock, double first_byte, double least_delay, bool went_back) {
+  const double sent = first_byte - least_delay;
+  const double unheard = last_ ? first_byte - last_->host : 0;
+  double device = read(clock, first_byte);
+  if (went_back || isEarly({device, sent - device}, kDriftMax * unheard)) {
+    last_.reset();
+    restart();
+    device = read(clock, first_byte);
+  }
+  const Point point{device, sent - device};
+  envelope_.expire(device);
+  if (isLateForLong(point, first_byte)) {
+    const Point lowest = late_->lowest;
+    restart();
+    envelope_.add(lowest);
+  }
+  envelope_.add(point);
+  measureSendDelay(device);
+  return device;
+}
+
+/// The sensor's time [s]: its clock, counted on where it wraps; by the host's time where it did so unheard.
+double DeviceClock::read(std::uint32_t clock, double host) {
+  if (!last_) {
+    last_ = Reading{clock, clock, host};
+  } else {
+    const std::int64_t ahead = (std::int64_t{clock} - last_->clock + kWrap) % kWrap;
+    const double unheard = (host - last_->host) / kMillisecond - static_cast<double>(ahead);
+    const double wraps = std::max(0.0, std::round(unheard / static_cast<double>(kWrap)));
+    last_ = Reading{clock, last_->device + ahead + static_cast<std::int64_t>(wraps) * kWrap, host};
+  }
+  return static_cast<double>(last_->device) * kMillisecond;
+}
+
+/// Before it can have been sent: the sensor was switched on anew, or a clock was set.
+bool DeviceClock::isEarly(const Point& point, double doubt) const {
+  return !envelope_.empty() && point.y < envelope_.at(point.x) - kEarly - doubt;
+}
+
+/// All scans of the last while came late: no stall, a clock was set.
+bool DeviceClock::isLateForLong(const Point& point, double host) {
+  if (envelope_.empty() || point.y <= envelope_.at(point.x) + kLate) {
+    late_.reset();
+    return false;
+  }
+  if (!late_) late_ = Late{host, point};
+  if (point.y < late_->lowest.y) late_->lowest = point;
+  return host - late_->since > kPatience;
+}
+
+void DeviceClock::restart() {
+  envelope_.restart();
+  late_.reset();
+  calibration_.reset();
+  ++state_.resets;
+}
+
+void DeviceClock::calibrate(std::uint32_t clock, double sent, double received) {
+  const double host = 0.5 * (sent + received);
+  const double doubt = received - sent;
+  const double unheard = last_ ? host - last_->host : 0;
+  double device = read(clock, host);
+  if (isEarly({device, host - device}, doubt + kDriftMax * unheard)) {
+    last_.reset();
+    restart();
+    device = read(clock, host);
+  }
+  if (calibration_ && doubt > calibration_->doubt && device - calibration_->point.x < kCalibrationAge) return;
+  calibration_ = Calibration{{device, host - device}, doubt};
+}
+
+/// What the line has too much: even the fastest scan was on its way for a while.
+void DeviceClock::measureSendDelay(double device) {
+  if (!calibration_ || device - calibration_->point.x > kCalibrationAge) return;
+  state_.calibrated = true;
+  state_.send_delay = std::max(0.0, envelope_.at(calibration_->point.x) - calibration_->point.y);
+}
+
+void DeviceClock::reset() { *this = DeviceClock(mode_); }
+
+}  // namespace kurumaisu::laser
