@@ -133,3 +133,8 @@ TEST(Rhythm, CountsIntervalsOfTheWindow) {
   rhythm.add(1.5);
   EXPECT_DOUBLE_EQ(rhythm.rate(1.5).value(), 2.0);
 }
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}

@@ -168,3 +168,8 @@ TEST(LaserSettings, ShippedFileIsNamedWhereItIsWrong) {
   EXPECT_TRUE(
       contains(complaint([] { k::loadShipped("/nowhere/laser_node.yaml"); }), "/nowhere/laser_node.yaml"));
 }
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}

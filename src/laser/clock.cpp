@@ -34,6 +34,7 @@ double DeviceClock::stamp(std::uint32_t clock, double first_byte, double least_d
     state_.fallback = std::abs(own - first_byte) > kDeviceApart;
     if (!state_.fallback) time = own;
   }
+  if (mode_ == TimeMode::kHost) time = latest;
   if (last_stamp_ && !went_back) time = std::max(time, *last_stamp_);
   last_stamp_ = time;
   state_.offset = time - device;

@@ -13,6 +13,7 @@ namespace kurumaisu::laser {
 enum class TimeMode {
   kEnvelope,  ///< time since it was switched on, at a rate of its own
   kDevice,    ///< the host's time modulo 2^24 ms: a virtual sensor under simulated time
+  kHost,      ///< nothing that is asked for: a scan is as old as the least delay when it comes
 };
 
 /// Turns a sensor's clock (24 bits, 1 ms, up to 0.5 % too fast or slow) into the host's time.

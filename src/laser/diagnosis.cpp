@@ -164,6 +164,9 @@ Diagnosis diagnoseScans(const Status& status, std::optional<double> rate, double
   } else if (rate && std::abs(*rate - expected) > tolerance * expected) {
     diagnosis.level = Level::kWarn;
     diagnosis.summary = shown("%.2f scans a second", *rate) + shown(" instead of %.2f", expected);
+  } else if (status.clock.fallback) {
+    diagnosis.level = Level::kWarn;
+    diagnosis.summary = "LASER_CLOCK: time_mode device, but the sensor's clock is not the host's";
   } else {
     diagnosis.summary = rate ? shown("%.2f scans a second", *rate) : "Too few scans for a rate";
   }
@@ -175,9 +178,11 @@ Diagnosis diagnoseScans(const Status& status, std::optional<double> rate, double
   add("Expected rate [1/s]", shown("%.3f", expected));
   add("Intensities", status.intensity ? "yes" : "no");
   add("Latency [ms]", shown("%.3f", 1e3 * status.latency));
-  add("Clock offset [s]", shown("%.6f", status.clock_offset));
-  add("Clock drift [ppm]", shown("%.1f", 1e6 * status.clock_drift));
-  add("Clock", status.clock_state);
+  add("Clock offset [s]", shown("%.6f", status.clock.offset));
+  add("Clock drift [ppm]", shown("%.1f", -1e6 * status.clock.drift));
+  add("Clock resets", std::to_string(status.clock.resets));
+  add("Clock calibrated", status.clock.calibrated ? "yes" : "no");
+  add("Scan to first byte [ms]", shown("%.3f", 1e3 * status.clock.latency));
   return diagnosis;
 }
 

@@ -57,10 +57,6 @@ DriverSettings checked(DriverSettings settings) {
   return settings;
 }
 
-TimeMode timeMode(const DriverSettings& settings) {
-  return settings.device_time ? TimeMode::kDevice : TimeMode::kEnvelope;
-}
-
 }  // namespace
 
 class Driver::Impl {
@@ -71,7 +67,7 @@ class Driver::Impl {
         now_(std::move(now)),
         monitor(now_, std::move(log)),
         control(settings_.live),
-        memory_{DeviceClock(timeMode(settings_)), {}, {}, false, 0, false} {}
+        memory_{DeviceClock(settings_.time_mode), {}, {}, false, 0, false} {}
 
   void start() {
     if (!thread_.joinable()) thread_ = std::thread([this] { run(); });

@@ -21,8 +21,8 @@ struct DriverSettings {
   std::string ip_address;   ///< in numbers; empty with serial_port
   int ip_port;
   LiveSettings live;
-  bool calibrate_time;     ///< ask the sensor's clock (TM) at each start; its laser is off meanwhile
-  bool device_time;        ///< the sensor's clock is the host's, modulo 2^24 ms
+  bool calibrate_time;  ///< ask the sensor's clock (TM) at each start; its laser is off meanwhile
+  TimeMode time_mode;
   double stale_timeout;    ///< [s] of the host's time without a scan: the sensor is sought anew
   int error_limit;         ///< damaged scans and errors in a row: the sensor is sought anew
   double connect_timeout;  ///< [s] for a TCP connection

@@ -89,9 +89,14 @@ LiveSettings readLive(Section& node) {
   return live;
 }
 
+TimeMode timeMode(const std::string& mode) {
+  if (mode == "device") return TimeMode::kDevice;
+  return mode == "host" ? TimeMode::kHost : TimeMode::kEnvelope;
+}
+
 void readTime(Section& node, DriverSettings& driver) {
   const std::string mode = node.choice("time_mode", {"envelope", "device", "host"});
-  driver.device_time = mode == "device";
+  driver.time_mode = timeMode(mode);
   driver.calibrate_time = node.flag("calibrate_time");
   if (driver.calibrate_time && mode != "envelope") {
     throw node.error("calibrate_time", "contradicts time_mode " + mode + ", which needs no calibration");
