@@ -4,25 +4,22 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import math
-import os
-import socket
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from kurumaisu.bench.processes import PATIENCE, cpu, master, memory, program
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 
 _INTERVAL = 0.1  # [s] of the world
-_PATIENCE = 30.0  # [s] for a process to be ready
 _SIDE = 16.0  # [m] of the room or the map, as of Stage's cave
 _PACE = 1.5  # [m] between robots
 _TOPICS = ("odom", "base_scan", "base_pose_ground_truth")
@@ -64,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         *("node and robots", "CPU s per simulated s", "real-time factor", "lost [%]", "memory [MB]", "times stage_ros"),
     )
     dearer = False
-    with tempfile.TemporaryDirectory() as folder, _master() as environment:
+    with tempfile.TemporaryDirectory() as folder, master() as environment:
         for robots in options.robots:
             world = Path(folder) / f"{robots}.world"
             world.write_text(_world(robots, options.map))
@@ -109,69 +106,24 @@ def _measure(command: list[str], world: Path, robots: int, seconds: float, envir
     node = subprocess.Popen(line, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         with subprocess.Popen(
-            [_listener(), str(seconds), *topics], env=environment, stdout=subprocess.PIPE, text=True
+            [program("listener"), str(seconds), *topics], env=environment, stdout=subprocess.PIPE, text=True
         ) as listener:
             assert listener.stdout is not None
-            before = _counts(listener.stdout.readline()), _cpu(node.pid), time.monotonic()
-            after = _counts(listener.stdout.readline()), _cpu(node.pid), time.monotonic()
-            memory = _memory(node.pid)
+            before = _counts(listener.stdout.readline()), cpu(node.pid), time.monotonic()
+            after = _counts(listener.stdout.readline()), cpu(node.pid), time.monotonic()
+            resident = memory(node.pid)
     finally:
         node.terminate()
-        node.wait(_PATIENCE)
+        node.wait(PATIENCE)
     if not after[0] or 0 in after[0].values():
         raise Error(f"{command[0]}: {world.name}: nothing came on {[t for t, n in after[0].items() if n == 0]}")
     heard = {topic: after[0][topic] - before[0][topic] for topic in after[0]}
     simulated = heard["/clock"] * _INTERVAL
     others = [count for topic, count in heard.items() if topic not in ("/clock", "/tf")]
     lost = 1 - sum(others) / len(others) / heard["/clock"]
-    return _Cost((after[1] - before[1]) / simulated, simulated / (after[2] - before[2]), lost, memory)
+    return _Cost((after[1] - before[1]) / simulated, simulated / (after[2] - before[2]), lost, resident)
 
 
 def _counts(line: str) -> dict[str, int]:
     words = line.split()
     return dict(zip(words[::2], map(int, words[1::2]), strict=True))
-
-
-def _cpu(pid: int) -> float:
-    """Return the CPU time [s] that a process has used, in and for itself."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def _memory(pid: int) -> float:
-    """Return the resident memory [MB] of a process."""
-    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-def _listener() -> str:
-    """Return the path of the listener that tests/CMakeLists.txt builds."""
-    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / "lib/kurumaisu/listener"
-        if path.exists():
-            return str(path)
-    raise Error("listener: is not built: it comes with the tests (cmake --build .ws/build --target listener)")
-
-
-@contextlib.contextmanager
-def _master() -> Iterator[dict[str, str]]:
-    """Run a master of our own; yield the environment of those who are to find it."""
-    with socket.socket() as probe:
-        probe.bind(("localhost", 0))
-        port = probe.getsockname()[1]
-    environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "ROS_HOSTNAME": "localhost"}
-    master = subprocess.Popen(
-        ["rosmaster", "--core", "-p", str(port)],
-        env=environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        deadline = time.monotonic() + _PATIENCE
-        while socket.socket().connect_ex(("localhost", port)):
-            if time.monotonic() > deadline:
-                raise Error(f"rosmaster: does not answer on port {port}")
-            time.sleep(0.05)
-        yield environment
-    finally:
-        master.terminate()
-        master.wait(_PATIENCE)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Processes of a benchmark: where our programs are, a ROS master, and what a process costs."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from kurumaisu.errors import Error
+
+PATIENCE = 30.0  # [s] for a process to be ready, or to end
+
+
+def program(name: str) -> str:
+    """Return the path of a program that the build made. Raise Error if it did not."""
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
+        path = Path(prefix) / "lib/kurumaisu" / name
+        if path.exists():
+            return str(path)
+    raise Error(f"{name}: is not built (cmake --build .ws/build; what only benchmarks need comes with the tests)")
+
+
+def cpu(pid: int) -> float:
+    """Return the CPU time [s] that a process has used, in and for itself."""
+    # the kernel's name of the clock that counts a whole process' time, to the nanosecond: clock_getcpuclockid(3)
+    return time.clock_gettime((~pid << 3) | 2)
+
+
+def memory(pid: int) -> float:
+    """Return the resident memory [MB] of a process."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def free_port() -> int:
+    """Return a TCP port of this host that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("localhost", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextlib.contextmanager
+def master() -> Iterator[dict[str, str]]:
+    """Run a master of our own; yield the environment of those who are to find it."""
+    port = free_port()
+    environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "ROS_HOSTNAME": "localhost"}
+    process = subprocess.Popen(
+        ["rosmaster", "--core", "-p", str(port)],
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        deadline = time.monotonic() + PATIENCE
+        while socket.socket().connect_ex(("localhost", port)):
+            if time.monotonic() > deadline:
+                raise Error(f"rosmaster: does not answer on port {port}")
+            time.sleep(0.05)
+        yield environment
+    finally:
+        process.terminate()
+        process.wait(PATIENCE)

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the benchmarks of the laser call good and bad."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from kurumaisu.bench.faults_cases import CASES, Case
+from kurumaisu.bench.faults_run import Result, noted, verdict
+from kurumaisu.bench.laser_heard import Status, read_scan, read_status
+
+CASE = Case(1, ("corrupt@20",), (1, 1), 0.26, proof="Bad Sums", level=1)
+STATUS = Status(1, "bad sums: 1", {"Bad Sums": "1", "Lost Scans": "1", "Reconnects": "0", "Last Error": "LASER_X: y"})
+GOOD = Result(
+    scans=70,
+    first=1.0,
+    lost=1,
+    twice=0,
+    wrong=0,
+    blank="",
+    gap=0.2,
+    stamp=0.03,
+    back=0,
+    cpu=0.01,
+    grown=0.1,
+    exit=0.3,
+    status=STATUS,
+)
+
+
+def test_a_scan_that_was_heard():
+    topic, scan = read_scan("scan /laser_3/scan 12.5 1000.25 1000.0 1234 682 1 0 2 3\n")
+    assert (topic, scan.arrival, scan.stamp, scan.range, scan.beams) == ("/laser_3/scan", 12.5, 1000.0, 1234, 682)
+    assert scan.wrong
+    assert not replace(scan, others=0).wrong
+    assert replace(scan, others=0, codes=1).wrong
+
+
+def test_a_status_that_was_heard():
+    name, status = read_status("status 2 laser_1: Hardware Status\tNot connected\tBad Sums=3\tLast Error=A=B\n")
+    assert name == "laser_1: Hardware Status"
+    assert status == Status(2, "Not connected", {"Bad Sums": "3", "Last Error": "A=B"})
+
+
+def test_a_good_driver():
+    assert verdict(CASE, GOOD) == []
+    assert noted(STATUS, ["Bad Sums", "Lost", "Reconnects"]) == "Bad Sums 1, Lost Scans 1, LASER_X"
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"scans": 0}, "no scan"),
+        ({"lost": 0}, "lost 0"),
+        ({"lost": 2}, "lost 2"),
+        ({"twice": 1}, "twice"),
+        ({"wrong": 1}, "wrong"),
+        ({"back": 1}, "stamps back"),
+        ({"gap": 0.3}, "gap"),
+        ({"stamp": 0.06}, "stamp off"),
+        ({"stamp": math.nan}, "stamp off"),
+        ({"cpu": 0.5}, "CPU"),
+        ({"cpu": math.nan}, "died"),
+        ({"exit": math.inf}, "exit"),
+        ({"grown": 9.0}, "memory"),
+        ({"status": replace(STATUS, values={"Bad Sums": "0"})}, "Bad Sums 0"),
+        ({"status": replace(STATUS, level=0)}, "level 0"),
+        ({"status": None}, "Bad Sums 0"),
+    ],
+)
+def test_a_bad_driver(change, word):
+    assert any(word in found for found in verdict(CASE, replace(GOOD, **change)))
+
+
+def test_what_must_not_be_published():
+    case = replace(CASE, lost=None)
+    assert verdict(case, GOOD) == ["70 scans"]
+    assert verdict(case, replace(GOOD, scans=0)) == []
+
+
+def test_the_outage_is_the_sensors():
+    assert verdict(replace(CASE, outage=1.0), replace(GOOD, gap=1.2)) == []
+
+
+def test_all_eighteen_are_there():
+    assert {case.number for case in CASES} == set(range(1, 19))
