@@ -22,9 +22,10 @@ enum class TimeMode {
 class DeviceClock {
  public:
   struct State {
-    double offset = 0;         ///< [s] host's time less the sensor's, which counts on where it wraps
-    double drift = 0;          ///< [s/s] host's time that passes in a second of the sensor's, less 1
-    double latency = 0;        ///< [s] of the newest scan, from its last step to its first byte
+    double offset = 0;   ///< [s] host's time less the sensor's, which counts on where it wraps
+    double drift = 0;    ///< [s/s] by which the sensor's clock runs fast; found after a few seconds
+    double elapsed = 0;  ///< [s] of the sensor's since the scan before; 0: unknown, as after a reset or 2 h
+    double latency = 0;  ///< [s] of the newest scan, from its last step to its first byte
     double send_delay = 0;     ///< [s] the shortest latency, if calibrated; else unknown and taken as 0
     double span = 0;           ///< [s] that the line rests on
     bool calibrated = false;   ///< by calibrate()
@@ -58,6 +59,10 @@ class DeviceClock {
     std::int64_t device = 0;  // [ms] clock, counted on where it wraps
     double host = 0;          // [s]
   };
+  struct Stamped {
+    double host = 0;  // [s] first byte
+    double stamp = 0;
+  };
   struct Late {
     double since = 0;  // [s] host's time
     Point lowest;
@@ -67,18 +72,19 @@ class DeviceClock {
     double doubt = 0;  // [s] how long the way there and back took
   };
 
-  double follow(std::uint32_t clock, double first_byte, double least_delay, bool went_back);
+  double follow(std::uint32_t clock, double first_byte, double least_delay);
   double read(std::uint32_t clock, double host);
   bool isEarly(const Point& point, double doubt) const;
   bool isLateForLong(const Point& point, double host);
-  void restart();
+  void startAnew();
   void measureSendDelay(double device);
 
   TimeMode mode_;
   State state_;
   Envelope envelope_;  // of the sensor's time [s], host's time less the sensor's [s]
   std::optional<Reading> last_;
-  std::optional<double> last_stamp_;
+  std::optional<double> last_scan_;  // [s] sensor's time
+  std::optional<Stamped> stamped_;
   std::optional<Late> late_;
   std::optional<Calibration> calibration_;
 };
