@@ -141,11 +141,12 @@ void bindKalman(py::module_& m) {
 }  // namespace
 
 PYBIND11_MODULE(_core, m) {
-  m.doc() = "Equations (1)-(4) of the paper, ray casting and whitening, in C++.";
+  m.doc() = "Equations (1)-(4) of the paper, ray casting, whitening and the virtual sensor, in C++.";
   bindModel(m);
   bindKalman(m);
   k::bindContact(m);
   k::bindFollow(m);
   k::bindRaycast(m);
   k::bindCamera(m);
+  k::bindVirtualUrg(m);
 }

@@ -15,5 +15,6 @@ void bindArena(pybind11::module_& m);
 void bindCellRays(pybind11::module_& m);
 void bindCells(pybind11::module_& m);
 void bindCamera(pybind11::module_& m);
+void bindVirtualUrg(pybind11::module_& m);
 
 }  // namespace kurumaisu

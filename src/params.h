@@ -60,6 +60,12 @@ class Section {
     return value;
   }
 
+  double within(const std::string& key, double low, double high) {
+    const double value = number(key);
+    if (low <= value && value <= high) return value;
+    throw error(key, "must be from " + shown(low) + " to " + shown(high) + ": " + shown(value));
+  }
+
   /// An integer; 3.0 is none, where roscpp would round even 3.4.
   int integer(const std::string& key, int at_least) {
     const XmlRpc::XmlRpcValue value = take(key);
@@ -69,19 +75,28 @@ class Section {
     return result;
   }
 
+  int integer(const std::string& key, int at_least, int at_most) {
+    const int result = integer(key, at_least);
+    if (result <= at_most) return result;
+    throw error(key, "must be at most " + shown(at_most) + ": " + shown(result));
+  }
+
   bool flag(const std::string& key) {
     const XmlRpc::XmlRpcValue value = take(key);
     if (value.getType() != XmlRpc::XmlRpcValue::TypeBoolean) throw wrongType(key, "true or false", value);
     return value;
   }
 
-  /// A string that is not empty.
+  /// A string that is not empty; or, for textOrNone, may be.
   std::string text(const std::string& key) {
-    const XmlRpc::XmlRpcValue value = take(key);
-    if (value.getType() != XmlRpc::XmlRpcValue::TypeString) throw wrongType(key, "a string", value);
-    std::string result = value;
+    std::string result = textOrNone(key);
     if (result.empty()) throw error(key, "must not be empty");
     return result;
+  }
+  std::string textOrNone(const std::string& key) {
+    const XmlRpc::XmlRpcValue value = take(key);
+    if (value.getType() != XmlRpc::XmlRpcValue::TypeString) throw wrongType(key, "a string", value);
+    return value;
   }
 
   /// One of the choices.

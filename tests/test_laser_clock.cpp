@@ -89,7 +89,6 @@ INSTANTIATE_TEST_SUITE_P(Laser, Ways, testing::ValuesIn(kBounds),
 TEST(DeviceClock, FirstStampIsTheArrivalLessTheLeastDelay) {
   l::DeviceClock clock(l::TimeMode::kEnvelope);
   EXPECT_DOUBLE_EQ(clock.stamp(1234, 1000.5, 0.07), 1000.43);
-  EXPECT_EQ(clock.state().elapsed, 0.0);
 }
 
 TEST(DeviceClock, CountsOnThroughTheWrap) {
@@ -136,7 +135,6 @@ TEST(DeviceClock, FollowsAHostsClockThatIsSet) {
     EXPECT_LT(follower.run(10).worst(), 0.010) << step;
     // A step of more than a wrap looks as a silence does.
     EXPECT_EQ(follower.clock.state().resets, step < kWrap ? 1U : 0U) << step;
-    EXPECT_NEAR(follower.clock.state().elapsed, sim::kScanTime, 0.0011) << step;
   }
 }
 
@@ -151,22 +149,12 @@ TEST(DeviceClock, FollowsARateThatChanges) {
   }
 }
 
-TEST(DeviceClock, SaysHowMuchOfTheSensorsTimePassed) {
-  Follower follower(sim::kUsb, kDrift, kWrapped);
-  follower.run(2);
-  EXPECT_NEAR(follower.clock.state().elapsed, sim::kScanTime, 0.0011);
-  follower.sensor.lose(9);
-  EXPECT_LT(std::abs(follower.next()), 0.010);
-  EXPECT_NEAR(follower.clock.state().elapsed, 10 * sim::kScanTime, 0.0011);
-}
-
 TEST(DeviceClock, CountsWrapsThatNobodyHeard) {
   for (const double silence : {100.0, 0.9 * kWrap, 1.1 * kWrap, 3.4 * kWrap}) {
     Follower follower(sim::kUsb, kDrift, kWrapped);
     follower.run(60);
     follower.sensor.lose(static_cast<int>(silence / sim::kScanTime));
     EXPECT_LT(std::abs(follower.next()), 0.010) << silence;
-    EXPECT_NEAR(follower.clock.state().elapsed, silence < 0.4 * kWrap ? silence : 0, 0.2) << silence;
     EXPECT_LT(follower.run(10).worst(), 0.010) << silence;
     EXPECT_EQ(follower.clock.state().resets, 0U) << silence;
   }
@@ -226,6 +214,19 @@ TEST(DeviceClock, CalibrationAfterARebootStartsAnew) {
   EXPECT_TRUE(follower.clock.state().calibrated);
 }
 
+TEST(DeviceClock, RestartKeepsTheDriftAndTheSendDelay) {
+  Follower follower(sim::kUsb);
+  const sim::Answer answer = follower.sensor.ask(0.1);
+  follower.clock.calibrate(answer.clock, answer.sent, answer.received);
+  follower.run(60);
+  const l::DeviceClock::State before = follower.clock.state();
+  follower.clock.restart();
+  EXPECT_LT(follower.run(3).worst(), 0.008);
+  EXPECT_NEAR(follower.clock.state().drift, before.drift, 1e-4);
+  EXPECT_EQ(follower.clock.state().send_delay, before.send_delay);
+  EXPECT_EQ(follower.clock.state().resets, 0U);
+}
+
 TEST(DeviceClock, ResetForgetsTheDrift) {
   Follower follower(sim::kTcp);
   follower.run(60);
@@ -251,6 +252,16 @@ TEST(DeviceClock, NonsenseNeverMakesAStampThatIsLateOrGoesBack) {
       ASSERT_TRUE(std::isfinite(follower.take(scan)));
     }
   }
+}
+
+TEST(DeviceClock, NotAskedForIsTheArrival) {
+  l::DeviceClock clock(l::TimeMode::kHost);
+  sim::Sensor sensor(sim::kUsb, kDrift, kWrapped, kEpoch, 1);
+  for (int i = 0; i < 100; ++i) {
+    const sim::Arrival scan = sensor.next();
+    ASSERT_EQ(clock.stamp(scan.clock, scan.first_byte, sim::kLeastDelay), scan.first_byte - sim::kLeastDelay);
+  }
+  EXPECT_NEAR(clock.state().drift, kDrift, 2e-4);
 }
 
 TEST(DeviceClockOfTheHost, IsTheMillisecondItself) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Types of the C++ module (src/bindings.cpp, src/raycast/*bindings.cpp); its docstrings are there."""
+"""Types of the C++ module (src/bindings.cpp, src/*/*bindings.cpp); its docstrings are there."""
 
 from collections.abc import Sequence
 from typing import overload
@@ -172,3 +172,73 @@ class Clearance:
         limit: float,
     ) -> float: ...
     def near(self, bodies: IntArray, poses: FloatArray, reach: float) -> list[int]: ...
+
+class UrgCodes:
+    no_return: int
+    error: int
+    too_near: int
+    outside: int
+    def __init__(self) -> None: ...
+
+class UrgModel:
+    name: str
+    version: list[tuple[str, str]]
+    version_11: list[tuple[str, str]]
+    parameters: list[tuple[str, str]]
+    state: list[tuple[str, str]]
+    laser_on: str
+    laser_off: str
+    idle: str
+    measuring: str
+    healthy: str
+    ill: str
+    refused: dict[str, str]
+    protocol: int
+    baud: int
+    bauds: list[int]
+    end_step: int
+    codes: UrgCodes
+    boot_time: float
+    output_delay: float
+    bad_serial_sum: bool
+    def __init__(self) -> None: ...
+
+class UrgClock:
+    def __init__(self, *, start: float, drift: float) -> None: ...
+
+class UrgOptions:
+    def __init__(self, *, fed: bool, patience: float, line_rate: bool) -> None: ...
+
+def urg_fault_help() -> str: ...
+
+class UrgServer:
+    @staticmethod
+    def at_pty(
+        model: UrgModel, faults: Sequence[str], clock: UrgClock, options: UrgOptions, link: str
+    ) -> UrgServer: ...
+    @staticmethod
+    def at_tcp(
+        model: UrgModel, faults: Sequence[str], clock: UrgClock, options: UrgOptions, host: str, port: int
+    ) -> UrgServer: ...
+    def show(
+        self, ranges: FloatArray, intensities: FloatArray | None = None, codes: IntArray | None = None
+    ) -> None: ...
+    def measure(
+        self,
+        now: float,
+        start: float,
+        ranges: FloatArray,
+        intensities: FloatArray | None = None,
+        codes: IntArray | None = None,
+    ) -> bool: ...
+    def advance(self, now: float) -> None: ...
+    def power_cycle(self) -> None: ...
+    def close(self) -> None: ...
+    @property
+    def address(self) -> str: ...
+    @property
+    def connected(self) -> bool: ...
+    @property
+    def baud(self) -> int: ...
+    @property
+    def counters(self) -> dict[str, int]: ...

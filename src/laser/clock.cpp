@@ -9,14 +9,12 @@ namespace {
 
 constexpr std::int64_t kWrap = std::int64_t{1} << 24U;  // [ms]
 constexpr double kMillisecond = 1e-3;                   // [s]
-constexpr double kEarly = 0.02;      // [s] below the line: no delay, one of the clocks was set
-constexpr double kDriftMax = 0.005;  // of a sensor's clock, while it was not heard
-constexpr double kLate = 0.12;       // [s] above the line: a stall, or a clock was set
-constexpr double kPatience = 2;      // [s] after which it is no stall
-constexpr double kSilence =
-    8000;  // [s] half a wrap: longer ones look as the host's clock does when it is set
+constexpr double kEarly = 0.02;         // [s] below the line: no delay, one of the clocks was set
+constexpr double kDriftMax = 0.005;     // of a sensor's clock, while it was not heard
+constexpr double kLate = 0.12;          // [s] above the line: a stall, or a clock was set
+constexpr double kPatience = 2;         // [s] after which it is no stall
 constexpr double kDeviceApart = 1;      // [s] from the host's time: the sensor's clock is not the host's
-constexpr double kCalibrationAge = 40;  // [s] after which drift spoils it
+constexpr double kCalibrationAge = 30;  // [s] after which drift spoils it
 
 /// The time [s] nearest to the host's at which a clock that counts the host's milliseconds has a reading.
 double nearest(std::uint32_t clock, double host) {
@@ -29,7 +27,8 @@ double nearest(std::uint32_t clock, double host) {
 double DeviceClock::stamp(std::uint32_t clock, double first_byte, double least_delay) {
   const double latest = first_byte - least_delay;
   const double device = follow(clock, first_byte, least_delay);
-  double time = std::min(device + envelope_.at(device) - state_.send_delay, latest);
+  double time = latest;
+  if (mode_ != TimeMode::kHost) time = std::min(device + envelope_.at(device) - state_.send_delay, latest);
   if (mode_ == TimeMode::kDevice) {
     const double own = nearest(clock, first_byte);
     state_.fallback = std::abs(own - first_byte) > kDeviceApart;
@@ -52,7 +51,8 @@ double DeviceClock::follow(std::uint32_t clock, double first_byte, double least_
   double device = read(clock, first_byte);
   if (went_back || isEarly({device, sent - device}, kDriftMax * unheard)) {
     if (went_back || envelope_.span() > kPatience) {
-      startAnew();
+      restart();
+      ++state_.resets;
       device = read(clock, first_byte);
     } else {
       envelope_.restart();  // the first scans were late
@@ -68,9 +68,6 @@ double DeviceClock::follow(std::uint32_t clock, double first_byte, double least_
   }
   envelope_.add(point);
   measureSendDelay(device);
-  const bool known = last_scan_ && unheard < kSilence;
-  state_.elapsed = known ? device - *last_scan_ : 0;
-  last_scan_ = device;
   return device;
 }
 
@@ -103,13 +100,11 @@ bool DeviceClock::isLateForLong(const Point& point, double host) {
   return host - late_->since > kPatience;
 }
 
-void DeviceClock::startAnew() {
+void DeviceClock::restart() {
   envelope_.restart();
   last_.reset();
-  last_scan_.reset();
   late_.reset();
   calibration_.reset();
-  ++state_.resets;
 }
 
 void DeviceClock::calibrate(std::uint32_t clock, double sent, double received) {
@@ -118,7 +113,8 @@ void DeviceClock::calibrate(std::uint32_t clock, double sent, double received) {
   const double unheard = last_ ? received - last_->host : 0;
   double device = read(clock, host);
   if (unheard < 0 || isEarly({device, host - device}, doubt + kDriftMax * unheard)) {
-    startAnew();
+    restart();
+    ++state_.resets;
     device = read(clock, host);
   }
   if (calibration_ && doubt > calibration_->doubt && device - calibration_->point.x < kCalibrationAge) return;

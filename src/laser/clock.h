@@ -13,19 +13,21 @@ namespace kurumaisu::laser {
 enum class TimeMode {
   kEnvelope,  ///< time since it was switched on, at a rate of its own
   kDevice,    ///< the host's time modulo 2^24 ms: a virtual sensor under simulated time
+  kHost,      ///< nothing that is asked for: a scan is as old as the least delay when it comes
 };
 
 /// Turns a sensor's clock (24 bits, 1 ms, up to 0.5 % too fast or slow) into the host's time.
 ///
 /// A scan's bytes can only come later than they were sent. So of all lines that lie below the points (sensor's time,
-/// arrival), the highest tells host's time from sensor's; its slope is the drift.
+/// arrival), the highest tells host's time from sensor's; its slope is the drift. The first stamps are as late as the
+/// first scans, and until the drift has been seen for 2 to 5 s it is taken to be what it was, at first 0: then a stamp is
+/// off by up to 2 ms for each 0.1 % of drift. docs/laser_clock.md has figures.
 class DeviceClock {
  public:
   struct State {
-    double offset = 0;   ///< [s] host's time less the sensor's, which counts on where it wraps
-    double drift = 0;    ///< [s/s] by which the sensor's clock runs fast; found after a few seconds
-    double elapsed = 0;  ///< [s] of the sensor's since the scan before; 0: unknown, as after a reset or 2 h
-    double latency = 0;  ///< [s] of the newest scan, from its last step to its first byte
+    double offset = 0;         ///< [s] host's time less the sensor's, which counts on where it wraps
+    double drift = 0;          ///< [s/s] by which the sensor's clock runs fast; found after a few seconds
+    double latency = 0;        ///< [s] of the newest scan, from its last step to its first byte
     double send_delay = 0;     ///< [s] the shortest latency, if calibrated; else unknown and taken as 0
     double span = 0;           ///< [s] that the line rests on
     bool calibrated = false;   ///< by calibrate()
@@ -47,6 +49,11 @@ class DeviceClock {
   ///
   /// Of several, that with the shortest way counts. To be given before the first scan.
   void calibrate(std::uint32_t clock, double sent, double received);
+
+  /// Forgets all but the drift, what a scan takes to be sent, and the last stamp: the sensor may have been off.
+  ///
+  /// Is done unasked where its clock or the host's shows that it was set.
+  void restart();
 
   /// Forgets everything: another sensor, or another link to it.
   void reset();
@@ -76,14 +83,12 @@ class DeviceClock {
   double read(std::uint32_t clock, double host);
   bool isEarly(const Point& point, double doubt) const;
   bool isLateForLong(const Point& point, double host);
-  void startAnew();
   void measureSendDelay(double device);
 
   TimeMode mode_;
   State state_;
   Envelope envelope_;  // of the sensor's time [s], host's time less the sensor's [s]
   std::optional<Reading> last_;
-  std::optional<double> last_scan_;  // [s] sensor's time
   std::optional<Stamped> stamped_;
   std::optional<Late> late_;
   std::optional<Calibration> calibration_;

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A file descriptor that does not block.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace kurumaisu::laser {
+
+/// What the system says of the last error: "No such file or directory".
+std::string systemError(int code);
+
+/// Owns a non-blocking descriptor, of a tty or a socket.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor();
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  int fd() const { return fd_; }
+
+  /// Waits until it is ready for these events of poll(), at most so long [s].
+  bool wait(short events, double timeout) const;
+
+  /// As Port::read and Port::write. Neither raises SIGPIPE.
+  std::size_t read(char* buffer, std::size_t size, double timeout) const;
+  void write(std::string_view bytes, double timeout, bool is_socket) const;
+
+ private:
+  int fd_;
+};
+
+}  // namespace kurumaisu::laser

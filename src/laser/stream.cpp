@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "laser/stream.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "scip/code.h"
+
+namespace kurumaisu::laser {
+namespace {
+
+constexpr std::size_t kLine = 64;        // characters of data in a line
+constexpr std::size_t kClockWidth = 4;   // characters
+constexpr std::size_t kNumberWidth = 3;  // characters of a distance or an intensity, as MRPT knows them
+
+std::string line(const std::string& key, int value) { return key + ":" + std::to_string(value) + ";"; }
+
+bool isStart(const std::string& command) { return scip::request(command).has_value(); }
+
+}  // namespace
+
+ScipStream::ScipStream(Link& link, const Sensor& sensor, const scip::Request& request, double answer_timeout)
+    : link_(link), sensor_(sensor), request_(request), answer_timeout_(answer_timeout) {}
+
+std::optional<Arrival> ScipStream::await(double timeout) {
+  const std::optional<scip::Message> message = link_.next(timeout);
+  if (!message) return std::nullopt;
+  const bool is_scan = message->status == "99";
+  const bool is_late = !scip::answers(message->command, request_) || message->status == "00";
+  if (!is_scan && is_late) return std::nullopt;  // an answer to what was asked before
+  if (!is_scan) return Arrival{Arrival::Kind::kStatus, {}, message->first_byte, message->status};
+  try {
+    Arrival arrival{Arrival::Kind::kScan, scip::decodeScan(*message, request_), message->first_byte, {}};
+    if (clock_ == arrival.rotation.clock) {
+      return Arrival{Arrival::Kind::kDuplicate, {}, message->first_byte, "clock " + std::to_string(*clock_)};
+    }
+    clock_ = arrival.rotation.clock;
+    putScan(arrival.rotation);
+    return arrival;
+  } catch (const scip::BadFrame& problem) {
+    return Arrival{Arrival::Kind::kDamaged, {}, message->first_byte, problem.what()};
+  }
+}
+
+void ScipStream::rethrow() const {
+  if (failure_) std::rethrow_exception(failure_);
+}
+
+std::size_t ScipStream::Read(void* buffer, std::size_t size) {
+  const std::size_t count = std::min(size, ready_.size() - read_);
+  std::memcpy(buffer, ready_.data() + read_, count);
+  read_ += count;
+  return count;
+}
+
+std::size_t ScipStream::Write(const void* buffer, std::size_t size) {
+  if (failure_) return size;
+  try {
+    std::string command(static_cast<const char*>(buffer), size);
+    command.erase(command.find_last_not_of('\n') + 1);
+    answer(command);
+  } catch (...) {
+    failure_ = std::current_exception();
+  }
+  return size;
+}
+
+void ScipStream::answer(const std::string& command) {
+  if (command == "PP") {
+    put(command, "00", plainFan());
+  } else if (command == "VV") {
+    put(command, "00", sensor_.version.lines);
+  } else if (command == "SCIP2.0") {
+    put(command, "0E", {});  // it speaks it already
+  } else if (isStart(command)) {
+    start(command);
+  } else {
+    const scip::Message reply = link_.ask(command, answer_timeout_);
+    const bool malfunctions = command == "BM" && (reply.status == "01" || reply.status == "10");
+    if (malfunctions)
+      throw Refused("LASER_NO_LIGHT: BM is answered by status " + reply.status +
+                    (reply.status == "01" ? ": the laser is out of order" : ": not yet ready"));
+    put(command, reply.status, reply.lines);
+  }
+}
+
+void ScipStream::start(const std::string& command) {
+  const std::string asked = scip::command(request_);
+  const std::string status = link_.ask(asked, answer_timeout_).status;
+  if (request_.form == scip::Form::kIntensity && status[0] == '0' && status != "00") {
+    throw NoIntensity("LASER_NO_INTENSITY: " + asked + " is answered by status " + status +
+                      "; scans come without");
+  }
+  if (status != "00") throw Refused("LASER_REFUSED: " + asked + " is answered by status " + status);
+  started_ = command;
+  put(command, status, {});
+}
+
+void ScipStream::put(const std::string& command, const std::string& status,
+                     const std::vector<std::string>& lines) {
+  ready_ = command + "\n" + status + scip::sum(status) + "\n";
+  for (const std::string& line : lines) ready_ += line + scip::sum(line) + "\n";
+  ready_ += "\n";
+  read_ = 0;
+}
+
+void ScipStream::putScan(const scip::Rotation& rotation) {
+  std::string data;
+  data.reserve(2 * kNumberWidth * rotation.distances.size());
+  for (std::size_t i = 0; i < rotation.distances.size(); ++i) {
+    data += scip::encode(static_cast<std::uint32_t>(rotation.distances[i]), kNumberWidth);
+    if (rotation.intensities.empty()) continue;
+    data += scip::encode(static_cast<std::uint32_t>(rotation.intensities[i]), kNumberWidth);
+  }
+  std::vector<std::string> lines{scip::encode(rotation.clock, kClockWidth)};
+  for (std::size_t at = 0; at < data.size(); at += kLine) lines.push_back(data.substr(at, kLine));
+  put(started_, "99", lines);
+}
+
+/// The beams of the window, as if they were a whole sensor's. Only their number matters to MRPT.
+std::vector<std::string> ScipStream::plainFan() const {
+  const scip::Parameters& sensor = sensor_.parameters;
+  return {"MODL:" + sensor.model + ";",
+          line("DMIN", sensor.distance_min),
+          line("DMAX", sensor.distance_max),
+          line("ARES", std::max(sensor.steps_per_turn / request_.cluster, 1)),
+          line("AMIN", 0),
+          line("AMAX", scip::beams(request_) - 1),
+          line("AFRT", std::max((sensor.front - request_.first) / request_.cluster, 0)),
+          line("SCAN", static_cast<int>(sensor.rpm))};
+}
+
+}  // namespace kurumaisu::laser

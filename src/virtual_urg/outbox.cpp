@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "virtual_urg/outbox.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace kurumaisu::virtual_urg {
+namespace {
+
+constexpr double kPieces = 100;  // at most, of an output that trickles: each costs a wake-up
+
+/// [bytes] in a piece.
+std::size_t pieceOf(const Output& output) {
+  return static_cast<std::size_t>(std::ceil(static_cast<double>(output.bytes.size()) / kPieces));
+}
+
+}  // namespace
+
+void Outbox::add(Output output, int baud) {
+  bytes_ += output.bytes.size();
+  parcels_.push_back({std::move(output), baud, 0, std::nullopt});
+}
+
+std::string_view Outbox::due(double now) {
+  if (empty()) return {};
+  Parcel& first = parcels_.front();
+  if (!first.began) first.began = now;
+  const std::string_view bytes = first.output.bytes;
+  if (first.output.spread <= 0) return bytes.substr(first.sent);
+  const double gone = (now - *first.began) / first.output.spread;
+  const double pieces = std::floor(gone * kPieces) + 1;  // the first goes at once
+  const double until = std::min(pieces * static_cast<double>(pieceOf(first.output)), 1.0 * bytes.size());
+  return bytes.substr(first.sent, std::max(static_cast<std::size_t>(until), first.sent) - first.sent);
+}
+
+double Outbox::next() const {
+  if (empty() || parcels_.front().sent == parcels_.front().output.bytes.size()) return kNever;
+  const Parcel& first = parcels_.front();
+  const auto pieces = static_cast<double>(first.sent / pieceOf(first.output));
+  return first.began.value_or(0) + pieces * first.output.spread / kPieces;
+}
+
+void Outbox::sent(std::size_t bytes) {
+  parcels_.front().sent += bytes;
+  bytes_ -= bytes;
+}
+
+std::optional<Output> Outbox::finished() {
+  if (empty() || parcels_.front().sent < parcels_.front().output.bytes.size()) return std::nullopt;
+  Output output = std::move(parcels_.front().output);
+  parcels_.pop_front();
+  return output;
+}
+
+void Outbox::clear() {
+  parcels_.clear();
+  bytes_ = 0;
+}
+
+}  // namespace kurumaisu::virtual_urg

@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "virtual_urg/server.h"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "virtual_urg/uart.h"
+
+namespace kurumaisu::virtual_urg {
+namespace {
+
+constexpr double kNever = Outbox::kNever;
+
+double steady() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Steps that a sensor measures in a turn.
+std::size_t stepsOf(const Model& model) {
+  const std::map<std::string, std::string> values(model.parameters.begin(), model.parameters.end());
+  const int steps = std::stoi(values.at("AMAX")) - std::stoi(values.at("AMIN")) + 1;
+  if (steps < 1) throw std::invalid_argument("AMAX must not be below AMIN");
+  return static_cast<std::size_t>(steps);
+}
+
+/// Waits so long [s] for one of the descriptors.
+template <std::size_t N>
+void pollFor(std::array<pollfd, N>& descriptors, double seconds) {
+  timespec timeout{};
+  if (std::isfinite(seconds)) {
+    seconds = std::max(seconds, 0.0);
+    timeout.tv_sec = static_cast<std::time_t>(seconds);
+    timeout.tv_nsec = static_cast<long>(1e9 * (seconds - std::floor(seconds)));
+  }
+  ppoll(descriptors.data(), N, std::isfinite(seconds) ? &timeout : nullptr, nullptr);
+}
+
+}  // namespace
+
+Server::Server(Model model, std::vector<Fault> faults, const Clock& clock, std::unique_ptr<Endpoint> endpoint,
+               const Options& options)
+    : options_(options),
+      steps_(stepsOf(model)),
+      device_(std::move(model), std::move(faults), clock, options.pace == Pace::kFed ? 0 : steady()),
+      endpoint_(std::move(endpoint)),
+      turn_start_(steady()),
+      back_at_(kNever) {
+  shown_.ranges.assign(steps_, std::numeric_limits<double>::infinity());
+  if (device_.isBlackHole()) endpoint_->ignore();
+  thread_ = std::thread(&Server::run, this);
+}
+
+Server::~Server() { close(); }
+
+void Server::close() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  room_.notify_all();
+  wake_.set();
+  if (thread_.joinable()) thread_.join();
+  const std::lock_guard lock(mutex_);
+  endpoint_.reset();
+}
+
+void Server::checkAlive() const {
+  if (failure_) std::rethrow_exception(failure_);
+  if (stopping_) throw std::runtime_error("the virtual sensor is closed");
+}
+
+void Server::show(Measurement measurement) {
+  const std::lock_guard lock(mutex_);
+  checkAlive();
+  const auto fits = [this](std::size_t size) { return size == steps_; };
+  if (!fits(measurement.ranges.size()) ||
+      !(measurement.intensities.empty() || fits(measurement.intensities.size())) ||
+      !(measurement.codes.empty() || fits(measurement.codes.size()))) {
+    throw std::invalid_argument("a measurement must have " + std::to_string(steps_) + " steps");
+  }
+  shown_ = std::move(measurement);
+}
+
+bool Server::measure(const Measurement& measurement, double now) {
+  std::unique_lock lock(mutex_);
+  const auto ready = [this] { return stopping_ || failure_ || outbox_.empty(); };
+  room_.wait_for(lock, std::chrono::duration<double>(options_.patience), ready);
+  checkAlive();
+  fed_time_ = std::max(fed_time_, now);
+  const bool kept = post(device_.measure(measurement, fed_time_), device_.baud(), true);
+  lock.unlock();
+  wake_.set();
+  return kept;
+}
+
+void Server::advance(double now) {
+  const std::lock_guard lock(mutex_);
+  checkAlive();
+  fed_time_ = std::max(fed_time_, now);
+}
+
+void Server::powerCycle() {
+  const std::lock_guard lock(mutex_);
+  checkAlive();
+  outbox_.clear();
+  device_.powerCycle(deviceTime());
+}
+
+std::string Server::address() const {
+  const std::lock_guard lock(mutex_);
+  checkAlive();
+  return endpoint_->address();
+}
+
+bool Server::connected() const {
+  const std::lock_guard lock(mutex_);
+  return endpoint_ && endpoint_->connected();
+}
+
+Counters Server::counters() const {
+  const std::lock_guard lock(mutex_);
+  Counters counters = counters_;
+  counters.device = device_.counts();
+  return counters;
+}
+
+int Server::baud() const {
+  const std::lock_guard lock(mutex_);
+  return device_.baud();
+}
+
+double Server::deviceTime() const { return options_.pace == Pace::kFed ? fed_time_ : steady(); }
+
+void Server::run() {
+  try {
+    serve();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failure_ = std::current_exception();
+  }
+  room_.notify_all();
+}
+
+void Server::serve() {
+  std::unique_lock lock(mutex_);
+  while (!stopping_) {
+    const double now = steady();
+    if (now >= back_at_) {
+      back_at_ = kNever;
+      endpoint_->plug();
+    }
+    if (options_.pace == Pace::kReal) turn(now);
+    flush(now);
+    const double until = wakeAt(now);
+    const bool reads = !endpoint_->connected() || outbox_.fits(kReply);
+    const short events = static_cast<short>((reads ? POLLIN : 0) | (full_ ? POLLOUT : 0));
+    std::array<pollfd, 2> polled{pollfd{wake_.descriptor(), POLLIN, 0},
+                                 pollfd{endpoint_->descriptor(), events, 0}};
+    lock.unlock();
+    pollFor(polled, until - steady());
+    lock.lock();
+    wake_.clear();
+    if ((polled[1].revents & POLLOUT) != 0) full_ = false;
+    if ((polled[1].revents & ~POLLOUT) != 0 && !stopping_) heed();
+  }
+}
+
+double Server::wakeAt(double now) {
+  double until = back_at_;
+  if (!full_ && endpoint_->connected()) until = std::min(until, outbox_.next());
+  if (options_.pace == Pace::kReal && device_.wantsScan()) {
+    until = std::min(until, turn_start_ + device_.readyAfter());
+  }
+  return std::max(until, now);
+}
+
+void Server::turn(double now) {
+  const double due = turn_start_ + device_.readyAfter();
+  if (now < due) return;
+  // A turn that is over is not made up for: its scan would come late, and the next with it.
+  const double behind = std::floor((now - due) / device_.scanTime());
+  turn_start_ += behind * device_.scanTime();
+  if (device_.wantsScan()) {
+    counters_.late += static_cast<std::uint64_t>(behind);
+    shown_.start = turn_start_;
+    post(device_.measure(shown_, now), device_.baud(), true);
+  }
+  turn_start_ += device_.scanTime();
+}
+
+void Server::begin(double now) {
+  // The laser comes on in the middle of a turn, so the next one is the first that it measures.
+  const double turns = std::ceil((now - turn_start_) / device_.scanTime());
+  turn_start_ += std::max(turns, 0.0) * device_.scanTime();
+}
+
+void Server::heed() {
+  if (!endpoint_->connected()) {
+    if (!endpoint_->accept()) return;
+    ++counters_.clients;
+    post(device_.connect(deviceTime()), device_.baud(), false);
+    return;
+  }
+  std::optional<std::string> bytes = endpoint_->read();
+  if (!bytes) return gone();
+  if (bytes->empty()) return;
+  counters_.bytes_in += bytes->size();
+  const int baud = device_.baud();
+  const int rate = endpoint_->rate();
+  if (device_.hasStrictBaud() && baud > 0 && rate > 0 && rate != baud) {
+    counters_.garbled += bytes->size();
+    bytes = received(*bytes, rate, baud);
+  }
+  const bool wanted = device_.wantsScan();
+  post(device_.receive(*bytes, deviceTime()), baud, false);
+  if (!wanted && device_.wantsScan()) begin(steady());
+}
+
+void Server::flush(double now) {
+  while (endpoint_->connected() && !outbox_.empty() && !full_) {
+    const std::string_view bytes = outbox_.due(now);
+    if (!bytes.empty()) {
+      const std::optional<std::size_t> taken = send(bytes);
+      if (!taken) return gone();
+      outbox_.sent(*taken);
+      full_ = *taken < bytes.size();
+    }
+    const std::optional<Output> output = outbox_.finished();
+    if (!output) break;
+    apply(*output);
+  }
+  if (outbox_.empty()) room_.notify_all();
+}
+
+std::optional<std::size_t> Server::send(std::string_view bytes) {
+  const int baud = outbox_.baud();
+  const int rate = endpoint_->rate();
+  if (!device_.hasStrictBaud() || baud <= 0 || rate <= 0 || rate == baud) {
+    const std::optional<std::size_t> taken = endpoint_->write(bytes);
+    counters_.bytes_out += taken.value_or(0);
+    return taken;
+  }
+  // What the system does not take of it is lost: it is of no use anyway.
+  const std::optional<std::size_t> taken = endpoint_->write(received(bytes, baud, rate));
+  if (!taken) return std::nullopt;
+  counters_.bytes_out += *taken;
+  counters_.garbled += bytes.size();
+  return bytes.size();
+}
+
+bool Server::post(Output output, int baud, bool is_scan) {
+  if (output.bytes.empty() && output.event == Event::kNone) return true;
+  if (!endpoint_->connected()) {
+    if (is_scan) ++counters_.unheard;
+    apply(output);
+    return true;
+  }
+  if (is_scan && !outbox_.fits(output.bytes.size())) {
+    ++counters_.dropped;
+    return false;
+  }
+  if (options_.line_rate && baud > 0) {
+    output.spread = std::max(output.spread, kBitsOfByte * static_cast<double>(output.bytes.size()) / baud);
+  }
+  outbox_.add(std::move(output), baud);
+  return true;
+}
+
+void Server::apply(const Output& output) {
+  switch (output.event) {
+    case Event::kNone:
+      return;
+    case Event::kClose:
+      endpoint_->close();
+      break;
+    case Event::kReset:
+      endpoint_->reset();
+      break;
+    case Event::kHangUp:
+      endpoint_->unplug();
+      back_at_ = steady() + output.away;
+      break;
+  }
+  gone();
+}
+
+void Server::gone() {
+  outbox_.clear();
+  full_ = false;
+  if (endpoint_->tellsLeaving()) device_.disconnect(deviceTime());
+  room_.notify_all();
+}
+
+}  // namespace kurumaisu::virtual_urg
