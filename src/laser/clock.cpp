@@ -47,10 +47,9 @@ double DeviceClock::stamp(std::uint32_t clock, double first_byte, double least_d
 double DeviceClock::follow(std::uint32_t clock, double first_byte, double least_delay) {
   const double sent = first_byte - least_delay;
   const double unheard = last_ ? first_byte - last_->host : 0;
-  const bool went_back = unheard < 0;
   double device = read(clock, first_byte);
-  if (went_back || isEarly({device, sent - device}, kDriftMax * unheard)) {
-    if (went_back || envelope_.span() > kPatience) {
+  if (isEarly({device, sent - device}, kDriftMax * unheard)) {
+    if (envelope_.span() > kPatience) {
       restart();
       ++state_.resets;
       device = read(clock, first_byte);
@@ -112,7 +111,7 @@ void DeviceClock::calibrate(std::uint32_t clock, double sent, double received) {
   const double doubt = received - sent;
   const double unheard = last_ ? received - last_->host : 0;
   double device = read(clock, host);
-  if (unheard < 0 || isEarly({device, host - device}, doubt + kDriftMax * unheard)) {
+  if (isEarly({device, host - device}, doubt + kDriftMax * unheard)) {
     restart();
     ++state_.resets;
     device = read(clock, host);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kWindow = 30;       // [s] longer: steadier; shorter: follows a change of the rate sooner
 constexpr double kBucket = 0.5;      // [s]
-constexpr double kSlopeMax = 0.005;  // of a sensor's clock; a real URG-04LX is off by 0.00125
+constexpr double kSlopeMax = 0.005;  // of a sensor's clock; a recorded URG-04LX is off by 0.0013
 constexpr double kDoubt = 1;         // [s] from the middle to where the edges must agree, while there are few
 constexpr double kDoubtShare = 0.125;  // of the span, once there are many
 
