@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import roslib.packages
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -31,11 +32,37 @@ SENSOR = load_sensor("urg_04lx")
 EXIT = 2.0  # [s] in which a node must end, whatever its sensor does
 
 
+LAUNCH = """
+<launch>
+  <node pkg="kurumaisu" type="laser_node" name="urg_node">
+    <param name="ip_address" value=""/>
+    <param name="serial_port" value="{serial}"/>
+    <param name="frame_id" value="base_laser"/>
+    <param name="calibrate_time" value="true"/>
+    <param name="publish_multiecho" value="false"/>
+    <param name="angle_min" value="-1.5707963"/>
+    <param name="angle_max" value="1.5707963"/>
+  </node>
+  <group ns="named">
+    <include file="$(find kurumaisu)/launch/laser.launch">
+      <arg name="ip_address" value="127.0.0.1"/>
+    </include>
+    <param name="laser_node/ip_port" value="{tcp}"/>
+  </group>
+</launch>
+"""
+
+
+def program(name: str) -> str:
+    return str(roslib.packages.find_node("kurumaisu", name)[0])
+
+
 def begin(name: str, **parameters: Any) -> subprocess.Popen[str]:
     """Start a laser_node, its topics under /NAME; parameters are private ones."""
     rospy.set_param(f"/{name}/laser_node", {"diagnostic_period": 0.2, **parameters})
-    command = ["rosrun", "kurumaisu", "laser_node", f"__ns:=/{name}"]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    return subprocess.Popen(
+        [program("laser_node"), f"__ns:=/{name}"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
 
 
 @contextmanager
@@ -179,9 +206,7 @@ class LaserNode(unittest.TestCase):
             with laser_node("late", serial_port=port):
                 self.check_refused("late")
                 scans.wait(lambda m: True, "scans go on")
-            identify = subprocess.run(
-                ["rosrun", "kurumaisu", "getID", port], capture_output=True, text=True, check=False
-            )
+            identify = subprocess.run([program("getID"), port], capture_output=True, text=True, check=False)
             assert identify.returncode == 1
             assert "LASER_IN_USE" in identify.stderr
 
@@ -194,16 +219,15 @@ class LaserNode(unittest.TestCase):
         assert not rospy.ServiceProxy(f"/{name}/update_laser_status", Trigger)().success
 
     def test_it_ends_though_nobody_answers(self) -> None:
-        with VirtualUrg(SENSOR, Tcp(), faults=["blackhole"]) as urg:
-            with laser_node("lost", ip_address="127.0.0.1", ip_port=urg.port):
-                Diagnostics("lost").wait("Hardware Status", DiagnosticStatus.ERROR, "Not connected")
-                rospy.wait_for_service("/lost/update_laser_status", PATIENCE)
+        sensor = VirtualUrg(SENSOR, Tcp(), faults=["blackhole"])
+        with sensor, laser_node("lost", ip_address="127.0.0.1", ip_port=sensor.port):
+            Diagnostics("lost").wait("Hardware Status", DiagnosticStatus.ERROR, "Not connected")
+            rospy.wait_for_service("/lost/update_laser_status", PATIENCE)
 
     def test_senseless_parameters_stop_the_start(self) -> None:
         cases: list[tuple[dict[str, Any], str]] = [
             ({"angle_min": 1.0, "angle_max": 0.5}, "angle_min must be less than angle_max: 1, 0.5"),
             ({"ip_address": "127.0.0.1", "serial_port": "tty"}, "/laser_node/serial_port: contradicts ip_address"),
-            ({"cluster": 100}, "/laser_node/cluster: must be at most 99: 100"),
             ({"serial_baud": 1200}, "serial_baud is no rate of SCIP 2.0: 1200"),
             ({"angle_mni": 0.0}, "/laser_node/angle_mni: is not a known key"),
         ]
@@ -251,16 +275,36 @@ class LaserNode(unittest.TestCase):
         wait_for(turn, "ten scans")
         return starts
 
+    def test_launch_files(self) -> None:
+        """laser.launch, and one of the form of urg_node's own with its pkg and type changed."""
+        launch = Path(self._folder.name) / "both.launch"
+        with self.pty() as urg, VirtualUrg(SENSOR, Tcp()) as ethernet:
+            launch.write_text(LAUNCH.format(serial=self.link, tcp=ethernet.port))
+            for each in (urg, ethernet):
+                each.show(fed_ranges())
+            process = subprocess.Popen(["roslaunch", str(launch)], stdout=subprocess.PIPE, text=True)
+            try:
+                scan = Topic("/scan", LaserScan).wait(lambda m: True, "urg_node's form")
+                assert (scan.header.frame_id, len(scan.ranges)) == ("base_laser", 513)  # 90 degrees are 256 steps
+                Topic("/named/scan", LaserScan).wait(lambda m: len(m.ranges) == SENSOR.steps, "laser.launch")
+                assert rospy.get_param("/named/laser_node/cluster") == 1  # from launch/laser_node.yaml
+            finally:
+                process.send_signal(signal.SIGINT)
+                process.communicate(timeout=PATIENCE)
+
     def test_get_id(self) -> None:
-        command = ["rosrun", "kurumaisu", "getID"]
         with self.pty() as urg:
-            loud = subprocess.run([*command, urg.address], capture_output=True, text=True, check=True)
+            loud = subprocess.run([program("getID"), urg.address], capture_output=True, text=True, check=True)
             assert loud.stdout == f"Device at {urg.address} has ID H0000000\n"
         with VirtualUrg(SENSOR, Tcp()) as urg:
-            quiet = subprocess.run([*command, "--quiet", urg.address], capture_output=True, text=True, check=True)
+            quiet = subprocess.run(
+                [program("getID"), "--quiet", urg.address], capture_output=True, text=True, check=True
+            )
             assert quiet.stdout == "H0000000\n"
         with VirtualUrg(SENSOR, Tcp(), faults=["blackhole"]) as urg:
-            silent = subprocess.run([*command, urg.address], capture_output=True, text=True, check=False, timeout=5)
+            silent = subprocess.run(
+                [program("getID"), urg.address], capture_output=True, text=True, check=False, timeout=5
+            )
             assert silent.returncode == 1
             assert silent.stdout == ""
 

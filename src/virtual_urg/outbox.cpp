@@ -17,9 +17,10 @@ std::size_t pieceOf(const Output& output) {
 
 }  // namespace
 
-void Outbox::add(Output output, int baud) {
+void Outbox::add(Output output, int baud, bool is_scan) {
   bytes_ += output.bytes.size();
-  parcels_.push_back({std::move(output), baud, 0, std::nullopt});
+  if (is_scan) ++scans_;
+  parcels_.push_back({std::move(output), baud, is_scan, 0, std::nullopt});
 }
 
 std::string_view Outbox::due(double now) {
@@ -49,6 +50,7 @@ void Outbox::sent(std::size_t bytes) {
 std::optional<Output> Outbox::finished() {
   if (empty() || parcels_.front().sent < parcels_.front().output.bytes.size()) return std::nullopt;
   Output output = std::move(parcels_.front().output);
+  if (parcels_.front().is_scan) --scans_;
   parcels_.pop_front();
   return output;
 }
@@ -56,6 +58,7 @@ std::optional<Output> Outbox::finished() {
 void Outbox::clear() {
   parcels_.clear();
   bytes_ = 0;
+  scans_ = 0;
 }
 
 }  // namespace kurumaisu::virtual_urg

@@ -70,7 +70,7 @@ class DrivenLaser:
         self._patience = patience
         self._news = threading.Condition()  # over what follows
         self._owed: float | None = None  # stamp [s] of the scan that has not come back
-        self._given_up = False  # until one comes
+        self._given_up = True  # until one comes
         self._late = 0
         self._driver = rospy.Subscriber("scan", rospy.AnyMsg, self._hear, queue_size=10, tcp_nodelay=True)
 
@@ -80,10 +80,14 @@ class DrivenLaser:
 
     def advance(self, now: int, scan: Scan | None, epoch: int) -> None:
         """Turn the sensor's clock on, and give it the scan."""
-        sent = self._device.advance(now, scan, epoch)
-        if sent and scan is not None and self._driver.get_num_connections():
+        if scan is None:
+            self._device.advance(now, None, epoch)
+            return
+        with self._news:  # before it is sent: the driver may be faster than this thread
+            self._owed = None if self._given_up else scan.time + epoch / _NS
+        if not self._device.advance(now, scan, epoch):
             with self._news:
-                self._owed = None if self._given_up else scan.time + epoch / _NS
+                self._owed = None
 
     def wait(self, hurry: Callable[[], bool]) -> None:
         """Wait until the driver has published the scan that was fed last, within patience."""
@@ -107,7 +111,7 @@ class DrivenLaser:
         rospy.logwarn_throttle(
             10.0,
             f"SIM_LASER_LATE no scan came back within {self._patience:g} s of {owed:.3f} s of the clock: "
-            f"time runs on; {self._late} times so far",
+            f"time runs on; {self._late} times so far, {self._device.counters['dropped']} scans dropped",
         )
 
     def _hear(self, message: rospy.AnyMsg) -> None:
