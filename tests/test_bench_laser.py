@@ -14,7 +14,6 @@ CASE = Case(1, ("corrupt@20",), (1, 1), 0.26, proof="Bad Sums", level=1)
 STATUS = Status(1, "bad sums: 1", {"Bad Sums": "1", "Lost Scans": "1", "Reconnects": "0", "Last Error": "LASER_X: y"})
 GOOD = Result(
     scans=70,
-    first=1.0,
     lost=1,
     twice=0,
     wrong=0,
