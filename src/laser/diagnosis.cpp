@@ -179,7 +179,7 @@ Diagnosis diagnoseScans(const Status& status, std::optional<double> rate, double
   add("Intensities", status.intensity ? "yes" : "no");
   add("Latency [ms]", shown("%.3f", 1e3 * status.latency));
   add("Clock offset [s]", shown("%.6f", status.clock.offset));
-  add("Clock drift [ppm]", shown("%.1f", -1e6 * status.clock.drift));
+  add("Clock drift [ppm]", shown("%.1f", 0.0 - 1e6 * status.clock.drift));
   add("Clock resets", std::to_string(status.clock.resets));
   add("Clock calibrated", status.clock.calibrated ? "yes" : "no");
   add("Scan to first byte [ms]", shown("%.3f", 1e3 * status.clock.latency));

@@ -90,6 +90,11 @@ LaserConfig configOf(const k::NodeSettings& settings) {
   return config;
 }
 
+std::string place(const k::DriverSettings& settings) {
+  if (settings.ip_address.empty()) return settings.serial_port;
+  return settings.ip_address + ":" + std::to_string(settings.ip_port);
+}
+
 void say(const k::Report& report) {
   if (report.level == k::Report::Level::kInfo) {
     ROS_INFO("%s", report.text.c_str());
@@ -233,6 +238,7 @@ void LaserNode::tick() {
   const std::string about = std::string(k::name(status.state)) + serial + of(status.device.state, "STAT");
   if (about != told_) {
     told_ = about;
+    ROS_INFO("%s: %s %s", place(settings_.driver).c_str(), k::name(status.state), serial.c_str());
     diagnostics_.setHardwareID(serial.empty() ? "none" : serial);
     publishStatus(status);
   }
@@ -277,19 +283,19 @@ void LaserNode::restart(Answer& answer) {
 
 /// Begins anew, which asks the sensor how it is, and wants a few good scans. Holds up other callbacks meanwhile.
 void LaserNode::selfTest(Answer& answer) {
-  const std::uint64_t reconnects = driver_.status().counts.reconnects;
-  std::optional<k::Counts> begun;
+  const k::Counts before = driver_.status().counts;
+  std::optional<k::Counts> begun;  // with the first scan after the restart, before which scans are lost
   const ros::SteadyTime deadline = ros::SteadyTime::now() + ros::WallDuration(kSelfTestPatience);
   k::Status status;
   driver_.restart();
   do {
     ros::WallDuration(kLongestWait).sleep();
     status = driver_.status();
-    if (!begun && status.counts.reconnects > reconnects) begun = status.counts;
+    const bool streams = status.counts.reconnects > before.reconnects && status.state == k::State::kStreaming;
+    if (!begun && streams) begun = status.counts;
     if (begun && status.counts.scans >= begun->scans + kSelfTestScans) break;
   } while (ros::ok() && ros::SteadyTime::now() < deadline);
-  const k::Diagnosis diagnosis =
-      k::diagnoseDevice(status, begun.value_or(status.counts), settings_.driver, 0);
+  const k::Diagnosis diagnosis = k::diagnoseDevice(status, begun.value_or(before), settings_.driver, 0);
   const bool scans = begun && status.counts.scans >= begun->scans + kSelfTestScans;
   answer.success = scans && diagnosis.level == k::Level::kOk;
   answer.message = (scans ? "" : "no scans within the self test; ") + diagnosis.summary;

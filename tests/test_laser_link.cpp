@@ -1,0 +1,432 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Ports, replies, and how a sensor is found, against a peer that is scripted here.
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "laser/fan.h"
+#include "laser/handshake.h"
+#include "laser/link.h"
+#include "laser/tcp.h"
+#include "laser/tty.h"
+#include "laser/urg.h"
+#include "laser_peer.h"
+
+namespace l = kurumaisu::laser;
+namespace scip = kurumaisu::scip;
+using kurumaisu::test::Peer;
+using kurumaisu::test::Pty;
+
+namespace {
+
+using kurumaisu::test::keyed;
+using kurumaisu::test::reply;
+using kurumaisu::test::summed;
+
+constexpr int kBaud = 115200;
+const auto kGoOn = [] { return false; };
+
+/// What waits where a test should not: fails instead of hanging.
+double seconds(const std::function<void()>& action) {
+  const double start = l::steadyTime();
+  action();
+  return l::steadyTime() - start;
+}
+
+std::string problem(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "nothing";
+}
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+std::string parameters(const std::map<std::string, std::string>& changed = {}) {
+  std::string lines;
+  for (const auto& [key, value] : std::vector<std::pair<std::string, std::string>>{{"MODL", "URG-04LX"},
+                                                                                   {"DMIN", "20"},
+                                                                                   {"DMAX", "5600"},
+                                                                                   {"ARES", "1024"},
+                                                                                   {"AMIN", "44"},
+                                                                                   {"AMAX", "725"},
+                                                                                   {"AFRT", "384"},
+                                                                                   {"SCAN", "600"}}) {
+    const auto found = changed.find(key);
+    lines += keyed(key + ":" + (found == changed.end() ? value : found->second));
+  }
+  return lines;
+}
+
+/// A sensor that is idle and speaks SCIP 2.0.
+std::string idle(const std::string& command) {
+  if (command == "QT" || command == "BM") return reply(command, "00");
+  if (command == "TM2") return reply(command, "03");
+  if (command == "VV") return reply(command, "00", keyed("VEND:Hokuyo") + keyed("SERI:H1"));
+  if (command == "PP") return reply(command, "00", parameters());
+  if (command == "II") return reply(command, "00", keyed("STAT:Sensor works well."));
+  if (command == "HS0") return reply(command, "02");
+  return reply(command, "0E");
+}
+
+class LinkTest : public testing::Test {
+ protected:
+  /// A link to a peer that answers so.
+  void connect(const Peer::Answer& answer) {
+    link.emplace(std::make_unique<l::Tty>(pty.path(), kBaud), l::steadyTime, [this] { return stop.load(); });
+    peer.emplace(pty.fd(), answer);
+  }
+
+  l::Sensor shake() {
+    return l::handshake(*link, {kBaud, 0.3},
+                        [this](l::Report::Level, const std::string& text) { told += text + "\n"; });
+  }
+
+  Pty pty;
+  std::atomic<bool> stop{false};
+  std::optional<l::Link> link;
+  std::optional<Peer> peer;
+  std::string told;
+};
+
+}  // namespace
+
+TEST(Tty, IsForOneAlone) {
+  const Pty pty;
+  std::optional<l::Tty> first(std::in_place, pty.path(), kBaud);
+  const std::string refusal = problem([&] { l::Tty(pty.path(), kBaud); });
+  EXPECT_TRUE(has(refusal, "LASER_IN_USE") && has(refusal, pty.path())) << refusal;
+  EXPECT_THROW(l::Tty(pty.path(), kBaud), l::PortInUse);
+  first.reset();
+  EXPECT_NO_THROW(l::Tty(pty.path(), kBaud));
+}
+
+TEST(Tty, PassesEveryByteAndSetsTheRate) {
+  const Pty pty;
+  l::Tty tty(pty.path(), kBaud);
+  EXPECT_EQ(pty.speed(), static_cast<speed_t>(B115200));
+  tty.setBaud(19200);
+  EXPECT_EQ(pty.speed(), static_cast<speed_t>(B19200));
+  tty.setBaud(750000);  // has no name
+  tty.setBaud(kBaud);
+  std::string all;
+  for (int byte = 0; byte < 256; ++byte) all += static_cast<char>(byte);
+  tty.write(all, 1);
+  std::string there(256, '\0');
+  ASSERT_EQ(read(pty.fd(), there.data(), there.size()), 256);
+  EXPECT_EQ(there, all);
+  ASSERT_EQ(write(pty.fd(), all.data(), all.size()), 256);
+  std::string back(300, '\0');
+  ASSERT_EQ(tty.read(back.data(), back.size(), 1), 256U);
+  EXPECT_EQ(back.substr(0, 256), all);
+  EXPECT_EQ(tty.read(back.data(), back.size(), 0.01), 0U);
+}
+
+TEST(Tty, TellsOfAHangUpAndOfAPortThatIsNotThere) {
+  Pty pty;
+  l::Tty tty(pty.path(), kBaud);
+  pty.hangUp();
+  char byte = 0;
+  EXPECT_THROW(tty.read(&byte, 1, 1), l::LinkLost);
+  EXPECT_THROW(tty.write("QT\n", 1), l::LinkLost);
+  const std::string refusal = problem([] { l::Tty("/dev/no_such_tty", kBaud); });
+  EXPECT_TRUE(has(refusal, "LASER_NO_PORT") && has(refusal, "/dev/no_such_tty")) << refusal;
+}
+
+TEST(Tty, DoesNotBlockWhereNobodyReads) {
+  const Pty pty;
+  l::Tty tty(pty.path(), kBaud);
+  const std::string much(1 << 20, 'x');
+  const double time = seconds([&] { EXPECT_THROW(tty.write(much, 0.1), l::LinkLost); });
+  EXPECT_LT(time, 0.5);
+}
+
+namespace {
+
+/// A listening socket on a free port of the loopback.
+class Listener {
+ public:
+  explicit Listener(int backlog) : fd_(socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof(address);
+    if (bind(fd_, reinterpret_cast<sockaddr*>(&address), size) != 0 || listen(fd_, backlog) != 0 ||
+        getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
+      throw std::runtime_error("no listener");
+    }
+    port = ntohs(address.sin_port);
+  }
+  ~Listener() { close(fd_); }
+  int accept() const { return ::accept(fd_, nullptr, nullptr); }
+  int port = 0;
+
+ private:
+  int fd_;
+};
+
+}  // namespace
+
+TEST(Tcp, GivesUpABlackHoleInTimeOrWhenTold) {
+  const Listener full(0);
+  std::vector<std::unique_ptr<l::Tcp>> crowd;  // a queue that is full drops who knocks
+  std::string refusal;
+  const double time = seconds([&] {
+    refusal = problem([&] {
+      for (int i = 0; i < 8; ++i)
+        crowd.push_back(std::make_unique<l::Tcp>("127.0.0.1", full.port, 0.3, kGoOn));
+    });
+  });
+  EXPECT_TRUE(has(refusal, "LASER_NO_PORT") && has(refusal, "no answer")) << refusal;
+  EXPECT_GE(time, 0.3);
+  EXPECT_LT(time, 0.6);
+  const double interrupted =
+      seconds([&] { EXPECT_THROW(l::Tcp("127.0.0.1", full.port, 60, [] { return true; }), l::LinkLost); });
+  EXPECT_LT(interrupted, 0.3);
+}
+
+TEST(Tcp, TellsOfClosingAndOfAResetWithoutASignal) {
+  const Listener listener(4);
+  l::Tcp closed("127.0.0.1", listener.port, 1, kGoOn);
+  close(listener.accept());
+  char byte = 0;
+  EXPECT_THROW(closed.read(&byte, 1, 1), l::LinkLost);
+
+  l::Tcp reset("127.0.0.1", listener.port, 1, kGoOn);
+  const int there = listener.accept();
+  const linger now{1, 0};
+  setsockopt(there, SOL_SOCKET, SO_LINGER, &now, sizeof(now));
+  close(there);
+  EXPECT_THROW(
+      {
+        for (int i = 0; i < 100; ++i) reset.write("QT\n", 1);
+      },
+      l::LinkLost);
+  EXPECT_TRUE(has(problem([] { l::Tcp("sensor.local", 10940, 1, kGoOn); }), "sensor.local"));
+}
+
+TEST_F(LinkTest, AnAnswerIsFoundAmongOthers) {
+  connect([](const std::string& command) {
+    return "noise" + reply("MD0044072501000", "99", summed("0000")) + reply("XX", "0E") +
+           reply(command, "00");
+  });
+  EXPECT_EQ(link->ask("BM", 0.5).status, "00");
+}
+
+TEST_F(LinkTest, NoAnswerIsOneInTime) {
+  connect([](const std::string&) { return ""; });
+  const double time = seconds([&] { EXPECT_THROW(link->ask("PP", 0.1), l::LinkLost); });
+  EXPECT_GE(time, 0.1);
+  EXPECT_LT(time, 0.3);
+  stop = true;
+  EXPECT_LT(seconds([&] { EXPECT_THROW(link->ask("PP", 60), l::LinkLost); }), 0.2);
+}
+
+TEST_F(LinkTest, NoiseWithoutEndDoesNotHoldItUp) {
+  connect([](const std::string&) { return ""; });
+  std::atomic<bool> enough{false};
+  std::thread noise([&] {
+    while (!enough) {
+      peer->say("\x01garbage\n0\n");
+      usleep(2000);
+    }
+  });
+  const double time = seconds([&] { EXPECT_FALSE(link->ask("QT", 0.1, 0.3)); });
+  enough = true;
+  noise.join();
+  EXPECT_GE(time, 0.29);
+  EXPECT_LT(time, 0.6);
+}
+
+TEST_F(LinkTest, AnIdleSensorSaysWhatItIs) {
+  connect(idle);
+  const l::Sensor sensor = shake();
+  EXPECT_EQ(sensor.parameters.last, 725);
+  EXPECT_EQ(sensor.baud, kBaud);
+  EXPECT_EQ(sensor.state.at("STAT"), "Sensor works well.");
+  EXPECT_EQ(told, "");
+}
+
+TEST_F(LinkTest, AColdSensorIsFoundAtItsRateAndBroughtToOurs) {
+  speed_t rate = B19200;
+  bool old = true;
+  connect([&](const std::string& command) -> std::string {
+    if (pty.speed() != rate) return "\xf8\x80\n\x1f";
+    if (old && command == "SCIP2.0") {
+      old = false;
+      return reply(command, "0");
+    }
+    if (old) return reply(command, "E");
+    if (command == "SS115200") {
+      // At the old rate; the new one holds after it.
+      peer->say(reply(command, "00"));
+      tcdrain(pty.fd());
+      rate = B115200;
+      return "";
+    }
+    return idle(command);
+  });
+  const double time = seconds([&] { EXPECT_EQ(shake().baud, kBaud); });
+  EXPECT_FALSE(old);
+  EXPECT_EQ(rate, static_cast<speed_t>(B115200));
+  EXPECT_LT(time, 0.5);
+}
+
+TEST_F(LinkTest, ASensorThatRefusesTheRateKeepsItsOwn) {
+  connect([&](const std::string& command) -> std::string {
+    if (pty.speed() != B19200) return "";
+    return command == "SS115200" ? reply(command, "0E") : idle(command);
+  });
+  EXPECT_EQ(shake().baud, 19200);
+  EXPECT_TRUE(has(told, "LASER_BAUD")) << told;
+}
+
+TEST_F(LinkTest, AWrongSumOfVVIsToldOnly) {
+  connect([](const std::string& command) {
+    return command == "VV" ? reply(command, "00", keyed("VEND:Hokuyo") + "SERI:H1;0\n") : idle(command);
+  });
+  EXPECT_EQ(scip::keyed(shake().version).at("SERI"), "H1");
+  EXPECT_TRUE(has(told, "LASER_BAD_SUM: VV")) << told;
+}
+
+TEST_F(LinkTest, AWrongSumOfPPIsAskedAgain) {
+  int asked = 0;
+  connect([&](const std::string& command) {
+    const bool is_bad = command == "PP" && ++asked == 1;
+    return is_bad ? reply(command, "00", "MODL:X;0\n" + parameters()) : idle(command);
+  });
+  EXPECT_EQ(shake().parameters.model, "URG-04LX");
+  EXPECT_EQ(asked, 2);
+  EXPECT_EQ(told, "");
+}
+
+TEST_F(LinkTest, ParametersThatCannotBeAreRefused) {
+  connect([](const std::string& command) {
+    return command == "PP" ? reply(command, "00", parameters({{"ARES", "0"}})) : idle(command);
+  });
+  const std::string refusal = problem([&] { shake(); });
+  EXPECT_TRUE(has(refusal, "LASER_BAD_PP") && has(refusal, "ARES")) << refusal;
+}
+
+TEST_F(LinkTest, ASensorInAdjustModeIsBroughtBack) {
+  bool adjusting = true;
+  connect([&](const std::string& command) {
+    if (command == "TM2") adjusting = false;
+    return adjusting ? reply(command, "0I") : idle(command);
+  });
+  EXPECT_EQ(shake().parameters.first, 44);
+}
+
+namespace {
+
+/// A scan of a request whose distances are a function of the beam.
+std::string frame(const scip::Request& request, std::uint32_t clock, int (*distance)(int)) {
+  std::string data;
+  for (int i = 0; i < scip::beams(request); ++i) {
+    data += scip::encode(static_cast<std::uint32_t>(distance(i)), 3);
+    if (request.form == scip::Form::kIntensity) data += scip::encode(static_cast<std::uint32_t>(i + 7), 3);
+  }
+  std::string lines = summed(scip::encode(clock, 4));
+  for (std::size_t at = 0; at < data.size(); at += 64) lines += summed(data.substr(at, 64));
+  return reply(scip::command(request), "99", lines);
+}
+
+int ramp(int beam) { return 20 + 3 * beam; }
+
+}  // namespace
+
+/// MRPT decodes each scan by itself from what the stream hands on: whatever is asked for, both agree.
+TEST_F(LinkTest, MrptAndOurDecoderAgree) {
+  std::string asked;
+  connect([&](const std::string& command) {
+    if (!scip::request(command)) return idle(command);
+    asked = command;
+    return reply(command, "00");
+  });
+  const l::Sensor sensor = shake();
+  for (const l::Window& window : {l::Window{-3.14, 3.14, 1, 0, false}, l::Window{-0.3, 1.2, 3, 2, false},
+                                  l::Window{0.1, 0.2, 1, 9, true}}) {
+    const scip::Request request = l::Fan(sensor.parameters, window).request();
+    auto stream = std::make_shared<l::ScipStream>(*link, sensor, request, 0.5);
+    l::Urg urg(stream, window.intensity);
+    EXPECT_EQ(asked, scip::command(request));
+    peer->say(frame(request, 1000, ramp));
+    const std::optional<l::Arrival> arrival = stream->await(1);
+    ASSERT_TRUE(arrival && arrival->kind == l::Arrival::Kind::kScan) << (arrival ? arrival->text : "none");
+    mrpt::obs::CObservation2DRangeScan observation;
+    ASSERT_TRUE(urg.take(observation));
+    ASSERT_EQ(observation.getScanSize(), arrival->rotation.distances.size());
+    for (std::size_t i = 0; i < observation.getScanSize(); ++i) {
+      ASSERT_FLOAT_EQ(observation.getScanRange(i), 1e-3F * static_cast<float>(ramp(static_cast<int>(i))));
+      ASSERT_EQ(arrival->rotation.distances[i], ramp(static_cast<int>(i)));
+      if (!window.intensity) continue;
+      ASSERT_EQ(observation.getScanIntensity(i), arrival->rotation.intensities[i]);
+    }
+  }
+}
+
+TEST_F(LinkTest, WhatIsNoGoodScanIsTold) {
+  connect([&](const std::string& command) {
+    return scip::request(command) ? reply(command, "00") : idle(command);
+  });
+  const l::Sensor sensor = shake();
+  const scip::Request request = l::Fan(sensor.parameters, {0, 1, 1, 0, false}).request();
+  auto stream = std::make_shared<l::ScipStream>(*link, sensor, request, 0.5);
+  l::Urg urg(stream, false);
+  using Kind = l::Arrival::Kind;
+  const auto kind = [&](const std::string& bytes) {
+    peer->say(bytes);
+    const std::optional<l::Arrival> arrival = stream->await(1);
+    return arrival ? arrival->kind : throw std::runtime_error("nothing came");
+  };
+  const std::string good = frame(request, 5, ramp);
+  EXPECT_EQ(kind(good), Kind::kScan);
+  EXPECT_EQ(kind(good), Kind::kDuplicate);
+  std::string bad = frame(request, 6, ramp);
+  ++bad[40];
+  EXPECT_EQ(kind(bad), Kind::kDamaged);
+  EXPECT_EQ(kind(reply(scip::command(request), "50")), Kind::kStatus);
+  EXPECT_EQ(kind(frame(request, 6, ramp)), Kind::kScan);
+  peer->say(reply("VV", "00"));
+  EXPECT_FALSE(stream->await(0.1));
+}
+
+TEST_F(LinkTest, RefusalsToStartHaveTheirReason) {
+  std::string bm = "01";
+  std::string start = "00";
+  connect([&](const std::string& command) {
+    if (command == "BM") return reply(command, bm);
+    return scip::request(command) ? reply(command, start) : idle(command);
+  });
+  const l::Sensor sensor = shake();
+  const auto begin = [&](bool intensity) {
+    return problem([&] {
+      const scip::Request request = l::Fan(sensor.parameters, {0, 1, 1, 0, intensity}).request();
+      l::Urg(std::make_shared<l::ScipStream>(*link, sensor, request, 0.2), intensity);
+    });
+  };
+  EXPECT_TRUE(has(begin(false), "LASER_NO_LIGHT: BM is answered by status 01")) << begin(false);
+  bm = "10";
+  EXPECT_TRUE(has(begin(false), "not yet ready")) << begin(false);
+  bm = "02";  // on already
+  EXPECT_EQ(begin(false), "nothing");
+  start = "0E";
+  EXPECT_TRUE(has(begin(false), "LASER_REFUSED: MD")) << begin(false);
+  EXPECT_TRUE(has(begin(true), "LASER_NO_INTENSITY: ME")) << begin(true);
+  EXPECT_EQ(peer->heard().back().substr(0, 2), "ME");
+}
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}
