@@ -114,9 +114,9 @@ def _result(
     )
 
 
-def verdict(case: Case, result: Result) -> list[str]:
-    """Return what is worse than the case's bounds, in words; nothing for a good driver."""
-    found = _of_process(result) + _of_diagnostics(case, result)
+def verdict(case: Case, result: Result, *, ours: bool = True) -> list[str]:
+    """Return what is worse than the case's bounds, in words; nothing for a good driver. Our diagnostics count, too."""
+    found = _of_process(result) + (_of_diagnostics(case, result) if ours else [])
     if case.lost is None:
         return [*found, *([f"{result.scans} scans"] if result.scans else [])]
     if not result.scans:
@@ -142,8 +142,8 @@ def _of_process(result: Result) -> list[str]:
 def _of_diagnostics(case: Case, result: Result) -> list[str]:
     status = result.status or Status(0, "", {})
     found = []
-    if case.proof and status.values.get(case.proof, "0") == "0":
-        found.append(f"{case.proof} 0")
+    if case.proof and status.values.get(case.proof, "0") in ("", "0"):
+        found.append(f"no {case.proof}")
     if status.level < case.level:
         found.append(f"level {status.level}")
     return found
