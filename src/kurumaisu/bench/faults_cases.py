@@ -18,8 +18,8 @@ class Case:
     lost: tuple[int, int] | None = (0, 0)  # scans, at least and at most; None: no scan is to come
     gap: float = 0.15  # [s] from scan to scan at most, beyond the outage
     outage: float = 0.0  # [s] for which the sensor itself is away
-    proof: str = ""  # the driver's count that shows that the fault struck
-    level: int = 0  # of the diagnostics, at least
+    proof: str = ""  # what our diagnostics have then: it shows that the fault struck
+    level: int = 0  # of our diagnostics at their worst, at least
     tcp: bool = False
     sensor: str = _USB
     parameters: dict[str, object] = field(default_factory=dict)  # of the driver, by urg_node's names
@@ -36,10 +36,10 @@ _SILENCE = 0.5  # [s] that laser_node waits before it asks why no scan comes (st
 
 CASES = (
     Case(1, (f"corrupt@{_SPAN}",), (1, 1), _LOST_ONE, proof="Bad Sums"),
-    Case(2, (f"trunc@{_SPAN}",), (1, 2), _LOST_TWO),
-    Case(2, (f"noend@{_SPAN}",), (1, 2), _LOST_TWO),
-    Case(3, (f"badlf@{_SPAN}",), (1, 1), _LOST_ONE),
-    Case(3, ("badlf@1",)),
+    Case(2, (f"trunc@{_SPAN}",), (1, 2), _LOST_TWO, proof="Unreadable Replies"),
+    Case(2, (f"noend@{_SPAN}",), (1, 2), _LOST_TWO, proof="Unreadable Replies"),
+    Case(3, (f"badlf@{_SPAN}",), (1, 1), _LOST_ONE, proof="Unreadable Replies"),
+    Case(3, ("badlf@1",), proof="Unreadable Replies"),
     Case(4, ("garbage",), proof="Stray Bytes"),
     Case(5, (f"dup@{_SPAN}",), proof="Duplicate Scans"),
     Case(6, (f"err50@{_SPAN}",), (1, 1), _LOST_ONE, proof="Errors of Status 50", level=2),
@@ -59,9 +59,9 @@ CASES = (
     Case(12, ("scip1", "strict-baud"), sensor=_RS232),
     Case(13, ("bm01",), None),
     Case(13, ("md0e",), None),
-    Case(13, ("no-me",), parameters={"publish_intensity": True}),
+    Case(13, ("no-me",), proof="Last Error", parameters={"publish_intensity": True}),
     Case(14, ("dribble=0.05",)),
-    Case(15, ("vv-badsum",)),
+    Case(15, ("vv-badsum",), proof="Last Error"),
     Case(16, ("blackhole",), None, tcp=True),
     Case(17, (f"zeros@{_SPAN}",), (0, 1), _LOST_ONE),
     Case(17, (f"codes@{_SPAN}",), (0, 1), _LOST_ONE),
