@@ -126,7 +126,8 @@ Sensor handshake(Link& link, const HandshakeSettings& settings, const Tell& tell
   if (found.voice == Voice::kScip1) speakScip2(link, settings.answer_timeout);
   if (found.baud != 0 && found.baud != settings.baud)
     sensor.baud = changeBaud(link, found.baud, settings, tell);
-  link.ask("TM2", settings.answer_timeout);  // out of the adjust mode, in which another program may have died
+  link.ask("TM2", settings.answer_timeout,
+           settings.answer_timeout);  // out of the adjust mode, in which another program may have died
   sensor.version = describe(link, "VV", settings.answer_timeout, tell);
   sensor.parameters = askParameters(link, settings.answer_timeout, tell);
   sensor.state = scip::keyed(describe(link, "II", settings.answer_timeout, tell));
