@@ -10,6 +10,7 @@ from pathlib import Path
 from kurumaisu.errors import Error
 
 _BLOCK = 64  # characters of data in a line
+_RECORDED = 20_000  # bytes of a recording that serve as seeds: what the sensor is, and some scans
 _RECORD = struct.Struct(">III")  # of Player's log: seconds, microseconds, bytes that follow
 
 
@@ -82,15 +83,15 @@ _II = _reply(b"II", b"00", [b"LASR:OFF", b"STAT:good"], b";")
 def _recorded(log: Path) -> list[bytes]:
     """Return the first replies of a real sensor."""
     data = log.read_bytes()
-    bytes_received = b""
+    received = bytearray()
     at = 0
-    while at < len(data):
+    while at < len(data) and len(received) < _RECORDED:
         if at + _RECORD.size > len(data):
             raise Error(f"{log}: byte {at}: a record's head is cut off")
         size = _RECORD.unpack_from(data, at)[2]
-        bytes_received += data[at + _RECORD.size : at + _RECORD.size + size]
+        received += data[at + _RECORD.size : at + _RECORD.size + size]
         at += _RECORD.size + size
-    return [reply + b"\n\n" for reply in bytes_received.split(b"\n\n")[:20]]
+    return [reply + b"\n\n" for reply in bytes(received).split(b"\n\n")[:-1]]
 
 
 def _commands() -> list[bytes]:
