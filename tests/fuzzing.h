@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "scip/request.h"
 #include "scip/scan.h"
@@ -49,22 +51,45 @@ class Oracle {
  public:
   explicit Oracle(std::string bytes) : bytes_(std::move(bytes)) {}
 
+  /// A scan in a reply of this echo.
   void check(const std::string& echo, const kurumaisu::scip::Rotation& rotation) {
-    frames::Scan scan{rotation.clock, {}};
-    for (std::size_t k = 0; k < rotation.distances.size(); ++k) {
-      scan.numbers.push_back(static_cast<std::uint32_t>(rotation.distances[k]));
-      if (!rotation.intensities.empty())
-        scan.numbers.push_back(static_cast<std::uint32_t>(rotation.intensities.at(k)));
-    }
-    const std::string frame = frames::scan(echo, scan);
+    const std::string frame = frameOf(echo, rotation);
     const std::size_t at = bytes_.find(frame, from_);
     require(at != std::string::npos, "a scan that was not sent");
-    require(frames::read(bytes_.substr(at, frame.size()), echo, scan.numbers.size()) == scan,
+    require(frames::read(bytes_.substr(at, frame.size()), echo, numbersOf(rotation).size()).has_value(),
             "the oracle does not agree with itself");
     from_ = at + frame.size();
   }
 
+  /// A scan that answers a stream's command; its echo may count down and carry a string.
+  void checkAnswer(const std::string& command, const kurumaisu::scip::Rotation& rotation) {
+    const std::string frame = frameOf(command, rotation).substr(command.size());
+    const std::string asked = command.substr(0, 13);
+    for (std::size_t at = bytes_.find(frame, from_); at != std::string::npos;
+         at = bytes_.find(frame, at + 1)) {
+      const std::size_t start = bytes_.rfind('\n', at - 1) + 1;
+      if (at == 0 || bytes_.substr(start, at - start).find(asked) == std::string::npos) continue;
+      from_ = at + frame.size();
+      return;
+    }
+    require(false, "a scan that was not sent");
+  }
+
  private:
+  static std::vector<std::uint32_t> numbersOf(const kurumaisu::scip::Rotation& rotation) {
+    std::vector<std::uint32_t> numbers;
+    for (std::size_t k = 0; k < rotation.distances.size(); ++k) {
+      numbers.push_back(static_cast<std::uint32_t>(rotation.distances[k]));
+      if (!rotation.intensities.empty())
+        numbers.push_back(static_cast<std::uint32_t>(rotation.intensities.at(k)));
+    }
+    return numbers;
+  }
+
+  static std::string frameOf(const std::string& echo, const kurumaisu::scip::Rotation& rotation) {
+    return frames::scan(echo, {rotation.clock, numbersOf(rotation)});
+  }
+
   std::string bytes_;
   std::size_t from_ = 0;
 };

@@ -10,44 +10,56 @@ from pathlib import Path
 from kurumaisu.errors import Error
 
 _BLOCK = 64  # characters of data in a line
+_RECORDED = 20_000  # bytes of a recording that serve as seeds: what the sensor is, and some scans
 _RECORD = struct.Struct(">III")  # of Player's log: seconds, microseconds, bytes that follow
 
 
 def seeds(target: str, log: Path | None) -> Iterator[bytes]:
     """Yield a target's first inputs. Raise Error for a log that cannot be read."""
-    replies = [*_made(), *(_recorded(log) if log else [])]
     if target == "device":
         yield from _commands()
         return
+    replies = [*_made(), *(_recorded(log) if log else [])]
+    if target == "stream":
+        yield from _dialogues()
     for number, reply in enumerate(replies):
         yield bytes([number % 256]) + reply + replies[number - 1]
 
 
 def _made() -> list[bytes]:
     """Return replies of each kind, small ones."""
-    pp = [
-        b"MODL:URG;",
-        b"DMIN:20;",
-        b"DMAX:5600;",
-        b"ARES:1024;",
-        b"AMIN:44;",
-        b"AMAX:725;",
-        b"AFRT:384;",
-        b"SCAN:600;",
+    return [
+        _PP,
+        _reply(b"QT", b"00", []),
+        b"QT\nE\n\n",
+        _scan(b"MD0000000500000", 3, 6),
+        _scan(b"MS0100013501007", 2, 36),
+        _scan(b"ME0000001001100", 6, 11),
+        _scan(b"GD0000004001", 3, 41),
+        _scan(b"GS0000006302", 2, 32),
+        _scan(b"GE0000001001", 6, 11),
     ]
-    replies = [_reply(b"PP", b"00", [line[:-1] for line in pp], b";"), _reply(b"QT", b"00", []), b"QT\nE\n\n"]
-    for command, width, beams in (
-        (b"MD0000000500000", 3, 6),
-        (b"MS0100013501007", 2, 36),
-        (b"ME0000001001100", 6, 11),
-        (b"GD0000004001", 3, 41),
-        (b"GS0000006302", 2, 32),
-        (b"GE0000001001", 6, 11),
-    ):
-        data = bytes(0x30 + (7 * i) % 64 for i in range(width * beams))
-        blocks = [data[at : at + _BLOCK] for at in range(0, len(data), _BLOCK)]
-        replies.append(_reply(command, b"99" if command[:1] == b"M" else b"00", [b"m2@0", *blocks]))
-    return replies
+
+
+def _dialogues() -> Iterator[bytes]:
+    """Yield what a sensor says from QT on, asked for each of the target's scans; in SCIP 2.0 and 1.1."""
+    words = [_reply(name, b"00", [], b";") for name in (b"QT", b"TM2")] + [_VV, _PP, _II, _reply(b"BM", b"00", [])]
+    asked = (
+        (b"MD0044005501000", 3, 12),
+        (b"ME0044005000000", 6, 7),
+        (b"MS0000003003000", 2, 11),
+        (b"MD0044072501100", 3, 682),
+    )
+    for number, (command, width, beams) in enumerate(asked):
+        scans = [_scan(command, width, beams, clock) for clock in (b"0001", b"001d", b"001d", b"0031")]
+        yield bytes([number]) + b"".join([*words, _reply(command, b"00", []), *scans])
+        yield bytes([number]) + b"QT\nE\n\nSCIP2.0\n0\n\n" + b"".join([*words, _reply(command, b"00", []), *scans])
+
+
+def _scan(command: bytes, width: int, beams: int, clock: bytes = b"m2@0") -> bytes:
+    data = bytes(0x30 + (7 * i) % 64 for i in range(width * beams))
+    blocks = [data[at : at + _BLOCK] for at in range(0, len(data), _BLOCK)]
+    return _reply(command, b"99" if command[:1] == b"M" else b"00", [clock, *blocks])
 
 
 def _reply(echo: bytes, status: bytes, lines: list[bytes], ending: bytes = b"") -> bytes:
@@ -58,18 +70,28 @@ def _summed(line: bytes, ending: bytes = b"") -> bytes:
     return line + ending + bytes([sum(line) % 64 + 0x30])
 
 
+_PP = _reply(
+    b"PP",
+    b"00",
+    [b"MODL:URG", b"DMIN:20", b"DMAX:5600", b"ARES:1024", b"AMIN:44", b"AMAX:725", b"AFRT:384", b"SCAN:600"],
+    b";",
+)
+_VV = _reply(b"VV", b"00", [b"VEND:a", b"PROD:b", b"FIRM:c", b"PROT:d", b"SERI:e"], b";")
+_II = _reply(b"II", b"00", [b"LASR:OFF", b"STAT:good"], b";")
+
+
 def _recorded(log: Path) -> list[bytes]:
     """Return the first replies of a real sensor."""
     data = log.read_bytes()
-    bytes_received = b""
+    received = bytearray()
     at = 0
-    while at < len(data):
+    while at < len(data) and len(received) < _RECORDED:
         if at + _RECORD.size > len(data):
             raise Error(f"{log}: byte {at}: a record's head is cut off")
         size = _RECORD.unpack_from(data, at)[2]
-        bytes_received += data[at + _RECORD.size : at + _RECORD.size + size]
+        received += data[at + _RECORD.size : at + _RECORD.size + size]
         at += _RECORD.size + size
-    return [reply + b"\n\n" for reply in bytes_received.split(b"\n\n")[:20]]
+    return [reply + b"\n\n" for reply in bytes(received).split(b"\n\n")[:-1]]
 
 
 def _commands() -> list[bytes]:
