@@ -179,3 +179,12 @@ int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   return RUN_ALL_TESTS();
 }
+
+TEST(Fan, AUtm30lxSaysOneWhereNothingIs) {
+  const l::Fan fan(kUtm, kAll);
+  for (int code = 0; code < 23; ++code) {
+    const float range = fan.convert(of(fan, code), 0).ranges[0];
+    EXPECT_TRUE(code == 1 ? range == kInfinity : std::isnan(range)) << code;
+  }
+  EXPECT_EQ(fan.convert(of(fan, 65533), 0).ranges[0], kInfinity);
+}

@@ -16,8 +16,6 @@ constexpr double kRounding = 1e-3;         // [steps] by which a bearing may mis
 constexpr int kClusterMax = 99;            // two digits
 constexpr int kSkipMax = 9;                // one digit
 constexpr int kCodesEnd = 20;              // distances below are codes
-constexpr int kFarCode = 0;                // of the URG-04LX: nothing within 22 m
-constexpr int kBeyondCode = 6;             // of the URG-04LX: beyond its reach
 constexpr double kMetre = 1000;            // [mm]
 
 void require(bool holds, const std::string& parameter, double value, const std::string& rule) {
@@ -35,6 +33,15 @@ void check(const Window& window) {
           "must be from 1 to " + std::to_string(kClusterMax));
   require(window.skip >= 0 && window.skip <= kSkipMax, "skip", window.skip,
           "must be from 0 to " + std::to_string(kSkipMax));
+}
+
+/// Codes that say: nothing came back. Hokuyo C-42-03320B, tables 3 and 4. Of the URG-04LX and its kin 0, nothing within
+/// 22 m, and 6, which real ones send of what stands beyond their reach; of the UTM-30LX and newer ones 1, no object.
+std::vector<int> farCodes(const std::string& model) {
+  for (const char* kin : {"URG-04LX", "UBG-04LX", "UHG-08LX"}) {
+    if (model.rfind(kin, 0) == 0) return {0, 6};
+  }
+  return {1};
 }
 
 std::string fromTo(double from, double to) { return std::to_string(from) + " to " + std::to_string(to); }
@@ -66,7 +73,10 @@ scip::Request ask(const scip::Parameters& sensor, const Window& window) {
 }  // namespace
 
 Fan::Fan(const scip::Parameters& sensor, const Window& window)
-    : request_(ask(sensor, window)), distance_min_(sensor.distance_min), distance_max_(sensor.distance_max) {
+    : request_(ask(sensor, window)),
+      far_codes_(farCodes(sensor.model)),
+      distance_min_(sensor.distance_min),
+      distance_max_(sensor.distance_max) {
   const double middle = 0.5 * (window.cluster - 1);  // [steps] of a cluster, from its first step
   first_beam_ = (request_.first + middle) * sensor.stepTime();
   least_delay_ = request_.last * sensor.stepTime();
@@ -82,8 +92,11 @@ Fan::Fan(const scip::Parameters& sensor, const Window& window)
 
 float Fan::range(int distance) const {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  if (distance == kFarCode || distance == kBeyondCode || distance > distance_max_) return kInfinity;
-  if (distance < std::max(kCodesEnd, distance_min_)) return std::numeric_limits<float>::quiet_NaN();
+  if (distance > distance_max_) return kInfinity;
+  if (distance < std::max(kCodesEnd, distance_min_)) {
+    const bool far = std::find(far_codes_.begin(), far_codes_.end(), distance) != far_codes_.end();
+    return far ? kInfinity : std::numeric_limits<float>::quiet_NaN();
+  }
   return static_cast<float>(distance / kMetre);
 }
 

@@ -46,6 +46,7 @@ class Fan {
   Scan empty_;  // all but what changes from scan to scan
   double first_beam_ = 0;
   double least_delay_ = 0;
+  std::vector<int> far_codes_;
   int distance_min_ = 0;  // [mm]
   int distance_max_ = 0;  // [mm]
 };
