@@ -12,7 +12,7 @@ namespace kurumaisu::laser {
 namespace {
 
 constexpr double kTurnHalf = M_PI + 0.01;  // [rad] 3.1416 is meant as pi, -180 is not
-constexpr double kRounding = 1e-6;         // [steps] by which a bearing may miss the step that it came from
+constexpr double kRounding = 1e-3;         // [steps] by which a bearing may miss a step: 1.5707963, a float32
 constexpr int kClusterMax = 99;            // two digits
 constexpr int kSkipMax = 9;                // one digit
 constexpr int kCodesEnd = 20;              // distances below are codes
