@@ -283,7 +283,7 @@ TEST(VirtualUrg, RefusesAModelThatContradictsItself) {
     v::Model model = v::shipped("urg_04lx");
     change(model);
     try {
-      v::Device(model, {}, {}, 0);
+      const v::Device device(model, {}, {}, 0);
       ADD_FAILURE() << key;
     } catch (const std::invalid_argument& error) {
       EXPECT_NE(std::string(error.what()).find(key), std::string::npos) << error.what();
@@ -310,7 +310,7 @@ TEST(VirtualUrg, SurvivesAnEndlessLine) {
 }
 
 TEST(VirtualUrg, SurvivesAnyBytesAndAnswersNoMoreThanItHears) {
-  constexpr std::size_t kFullReplies = 17 * 300;  // [bytes] one of each command
+  constexpr std::size_t kFullReplies = 5100;  // [bytes] 17 commands
   std::mt19937 random(1);
   Urg urg;
   const std::string words = "MGDSE0472;\n\r\n\nVPIQTBRCHx\xff ";
