@@ -166,7 +166,7 @@ TEST(VirtualUrgFaults, Refusals) {
 
 TEST(VirtualUrgFaults, WrongWordsOfItself) {
   Stream stream({"vv-badsum", "pp-ares0", "pp-crossed"});
-  EXPECT_NE(stream.ask("VV").find("SERI:H0000000;0\n"), std::string::npos);
+  EXPECT_NE(stream.ask("VV").find("SERI:H0000000;6\n"), std::string::npos);
   const std::string parameters = stream.ask("PP");
   EXPECT_NE(parameters.find("ARES:0;"), std::string::npos);
   EXPECT_NE(parameters.find("AMIN:725;"), std::string::npos);

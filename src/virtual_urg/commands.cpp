@@ -155,7 +155,8 @@ std::string Commands::versionBody() const {
   for (const auto& [key, value] : model_.version) {
     std::string line = keyedLine(key, value);
     char& sum = line[line.size() - 2];
-    if (is_wrong && key == "SERI") sum = sum == '0' ? '1' : '0';
+    // one more; five less would be the sum with the semicolon, which some clients take, too
+    if (is_wrong && key == "SERI") sum = sum == 'o' ? '0' : static_cast<char>(sum + 1);
     lines += line;
   }
   return lines;
