@@ -148,16 +148,18 @@ def test_a_stalled_sensor_keeps_the_connection():
 
 
 def test_a_trickle_takes_its_time():
-    with at_tcp("dribble@2=0.08") as urg, Client(urg.port) as client:
+    with at_tcp("dribble=0.06") as urg, Client(urg.port) as client:
         client.stream()
-        client.scan()
-        pieces, times = [], []
-        while b"\n\n" not in b"".join(pieces):
-            pieces.append(client.some())
-            times.append(time.monotonic())
-        assert len(pieces) > 20
-        assert times[-1] - times[0] == pytest.approx(0.08, abs=0.03)
-        client.scan()
+        took, parts = [], []
+        for _ in range(5):
+            pieces, times = [], []
+            while b"\n\n" not in b"".join(pieces):
+                pieces.append(client.some())
+                times.append(time.monotonic())
+            took.append(times[-1] - times[0])
+            parts.append(len(pieces))
+        assert max(parts) > 20
+        assert np.median(took) == pytest.approx(0.06, abs=0.03)
 
 
 def test_the_rate_must_be_right(tmp_path):
@@ -195,9 +197,12 @@ def test_without_strictness_any_rate_will_do(tmp_path):
 def test_bytes_take_their_time_on_a_serial_line(tmp_path):
     with VirtualUrg(SERIAL, Pty(tmp_path / "urg"), line_rate=True) as urg, Client(urg.address) as client:
         client.ask(b"SCIP2.0")
-        start = time.monotonic()
-        reply = client.ask(b"VV")
-        assert time.monotonic() - start == pytest.approx(10 * len(reply) / 19200, abs=0.03)
+        took = []
+        for _ in range(5):
+            start = time.monotonic()
+            reply = client.ask(b"VV")
+            took.append(time.monotonic() - start)
+        assert min(took) == pytest.approx(10 * len(reply) / 19200, abs=0.01)
         client.ask(b"SS115200")
         client.stream()
         clocks = []

@@ -11,9 +11,7 @@ namespace {
 constexpr double kPieces = 100;  // at most, of an output that trickles: each costs a wake-up
 
 /// [bytes] in a piece.
-std::size_t pieceOf(const Output& output) {
-  return static_cast<std::size_t>(std::ceil(static_cast<double>(output.bytes.size()) / kPieces));
-}
+double pieceOf(const Output& output) { return std::ceil(static_cast<double>(output.bytes.size()) / kPieces); }
 
 }  // namespace
 
@@ -29,17 +27,18 @@ std::string_view Outbox::due(double now) {
   if (!first.began) first.began = now;
   const std::string_view bytes = first.output.bytes;
   if (first.output.spread <= 0) return bytes.substr(first.sent);
-  const double gone = (now - *first.began) / first.output.spread;
-  const double pieces = std::floor(gone * kPieces) + 1;  // the first goes at once
-  const double until = std::min(pieces * static_cast<double>(pieceOf(first.output)), 1.0 * bytes.size());
+  const double piece = pieceOf(first.output);
+  const double size = static_cast<double>(bytes.size());
+  const double run = size * (now - *first.began) / first.output.spread;        // [bytes]
+  const double until = std::min((std::floor(run / piece) + 1) * piece, size);  // the first piece goes at once
   return bytes.substr(first.sent, std::max(static_cast<std::size_t>(until), first.sent) - first.sent);
 }
 
 double Outbox::next() const {
   if (empty() || parcels_.front().sent == parcels_.front().output.bytes.size()) return kNever;
   const Parcel& first = parcels_.front();
-  const auto pieces = static_cast<double>(first.sent / pieceOf(first.output));
-  return first.began.value_or(0) + pieces * first.output.spread / kPieces;
+  const double share = static_cast<double>(first.sent) / static_cast<double>(first.output.bytes.size());
+  return first.began.value_or(0) + share * first.output.spread;
 }
 
 void Outbox::sent(std::size_t bytes) {

@@ -2,11 +2,13 @@
 #include "virtual_urg/server.h"
 
 #include <poll.h>
+#include <pthread.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <ctime>
 #include <limits>
 #include <stdexcept>
@@ -143,6 +145,9 @@ int Server::baud() const {
 double Server::deviceTime() const { return options_.pace == Pace::kFed ? fed_time_ : steady(); }
 
 void Server::run() {
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);  // they are for the program, not for this thread
   try {
     serve();
   } catch (...) {
