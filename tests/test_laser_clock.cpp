@@ -298,6 +298,33 @@ TEST(DeviceClockOfTheHost, SaysWhenItIsNot) {
   }
 }
 
+// The driver was stopped while simulated time ran on: it reads what was kept for it before it hears the time, then the
+// time before the rest.
+TEST(DeviceClockOfTheHost, IsTrustedWhileItsReaderWasHeldUp) {
+  l::DeviceClock clock(l::TimeMode::kDevice);
+  EXPECT_DOUBLE_EQ(clock.stamp(10000, 10.07, 0.07), 10.0);
+  const double late[] = {10.07, 10.07, 16.07, 16.07, 16.08};  // [s] host's time
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_NEAR(clock.stamp(static_cast<std::uint32_t>(10100 + 400 * i), late[i], 0.07), 10.1 + 0.4 * i,
+                1e-9);
+    EXPECT_FALSE(clock.state().fallback);
+  }
+  EXPECT_NEAR(clock.stamp(16100, 16.17, 0.07), 16.1, 1e-9);
+}
+
+TEST(DeviceClockOfTheHost, IsNotTrustedForLongOrAfterAPowerFailure) {
+  l::DeviceClock late(l::TimeMode::kDevice);
+  l::DeviceClock off(l::TimeMode::kDevice);
+  late.stamp(10000, 10.07, 0.07);
+  off.stamp(10000, 10.07, 0.07);
+  for (int i = 1; i < 40; ++i) {
+    late.stamp(static_cast<std::uint32_t>(10000 + 100 * i), 13.07 + 0.1 * i, 0.07);
+    EXPECT_EQ(late.state().fallback, i > 21) << i;  // 2 s from the first
+    off.stamp(static_cast<std::uint32_t>(100 * i), 11.07 + 0.1 * i, 0.07);
+    EXPECT_TRUE(off.state().fallback);
+  }
+}
+
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   return RUN_ALL_TESTS();

@@ -31,7 +31,7 @@ double DeviceClock::stamp(std::uint32_t clock, double first_byte, double least_d
   if (mode_ != TimeMode::kHost) time = std::min(device + envelope_.at(device) - state_.send_delay, latest);
   if (mode_ == TimeMode::kDevice) {
     const double own = nearest(clock, first_byte);
-    state_.fallback = std::abs(own - first_byte) > kDeviceApart;
+    state_.fallback = !isHosts(own, first_byte);
     if (!state_.fallback) time = own;
   }
   if (stamped_ && first_byte >= stamped_->host) time = std::max(time, stamped_->stamp);
@@ -41,6 +41,23 @@ double DeviceClock::stamp(std::uint32_t clock, double first_byte, double least_d
   state_.latency = latest - time;
   state_.span = envelope_.span();
   return time;
+}
+
+/// Is a time [s] by the sensor's clock the host's?
+///
+/// Who was held up himself finds bytes and the host's time of different moments, for a short while; a sensor that was
+/// off finds another clock.
+bool DeviceClock::isHosts(double own, double host) {
+  if (std::abs(own - host) <= kDeviceApart) {
+    own_ = Own{own, std::nullopt};
+    return true;
+  }
+  if (!own_) return false;
+  const bool goes_on = own > own_->newest && own - own_->newest < kPatience;
+  if (!own_->apart) own_->apart = own;
+  own_->newest = own;
+  if (!goes_on || own - *own_->apart > kPatience) own_.reset();
+  return own_.has_value();
 }
 
 /// Brings the envelope up to a scan; returns the sensor's time [s] of it.

@@ -42,7 +42,7 @@ class DeviceClock {
   /// first_byte: [s] when the scan began to come; least_delay: [s] before which it cannot have been sent (Fan).
   /// In envelope mode the result is never after first_byte - least_delay, and never before the one of the scan
   /// before unless the host's time went back. In device mode it is the sensor's own, which leads a host's clock that
-  /// lags. Each scan must come once.
+  /// lags, also where both were held up and are far apart for a while. Each scan must come once.
   double stamp(std::uint32_t clock, double first_byte, double least_delay);
 
   /// Takes the sensor's clock [ms], asked for (TM1) at one time [s] and answered at another.
@@ -70,6 +70,10 @@ class DeviceClock {
     double host = 0;  // [s] first byte
     double stamp = 0;
   };
+  struct Own {
+    double newest = 0;            // [s] by the sensor's clock, which is the host's
+    std::optional<double> apart;  // [s] by it, since when the host's says otherwise
+  };
   struct Late {
     double since = 0;  // [s] host's time
     Point lowest;
@@ -81,6 +85,7 @@ class DeviceClock {
 
   double follow(std::uint32_t clock, double first_byte, double least_delay);
   double read(std::uint32_t clock, double host);
+  bool isHosts(double own, double host);
   bool isEarly(const Point& point, double doubt) const;
   bool isLateForLong(const Point& point, double host);
   void measureSendDelay(double device);
@@ -90,6 +95,7 @@ class DeviceClock {
   Envelope envelope_;  // of the sensor's time [s], host's time less the sensor's [s]
   std::optional<Reading> last_;
   std::optional<Stamped> stamped_;
+  std::optional<Own> own_;  // while the sensor's clock is the host's
   std::optional<Late> late_;
   std::optional<Calibration> calibration_;
 };
