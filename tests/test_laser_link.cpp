@@ -258,8 +258,8 @@ TEST_F(LinkTest, AnIdleSensorSaysWhatItIs) {
 }
 
 TEST_F(LinkTest, AColdSensorIsFoundAtItsRateAndBroughtToOurs) {
-  speed_t rate = B19200;
-  bool old = true;
+  std::atomic<speed_t> rate{B19200};
+  std::atomic<bool> old{true};
   connect([&](const std::string& command) -> std::string {
     if (pty.speed() != rate) return "\xf8\x80\n\x1f";
     if (old && command == "SCIP2.0") {
@@ -300,7 +300,7 @@ TEST_F(LinkTest, AWrongSumOfVVIsToldOnly) {
 }
 
 TEST_F(LinkTest, AWrongSumOfPPIsAskedAgain) {
-  int asked = 0;
+  std::atomic<int> asked{0};
   connect([&](const std::string& command) {
     const bool is_bad = command == "PP" && ++asked == 1;
     return is_bad ? reply(command, "00", "MODL:X;0\n" + parameters()) : idle(command);
@@ -347,11 +347,8 @@ int ramp(int beam) { return 20 + 3 * beam; }
 
 /// MRPT decodes each scan by itself from what the stream hands on: whatever is asked for, both agree.
 TEST_F(LinkTest, MrptAndOurDecoderAgree) {
-  std::string asked;
   connect([&](const std::string& command) {
-    if (!scip::request(command)) return idle(command);
-    asked = command;
-    return reply(command, "00");
+    return scip::request(command) ? reply(command, "00") : idle(command);
   });
   const l::Sensor sensor = shake();
   for (const l::Window& window : {l::Window{-3.14, 3.14, 1, 0, false}, l::Window{-0.3, 1.2, 3, 2, false},
@@ -359,7 +356,7 @@ TEST_F(LinkTest, MrptAndOurDecoderAgree) {
     const scip::Request request = l::Fan(sensor.parameters, window).request();
     auto stream = std::make_shared<l::ScipStream>(*link, sensor, request, 0.5);
     l::Urg urg(stream, window.intensity);
-    EXPECT_EQ(asked, scip::command(request));
+    EXPECT_EQ(peer->heard().back(), scip::command(request));
     peer->say(frame(request, 1000, ramp));
     const std::optional<l::Arrival> arrival = stream->await(1);
     ASSERT_TRUE(arrival && arrival->kind == l::Arrival::Kind::kScan) << (arrival ? arrival->text : "none");
@@ -402,11 +399,11 @@ TEST_F(LinkTest, WhatIsNoGoodScanIsTold) {
 }
 
 TEST_F(LinkTest, RefusalsToStartHaveTheirReason) {
-  std::string bm = "01";
-  std::string start = "00";
+  std::atomic<const char*> bm{"01"};
+  std::atomic<const char*> start{"00"};
   connect([&](const std::string& command) {
-    if (command == "BM") return reply(command, bm);
-    return scip::request(command) ? reply(command, start) : idle(command);
+    if (command == "BM") return reply(command, bm.load());
+    return scip::request(command) ? reply(command, start.load()) : idle(command);
   });
   const l::Sensor sensor = shake();
   const auto begin = [&](bool intensity) {
