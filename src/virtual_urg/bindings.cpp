@@ -105,7 +105,7 @@ void bindVirtualUrg(py::module_& m) {
   bindModel(m);
   py::register_local_exception_translator([](std::exception_ptr error) {
     try {
-      if (error) std::rethrow_exception(error);
+      if (error) std::rethrow_exception(std::move(error));
     } catch (const std::system_error& problem) {
       const py::tuple arguments = py::make_tuple(problem.code().value(), problem.what());
       PyErr_SetObject(PyExc_OSError, arguments.ptr());

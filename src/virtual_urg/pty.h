@@ -10,7 +10,7 @@
 namespace kurumaisu::virtual_urg {
 
 /// A link of a chosen name leads to the terminal, as udev's do.
-class Pty : public Endpoint {
+class Pty final : public Endpoint {
  public:
   /// Puts the link. Throws std::system_error where there is something else of that name, or a link to what is there.
   explicit Pty(std::string link);
@@ -34,8 +34,6 @@ class Pty : public Endpoint {
   const std::string& terminal() const { return terminal_; }
 
  private:
-  struct Terminal;
-
   void open();
   void putLink();
   void removeLink() const;

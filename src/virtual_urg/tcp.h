@@ -12,7 +12,7 @@
 namespace kurumaisu::virtual_urg {
 
 /// Listens; while it has a client, the next one waits in the backlog.
-class Tcp : public Endpoint {
+class Tcp final : public Endpoint {
  public:
   /// host: an address in numbers; port 0: any that is free.
   Tcp(std::string host, std::uint16_t port);
