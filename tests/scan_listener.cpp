@@ -1,61 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// scan_listener TOPIC...: prints a line for each sensor_msgs/LaserScan that comes on the topics, and for each status on
-// /diagnostics. For scripts/bench laser and faults, whose sensor shows all beams the same range, another one each scan:
-//   scan TOPIC ARRIVAL NOW STAMP RANGE BEAMS OTHERS CODES NANS INFS
-// ARRIVAL is [s] of the monotonic clock, NOW and STAMP [s] of the host's, RANGE the median [mm], OTHERS how many measured
-// beams are not at the median, CODES how many are below 20 mm, where the sensor's error codes lie.
-//   status LEVEL NAME<tab>MESSAGE<tab>KEY=VALUE<tab>...
+// scan_listener TOPIC...: prints a line for each sensor_msgs/LaserScan that comes on the topics (scan_line.h), and for each
+// status on /diagnostics: status LEVEL NAME<tab>MESSAGE<tab>KEY=VALUE<tab>...
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <ros/ros.h>
 #include <sensor_msgs/LaserScan.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <string>
 #include <vector>
 
+#include "scan_line.h"
+
 namespace {
 
-constexpr float kCodes = 0.02F;  // [m]
-
-double monotonic() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-long median(std::vector<long> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 void heard(const std::string& topic, const sensor_msgs::LaserScan& scan) {
-  const double arrival = monotonic();
-  const double now = ros::WallTime::now().toSec();
-  std::vector<long> measured;
-  long codes = 0, nans = 0, infs = 0;
-  for (const float range : scan.ranges) {
-    if (std::isnan(range))
-      ++nans;
-    else if (std::isinf(range))
-      ++infs;
-    else if (range < kCodes)
-      ++codes;
-    else
-      measured.push_back(std::lround(1000.0 * static_cast<double>(range)));
-  }
-  const long middle = median(measured);
-  const auto others =
-      static_cast<long>(measured.size()) - std::count(measured.begin(), measured.end(), middle);
-  std::printf("scan %s %.6f %.6f %.6f %ld %zu %ld %ld %ld %ld\n", topic.c_str(), arrival, now,
-              scan.header.stamp.toSec(), middle, scan.ranges.size(), static_cast<long>(others), codes, nans,
-              infs);
-  std::fflush(stdout);
+  ScanLine line(topic);
+  for (const float range : scan.ranges) line.add(static_cast<double>(range));
+  line.print(scan.header.stamp.toSec());
 }
 
-std::string line(std::string text) {
+std::string onLine(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
   return text;
@@ -63,10 +28,10 @@ std::string line(std::string text) {
 
 void diagnosed(const diagnostic_msgs::DiagnosticArray::ConstPtr& array) {
   for (const auto& status : array->status) {
-    std::printf("status %d %s\t%s", static_cast<int>(status.level), line(status.name).c_str(),
-                line(status.message).c_str());
+    std::printf("status %d %s\t%s", static_cast<int>(status.level), onLine(status.name).c_str(),
+                onLine(status.message).c_str());
     for (const auto& item : status.values)
-      std::printf("\t%s=%s", line(item.key).c_str(), line(item.value).c_str());
+      std::printf("\t%s=%s", onLine(item.key).c_str(), onLine(item.value).c_str());
     std::puts("");
   }
   std::fflush(stdout);

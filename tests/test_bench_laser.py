@@ -2,13 +2,17 @@
 """What the benchmarks of the laser call good and bad."""
 
 import math
+import os
+import time
 from dataclasses import replace
 
 import pytest
 
 from kurumaisu.bench.faults_cases import CASES, Case
-from kurumaisu.bench.faults_run import Result, noted, verdict
+from kurumaisu.bench.faults_run import Result, noted, run, verdict
 from kurumaisu.bench.laser_heard import Status, read_scan, read_status
+from kurumaisu.bench.laser_rig import Driver, fed, ours, sensor_at, stock
+from kurumaisu.bench.processes import master
 
 CASE = Case(1, ("corrupt@20",), (1, 1), 0.26, proof="Bad Sums", level=1)
 STATUS = Status(1, "bad sums: 1", {"Bad Sums": "1", "Lost Scans": "1", "Reconnects": "0", "Last Error": "LASER_X: y"})
@@ -88,3 +92,35 @@ def test_the_outage_is_the_sensors():
 
 def test_all_eighteen_are_there():
     assert {case.number for case in CASES} == set(range(1, 19))
+
+
+def test_every_case_is_a_sensors(tmp_path):
+    for case in CASES:
+        with sensor_at(case.sensor, case.faults, tmp_path / "urg", tcp=case.tcp) as sensor:
+            assert sensor.address.words
+
+
+def test_mrpts_own_driver_is_seen_to_publish_a_damaged_scan(tmp_path):
+    with sensor_at("urg_04lx_ug01", ("corrupt@6",), tmp_path / "urg", tcp=True) as sensor, fed([sensor]):
+        driver = Driver(stock(sensor.address), dict(os.environ), tmp_path / "log", heard=True)
+        try:
+            assert driver.heard is not None
+            deadline = time.monotonic() + 20
+            while len(driver.heard.scans()) < 10 and time.monotonic() < deadline:
+                time.sleep(0.05)
+            scans = driver.heard.scans()
+        finally:
+            driver.stop()
+    assert len(scans) >= 10, (tmp_path / "log").read_text()[-500:]
+    assert [scan.others for scan in scans if scan.wrong] == [1]
+    # it stamps a scan when it comes: 98 ms after step 0, which the first beam follows by 4 ms
+    assert all(sensor.latency(scan) > 0 and sensor.stamp_error(scan) > 0.05 for scan in scans)
+
+
+def test_our_driver_loses_the_damaged_scan_only(tmp_path):
+    case = Case(1, ("corrupt@5",), (1, 1))
+    with master() as environment:
+        (result,) = run([case], lambda address, name, _: ours(address, name), 2.5, environment, tmp_path)
+    assert (result.lost, result.wrong, result.twice, result.back) == (1, 0, 0, 0)
+    assert result.status
+    assert result.status.values["Bad Sums"] == "1"

@@ -15,7 +15,7 @@ LAST = 3999  # [mm] after which FIRST comes again
 
 @dataclass(frozen=True)
 class Scan:
-    """A scan as tests/scan_listener.cpp prints it."""
+    """A scan as tests/scan_line.h prints it."""
 
     arrival: float  # [s] monotonic
     now: float  # [s] host's time
