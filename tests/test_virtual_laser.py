@@ -18,14 +18,14 @@ from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
 from kurumaisu.sim.chair import ChairSimulator, Command
 from kurumaisu.sim.scanner import Scan
-from kurumaisu.sim.settings import load_physics
+from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.sim.virtual_laser import VirtualLaser, check_fan, remainder, turn_start
 from kurumaisu.virtual_urg import Sensor, load_sensor
 from kurumaisu.world import load_world
 
 FILE = shipped("launch/md100.yaml")
 MODEL = load_model(FILE)
-PHYSICS = load_physics(shipped("launch/sim_node.yaml"))
+DYNAMICS = load_dynamics(shipped("launch/physical.yaml"))
 MS, NS = 10**6, 10**9
 EPOCH = NS  # of /clock at the simulation's time 0
 ON_CLOCK = [e.id for e in effects.LASER if e.id.split(".")[1] in ("clock_skew", "latency", "sweep")]
@@ -77,7 +77,7 @@ def streaming(sensor: Sensor, model: Model, command: bytes) -> Iterator[tuple[Vi
 
 def driven(model: Model, count: int) -> Iterator[tuple[int, Scan | None]]:
     """Yield time [ns] and scan of each step on a curve, until there were so many scans."""
-    simulator = ChairSimulator(model, load_world(shipped("worlds/room.world")), PHYSICS)
+    simulator = ChairSimulator(model, load_world(shipped("worlds/room.world")), DYNAMICS)
     simulator.reset(3)
     command = Command(float(model.translation.volts(0.3)), float(model.steering.volts(0.6)), 1.0, 1.0)
     while count:
