@@ -227,7 +227,6 @@ class LaserNode(unittest.TestCase):
     def test_senseless_parameters_stop_the_start(self) -> None:
         cases: list[tuple[dict[str, Any], str]] = [
             ({"angle_min": 1.0, "angle_max": 0.5}, "angle_min must be less than angle_max: 1, 0.5"),
-            ({"ip_address": "127.0.0.1", "serial_port": "tty"}, "/laser_node/serial_port: contradicts ip_address"),
             ({"serial_baud": 1200}, "serial_baud is no rate of SCIP 2.0: 1200"),
             ({"angle_mni": 0.0}, "/laser_node/angle_mni: is not a known key"),
         ]

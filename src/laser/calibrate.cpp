@@ -19,7 +19,7 @@ bool tellsTime(const scip::Message& reply) {
 
 void calibrate(Link& link, DeviceClock& clock, const std::function<double()>& now, double answer_timeout,
                const Tell& tell) {
-  clock.reset();
+  clock.restart();
   const std::string status = link.ask("TM0", answer_timeout).status;
   int heard = 0;
   for (int i = 0; status == "00" && i < kTimes; ++i) {

@@ -43,13 +43,20 @@ std::string hardwareId(const k::Status& status) {
   return serial.empty() ? "none" : serial;
 }
 
+void log(ros::console::levels::Level level, const std::string& text) {
+  ROS_LOG(level, ROSCONSOLE_DEFAULT_NAME, "%s", text.c_str());
+}
+
+void warn(const std::string& text) { log(ros::console::levels::Warn, text); }
+
 void say(const k::Report& report) {
-  if (report.level == k::Report::Level::kInfo) {
-    ROS_INFO("%s", report.text.c_str());
-  } else if (report.level == k::Report::Level::kWarning) {
-    ROS_WARN("%s", report.text.c_str());
-  } else {
-    ROS_ERROR("%s", report.text.c_str());
+  switch (report.level) {
+    case k::Report::Level::kInfo:
+      return log(ros::console::levels::Info, report.text);
+    case k::Report::Level::kWarning:
+      return warn(report.text);
+    default:
+      return log(ros::console::levels::Error, report.text);
   }
 }
 
@@ -161,7 +168,7 @@ void LaserNode::reconfigure(LaserConfig& config) {
     try {
       part();
     } catch (const std::invalid_argument& problem) {
-      ROS_WARN("LASER_REFUSED: %s", problem.what());
+      warn(std::string("LASER_REFUSED: ") + problem.what());
     }
   };
   take([&] {
@@ -182,7 +189,7 @@ void LaserNode::tick() {
                             k::health(status.device);
   if (about != told_) {
     told_ = about;
-    ROS_INFO("%s: %s", place(settings_.driver).c_str(), about.c_str());
+    log(ros::console::levels::Info, place(settings_.driver) + ": " + about);
     diagnostics_.setHardwareID(hardwareId(status));
     publishStatus(status);
   }
@@ -243,15 +250,15 @@ k::NodeSettings read(const XmlRpc::XmlRpcValue& given) {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "laser_node");
-  ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
+  ros::NodeHandle nh;  // here, because ROS's log is mute once the last one is gone
   try {
     XmlRpc::XmlRpcValue given;
     ros::param::get(ros::this_node::getName(), given);  // nothing given: all as shipped
     const k::NodeSettings settings = read(given);
-    for (const std::string& warning : settings.warnings) ROS_WARN("%s", warning.c_str());
+    for (const std::string& warning : settings.warnings) warn(warning);
     LaserNode(nh, settings, read({})).run();
   } catch (const std::exception& error) {
-    ROS_FATAL("%s", error.what());
+    log(ros::console::levels::Fatal, error.what());
     return 1;
   }
   return 0;

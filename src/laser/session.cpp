@@ -133,7 +133,7 @@ void Session::checkClock(std::uint32_t clock, double first_byte) {
   Memory& memory = with_.memory;
   if (!std::exchange(is_first_, false) || memory.sequence.continues(clock, first_byte)) return;
   memory.sequence.reset();
-  if (!with_.settings.calibrate_time) memory.clock.reset();
+  if (!with_.settings.calibrate_time) memory.clock.restart();
 }
 
 void Session::publish(const Arrival& arrival) {

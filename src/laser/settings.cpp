@@ -47,7 +47,9 @@ Value merged(const Value& shipped, const Value& given, const std::string& name,
     if (other == notDone().end()) {
       result[key] = value;
     } else if (asks(value)) {
-      warnings.push_back("LASER_IGNORED_PARAMETER: " + name + "/" + key + ": " + other->second);
+      std::ostringstream out;
+      out << "LASER_IGNORED_PARAMETER: " << name << "/" << key << ": " << other->second;
+      warnings.push_back(out.str());
     }
   }
   return result;

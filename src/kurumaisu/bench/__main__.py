@@ -8,7 +8,7 @@ import importlib.util
 import sys
 from collections.abc import Sequence
 
-NAMES = ("sim", "pool", "agreement", "arena", "stageros", "critic", "laser", "base", "slam", "faults")
+NAMES = ("sim", "pool", "agreement", "arena", "stageros", "critic", "laser", "laser_clock", "base", "slam", "faults")
 
 
 def main(arguments: Sequence[str]) -> int:
