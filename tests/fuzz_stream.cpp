@@ -66,9 +66,10 @@ void checkToldScan(const std::string& told, const std::string& command, const s:
   require(scan.has_value(), "MRPT is told no scan");
   require(scan->clock == rotation.clock, "MRPT is told another time");
   const std::size_t stride = rotation.intensities.empty() ? 1 : 2;
-  for (std::size_t k = 0; k < rotation.distances.size(); ++k)
+  for (std::size_t k = 0; k < rotation.distances.size(); ++k) {
     require(static_cast<int>(scan->numbers[stride * k]) == rotation.distances[k],
             "MRPT is told another distance");
+  }
 }
 
 void drive(const std::string& bytes, unsigned choice) {

@@ -170,7 +170,7 @@ TEST(ScipDamage, NoiseBetweenFramesCostsNoScan) {
   const std::vector<Scan> scans = scansOf(kSmall, 4);
   const std::vector<std::string> noises = {"\n",        "\n\n\n", "x",    "\n0\n",      "M",
                                            "\nMD\n99b", "99b\n",  "\r\n", "MD0044\n\n", "0\n\n0"};
-  for (std::string noise : noises) {
+  for (const std::string& noise : noises) {
     std::string bytes = noise;
     for (const Scan& scan : scans) bytes += frames::scan(kSmall, scan) + noise;
     EXPECT_EQ(decoded(bytes, kSmall), scans) << noise;
@@ -258,7 +258,7 @@ TEST(ScipDamage, NeitherNoiseNorFloodTakesMoreThanLinearTime) {
     const std::string bytes = repeated(flood, kBytes);
     EXPECT_LT(secondsFor(bytes), 0.5) << flood;
     std::vector<Scan> found =
-        decoded(bytes + frame + frame, kFull);  // the first may be cut at the longest message
+        decoded(std::string(bytes).append(frame).append(frame), kFull);  // the flood may take the first along
     ASSERT_FALSE(found.empty()) << flood;
     EXPECT_EQ(found.back(), scan) << flood;
   }

@@ -41,7 +41,9 @@ class Bench {
   bool has(const s::Request& request) const {
     return model_.refused.count(s::command(request).substr(0, 2)) == 0;
   }
-  std::size_t steps() const { return static_cast<std::size_t>(fan_.last - fan_.first + 1); }
+  std::size_t steps() const {
+    return static_cast<std::size_t>(fan_.last) - static_cast<std::size_t>(fan_.first) + 1;
+  }
 
   std::vector<s::Message> say(const std::string& command) {
     return read(device_.receive(command + "\n", now_));
@@ -125,7 +127,7 @@ v::Measurement drawn(const Bench& bench, unsigned seed) {
     if (random() % 8 == 0) range = std::numeric_limits<double>::quiet_NaN();
     if (random() % 8 == 0) range = std::numeric_limits<double>::infinity();
     measurement.ranges.push_back(range);
-    measurement.intensities.push_back(random() % (kMost + 1));
+    measurement.intensities.push_back(static_cast<double>(random() % (kMost + 1)));
   }
   return measurement;
 }
