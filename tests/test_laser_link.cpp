@@ -361,14 +361,14 @@ TEST_F(LinkTest, MrptAndOurDecoderAgree) {
     peer->say(frame(request, 1000, ramp));
     const std::optional<l::Arrival> arrival = stream->await(1);
     ASSERT_TRUE(arrival && arrival->kind == l::Arrival::Kind::kScan) << (arrival ? arrival->text : "none");
-    mrpt::obs::CObservation2DRangeScan observation;
-    ASSERT_TRUE(urg.take(observation));
-    ASSERT_EQ(observation.getScanSize(), arrival->rotation.distances.size());
-    for (std::size_t i = 0; i < observation.getScanSize(); ++i) {
-      ASSERT_FLOAT_EQ(observation.getScanRange(i), 1e-3F * static_cast<float>(ramp(static_cast<int>(i))));
-      ASSERT_EQ(arrival->rotation.distances[i], ramp(static_cast<int>(i)));
-      if (!window.intensity) continue;
-      ASSERT_EQ(observation.getScanIntensity(i), arrival->rotation.intensities[i]);
+    const std::optional<scip::Rotation> decoded = urg.take();
+    ASSERT_TRUE(decoded);
+    EXPECT_EQ(decoded->distances, arrival->rotation.distances);
+    EXPECT_EQ(decoded->intensities, arrival->rotation.intensities);
+    EXPECT_EQ(decoded->clock, arrival->rotation.clock);
+    ASSERT_EQ(decoded->distances.size(), static_cast<std::size_t>(scip::beams(request)));
+    for (std::size_t i = 0; i < decoded->distances.size(); ++i) {
+      ASSERT_EQ(decoded->distances[i], ramp(static_cast<int>(i)));
     }
   }
 }

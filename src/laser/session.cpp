@@ -116,10 +116,11 @@ bool Session::streamUntilQuiet(Urg& urg, ScipStream& stream) {
 }
 
 void Session::handle(const Arrival& arrival, Urg& urg, Watch& watch) {
-  mrpt::obs::CObservation2DRangeScan observation;
   if (arrival.kind == Arrival::Kind::kScan) {
-    if (!urg.take(observation)) throw LinkLost("LASER_MRPT: MRPT does not take a good scan");
-    publish(arrival);
+    const std::optional<scip::Rotation> scan = urg.take();
+    if (!scan || !(*scan == arrival.rotation))
+      throw LinkLost("LASER_MRPT: MRPT does not read a good scan as it was sent");
+    publish(*scan, arrival.first_byte);
     watch = {with_.now(), steadyTime()};
     return;
   }
@@ -136,12 +137,11 @@ void Session::checkClock(std::uint32_t clock, double first_byte) {
   if (!with_.settings.calibrate_time) memory.clock.restart();
 }
 
-void Session::publish(const Arrival& arrival) {
+void Session::publish(const scip::Rotation& rotation, double first_byte) {
   Memory& memory = with_.memory;
-  const scip::Rotation& rotation = arrival.rotation;
-  checkClock(rotation.clock, arrival.first_byte);
-  const std::uint64_t missing = memory.sequence.missing(rotation.clock, arrival.first_byte, period_);
-  const double time = memory.clock.stamp(rotation.clock, arrival.first_byte, fan_->leastDelay());
+  checkClock(rotation.clock, first_byte);
+  const std::uint64_t missing = memory.sequence.missing(rotation.clock, first_byte, period_);
+  const double time = memory.clock.stamp(rotation.clock, first_byte, fan_->leastDelay());
   Scan scan = fan_->convert(rotation, time);
   scan.latency = memory.clock.state().latency;
   with_.sink(scan);

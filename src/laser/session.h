@@ -64,7 +64,7 @@ class Session {
   bool streamUntilQuiet(Urg& urg, ScipStream& stream);
   void handle(const Arrival& arrival, Urg& urg, Watch& watch);
   void checkClock(std::uint32_t clock, double first_byte);
-  void publish(const Arrival& arrival);
+  void publish(const scip::Rotation& rotation, double first_byte);
   void complain(const Arrival& arrival);
   bool isQuiet(Watch& watch) const;
   void updateCounts();

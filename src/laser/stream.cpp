@@ -9,10 +9,6 @@
 namespace kurumaisu::laser {
 namespace {
 
-constexpr std::size_t kLine = 64;        // characters of data in a line
-constexpr std::size_t kClockWidth = 4;   // characters
-constexpr std::size_t kNumberWidth = 3;  // characters of a distance or an intensity, as MRPT knows them
-
 std::string line(const std::string& key, int value) { return key + ":" + std::to_string(value) + ";"; }
 
 void checkLaser(const std::string& status) {
@@ -42,7 +38,7 @@ std::optional<Arrival> ScipStream::await(double timeout) {
       return Arrival{Arrival::Kind::kDuplicate, {}, message->first_byte, "clock " + std::to_string(*clock_)};
     }
     clock_ = arrival.rotation.clock;
-    putScan(arrival.rotation);
+    put(started_, message->status, message->lines);
     return arrival;
   } catch (const scip::BadFrame& problem) {
     return Arrival{Arrival::Kind::kDamaged, {}, message->first_byte, problem.what()};
@@ -106,19 +102,6 @@ void ScipStream::put(const std::string& command, const std::string& status,
   for (const std::string& line : lines) ready_ += line + scip::sum(line) + "\n";
   ready_ += "\n";
   read_ = 0;
-}
-
-void ScipStream::putScan(const scip::Rotation& rotation) {
-  std::string data;
-  data.reserve(2 * kNumberWidth * rotation.distances.size());
-  for (std::size_t i = 0; i < rotation.distances.size(); ++i) {
-    data += scip::encode(static_cast<std::uint32_t>(rotation.distances[i]), kNumberWidth);
-    if (rotation.intensities.empty()) continue;
-    data += scip::encode(static_cast<std::uint32_t>(rotation.intensities[i]), kNumberWidth);
-  }
-  std::vector<std::string> lines{scip::encode(rotation.clock, kClockWidth)};
-  for (std::size_t at = 0; at < data.size(); at += kLine) lines.push_back(data.substr(at, kLine));
-  put(started_, "99", lines);
 }
 
 /// The beams of the window, as if they were a whole sensor's. Only their number matters to MRPT.

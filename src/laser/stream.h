@@ -57,7 +57,6 @@ class ScipStream : public mrpt::io::CStream {
   void answer(const std::string& command);
   void start(const std::string& command);
   void put(const std::string& command, const std::string& status, const std::vector<std::string>& lines);
-  void putScan(const scip::Rotation& rotation);
   std::vector<std::string> plainFan() const;
 
   Link& link_;

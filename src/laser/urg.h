@@ -5,8 +5,10 @@
 #include <mrpt/hwdrivers/CHokuyoURG.h>
 
 #include <memory>
+#include <optional>
 
 #include "laser/stream.h"
+#include "scip/scan.h"
 
 namespace kurumaisu::laser {
 
@@ -18,8 +20,8 @@ class Urg : public mrpt::hwdrivers::CHokuyoURG {
   Urg(std::shared_ptr<ScipStream> stream, bool intensity);
   ~Urg() override;
 
-  /// The scan that lies ready in the stream, decoded by MRPT. False if MRPT does not take it.
-  bool take(mrpt::obs::CObservation2DRangeScan& observation);
+  /// The scan that lies ready in the stream, as MRPT decodes it; none if MRPT does not take it.
+  std::optional<scip::Rotation> take();
 };
 
 }  // namespace kurumaisu::laser

@@ -15,6 +15,10 @@ struct Rotation {
   std::uint32_t clock = 0;       ///< [ms] of the sensor, 24 bits, when the mirror was at step 0
   std::vector<int> distances;    ///< (beams,) [mm]; below 20 a code: there is no distance
   std::vector<int> intensities;  ///< (beams,), or none
+
+  bool operator==(const Rotation& other) const {
+    return clock == other.clock && distances == other.distances && intensities == other.intensities;
+  }
 };
 
 /// The sensor's clock in the four characters of a time stamp; it wraps at 2^24 ms.
