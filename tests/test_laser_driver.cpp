@@ -28,7 +28,8 @@ namespace v = kurumaisu::virtual_urg;
 
 namespace {
 
-constexpr double kLong = 6;  // [s] after which a test gives up waiting
+constexpr double kLong = 6;       // [s] after which a test gives up waiting
+constexpr double kJitter = 0.05;  // [s] that an idle computer may be late
 
 /// What a sensor does, and until when it is watched.
 struct Case {
@@ -55,6 +56,7 @@ struct Result {
   double seconds = 0;
   double cpu = 0;       // of a core, taken by the driver's thread
   double stopping = 0;  // [s] that stop() took
+  double jitter = 0;    // [s] that may be this computer's fault
 
   double longestGap() const {
     double longest = 0;
@@ -221,15 +223,48 @@ Result run(const Case& what) {
   return result;
 }
 
+/// How late this computer is with what it is asked to do: other programs may keep it busy.
+class Lateness {
+ public:
+  Lateness() : thread_([this] { watch(); }) {}
+  ~Lateness() { stop(); }
+  Lateness(const Lateness&) = delete;
+  Lateness& operator=(const Lateness&) = delete;
+
+  /// [s] the worst since the start.
+  double stop() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+    return worst_;
+  }
+
+ private:
+  void watch() {
+    constexpr double kNap = 0.005;  // [s]
+    while (!stop_) {
+      const double start = l::steadyTime();
+      std::this_thread::sleep_for(std::chrono::duration<double>(kNap));
+      worst_ = std::max(worst_, l::steadyTime() - start - kNap);
+    }
+  }
+
+  std::atomic<bool> stop_{false};
+  double worst_ = 0;
+  std::thread thread_;
+};
+
 /// All of them at once: they mostly wait.
 std::map<std::string, Result> runAll(const Cases& cases) {
   std::map<std::string, Result> results;
+  Lateness lateness;
   for (const auto& [name, what] : cases) results[name];
   std::vector<std::thread> threads;
   for (const auto& [name, what] : cases) {
     threads.emplace_back([&result = results.at(name), &what = what] { result = run(what); });
   }
   for (std::thread& thread : threads) thread.join();
+  const double jitter = kJitter + 4 * lateness.stop();  // sensor's side and driver's, there and back
+  for (auto& [name, result] : results) result.jitter = jitter;
   return results;
 }
 
@@ -238,7 +273,6 @@ std::map<std::string, Result> runAll(const Cases& cases) {
 namespace {
 
 constexpr double kPeriod = 0.1;    // [s] of the sensors below
-constexpr double kJitter = 0.1;    // [s] that this computer may be late
 constexpr double kRecovery = 0.6;  // [s] after the sensor answers again
 constexpr double kAway = 0.5;      // [s] for which it is away, where it is
 
@@ -261,13 +295,13 @@ void expectTruth(const Result& result) {
   for (std::size_t i = 0; i < result.scans.size(); ++i) {
     const auto& [time, scan] = result.scans[i];
     EXPECT_GT(time - scan.stamp, 0.05) << i;
-    EXPECT_LT(time - scan.stamp, 0.2 + kJitter) << i;
+    EXPECT_LT(time - scan.stamp, 0.2 + result.jitter) << i;
     if (i == 0) continue;
     EXPECT_GE(scan.stamp, result.scans[i - 1].scan.stamp) << i;
     EXPECT_TRUE(scan.clock != result.scans[i - 1].scan.clock || result.status.counts.reconnects > 0) << i;
   }
   EXPECT_LT(result.cpu, 0.05);
-  EXPECT_LT(result.stopping, 0.3);
+  EXPECT_LT(result.stopping, 0.25 + result.jitter);
   EXPECT_EQ(result.status.counts.scans, result.scans.size());
 }
 
@@ -310,25 +344,29 @@ const std::map<std::string, Cost>& streamFaults() {
 
 }  // namespace
 
-/// One bad frame costs one scan, a sensor that was away is back in 0.6 s, and nothing false is ever published.
-TEST(Driver, BearsEveryFaultOfAStream) {
+namespace {
+
+void expectCosts(bool serial) {
   Cases cases;
-  for (const auto& [fault, cost] : streamFaults()) {
-    cases["tcp " + fault] = {{fault}};
-    cases["pty " + fault] = {{fault}, true};
-  }
-  const auto results = runAll(cases);
-  for (const auto& [name, result] : results) {
-    SCOPED_TRACE(name);
-    const Cost& cost = streamFaults().at(name.substr(4));
+  for (const auto& [fault, cost] : streamFaults()) cases[fault] = {{fault}, serial};
+  for (const auto& [name, result] : runAll(cases)) {
+    SCOPED_TRACE((serial ? "pty " : "tcp ") + name);
+    const Cost& cost = streamFaults().at(name);
     expectTruth(result);
     ASSERT_GE(result.scans.size(), cases.at(name).scans) << result.status.last_error;
     for (const Came& came : result.scans) ASSERT_NO_FATAL_FAILURE(expectRoom(came.scan));
-    EXPECT_LE(result.longestGap(), cost.gap + kJitter);
+    EXPECT_LE(result.longestGap(), cost.gap + result.jitter);
     EXPECT_LE(result.status.counts.lost, cost.lost);
     EXPECT_TRUE(cost.counted(result.status.counts));
     EXPECT_TRUE(cost.told.empty() || result.tells(cost.told));
   }
+}
+
+}  // namespace
+
+/// One bad frame costs one scan, a sensor that was away is back in 0.6 s, and nothing false is ever published.
+TEST(Driver, BearsEveryFaultOfAStream) {
+  for (const bool serial : {false, true}) expectCosts(serial);
 }
 
 /// RS-232: at power-up SCIP 1.1 at 19200 baud, and what comes at another rate is garbage.
@@ -345,7 +383,7 @@ TEST(Driver, FindsAColdSensorAtItsRate) {
     expectTruth(result);
     ASSERT_GE(result.scans.size(), cases.at(name).scans) << result.status.last_error;
     for (const Came& came : result.scans) ASSERT_NO_FATAL_FAILURE(expectRoom(came.scan));
-    EXPECT_LE(result.longestGap(), away.at(name) + kRecovery + kJitter);
+    EXPECT_LE(result.longestGap(), away.at(name) + kRecovery + result.jitter);
     EXPECT_EQ(result.status.device.baud, 115200);
   }
 }
@@ -468,7 +506,7 @@ TEST(Driver, LeavesAPortToItsOwner) {
   EXPECT_EQ(first->driver().status().counts.lost, 0U);
   EXPECT_EQ(second.driver().status().counts.scans, 0U);
   first.reset();
-  EXPECT_TRUE(second.await(2, kRecovery + kJitter));
+  EXPECT_TRUE(second.await(2, kLong));
 }
 
 TEST(Driver, AsksTheClockWhenTold) {

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "laser/driver.h"
 #include "laser/fan.h"
 #include "laser/handshake.h"
 #include "laser/link.h"
@@ -421,6 +422,93 @@ TEST_F(LinkTest, RefusalsToStartHaveTheirReason) {
   EXPECT_TRUE(has(begin(false), "LASER_REFUSED: MD")) << begin(false);
   EXPECT_TRUE(has(begin(true), "LASER_NO_INTENSITY: ME")) << begin(true);
   EXPECT_EQ(peer->heard().back().substr(0, 2), "ME");
+}
+
+namespace {
+
+/// A driver of the sensor at a pty, and how often it published.
+class DriverTest : public testing::Test {
+ protected:
+  void drive(bool intensity) {
+    l::DriverSettings settings{};
+    settings.serial_port = pty.path();
+    settings.serial_baud = kBaud;
+    settings.live = {0, 1, 1, 0, intensity};
+    settings.stale_timeout = 0.5;
+    settings.error_limit = 4;
+    settings.connect_timeout = 0.3;
+    settings.answer_timeout = 0.2;
+    settings.retry_min = 0.1;
+    settings.retry_max = 0.3;
+    driver = std::make_unique<l::Driver>(
+        settings, [this](const l::Scan&) { ++scans; }, l::steadyTime, [](const l::Report&) {});
+    driver->start();
+  }
+
+  bool await(const std::function<bool(const l::Status&)>& holds, double timeout) const {
+    for (const double until = l::steadyTime() + timeout; l::steadyTime() < until; usleep(2000)) {
+      if (holds(driver->status())) return true;
+    }
+    return false;
+  }
+
+  Pty pty;
+  std::atomic<int> scans{0};
+  std::optional<Peer> peer;
+  std::unique_ptr<l::Driver> driver;
+};
+
+bool streams(const l::Status& status) { return status.state == l::State::kStreaming; }
+
+}  // namespace
+
+/// Some URG-04LX do not answer to ME, instead of refusing it.
+TEST_F(DriverTest, ASensorThatFallsSilentAtIntensitiesIsNotAskedAgain) {
+  peer.emplace(pty.fd(), [](const std::string& command) -> std::string {
+    const auto request = scip::request(command);
+    if (!request) return idle(command);
+    if (request->form == scip::Form::kIntensity) return "";
+    return reply(command, "00") + frame(*request, 1, ramp);
+  });
+  drive(true);
+  EXPECT_TRUE(await(streams, 2)) << driver->status().last_error;
+  EXPECT_FALSE(driver->status().intensity);
+  EXPECT_TRUE(has(driver->status().last_error, "LASER_NO_INTENSITY"));
+}
+
+TEST_F(DriverTest, ASensorThatWakesUpIsFoundAtOnce) {
+  std::atomic<bool> awake{false};
+  peer.emplace(pty.fd(), [&](const std::string& command) -> std::string {
+    if (!awake) return "";
+    const auto request = scip::request(command);
+    return request ? reply(command, "00") + frame(*request, 1, ramp) : idle(command);
+  });
+  drive(false);
+  EXPECT_FALSE(await(streams, 0.5));
+  EXPECT_TRUE(
+      has(driver->status().last_error, "LASER_NO_ANSWER: no sensor answers QT at 115200, 19200 baud"));
+  awake = true;
+  EXPECT_TRUE(await(streams, 0.6));
+}
+
+/// The bytes that make a scan may come one by one, and the sensor may leave amid them.
+TEST_F(DriverTest, ACutAnywhereCostsNoMoreThanThatScan) {
+  const scip::Request request{true, scip::Form::kDistance, 384, 546, 1, 0, 0};
+  peer.emplace(pty.fd(), [&](const std::string& command) {
+    return scip::request(command) ? reply(command, "00") : idle(command);
+  });
+  drive(false);
+  ASSERT_TRUE(
+      await([&](const l::Status& s) { return s.state == l::State::kStarting && s.scan_period > 0; }, 2));
+  const std::string whole = frame(request, 0, ramp);
+  int published = 0;
+  for (std::size_t cut = 1; cut < whole.size(); cut += 23) {
+    const auto clock = static_cast<std::uint32_t>(100 * ++published);
+    peer->say(frame(request, clock - 50, ramp).substr(0, cut) + frame(request, clock, ramp));
+    ASSERT_TRUE(await([&](const l::Status&) { return scans >= published; }, 1)) << cut;
+  }
+  EXPECT_EQ(scans, published);
+  EXPECT_EQ(driver->status().counts.reconnects, 0U);
 }
 
 int main(int argc, char** argv) {

@@ -81,9 +81,7 @@ std::unique_ptr<Urg> Session::start(std::shared_ptr<ScipStream>& stream) {
   } catch (const NoAnswer&) {
     if (!window.intensity) throw;
     with_.memory.wedged = true;  // some URG-04LX fall silent when asked for intensities
-    tell_(Report::Level::kWarning,
-          "LASER_NO_INTENSITY: the sensor has not answered to ME and is not asked again");
-    throw;
+    throw LinkLost("LASER_NO_INTENSITY: the sensor has not answered to ME and is not asked again");
   }
   window.intensity = false;
   return startForm(stream, window);

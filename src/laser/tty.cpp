@@ -52,7 +52,7 @@ void drain(const Descriptor& tty) {
 
 Tty::Tty(const std::string& path, int baud) : path_(path), tty_(openTty(path)) {
   lock(tty_.fd(), path);
-  setBaud(baud);
+  Tty::setBaud(baud);
 }
 
 Tty::~Tty() {
