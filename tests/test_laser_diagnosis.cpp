@@ -75,6 +75,11 @@ TEST(DeviceDiagnosis, EachTroubleSinceTheLastReportWarnsOnce) {
   k::Status status = streaming();
   status.counts.errors["50"] = 3;
   EXPECT_EQ(device(status, {}).summary, "errors of the sensor: 3");
+  EXPECT_EQ(device(status, {}).level, k::Level::kError);
+  EXPECT_EQ(device(status, status.counts).level, k::Level::kOk);
+  k::Status over = streaming();
+  over.counts.errors["98"] = 1;
+  EXPECT_EQ(device(over, {}).level, k::Level::kWarn);
   EXPECT_EQ(valuesOf(device(status, {}))["Errors of Status 50"], "3");
 }
 

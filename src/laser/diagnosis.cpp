@@ -25,6 +25,12 @@ std::uint64_t total(const std::map<std::string, std::uint64_t>& errors) {
   return sum;
 }
 
+/// Errors of the sensor but the one that says that it is over, 98.
+std::uint64_t severe(const std::map<std::string, std::uint64_t>& errors) {
+  const auto over = errors.find("98");
+  return total(errors) - (over == errors.end() ? 0 : over->second);
+}
+
 /// "3.3.00(18/Jan./2010)" is a version and its date.
 std::pair<std::string, std::string> versionAndDate(const std::string& firmware) {
   const std::size_t open = firmware.find('(');
@@ -65,6 +71,7 @@ std::pair<Level, std::string> judge(const Status& status, const Counts& before) 
   const std::string stat = health(status.device);
   if (!stat.empty() && !isWell(stat)) return {Level::kError, "Abnormal status: " + stat};
   const std::string since = troubles(status.counts, before);
+  if (severe(status.counts.errors) > severe(before.errors)) return {Level::kError, since};
   if (!since.empty()) return {Level::kWarn, since};
   return {Level::kOk, "Streaming"};
 }

@@ -19,7 +19,7 @@ _NODE = "laser_node"
 _OURS, _PEERS = 6.0, 14.0  # [s] after the first scan; the fault comes at 2 s, urg_node needs 10 s to come back
 _COLUMNS = ("scans", "lost", "twice", "wrong", "gap [s]", "outage", "stamp [ms]", "CPU [%]", "exit [s]")
 _COUNTS = (
-    *("Bad Sums", "Unreadable", "Damaged", "Duplicate", "Lost", "Stray", "Reconnects", "Attempts", "Errors of"),
+    *("Bad Sums", "Unreadable", "Damaged", "Duplicate", "Lost", "Stray", "Reconnects", "Errors of"),
     "Scan Retrieve Error Count",
 )
 

@@ -12,11 +12,12 @@ from itertools import pairwise
 from pathlib import Path
 
 from kurumaisu.bench.faults_cases import Case
-from kurumaisu.bench.laser_heard import Heard, Status
+from kurumaisu.bench.laser_heard import Heard, Scan, Status
 from kurumaisu.bench.laser_rig import Address, Driver, Sensor, fed, listening, sensor_at
 
 Client = Callable[[Address, str, Case], list[str]]  # where the sensor is, the node's name -> its command line
 _START = 12.0  # [s] for all drivers to begin: the libraries of MRPT take their time
+_PERIOD = 1.2  # [s] of the diagnostics, and what a busy machine adds
 _LOOK = 0.02  # [s] between two looks whether one has begun
 _LIMITS = {"CPU share": 0.05, "time to exit [s]": 2.0, "stamp's error [s]": 0.05, "memory [MB]": 5.0}
 
@@ -58,7 +59,7 @@ def run(
         before = _begin(cases, drivers, heard, names)
         time.sleep(seconds)
         ends = [(time.monotonic(), driver.share(), driver.memory()) for driver in drivers]
-        statuses = [heard.status(name) for name in names]
+        statuses = [heard.status(name, _since(heard.scans(f"/{name}/scan"))) for name in names]
         return [
             _result(sensor, driver, heard, name, end, grown_from, status)
             for sensor, driver, name, end, grown_from, status in zip(
@@ -82,6 +83,11 @@ def _begin(cases: Sequence[Case], drivers: Sequence[Driver], heard: Heard, names
                 waiting.remove(i)
         time.sleep(_LOOK)
     return memories
+
+
+def _since(scans: Sequence[Scan]) -> float:
+    """Return when the diagnostics no longer tell of the start [s, monotonic]."""
+    return scans[0].arrival + _PERIOD if scans else 0.0
 
 
 def _result(

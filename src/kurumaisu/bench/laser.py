@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="bench laser", description=__doc__)
     parser.add_argument("--urg-node", type=Path, metavar="PREFIX", help="where urg_node is installed; else without it")
     parser.add_argument("--no-stock", action="store_true", help="without MRPT's own driver")
-    parser.add_argument("--seconds", type=float, default=15.0, help="of each driver at each wire")
+    parser.add_argument("--seconds", type=float, default=12.0, help="of each driver at each wire")
     parser.add_argument("--sensors", type=int, default=10, help="at once")
     parser.add_argument("--minute", type=float, default=60.0, help="of all sensors at once [s]")
     options = parser.parse_args(arguments)

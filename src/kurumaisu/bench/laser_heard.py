@@ -57,14 +57,14 @@ def read_status(line: str) -> tuple[str, Status]:
 
 
 class Heard:
-    """What a process printed so far: scans by topic, the worst and the last status by name."""
+    """What a process printed so far: scans by topic, the levels and the last status by name."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         """Read a process' output in a thread until it ends."""
         self._process = process
         self._scans: dict[str, list[Scan]] = defaultdict(list)
         self._statuses: dict[str, Status] = {}
-        self._worst: dict[str, int] = {}
+        self._levels: dict[str, list[tuple[float, int]]] = defaultdict(list)  # [s] monotonic
         self._ready = threading.Event()
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
@@ -84,12 +84,19 @@ class Heard:
             time.sleep(0.02)
         return bool(self._scans[topic])
 
-    def status(self, node: str) -> Status | None:
-        """Return the last status of a node, of all its values together."""
+    def status(self, node: str, since: float) -> Status | None:
+        """Return a node's last values, and its worst level since a time [s, monotonic]."""
         of_node = [status for name, status in list(self._statuses.items()) if name.startswith(node)]
         values = {key: value for status in of_node for key, value in status.values.items()}
-        worst = max((level for name, level in list(self._worst.items()) if name.startswith(node)), default=0)
-        return Status(worst, "; ".join(s.message for s in of_node if s.level), values) if of_node else None
+        levels = [
+            level
+            for name, heard in list(self._levels.items())
+            if name.startswith(node)
+            for when, level in heard
+            if when >= since
+        ]
+        message = "; ".join(status.message for status in of_node if status.level)
+        return Status(max(levels, default=0), message, values) if of_node else None
 
     def _read(self) -> None:
         assert self._process.stdout is not None
@@ -100,6 +107,6 @@ class Heard:
             elif line.startswith("status "):
                 name, status = read_status(line)
                 self._statuses[name] = status
-                self._worst[name] = max(status.level, self._worst.get(name, 0))
+                self._levels[name].append((time.monotonic(), status.level))
             elif line.startswith("ready"):
                 self._ready.set()
