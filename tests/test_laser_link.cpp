@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "laser/driver.h"
 #include "laser/fan.h"
 #include "laser/handshake.h"
 #include "laser/link.h"
@@ -258,8 +259,8 @@ TEST_F(LinkTest, AnIdleSensorSaysWhatItIs) {
 }
 
 TEST_F(LinkTest, AColdSensorIsFoundAtItsRateAndBroughtToOurs) {
-  speed_t rate = B19200;
-  bool old = true;
+  std::atomic<speed_t> rate{B19200};
+  std::atomic<bool> old{true};
   connect([&](const std::string& command) -> std::string {
     if (pty.speed() != rate) return "\xf8\x80\n\x1f";
     if (old && command == "SCIP2.0") {
@@ -300,7 +301,7 @@ TEST_F(LinkTest, AWrongSumOfVVIsToldOnly) {
 }
 
 TEST_F(LinkTest, AWrongSumOfPPIsAskedAgain) {
-  int asked = 0;
+  std::atomic<int> asked{0};
   connect([&](const std::string& command) {
     const bool is_bad = command == "PP" && ++asked == 1;
     return is_bad ? reply(command, "00", "MODL:X;0\n" + parameters()) : idle(command);
@@ -347,11 +348,8 @@ int ramp(int beam) { return 20 + 3 * beam; }
 
 /// MRPT decodes each scan by itself from what the stream hands on: whatever is asked for, both agree.
 TEST_F(LinkTest, MrptAndOurDecoderAgree) {
-  std::string asked;
   connect([&](const std::string& command) {
-    if (!scip::request(command)) return idle(command);
-    asked = command;
-    return reply(command, "00");
+    return scip::request(command) ? reply(command, "00") : idle(command);
   });
   const l::Sensor sensor = shake();
   for (const l::Window& window : {l::Window{-3.14, 3.14, 1, 0, false}, l::Window{-0.3, 1.2, 3, 2, false},
@@ -359,7 +357,7 @@ TEST_F(LinkTest, MrptAndOurDecoderAgree) {
     const scip::Request request = l::Fan(sensor.parameters, window).request();
     auto stream = std::make_shared<l::ScipStream>(*link, sensor, request, 0.5);
     l::Urg urg(stream, window.intensity);
-    EXPECT_EQ(asked, scip::command(request));
+    EXPECT_EQ(peer->heard().back(), scip::command(request));
     peer->say(frame(request, 1000, ramp));
     const std::optional<l::Arrival> arrival = stream->await(1);
     ASSERT_TRUE(arrival && arrival->kind == l::Arrival::Kind::kScan) << (arrival ? arrival->text : "none");
@@ -402,11 +400,11 @@ TEST_F(LinkTest, WhatIsNoGoodScanIsTold) {
 }
 
 TEST_F(LinkTest, RefusalsToStartHaveTheirReason) {
-  std::string bm = "01";
-  std::string start = "00";
+  std::atomic<const char*> bm{"01"};
+  std::atomic<const char*> start{"00"};
   connect([&](const std::string& command) {
-    if (command == "BM") return reply(command, bm);
-    return scip::request(command) ? reply(command, start) : idle(command);
+    if (command == "BM") return reply(command, bm.load());
+    return scip::request(command) ? reply(command, start.load()) : idle(command);
   });
   const l::Sensor sensor = shake();
   const auto begin = [&](bool intensity) {
@@ -424,6 +422,93 @@ TEST_F(LinkTest, RefusalsToStartHaveTheirReason) {
   EXPECT_TRUE(has(begin(false), "LASER_REFUSED: MD")) << begin(false);
   EXPECT_TRUE(has(begin(true), "LASER_NO_INTENSITY: ME")) << begin(true);
   EXPECT_EQ(peer->heard().back().substr(0, 2), "ME");
+}
+
+namespace {
+
+/// A driver of the sensor at a pty, and how often it published.
+class DriverTest : public testing::Test {
+ protected:
+  void drive(bool intensity) {
+    l::DriverSettings settings{};
+    settings.serial_port = pty.path();
+    settings.serial_baud = kBaud;
+    settings.live = {0, 1, 1, 0, intensity};
+    settings.stale_timeout = 0.5;
+    settings.error_limit = 4;
+    settings.connect_timeout = 0.3;
+    settings.answer_timeout = 0.2;
+    settings.retry_min = 0.1;
+    settings.retry_max = 0.3;
+    driver = std::make_unique<l::Driver>(
+        settings, [this](const l::Scan&) { ++scans; }, l::steadyTime, [](const l::Report&) {});
+    driver->start();
+  }
+
+  bool await(const std::function<bool(const l::Status&)>& holds, double timeout) const {
+    for (const double until = l::steadyTime() + timeout; l::steadyTime() < until; usleep(2000)) {
+      if (holds(driver->status())) return true;
+    }
+    return false;
+  }
+
+  Pty pty;
+  std::atomic<int> scans{0};
+  std::optional<Peer> peer;
+  std::unique_ptr<l::Driver> driver;
+};
+
+bool streams(const l::Status& status) { return status.state == l::State::kStreaming; }
+
+}  // namespace
+
+/// Some URG-04LX do not answer to ME, instead of refusing it.
+TEST_F(DriverTest, ASensorThatFallsSilentAtIntensitiesIsNotAskedAgain) {
+  peer.emplace(pty.fd(), [](const std::string& command) -> std::string {
+    const auto request = scip::request(command);
+    if (!request) return idle(command);
+    if (request->form == scip::Form::kIntensity) return "";
+    return reply(command, "00") + frame(*request, 1, ramp);
+  });
+  drive(true);
+  EXPECT_TRUE(await(streams, 2)) << driver->status().last_error;
+  EXPECT_FALSE(driver->status().intensity);
+  EXPECT_TRUE(has(driver->status().last_error, "LASER_NO_INTENSITY"));
+}
+
+TEST_F(DriverTest, ASensorThatWakesUpIsFoundAtOnce) {
+  std::atomic<bool> awake{false};
+  peer.emplace(pty.fd(), [&](const std::string& command) -> std::string {
+    if (!awake) return "";
+    const auto request = scip::request(command);
+    return request ? reply(command, "00") + frame(*request, 1, ramp) : idle(command);
+  });
+  drive(false);
+  EXPECT_FALSE(await(streams, 0.5));
+  EXPECT_TRUE(
+      has(driver->status().last_error, "LASER_NO_ANSWER: no sensor answers QT at 115200, 19200 baud"));
+  awake = true;
+  EXPECT_TRUE(await(streams, 0.6));
+}
+
+/// The bytes that make a scan may come one by one, and the sensor may leave amid them.
+TEST_F(DriverTest, ACutAnywhereCostsNoMoreThanThatScan) {
+  const scip::Request request{true, scip::Form::kDistance, 384, 546, 1, 0, 0};
+  peer.emplace(pty.fd(), [&](const std::string& command) {
+    return scip::request(command) ? reply(command, "00") : idle(command);
+  });
+  drive(false);
+  ASSERT_TRUE(
+      await([&](const l::Status& s) { return s.state == l::State::kStarting && s.scan_period > 0; }, 2));
+  const std::string whole = frame(request, 0, ramp);
+  int published = 0;
+  for (std::size_t cut = 1; cut < whole.size(); cut += 23) {
+    const auto clock = static_cast<std::uint32_t>(100 * ++published);
+    peer->say(frame(request, clock - 50, ramp).substr(0, cut) + frame(request, clock, ramp));
+    ASSERT_TRUE(await([&](const l::Status&) { return scans >= published; }, 1)) << cut;
+  }
+  EXPECT_EQ(scans, published);
+  EXPECT_EQ(driver->status().counts.reconnects, 0U);
 }
 
 int main(int argc, char** argv) {

@@ -53,7 +53,11 @@ PYTHON_RULES = [
     Rule(r"kurumaisu/\w+\.py", r"kurumaisu\.(sim|world|viewer)(\.|$)", "what all share rests on nothing"),
 ]
 CPP_RULES = [
-    Rule(r"(?!.*_node\.cpp|params\.h)", ROS_CPP, "ROS headers only in *_node.cpp and params.h"),
+    Rule(
+        r"(?!.*_node\.cpp|.*/messages\.(cpp|h)|params\.h)",
+        ROS_CPP,
+        "ROS headers only in *_node.cpp, its messages.h and params.h",
+    ),
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
     Rule(r"(?!.*bindings\.(cpp|h))", r"<pybind11/", "pybind11 only in bindings"),
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),

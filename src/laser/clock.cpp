@@ -11,10 +11,10 @@ constexpr std::int64_t kWrap = std::int64_t{1} << 24U;  // [ms]
 constexpr double kMillisecond = 1e-3;                   // [s]
 constexpr double kEarly = 0.02;         // [s] below the line: no delay, one of the clocks was set
 constexpr double kDriftMax = 0.005;     // of a sensor's clock, while it was not heard
-constexpr double kLate = 0.05;          // [s] above the line: a stall, or a clock was set
+constexpr double kLate = 0.12;          // [s] above the line: a stall, or a clock was set
 constexpr double kPatience = 2;         // [s] after which it is no stall
 constexpr double kDeviceApart = 1;      // [s] from the host's time: the sensor's clock is not the host's
-constexpr double kCalibrationAge = 40;  // [s] after which drift spoils it
+constexpr double kCalibrationAge = 30;  // [s] after which drift spoils it
 
 /// The time [s] nearest to the host's at which a clock that counts the host's milliseconds has a reading.
 double nearest(std::uint32_t clock, double host) {
@@ -25,41 +25,45 @@ double nearest(std::uint32_t clock, double host) {
 }  // namespace
 
 double DeviceClock::stamp(std::uint32_t clock, double first_byte, double least_delay) {
-  const bool went_back = last_ && first_byte < last_->host;
   const double latest = first_byte - least_delay;
-  const double device = follow(clock, first_byte, least_delay, went_back);
-  double time = std::min(device + envelope_.at(device) - state_.send_delay, latest);
+  const double device = follow(clock, first_byte, least_delay);
+  double time = latest;
+  if (mode_ != TimeMode::kHost) time = std::min(device + envelope_.at(device) - state_.send_delay, latest);
   if (mode_ == TimeMode::kDevice) {
     const double own = nearest(clock, first_byte);
     state_.fallback = std::abs(own - first_byte) > kDeviceApart;
     if (!state_.fallback) time = own;
   }
-  if (mode_ == TimeMode::kHost) time = latest;
-  if (last_stamp_ && !went_back) time = std::max(time, *last_stamp_);
-  last_stamp_ = time;
+  if (stamped_ && first_byte >= stamped_->host) time = std::max(time, stamped_->stamp);
+  stamped_ = Stamped{first_byte, time};
   state_.offset = time - device;
-  state_.drift = envelope_.slope();
+  state_.drift = 1 / (1 + envelope_.slope()) - 1;
   state_.latency = latest - time;
   state_.span = envelope_.span();
   return time;
 }
 
 /// Brings the envelope up to a scan; returns the sensor's time [s] of it.
-double DeviceClock::follow(std::uint32_t clock, double first_byte, double least_delay, bool went_back) {
+double DeviceClock::follow(std::uint32_t clock, double first_byte, double least_delay) {
   const double sent = first_byte - least_delay;
   const double unheard = last_ ? first_byte - last_->host : 0;
   double device = read(clock, first_byte);
-  if (went_back || isEarly({device, sent - device}, kDriftMax * unheard)) {
-    last_.reset();
-    restart();
-    device = read(clock, first_byte);
+  if (isEarly({device, sent - device}, kDriftMax * unheard)) {
+    if (envelope_.span() > kPatience) {
+      restart();
+      ++state_.resets;
+      device = read(clock, first_byte);
+    } else {
+      envelope_.restart();  // the first scans were late
+    }
   }
   const Point point{device, sent - device};
   envelope_.expire(device);
   if (isLateForLong(point, first_byte)) {
-    const Point lowest = late_->lowest;
-    restart();
-    envelope_.add(lowest);
+    envelope_.restart();
+    envelope_.add(late_->lowest);
+    late_.reset();
+    ++state_.resets;
   }
   envelope_.add(point);
   measureSendDelay(device);
@@ -97,19 +101,19 @@ bool DeviceClock::isLateForLong(const Point& point, double host) {
 
 void DeviceClock::restart() {
   envelope_.restart();
+  last_.reset();
   late_.reset();
   calibration_.reset();
-  ++state_.resets;
 }
 
 void DeviceClock::calibrate(std::uint32_t clock, double sent, double received) {
   const double host = 0.5 * (sent + received);
   const double doubt = received - sent;
-  const double unheard = last_ ? host - last_->host : 0;
+  const double unheard = last_ ? received - last_->host : 0;
   double device = read(clock, host);
   if (isEarly({device, host - device}, doubt + kDriftMax * unheard)) {
-    last_.reset();
     restart();
+    ++state_.resets;
     device = read(clock, host);
   }
   if (calibration_ && doubt > calibration_->doubt && device - calibration_->point.x < kCalibrationAge) return;

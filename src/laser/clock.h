@@ -19,12 +19,14 @@ enum class TimeMode {
 /// Turns a sensor's clock (24 bits, 1 ms, up to 0.5 % too fast or slow) into the host's time.
 ///
 /// A scan's bytes can only come later than they were sent. So of all lines that lie below the points (sensor's time,
-/// arrival), the highest tells host's time from sensor's; its slope is the drift.
+/// arrival), the highest tells host's time from sensor's; its slope is the drift. The first stamps are as late as the
+/// first scans, and until the drift has been seen for 2 to 5 s it is taken to be what it was, at first 0: then a stamp is
+/// off by up to 2 ms for each 0.1 % of drift. docs/laser_clock.md has figures.
 class DeviceClock {
  public:
   struct State {
     double offset = 0;         ///< [s] host's time less the sensor's, which counts on where it wraps
-    double drift = 0;          ///< [s/s] host's time that passes in a second of the sensor's, less 1
+    double drift = 0;          ///< [s/s] by which the sensor's clock runs fast; found after a few seconds
     double latency = 0;        ///< [s] of the newest scan, from its last step to its first byte
     double send_delay = 0;     ///< [s] the shortest latency, if calibrated; else unknown and taken as 0
     double span = 0;           ///< [s] that the line rests on
@@ -48,6 +50,11 @@ class DeviceClock {
   /// Of several, that with the shortest way counts. To be given before the first scan.
   void calibrate(std::uint32_t clock, double sent, double received);
 
+  /// Forgets all but the drift, what a scan takes to be sent, and the last stamp: the sensor may have been off.
+  ///
+  /// Is done unasked where its clock or the host's shows that it was set.
+  void restart();
+
   /// Forgets everything: another sensor, or another link to it.
   void reset();
 
@@ -59,6 +66,10 @@ class DeviceClock {
     std::int64_t device = 0;  // [ms] clock, counted on where it wraps
     double host = 0;          // [s]
   };
+  struct Stamped {
+    double host = 0;  // [s] first byte
+    double stamp = 0;
+  };
   struct Late {
     double since = 0;  // [s] host's time
     Point lowest;
@@ -68,18 +79,17 @@ class DeviceClock {
     double doubt = 0;  // [s] how long the way there and back took
   };
 
-  double follow(std::uint32_t clock, double first_byte, double least_delay, bool went_back);
+  double follow(std::uint32_t clock, double first_byte, double least_delay);
   double read(std::uint32_t clock, double host);
   bool isEarly(const Point& point, double doubt) const;
   bool isLateForLong(const Point& point, double host);
-  void restart();
   void measureSendDelay(double device);
 
   TimeMode mode_;
   State state_;
   Envelope envelope_;  // of the sensor's time [s], host's time less the sensor's [s]
   std::optional<Reading> last_;
-  std::optional<double> last_stamp_;
+  std::optional<Stamped> stamped_;
   std::optional<Late> late_;
   std::optional<Calibration> calibration_;
 };

@@ -62,7 +62,7 @@ std::pair<Level, std::string> judge(const Status& status, const Counts& before) 
     default:
       return {Level::kError, "Not connected: " + std::string(name(status.state)) + why};
   }
-  const std::string stat = valueOf(status.device.state, "STAT");
+  const std::string stat = health(status.device);
   if (!stat.empty() && !isWell(stat)) return {Level::kError, "Abnormal status: " + stat};
   const std::string since = troubles(status.counts, before);
   if (!since.empty()) return {Level::kWarn, since};
@@ -79,9 +79,9 @@ void addDevice(const Device& device, Diagnosis& diagnosis) {
   add("Firmware Version", version);
   add("Firmware Date", date);
   add("Protocol Version", valueOf(device.version, "PROT"));
-  add("Device ID", valueOf(device.version, "SERI"));
+  add("Device ID", serialNumber(device));
   add("Model", device.parameters ? device.parameters->model : "");
-  add("Device Status", valueOf(device.state, "STAT"));
+  add("Device Status", health(device));
 }
 
 void addPlace(const DriverSettings& settings, const Device& device, Diagnosis& diagnosis) {
@@ -111,6 +111,10 @@ void addCounts(const Counts& counts, Diagnosis& diagnosis) {
 }
 
 }  // namespace
+
+std::string serialNumber(const Device& device) { return valueOf(device.version, "SERI"); }
+
+std::string health(const Device& device) { return valueOf(device.state, "STAT"); }
 
 void Rhythm::add(double time) {
   if (!times_.empty() && time < times_.back()) times_.clear();

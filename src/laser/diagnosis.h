@@ -38,6 +38,10 @@ class Rhythm {
   std::deque<double> times_;
 };
 
+/// What a sensor says of itself: SERI of VV, STAT of II; empty until it has.
+std::string serialNumber(const Device& device);
+std::string health(const Device& device);
+
 /// Is what a sensor says of its own state (II: STAT) one of the ways to say that it is well?
 bool isWell(const std::string& stat);
 

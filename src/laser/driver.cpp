@@ -99,6 +99,7 @@ class Driver::Impl {
 
 void Driver::Impl::run() {
   pause_ = settings_.retry_min;
+  monitor.update([](Status& status) { status.state = State::kConnecting; });
   while (!control.stopped()) {
     const double start = steadyTime();
     monitor.update([](Status& status) { ++status.counts.attempts; });
@@ -107,6 +108,7 @@ void Driver::Impl::run() {
     } catch (const LinkLost& problem) {
       fail(State::kConnecting, Report::Level::kWarning, problem.what());
     } catch (const Refused& problem) {
+      pause_ = settings_.retry_max;
       fail(State::kRefused, Report::Level::kError, problem.what());
     } catch (const std::invalid_argument& problem) {
       fail(State::kMisconfigured, Report::Level::kError, std::string("LASER_SETTINGS: ") + problem.what());

@@ -8,11 +8,11 @@
 namespace kurumaisu::laser {
 namespace {
 
-constexpr double kWindow = 40;       // [s] longer: steadier; shorter: follows a change of the rate sooner
-constexpr double kBucket = 1;        // [s]
-constexpr double kSlopeMax = 0.005;  // of a sensor's clock; a real URG-04LX is off by 0.00125
-constexpr double kDoubt =
-    2.5;  // [s] at least that points must span on both sides of the pivot to move the slope
+constexpr double kWindow = 30;       // [s] longer: steadier; shorter: follows a change of the rate sooner
+constexpr double kBucket = 0.5;      // [s]
+constexpr double kSlopeMax = 0.005;  // of a sensor's clock; a recorded URG-04LX is off by 0.0013
+constexpr double kDoubt = 1;         // [s] from the middle to where the edges must agree, while there are few
+constexpr double kDoubtShare = 0.125;  // of the span, once there are many
 
 double slopeBetween(const Point& a, const Point& b) { return (b.y - a.y) / (b.x - a.x); }
 
@@ -62,7 +62,7 @@ void Envelope::fit() {
   // both sides of the middle agree on: a few points prove nothing.
   const std::vector<Point> edges = hull();
   const double middle = 0.5 * (edges.front().x + newest_);
-  const double doubt = std::max(kDoubt, 0.125 * span());
+  const double doubt = std::max(kDoubt, kDoubtShare * span());
   slope_ = std::clamp(slope_, slopeAt(edges, middle - doubt), slopeAt(edges, middle + doubt));
   slope_ = std::clamp(slope_, -kSlopeMax, kSlopeMax);
   height_ = std::numeric_limits<double>::infinity();

@@ -12,13 +12,13 @@ namespace kurumaisu::laser {
 namespace {
 
 constexpr double kTurnHalf = M_PI + 0.01;  // [rad] 3.1416 is meant as pi, -180 is not
-constexpr double kRounding = 1e-6;         // [steps] by which a bearing may miss the step that it came from
+constexpr double kRounding = 1e-3;         // [steps] by which a bearing may miss a step: 1.5707963, a float32
 constexpr int kClusterMax = 99;            // two digits
 constexpr int kSkipMax = 9;                // one digit
 constexpr int kCodesEnd = 20;              // distances below are codes
 constexpr int kFarCode = 0;                // of the URG-04LX: nothing within 22 m
 constexpr int kBeyondCode = 6;             // of the URG-04LX: beyond its reach
-constexpr double kMetre = 1e-3;            // of a sensor's millimetre
+constexpr double kMetre = 1000;            // [mm]
 
 void require(bool holds, const std::string& parameter, double value, const std::string& rule) {
   if (!holds) throw std::invalid_argument(parameter + " " + std::to_string(value) + " " + rule);
@@ -76,15 +76,15 @@ Fan::Fan(const scip::Parameters& sensor, const Window& window)
   empty_.time_increment = window.cluster * sensor.stepTime();
   // sensor_msgs/LaserScan: "time between scans"
   empty_.scan_time = (window.skip + 1) * sensor.scanTime();
-  empty_.range_min = sensor.distance_min * kMetre;
-  empty_.range_max = sensor.distance_max * kMetre;
+  empty_.range_min = sensor.distance_min / kMetre;
+  empty_.range_max = sensor.distance_max / kMetre;
 }
 
 float Fan::range(int distance) const {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   if (distance == kFarCode || distance == kBeyondCode || distance > distance_max_) return kInfinity;
   if (distance < std::max(kCodesEnd, distance_min_)) return std::numeric_limits<float>::quiet_NaN();
-  return static_cast<float>(distance * kMetre);
+  return static_cast<float>(distance / kMetre);
 }
 
 Scan Fan::convert(const scip::Rotation& rotation, double time) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "laser/handshake.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <vector>
 
@@ -19,15 +20,16 @@ constexpr int kTries = 3;
 
 enum class Voice { kNone, kScip1, kScip2 };
 
-/// Quiets a sensor. What came at a wrong rate before may spoil the first command, so the answer of the second counts.
+/// Quiets a sensor that may be deaf for a while, so that it is told again and again. What came at a wrong rate before may
+/// spoil the first command: an answer that is no 00 counts the second time.
 Voice quiet(Link& link, double timeout) {
   Voice voice = Voice::kNone;
-  for (int i = 0; i < 2; ++i) {
-    const auto reply = link.ask("QT", timeout, kBusyTimeout);
-    if (!reply) return voice;
+  for (const double until = steadyTime() + timeout; steadyTime() < until;) {
+    const auto reply = link.ask("QT", std::min(timeout, kProbeTimeout), kBusyTimeout);
+    if (!reply) continue;
     if (reply->status.size() == 1) return Voice::kScip1;
+    if (reply->status == "00" || voice == Voice::kScip2) return Voice::kScip2;
     voice = Voice::kScip2;
-    if (reply->status == "00") break;
   }
   return voice;
 }
@@ -126,7 +128,8 @@ Sensor handshake(Link& link, const HandshakeSettings& settings, const Tell& tell
   if (found.voice == Voice::kScip1) speakScip2(link, settings.answer_timeout);
   if (found.baud != 0 && found.baud != settings.baud)
     sensor.baud = changeBaud(link, found.baud, settings, tell);
-  link.ask("TM2", settings.answer_timeout);  // out of the adjust mode, in which another program may have died
+  link.ask("TM2", settings.answer_timeout,
+           settings.answer_timeout);  // out of the adjust mode, in which another program may have died
   sensor.version = describe(link, "VV", settings.answer_timeout, tell);
   sensor.parameters = askParameters(link, settings.answer_timeout, tell);
   sensor.state = scip::keyed(describe(link, "II", settings.answer_timeout, tell));

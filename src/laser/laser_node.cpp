@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The laser driver as a ROS node: scan, laser_status and diagnostics out; no algorithm here.
-#include <diagnostic_msgs/DiagnosticStatus.h>
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <dynamic_reconfigure/server.h>
-#include <kurumaisu/LaserConfig.h>
 #include <ros/callback_queue.h>
 #include <ros/package.h>
 #include <ros/ros.h>
-#include <sensor_msgs/LaserScan.h>
 #include <std_srvs/Trigger.h>
 
 #include <memory>
@@ -18,85 +15,48 @@
 
 #include "laser/diagnosis.h"
 #include "laser/driver.h"
-#include "laser/scan.h"
+#include "laser/messages.h"
+#include "laser/self_test.h"
 #include "laser/settings.h"
 #include "laser/shipped.h"
 
 namespace {
 
 namespace k = kurumaisu::laser;
+using diagnostic_msgs::DiagnosticStatus;
 using kurumaisu::LaserConfig;
 using Trigger = std_srvs::Trigger;
 
-constexpr double kLongestWait = 0.02;    // [s] for a callback, so that a stop is soon noticed
-constexpr double kWarningPeriod = 1.0;   // [s] between two equal warnings
-constexpr double kSelfTestPatience = 5;  // [s] for scans after a restart
-constexpr std::uint64_t kSelfTestScans = 3;
-constexpr std::uint32_t kQueue = 20;  // scans, urg_node's
+constexpr double kLongestWait = 0.02;   // [s] for a callback, so that a stop is soon noticed
+constexpr double kWarningPeriod = 1.0;  // [s] between two equal warnings
+constexpr std::uint32_t kQueue = 20;    // scans, urg_node's
 
 double now() { return ros::Time::now().toSec(); }
 
-std::uint8_t levelOf(k::Level level) {
-  switch (level) {
-    case k::Level::kOk:
-      return diagnostic_msgs::DiagnosticStatus::OK;
-    case k::Level::kWarn:
-      return diagnostic_msgs::DiagnosticStatus::WARN;
-    case k::Level::kError:
-      return diagnostic_msgs::DiagnosticStatus::ERROR;
-    default:
-      return diagnostic_msgs::DiagnosticStatus::STALE;
-  }
+std::string place(const k::DriverSettings& settings) {
+  if (settings.ip_address.empty()) return settings.serial_port;
+  return settings.ip_address + ":" + std::to_string(settings.ip_port);
 }
 
-void fill(diagnostic_msgs::DiagnosticStatus& status, const k::Diagnosis& diagnosis) {
-  status.level = levelOf(diagnosis.level);
-  status.message = diagnosis.summary;
-  for (const auto& [name, value] : diagnosis.values) {
-    diagnostic_msgs::KeyValue item;
-    item.key = name;
-    item.value = value;
-    status.values.push_back(item);
-  }
+std::string hardwareId(const k::Status& status) {
+  const std::string serial = k::serialNumber(status.device);
+  return serial.empty() ? "none" : serial;
 }
 
-sensor_msgs::LaserScan messageOf(const k::Scan& scan) {
-  sensor_msgs::LaserScan message;
-  message.angle_min = static_cast<float>(scan.angle_min);
-  message.angle_max = static_cast<float>(scan.angle_max);
-  message.angle_increment = static_cast<float>(scan.angle_increment);
-  message.time_increment = static_cast<float>(scan.time_increment);
-  message.scan_time = static_cast<float>(scan.scan_time);
-  message.range_min = static_cast<float>(scan.range_min);
-  message.range_max = static_cast<float>(scan.range_max);
-  message.ranges = scan.ranges;
-  message.intensities = scan.intensities;
-  return message;
+void log(ros::console::levels::Level level, const std::string& text) {
+  ROS_LOG(level, ROSCONSOLE_DEFAULT_NAME, "%s", text.c_str());
 }
 
-void setLive(LaserConfig& config, const k::LiveSettings& live) {
-  config.angle_min = live.angle_min;
-  config.angle_max = live.angle_max;
-  config.cluster = live.cluster;
-  config.skip = live.skip;
-  config.publish_intensity = live.intensity;
-}
-
-LaserConfig configOf(const k::NodeSettings& settings) {
-  LaserConfig config = LaserConfig::__getDefault__();
-  config.frame_id = settings.frame_id;
-  config.time_offset = settings.time_offset;
-  setLive(config, settings.driver.live);
-  return config;
-}
+void warn(const std::string& text) { log(ros::console::levels::Warn, text); }
 
 void say(const k::Report& report) {
-  if (report.level == k::Report::Level::kInfo) {
-    ROS_INFO("%s", report.text.c_str());
-  } else if (report.level == k::Report::Level::kWarning) {
-    ROS_WARN("%s", report.text.c_str());
-  } else {
-    ROS_ERROR("%s", report.text.c_str());
+  switch (report.level) {
+    case k::Report::Level::kInfo:
+      return log(ros::console::levels::Info, report.text);
+    case k::Report::Level::kWarning:
+      return warn(report.text);
+    default:
+      return log(ros::console::levels::Error, report.text);
   }
 }
 
@@ -116,7 +76,7 @@ class LaserNode {
   void publish(const k::Scan& scan);
   void reconfigure(LaserConfig& config);
   void tick();
-  void diagnoseScans(diagnostic_msgs::DiagnosticStatus& status);
+  void diagnoseScans(DiagnosticStatus& status);
   void publishStatus(const k::Status& status);
   void updateStatus(Answer& answer);
   void restart(Answer& answer);
@@ -142,7 +102,7 @@ LaserNode::LaserNode(ros::NodeHandle& nh, const k::NodeSettings& settings, const
     : settings_(settings),
       rhythm_(settings.diagnostics_window_time),
       scan_(nh.advertise<sensor_msgs::LaserScan>("scan", kQueue)),
-      status_(nh.advertise<diagnostic_msgs::DiagnosticStatus>("laser_status", 1, true)),
+      status_(nh.advertise<DiagnosticStatus>("laser_status", 1, true)),
       driver_(
           settings.driver, [this](const k::Scan& scan) { publish(scan); }, now, say) {
   serve(nh, "update_laser_status", &LaserNode::updateStatus);
@@ -151,7 +111,7 @@ LaserNode::LaserNode(ros::NodeHandle& nh, const k::NodeSettings& settings, const
   diagnostics_.setHardwareID("none");
   diagnostics_.add("Hardware Status", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
     const k::Status state = driver_.status();
-    fill(status, k::diagnoseDevice(state, reported_, settings_.driver, settings_.time_offset));
+    k::fill(status, k::diagnoseDevice(state, reported_, settings_.driver, settings_.time_offset));
     reported_ = state.counts;
   });
   diagnostics_.add("Laser Scan",
@@ -169,10 +129,10 @@ void LaserNode::serve(ros::NodeHandle& nh, const std::string& name, void (LaserN
 }
 
 void LaserNode::offerReconfigure(const k::NodeSettings& shipped) {
-  const LaserConfig config = configOf(settings_);
+  const LaserConfig config = k::configOf(settings_);
   config.__toServer__(private_nh_);  // where its own start reads them
   reconfigure_ = std::make_unique<Reconfigure>(reconfigure_mutex_, private_nh_);
-  reconfigure_->setConfigDefault(configOf(shipped));
+  reconfigure_->setConfigDefault(k::configOf(shipped));
   reconfigure_->setCallback([this](LaserConfig& wanted, std::uint32_t /*level*/) { reconfigure(wanted); });
 }
 
@@ -186,7 +146,7 @@ void LaserNode::run() {
 }
 
 void LaserNode::publish(const k::Scan& scan) {
-  sensor_msgs::LaserScan message = messageOf(scan);
+  sensor_msgs::LaserScan message = k::messageOf(scan);
   double stamp = scan.stamp;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -204,36 +164,33 @@ void LaserNode::publish(const k::Scan& scan) {
 
 /// Takes what can be had; the rest of the request is set back, which its sender sees.
 void LaserNode::reconfigure(LaserConfig& config) {
-  const k::LiveSettings live{config.angle_min, config.angle_max, config.cluster, config.skip,
-                             config.publish_intensity};
-  try {
+  const auto take = [](const std::function<void()>& part) {
+    try {
+      part();
+    } catch (const std::invalid_argument& problem) {
+      warn(std::string("LASER_REFUSED: ") + problem.what());
+    }
+  };
+  take([&] {
+    const k::LiveSettings live = k::liveOf(config);
     k::validate(live);
     driver_.reconfigure(live);
     settings_.driver.live = live;
-  } catch (const std::invalid_argument& problem) {
-    ROS_WARN("LASER_REFUSED: %s", problem.what());
-  }
+  });
   const std::lock_guard<std::mutex> lock(mutex_);
-  try {
-    settings_.frame_id = k::frame(config.frame_id);
-    settings_.time_offset = k::finite("time_offset", config.time_offset);
-  } catch (const std::invalid_argument& problem) {
-    ROS_WARN("LASER_REFUSED: %s", problem.what());
-  }
-  config = configOf(settings_);
+  take([&] { settings_.frame_id = k::frame(config.frame_id); });
+  take([&] { settings_.time_offset = k::finite("time_offset", config.time_offset); });
+  config = k::configOf(settings_);
 }
 
 void LaserNode::tick() {
   const k::Status status = driver_.status();
-  const auto of = [](const std::map<std::string, std::string>& values, const char* key) {
-    const auto found = values.find(key);
-    return found == values.end() ? std::string() : found->second;
-  };
-  const std::string serial = of(status.device.version, "SERI");
-  const std::string about = std::string(k::name(status.state)) + serial + of(status.device.state, "STAT");
+  const std::string about = std::string(k::name(status.state)) + " " + k::serialNumber(status.device) + " " +
+                            k::health(status.device);
   if (about != told_) {
     told_ = about;
-    diagnostics_.setHardwareID(serial.empty() ? "none" : serial);
+    log(ros::console::levels::Info, place(settings_.driver) + ": " + about);
+    diagnostics_.setHardwareID(hardwareId(status));
     publishStatus(status);
   }
   const ros::SteadyTime time = ros::SteadyTime::now();
@@ -242,23 +199,22 @@ void LaserNode::tick() {
   diagnostics_.force_update();  // update() would go by a clock that may be set back, or stand
 }
 
-void LaserNode::diagnoseScans(diagnostic_msgs::DiagnosticStatus& status) {
+void LaserNode::diagnoseScans(DiagnosticStatus& status) {
   const double time = now();
   std::optional<double> rate;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     rate = rhythm_.rate(time);
   }
-  fill(status, k::diagnoseScans(driver_.status(), rate, time, settings_.diagnostics_tolerance,
-                                settings_.driver.stale_timeout));
+  k::fill(status, k::diagnoseScans(driver_.status(), rate, time, settings_.diagnostics_tolerance,
+                                   settings_.driver.stale_timeout));
 }
 
 void LaserNode::publishStatus(const k::Status& status) {
-  diagnostic_msgs::DiagnosticStatus message;
+  DiagnosticStatus message;
   message.name = ros::this_node::getName();
-  const auto serial = status.device.version.find("SERI");
-  if (serial != status.device.version.end()) message.hardware_id = serial->second;
-  fill(message, k::diagnoseDevice(status, status.counts, settings_.driver, settings_.time_offset));
+  message.hardware_id = hardwareId(status);
+  k::fill(message, k::diagnoseDevice(status, status.counts, settings_.driver, settings_.time_offset));
   status_.publish(message);
 }
 
@@ -275,24 +231,14 @@ void LaserNode::restart(Answer& answer) {
   answer.message = "the port is opened anew";
 }
 
-/// Begins anew, which asks the sensor how it is, and wants a few good scans. Holds up other callbacks meanwhile.
+/// Holds up other callbacks meanwhile.
 void LaserNode::selfTest(Answer& answer) {
-  const std::uint64_t reconnects = driver_.status().counts.reconnects;
-  std::optional<k::Counts> begun;
-  const ros::SteadyTime deadline = ros::SteadyTime::now() + ros::WallDuration(kSelfTestPatience);
-  k::Status status;
-  driver_.restart();
-  do {
+  const k::Verdict verdict = k::selfTest(driver_, settings_.driver, [] {
     ros::WallDuration(kLongestWait).sleep();
-    status = driver_.status();
-    if (!begun && status.counts.reconnects > reconnects) begun = status.counts;
-    if (begun && status.counts.scans >= begun->scans + kSelfTestScans) break;
-  } while (ros::ok() && ros::SteadyTime::now() < deadline);
-  const k::Diagnosis diagnosis =
-      k::diagnoseDevice(status, begun.value_or(status.counts), settings_.driver, 0);
-  const bool scans = begun && status.counts.scans >= begun->scans + kSelfTestScans;
-  answer.success = scans && diagnosis.level == k::Level::kOk;
-  answer.message = (scans ? "" : "no scans within the self test; ") + diagnosis.summary;
+    return ros::ok();
+  });
+  answer.success = verdict.passed;
+  answer.message = verdict.words;
 }
 
 k::NodeSettings read(const XmlRpc::XmlRpcValue& given) {
@@ -304,15 +250,15 @@ k::NodeSettings read(const XmlRpc::XmlRpcValue& given) {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "laser_node");
-  ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
+  ros::NodeHandle nh;  // here, because ROS's log is mute once the last one is gone
   try {
     XmlRpc::XmlRpcValue given;
     ros::param::get(ros::this_node::getName(), given);  // nothing given: all as shipped
     const k::NodeSettings settings = read(given);
-    for (const std::string& warning : settings.warnings) ROS_WARN("%s", warning.c_str());
+    for (const std::string& warning : settings.warnings) warn(warning);
     LaserNode(nh, settings, read({})).run();
   } catch (const std::exception& error) {
-    ROS_FATAL("%s", error.what());
+    log(ros::console::levels::Fatal, error.what());
     return 1;
   }
   return 0;

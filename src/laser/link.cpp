@@ -61,7 +61,7 @@ std::optional<scip::Message> Link::ask(const std::string& command, double timeou
 
 scip::Message Link::ask(const std::string& command, double timeout) {
   if (std::optional<scip::Message> message = ask(command, timeout, timeout)) return *message;
-  throw LinkLost("LASER_NO_ANSWER: no answer to " + command + " in " + std::to_string(timeout) + " s");
+  throw NoAnswer("LASER_NO_ANSWER: no answer to " + command + " in " + std::to_string(timeout) + " s");
 }
 
 void Link::setBaud(int baud) {

@@ -31,7 +31,7 @@ class Link {
   /// bytes come, it waits up to `busy` [s].
   std::optional<scip::Message> ask(const std::string& command, double timeout, double busy);
 
-  /// As above. Throws LinkLost if there is no reply in so long [s].
+  /// As above. Throws NoAnswer if there is no reply in so long [s].
   scip::Message ask(const std::string& command, double timeout);
 
   /// Changes the rate [baud] and forgets what came at the other.

@@ -8,7 +8,8 @@
 namespace kurumaisu::laser {
 namespace {
 
-constexpr double kAgain = 10;  // [s] after which the same is worth telling again
+constexpr double kSame = 10;  // [s] after which the same is worth telling again
+constexpr double kOther = 1;  // [s] the same for other words of that code
 
 }  // namespace
 
@@ -30,6 +31,14 @@ const char* name(State state) {
   return "unknown";
 }
 
+std::string meaning(const std::string& status) {
+  if (status == "10") return "its laser is off";
+  if (status == "98") return "it has resumed after it checked itself";
+  if (status >= "21" && status <= "49") return "it has stopped to check itself";
+  if (status >= "50" && status <= "97") return "its hardware is in trouble";
+  return "unexpected while it streams";
+}
+
 void Monitor::tell(Report::Level level, const std::string& text) {
   if (level != Report::Level::kInfo) {
     update([&](Status& status) {
@@ -38,9 +47,10 @@ void Monitor::tell(Report::Level level, const std::string& text) {
     });
   }
   const double time = steadyTime();
-  if (text == told_ && time < told_time_ + kAgain) return;
-  told_ = text;
-  told_time_ = time;
+  const auto [before, is_new] = told_.try_emplace(text.substr(0, text.find(':')));
+  Told& told = before->second;
+  if (!is_new && time < told.time + (text == told.text ? kSame : kOther)) return;
+  told = {text, time};
   log_({level, text});
 }
 

@@ -4,6 +4,7 @@
 
 #include <condition_variable>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -21,7 +22,8 @@ class Monitor {
 
   Monitor(Now now, Log log) : now_(std::move(now)), log_(std::move(log)) {}
 
-  /// Notes what happened and passes it on; the same words again only after a while. From the driver's thread only.
+  /// Notes what happened and passes it on: of one code (what stands before the first colon) at most once a second, the
+  /// same words every ten. From the driver's thread only.
   void tell(Report::Level level, const std::string& text);
 
   /// Changes the status by a function of it.
@@ -41,8 +43,11 @@ class Monitor {
   Log log_;
   mutable std::mutex mutex_;
   Status status_;
-  std::string told_;      // last words passed on
-  double told_time_ = 0;  // [s] steady
+  struct Told {
+    std::string text;
+    double time = 0;  // [s] steady
+  };
+  std::map<std::string, Told> told_;  // by code
 };
 
 /// What the driver is to do.

@@ -15,6 +15,11 @@ struct LinkLost : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// It is there, but does not answer.
+struct NoAnswer : LinkLost {
+  using LinkLost::LinkLost;
+};
+
 /// Another program holds the port.
 struct PortInUse : LinkLost {
   using LinkLost::LinkLost;

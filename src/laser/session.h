@@ -53,27 +53,31 @@ class Session {
 
  private:
   struct Watch {
-    double heard;  // [s] host's time of the last scan, or of the start
-    int errors = 0;
+    double scan;         // [s] host's time of the last one, or of the start
+    double steady_scan;  // [s] the same in steadyTime()
+    int errors = 0;      // since then
   };
 
   void identify();
-  void calibrate();
   std::unique_ptr<Urg> start(std::shared_ptr<ScipStream>& stream);
   std::unique_ptr<Urg> startForm(std::shared_ptr<ScipStream>& stream, const Window& window);
-  bool stream(Urg& urg, ScipStream& stream);
+  bool streamUntilQuiet(Urg& urg, ScipStream& stream);
   void handle(const Arrival& arrival, Urg& urg, Watch& watch);
+  void checkClock(std::uint32_t clock, double first_byte);
   void publish(const Arrival& arrival);
   void complain(const Arrival& arrival);
-  bool isSilent(Watch& watch) const;
+  bool isQuiet(Watch& watch) const;
   void updateCounts();
 
   Surroundings with_;
   Link link_;
+  const Tell tell_;
   const Counts before_;  // of earlier connections
   Sensor sensor_;
   std::unique_ptr<Fan> fan_;
-  double period_ = 0;  // [s] from scan to scan
+  double period_ = 0;             // [s] from scan to scan
+  bool is_first_ = true;          // the next scan is the first one of a sensor just asked what it is
+  std::uint64_t unreadable_ = 0;  // replies that have been told of
 };
 
 }  // namespace kurumaisu::laser

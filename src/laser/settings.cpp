@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "laser/settings.h"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -9,10 +10,11 @@ namespace {
 
 using Value = XmlRpc::XmlRpcValue;
 
-// Protocol: three digits of two for cluster, one for the scans left out. The others are msg/Laser.cfg's.
+// Protocol: two digits for a cluster, one for the scans left out. All limits are msg/Laser.cfg's, too.
 constexpr int kMaxCluster = 99;
 constexpr int kMaxSkip = 9;
 constexpr double kPi = 3.14159265358979323846;  // [rad]
+constexpr double kPiRounding = 0.01;            // [rad] 3.15 and 3.1416 are meant as pi, -180 is not
 constexpr double kMaxTimeOffset = 10;           // [s]
 constexpr int kMaxPort = 65535;
 
@@ -45,7 +47,9 @@ Value merged(const Value& shipped, const Value& given, const std::string& name,
     if (other == notDone().end()) {
       result[key] = value;
     } else if (asks(value)) {
-      warnings.push_back("LASER_IGNORED_PARAMETER: " + name + "/" + key + ": " + other->second);
+      std::ostringstream out;
+      out << "LASER_IGNORED_PARAMETER: " << name << "/" << key << ": " << other->second;
+      warnings.push_back(out.str());
     }
   }
   return result;
@@ -74,10 +78,14 @@ void readPlace(Section& node, bool port_given, DriverSettings& driver) {
   driver.serial_port.clear();
 }
 
+double readAngle(Section& node, const std::string& key) {
+  return std::clamp(node.within(key, -kPi - kPiRounding, kPi + kPiRounding), -kPi, kPi);
+}
+
 LiveSettings readLive(Section& node) {
   LiveSettings live{};
-  live.angle_min = node.within("angle_min", -kPi, kPi);
-  live.angle_max = node.within("angle_max", -kPi, kPi);
+  live.angle_min = readAngle(node, "angle_min");
+  live.angle_max = readAngle(node, "angle_max");
   live.cluster = node.integer("cluster", 1, kMaxCluster);
   live.skip = node.integer("skip", 0, kMaxSkip);
   live.intensity = node.flag("publish_intensity");

@@ -24,6 +24,9 @@ enum class State {
 /// A state's name for people: "streaming".
 const char* name(State state);
 
+/// A sensor's status for people, while it streams.
+std::string meaning(const std::string& status);
+
 /// Something to tell: a stable code such as LASER_STALE, then words.
 struct Report {
   enum class Level { kInfo, kWarning, kError };

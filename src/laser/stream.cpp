@@ -15,6 +15,13 @@ constexpr std::size_t kNumberWidth = 3;  // characters of a distance or an inten
 
 std::string line(const std::string& key, int value) { return key + ":" + std::to_string(value) + ";"; }
 
+void checkLaser(const std::string& status) {
+  const bool is_broken = status == "01";
+  if (!is_broken && status != "10") return;
+  throw Refused("LASER_NO_LIGHT: BM is answered by status " + status +
+                (is_broken ? ": the laser is out of order" : ": not yet ready"));
+}
+
 bool isStart(const std::string& command) { return scip::request(command).has_value(); }
 
 }  // namespace
@@ -76,10 +83,7 @@ void ScipStream::answer(const std::string& command) {
     start(command);
   } else {
     const scip::Message reply = link_.ask(command, answer_timeout_);
-    const bool malfunctions = command == "BM" && (reply.status == "01" || reply.status == "10");
-    if (malfunctions)
-      throw Refused("LASER_NO_LIGHT: BM is answered by status " + reply.status +
-                    (reply.status == "01" ? ": the laser is out of order" : ": not yet ready"));
+    if (command == "BM") checkLaser(reply.status);
     put(command, reply.status, reply.lines);
   }
 }

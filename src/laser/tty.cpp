@@ -23,6 +23,8 @@ struct Rate {
 constexpr std::array<Rate, 5> kNamed{
     {{19200, B19200}, {38400, B38400}, {57600, B57600}, {115200, B115200}, {500000, B500000}}};
 
+constexpr double kDrainTime = 0.02;  // [s] three bytes at 19200 baud, and what a USB converter adds
+
 tcflag_t nameOf(int baud) {
   const auto* const found =
       std::find_if(kNamed.begin(), kNamed.end(), [baud](const Rate& rate) { return rate.baud == baud; });
@@ -36,15 +38,25 @@ int openTty(const std::string& path) {
   throw LinkLost("LASER_NO_PORT: " + path + ": " + systemError(errno));
 }
 
+/// Gives the last command time to leave. What a dead device does not take goes: closing would wait for it.
+void drain(const Descriptor& tty) {
+  for (const double until = steadyTime() + kDrainTime; steadyTime() < until;) {
+    int waiting = 0;
+    if (ioctl(tty.fd(), TIOCOUTQ, &waiting) != 0 || waiting == 0) return;
+    tty.wait(0, kDrainTime / 10);
+  }
+  ioctl(tty.fd(), TCFLSH, TCOFLUSH);
+}
+
 }  // namespace
 
 Tty::Tty(const std::string& path, int baud) : path_(path), tty_(openTty(path)) {
   lock(tty_.fd(), path);
-  setBaud(baud);
+  Tty::setBaud(baud);
 }
 
 Tty::~Tty() {
-  ioctl(tty_.fd(), TCFLSH, TCIOFLUSH);  // or closing waits for what cannot be sent
+  drain(tty_);
   unlock(tty_.fd());
 }
 

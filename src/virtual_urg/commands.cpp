@@ -102,22 +102,23 @@ std::string Commands::answer(std::string_view line, Memory& memory, std::uint32_
 }
 
 std::string Commands::answer11(const Command& command, Memory& memory) const {
-  const std::string echo = std::string(command.echo) + '\n';
+  std::string answer = std::string(command.echo) + '\n';
   if (command.text == "SCIP2.0") {
     memory.protocol = 2;
-    return echo + "0\n\n";
+    return answer + "0\n\n";
   }
-  if (command.echo != "V" || model_.version_11.empty()) return echo + "E\n\n";
-  std::string lines;
-  for (const auto& [key, value] : model_.version_11) lines += key + ":" + value + "\n";
-  return echo + "0\n" + lines + "\n";
+  if (command.echo != "V" || model_.version_11.empty()) return answer + "E\n\n";
+  answer += "0\n";
+  for (const auto& [key, value] : model_.version_11)
+    answer.append(key).append(":").append(value).append("\n");
+  return answer + "\n";
 }
 
 std::string Commands::status(const Command& command, Memory& memory) const {
   const std::string name(command.name());
-  if (const std::string label = labelStatus(command.label); !label.empty()) return label;
+  if (std::string label = labelStatus(command.label); !label.empty()) return label;
   if (const auto refused = model_.refused.find(name); refused != model_.refused.end()) return refused->second;
-  if (const std::string shape = shapeOf(command); !shape.empty()) return shape;
+  if (std::string shape = shapeOf(command); !shape.empty()) return shape;
   if (memory.adjusting && name != "TM" && name != "RS" && name != "QT") return kAdjusting;
   if (name[0] == 'M' || name[0] == 'G') return measure(command, memory);
   if (name == "BM" && faults_.find("bm01") != nullptr) return "01";
@@ -128,7 +129,7 @@ std::string Commands::status(const Command& command, Memory& memory) const {
 std::string Commands::measure(const Command& command, Memory& memory) const {
   const bool is_intensity = command.text[1] == 'E';
   if (faults_.find("md0e") != nullptr || (is_intensity && faults_.find("no-me") != nullptr)) return kUnknown;
-  if (const std::string wrong = digitsStatus(command.arguments()); !wrong.empty()) return wrong;
+  if (std::string wrong = digitsStatus(command.arguments()); !wrong.empty()) return wrong;
   const std::optional<scip::Request> request = scip::request(command.text);
   if (!request) return kUnknown;
   if (request->last > model_.end_step) return "04";
@@ -154,7 +155,8 @@ std::string Commands::versionBody() const {
   for (const auto& [key, value] : model_.version) {
     std::string line = keyedLine(key, value);
     char& sum = line[line.size() - 2];
-    if (is_wrong && key == "SERI") sum = sum == '0' ? '1' : '0';
+    // one more; five less would be the sum with the semicolon, which some clients take, too
+    if (is_wrong && key == "SERI") sum = sum == 'o' ? '0' : static_cast<char>(sum + 1);
     lines += line;
   }
   return lines;

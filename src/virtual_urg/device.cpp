@@ -37,8 +37,9 @@ Model checked(Model model) {
   require(model.output_delay >= 0,
           "output_delay must not be negative: " + std::to_string(model.output_delay));
   for (const auto& [command, status] : model.refused) {
-    require(command.size() == 2 && status.size() == 2,
-            "refused: two letters and a status of two characters: " + command + ": " + status);
+    require(
+        command.size() == 2 && status.size() == 2,
+        "refused: two letters and a status of two characters: " + std::string(command).append(": ") + status);
   }
   return model;
 }

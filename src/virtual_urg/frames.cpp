@@ -32,7 +32,7 @@ int distanceOf(double range, const Codes& codes, const scip::Parameters& paramet
 
 std::vector<int> distancesOf(const Measurement& measurement, const Codes& codes,
                              const scip::Parameters& parameters) {
-  const auto count = static_cast<std::size_t>(parameters.last - parameters.first + 1);
+  const auto count = static_cast<std::size_t>(parameters.last - parameters.first) + 1;
   if (!measurement.codes.empty()) {
     requireSize("codes", measurement.codes.size(), count);
     return measurement.codes;
@@ -95,7 +95,8 @@ std::string reply(std::string_view echo, std::string_view status, std::string_vi
 
 scip::Parameters parametersOf(const Lines& lines) {
   scip::Message message;
-  for (const auto& [key, value] : lines) message.lines.push_back(key + ":" + value + ";");
+  for (const auto& [key, value] : lines)
+    message.lines.push_back(std::string(key).append(":").append(value).append(";"));
   try {
     return scip::parameters(message);
   } catch (const scip::BadFrame& error) {

@@ -20,11 +20,14 @@ class Outbox {
 
   bool empty() const { return parcels_.empty(); }
 
-  /// May one more of this size be kept? The first always may.
-  bool fits(std::size_t bytes) const { return empty() || bytes_ + bytes <= kCapacity; }
+  /// May a scan be added? A sensor measures the next one while one goes out, and has no memory for more.
+  bool takesScan() const { return scans_ < kScans; }
+
+  /// May more commands be answered?
+  bool takesReply() const { return bytes_ < kCapacity; }
 
   /// At a rate [bit/s], 0: none.
-  void add(Output output, int baud);
+  void add(Output output, int baud, bool is_scan);
 
   /// What may go now: a part of the first output, perhaps nothing. The time of an output begins with its first call.
   std::string_view due(double now);
@@ -47,15 +50,17 @@ class Outbox {
   struct Parcel {
     Output output;
     int baud = 0;
+    bool is_scan = false;
     std::size_t sent = 0;
     std::optional<double> began;  // [s]
   };
 
-  // [bytes] About as much as a sensor can keep: two scans of 1081 beams with intensities.
-  static constexpr std::size_t kCapacity = 16384;
+  static constexpr int kScans = 2;
+  static constexpr std::size_t kCapacity = 16384;  // [bytes]: a scan of any kind, and replies
 
   std::deque<Parcel> parcels_;
   std::size_t bytes_ = 0;  // not yet sent
+  int scans_ = 0;
 };
 
 }  // namespace kurumaisu::virtual_urg

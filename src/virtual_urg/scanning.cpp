@@ -64,10 +64,11 @@ void Device::State::send(Order& order, const Measurement& measurement, double no
   const int scan = static_cast<int>(++counts.scans);
   ++order.sent;
   if (const Fault* stall = faults.find("stall", scan); stall != nullptr) {
-    if (stall->value)
+    if (stall->value) {
       deaf_until = now + *stall->value;
-    else
+    } else {
       memory.stream.reset();
+    }
     return;
   }
   output.bytes += damaged(frame(order, measurement, scan), faults, scan);

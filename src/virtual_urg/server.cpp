@@ -2,11 +2,13 @@
 #include "virtual_urg/server.h"
 
 #include <poll.h>
+#include <pthread.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <ctime>
 #include <limits>
 #include <stdexcept>
@@ -94,7 +96,8 @@ void Server::show(Measurement measurement) {
 bool Server::measure(const Measurement& measurement, double now) {
   std::unique_lock lock(mutex_);
   const auto ready = [this] { return stopping_ || failure_ || outbox_.empty(); };
-  room_.wait_for(lock, std::chrono::duration<double>(options_.patience), ready);
+  // Whoever was waited for in vain is not waited for again until it has read all that was kept for it.
+  if (patient_) patient_ = room_.wait_for(lock, std::chrono::duration<double>(options_.patience), ready);
   checkAlive();
   fed_time_ = std::max(fed_time_, now);
   const bool kept = post(device_.measure(measurement, fed_time_), device_.baud(), true);
@@ -142,6 +145,9 @@ int Server::baud() const {
 double Server::deviceTime() const { return options_.pace == Pace::kFed ? fed_time_ : steady(); }
 
 void Server::run() {
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);  // they are for the program, not for this thread
   try {
     serve();
   } catch (...) {
@@ -162,7 +168,7 @@ void Server::serve() {
     if (options_.pace == Pace::kReal) turn(now);
     flush(now);
     const double until = wakeAt(now);
-    const bool reads = !endpoint_->connected() || outbox_.fits(kReply);
+    const bool reads = !endpoint_->connected() || outbox_.takesReply();
     const short events = static_cast<short>((reads ? POLLIN : 0) | (full_ ? POLLOUT : 0));
     std::array<pollfd, 2> polled{pollfd{wake_.descriptor(), POLLIN, 0},
                                  pollfd{endpoint_->descriptor(), events, 0}};
@@ -239,7 +245,12 @@ void Server::flush(double now) {
     if (!output) break;
     apply(*output);
   }
-  if (outbox_.empty()) room_.notify_all();
+  if (outbox_.empty()) makeRoom();
+}
+
+void Server::makeRoom() {
+  patient_ = true;
+  room_.notify_all();
 }
 
 std::optional<std::size_t> Server::send(std::string_view bytes) {
@@ -265,14 +276,14 @@ bool Server::post(Output output, int baud, bool is_scan) {
     apply(output);
     return true;
   }
-  if (is_scan && !outbox_.fits(output.bytes.size())) {
+  if (is_scan && !outbox_.takesScan()) {
     ++counters_.dropped;
     return false;
   }
   if (options_.line_rate && baud > 0) {
     output.spread = std::max(output.spread, kBitsOfByte * static_cast<double>(output.bytes.size()) / baud);
   }
-  outbox_.add(std::move(output), baud);
+  outbox_.add(std::move(output), baud, is_scan);
   return true;
 }
 
@@ -298,7 +309,7 @@ void Server::gone() {
   outbox_.clear();
   full_ = false;
   if (endpoint_->tellsLeaving()) device_.disconnect(deviceTime());
-  room_.notify_all();
+  makeRoom();
 }
 
 }  // namespace kurumaisu::virtual_urg

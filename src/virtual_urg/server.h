@@ -73,8 +73,7 @@ class Server {
   int baud() const;
 
  private:
-  static constexpr std::size_t kReply = 4096;  // [bytes] of room that replies need before more is read
-  static constexpr double kBitsOfByte = 10;    // on a serial line: start, 8 data, stop
+  static constexpr double kBitsOfByte = 10;  // on a serial line: start, 8 data, stop
 
   void run();
   void serve();
@@ -90,6 +89,7 @@ class Server {
   bool post(Output output, int baud, bool is_scan);
   void apply(const Output& output);
   void gone();
+  void makeRoom();
 
   const Options options_;
   const std::size_t steps_;  // of a measurement
@@ -103,6 +103,7 @@ class Server {
   double fed_time_ = 0;  // [s]
   double turn_start_;    // [s] steady, of the turn that is measured next
   double back_at_;       // [s] steady, when the device is plugged in again
+  bool patient_ = true;  // measure() may wait
   bool full_ = false;    // the client's system takes no more for now
   bool stopping_ = false;
   std::exception_ptr failure_;  // that ended the thread

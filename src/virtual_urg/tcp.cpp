@@ -56,8 +56,13 @@ int Tcp::descriptor() const {
 
 bool Tcp::accept() {
   client_ = Descriptor(accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
-  if (client_) set(client_.get(), IPPROTO_TCP, TCP_NODELAY, 1);
-  return connected();
+  const bool none = !client_ && (later() || errno == ECONNABORTED);
+  if (none) return false;
+  checked(client_.get(), "accept at " + address());  // with too many files open, say: it would go on for ever
+  const int at_once = 1;
+  setsockopt(client_.get(), IPPROTO_TCP, TCP_NODELAY, &at_once,
+             sizeof at_once);  // in vain if it is gone again
+  return true;
 }
 
 std::optional<std::string> Tcp::read() {

@@ -8,7 +8,20 @@ import importlib.util
 import sys
 from collections.abc import Sequence
 
-NAMES = ("sim", "pool", "agreement", "arena", "stageros", "critic", "laser", "base", "slam", "faults", "fuzz")
+NAMES = (
+    "sim",
+    "pool",
+    "agreement",
+    "arena",
+    "stageros",
+    "critic",
+    "laser",
+    "laser_clock",
+    "base",
+    "slam",
+    "faults",
+    "fuzz",
+)
 
 
 def main(arguments: Sequence[str]) -> int:

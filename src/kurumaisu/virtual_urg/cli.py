@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu._core import urg_fault_help
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 from kurumaisu.virtual_urg import feeds
 from kurumaisu.virtual_urg.models import Sensor, load_sensor, sensor_names
@@ -44,7 +44,6 @@ def main(arguments: list[str] | None = None) -> int:
         return 0
     if options.pty is None and options.tcp is None:
         parser.error("one of the arguments --pty --tcp is required")
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
     try:
         sensor = load_sensor(options.sensor)
         feed, changes = _feed(sensor, options)
@@ -52,7 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
         with VirtualUrg(sensor, at, faults=options.fault, drift=options.drift, line_rate=options.line_rate) as urg:
             _serve(urg, feed, changes, options)
     except Error as error:
-        print(f"virtual_urg: {one_line(error)}", file=sys.stderr)
+        print(f"virtual_urg: {error}", file=sys.stderr)
         return 2
     return 0
 
@@ -105,6 +104,7 @@ def _serve(urg: VirtualUrg, feed: feeds.Feed, changes: bool, options: argparse.N
     intensities: FloatArray | None = None
     if options.intensity is not None:
         intensities = np.full(urg.sensor.steps, options.intensity)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
     print(f"{urg.sensor.model.name} at {urg.address}", flush=True)
     with contextlib.suppress(KeyboardInterrupt):
         start = due = time.monotonic()
