@@ -153,19 +153,17 @@ class Story {
     require(output.bytes.size() <= most, "an answer out of proportion");
     require(output.spread >= 0 && output.away >= 0, "an event in the past");
     if (output.bytes.empty()) return;
-    fuzzing::Oracle oracle(rest_ + output.bytes);
+    oracle_.add(output.bytes);
     assembler_.add(output.bytes, now_);
-    while (const auto message = assembler_.next()) check(*message, oracle);
-    rest_ = (rest_ + output.bytes);
-    if (rest_.size() > 64 * kReply) rest_.erase(0, rest_.size() - 32 * kReply);
+    while (const auto message = assembler_.next()) check(*message);
   }
 
-  void check(const s::Message& message, fuzzing::Oracle& oracle) {
+  void check(const s::Message& message) {
     const auto request = s::request(message.command.substr(0, message.command.find(';')));
     if (!request) return;
     try {
       const s::Rotation rotation = s::decodeScan(message, *request);
-      oracle.check(message.command, rotation);
+      oracle_.check(message.command, rotation);
       checkTruth(rotation, *request);
     } catch (const s::BadFrame&) {
     }
@@ -200,7 +198,7 @@ class Story {
   v::Device device_;
   std::string received_;
   s::Assembler assembler_;
-  std::string rest_;
+  fuzzing::Oracle oracle_{""};
   std::deque<Truth> truths_;
   fuzzing::Dice dice_{1};
   double now_ = 1;

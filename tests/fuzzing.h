@@ -51,6 +51,15 @@ class Oracle {
  public:
   explicit Oracle(std::string bytes) : bytes_(std::move(bytes)) {}
 
+  /// More bytes that were sent; those of long ago are forgotten.
+  void add(const std::string& bytes) {
+    if (bytes_.size() > kRemembered) {
+      bytes_.erase(0, bytes_.size() - kRemembered / 2);
+      from_ = 0;
+    }
+    bytes_ += bytes;
+  }
+
   /// A scan in a reply of this echo.
   void check(const std::string& echo, const kurumaisu::scip::Rotation& rotation) {
     const std::string frame = frameOf(echo, rotation);
@@ -76,6 +85,8 @@ class Oracle {
   }
 
  private:
+  static constexpr std::size_t kRemembered = 1U << 18U;  // [bytes] some times what the driver keeps
+
   static std::vector<std::uint32_t> numbersOf(const kurumaisu::scip::Rotation& rotation) {
     std::vector<std::uint32_t> numbers;
     for (std::size_t k = 0; k < rotation.distances.size(); ++k) {

@@ -66,7 +66,13 @@ def run(target: str, runs: int, seed: int, log: Path | None = None) -> Outcome:
         for number, data in enumerate(seeds(target, log)):
             (folder / f"seed{number}").write_bytes(data)
         command = [str(_program(target)), f"-runs={runs}", f"-seed={seed}", f"-max_len={TARGETS[target]}"]
-        command += [f"-timeout={_ONE_INPUT}", f"-rss_limit_mb={_MEMORY}", "-artifact_prefix=" + name + "/", name]
+        command += [
+            "-len_control=0",
+            f"-timeout={_ONE_INPUT}",
+            f"-rss_limit_mb={_MEMORY}",
+            "-artifact_prefix=" + name + "/",
+            name,
+        ]
         environment = {**os.environ, "ASAN_OPTIONS": "quarantine_size_mb=8"}
         start = time.monotonic()
         done = subprocess.run(command, check=False, stderr=subprocess.PIPE, env=environment)
