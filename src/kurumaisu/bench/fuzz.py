@@ -18,7 +18,7 @@ from kurumaisu.bench.fuzz_seeds import seeds
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 
-TARGETS = {"scip": 1024, "stream": 2048, "device": 512}  # longest input [bytes]
+TARGETS = {"scip": 1024, "stream": 2048, "device": 128}  # longest input [bytes]
 _ONE_INPUT = 5  # [s] one that takes longer is a failure
 _MEMORY = 512  # [MB] with the sanitizers' own
 _TAIL = 40  # lines of a failed target's output that are shown
@@ -73,7 +73,7 @@ def run(target: str, runs: int, seed: int, log: Path | None = None) -> Outcome:
             "-artifact_prefix=" + name + "/",
             name,
         ]
-        environment = {**os.environ, "ASAN_OPTIONS": "quarantine_size_mb=8"}
+        environment = {**os.environ, "ASAN_OPTIONS": "quarantine_size_mb=8:malloc_context_size=4"}
         start = time.monotonic()
         done = subprocess.run(command, check=False, stderr=subprocess.PIPE, env=environment)
         return _outcome(done.returncode, done.stderr.decode(errors="replace"), time.monotonic() - start)
