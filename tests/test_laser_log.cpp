@@ -175,6 +175,27 @@ TEST_F(LaserLogTest, OnceTheDriftIsKnownStampsLieOnALine) {
   }
 }
 
+/// A URG-04LX sends a scan once the mirror has come round: 100 ms after it began, 29.5 ms after step 722.
+TEST_F(LaserLogTest, IiTellsWhatListeningCannot) {
+  l::DeviceClock clock(l::TimeMode::kEnvelope);
+  int told = 0;
+  std::size_t scan = 0;
+  for (const s::Message& message : log.messages) {
+    if (message.command == "II") {
+      const std::string time = s::keyed(message).at("TIME");
+      clock.calibrate(static_cast<std::uint32_t>(std::stoul(time, nullptr, 16)), message.first_byte,
+                      message.first_byte);
+      ++told;
+    } else if (s::request(message.command) && scan < kBehind) {
+      clock.stamp(rotations[scan].clock, first_bytes[scan], 722 * sensor().stepTime());
+      ++scan;
+    }
+  }
+  EXPECT_EQ(told, 3);
+  EXPECT_TRUE(clock.state().calibrated);
+  EXPECT_NEAR(clock.state().send_delay, 0.028, 0.002);
+}
+
 TEST_F(LaserLogTest, TheGapIsReported) {
   l::Sequence sequence;
   std::vector<std::pair<std::size_t, std::uint64_t>> gaps;

@@ -9,11 +9,13 @@ namespace {
 
 constexpr std::int64_t kWrap = std::int64_t{1} << 24U;  // [ms]
 constexpr double kMillisecond = 1e-3;                   // [s]
-constexpr double kEarly = 0.02;         // [s] below the line: no delay, one of the clocks was set
-constexpr double kDriftMax = 0.005;     // of a sensor's clock, while it was not heard
-constexpr double kLate = 0.12;          // [s] above the line: a stall, or a clock was set
-constexpr double kPatience = 2;         // [s] after which it is no stall
-constexpr double kDeviceApart = 1;      // [s] from the host's time: the sensor's clock is not the host's
+constexpr double kEarly = 0.02;      // [s] below the line: no delay, one of the clocks was set
+constexpr double kDriftMax = 0.005;  // of a sensor's clock, while it was not heard
+constexpr double kLate = 0.12;       // [s] above the line: a stall, or a clock was set
+constexpr double kPatience = 2;      // [s] after which it is no stall
+constexpr double kDeviceApart = 1;   // [s] from the host's time: the sensor's clock is not the host's
+constexpr double kSendDelayMost =
+    0.3;  // [s] what was told is not the clock that stamps scans, or none came in time
 constexpr double kCalibrationAge = 30;  // [s] after which drift spoils it
 
 /// The time [s] nearest to the host's at which a clock that counts the host's milliseconds has a reading.
@@ -140,8 +142,10 @@ void DeviceClock::calibrate(std::uint32_t clock, double sent, double received) {
 /// What the line has too much: even the fastest scan was on its way for a while.
 void DeviceClock::measureSendDelay(double device) {
   if (!calibration_ || device - calibration_->point.x > kCalibrationAge) return;
+  const double delay = envelope_.at(calibration_->point.x) - calibration_->point.y;
+  if (delay > kSendDelayMost) return;
   state_.calibrated = true;
-  state_.send_delay = std::max(0.0, envelope_.at(calibration_->point.x) - calibration_->point.y);
+  state_.send_delay = std::max(0.0, delay);
 }
 
 void DeviceClock::reset() { *this = DeviceClock(mode_); }

@@ -45,7 +45,8 @@ class DeviceClock {
   /// lags, also where both were held up and are far apart for a while. Each scan must come once.
   double stamp(std::uint32_t clock, double first_byte, double least_delay);
 
-  /// Takes the sensor's clock [ms], asked for (TM1) at one time [s] and answered at another.
+  /// Takes the sensor's clock [ms], asked for at one time [s] and answered at another: by TM1 in between, by II as its
+  /// answer begins to come, so that both are that.
   ///
   /// Of several, that with the shortest way counts. To be given before the first scan.
   void calibrate(std::uint32_t clock, double sent, double received);

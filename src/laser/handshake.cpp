@@ -2,6 +2,7 @@
 #include "laser/handshake.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <vector>
 
@@ -109,6 +110,17 @@ scip::Message describe(Link& link, const std::string& command, double timeout, c
   throw LinkLost("LASER_BAD_SUM: " + command + " comes with a wrong sum each time, never alike");
 }
 
+std::optional<Told> timeIn(const std::map<std::string, std::string>& state, double host) {
+  constexpr std::size_t kDigits = 6;
+  const auto found = state.find("TIME");
+  if (found == state.end() || found->second.size() != kDigits) return std::nullopt;
+  const std::string& digits = found->second;
+  std::uint32_t clock = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + kDigits, clock, 16);
+  if (error != std::errc() || end != digits.data() + kDigits) return std::nullopt;
+  return Told{clock, host};
+}
+
 scip::Parameters askParameters(Link& link, double timeout, const Tell& tell) {
   const scip::Message reply = describe(link, "PP", timeout, tell);
   if (reply.status != "00") throw Refused("LASER_REFUSED: PP is answered by status " + reply.status);
@@ -132,7 +144,9 @@ Sensor handshake(Link& link, const HandshakeSettings& settings, const Tell& tell
            settings.answer_timeout);  // out of the adjust mode, in which another program may have died
   sensor.version = describe(link, "VV", settings.answer_timeout, tell);
   sensor.parameters = askParameters(link, settings.answer_timeout, tell);
-  sensor.state = scip::keyed(describe(link, "II", settings.answer_timeout, tell));
+  const scip::Message state = describe(link, "II", settings.answer_timeout, tell);
+  sensor.state = scip::keyed(state);
+  sensor.time = timeIn(sensor.state, state.first_byte);
   return sensor;
 }
 

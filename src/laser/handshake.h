@@ -2,8 +2,10 @@
 // From an open port to a sensor that speaks SCIP 2.0 and has said what it is.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -27,12 +29,19 @@ struct NoIntensity : Refused {
 /// What is told on the way.
 using Tell = std::function<void(Report::Level, const std::string&)>;
 
+/// A sensor's clock, as it told it when asked for its state (II).
+struct Told {
+  std::uint32_t clock;  ///< [ms]
+  double host;          ///< [s] host's time at which the answer began to come
+};
+
 /// What a sensor says of itself.
 struct Sensor {
   scip::Parameters parameters;
   scip::Message version;  ///< VV
   std::map<std::string, std::string> state;
-  int baud = 0;  ///< [baud] at which it was left; 0 where there is none
+  std::optional<Told> time;  ///< none if II has no TIME of six hexadecimal digits
+  int baud = 0;              ///< [baud] at which it was left; 0 where there is none
 };
 
 struct HandshakeSettings {

@@ -60,6 +60,7 @@ void Session::identify() {
     with_.memory.sequence.reset();
     with_.memory.serial = device.version["SERI"];
   }
+  if (sensor_.time) with_.memory.clock.calibrate(sensor_.time->clock, sensor_.time->host, sensor_.time->host);
   with_.monitor.update([&](Status& status) {
     status.state = State::kStarting;
     status.device = std::move(device);
