@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "laser/calibrate.h"
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
+#include "scip/code.h"
 #include "scip/scan.h"
 
 namespace kurumaisu::laser {
@@ -10,9 +13,12 @@ namespace {
 
 constexpr int kTimes = 10;
 
-/// A reply to TM1 that can be relied on.
-bool tellsTime(const scip::Message& reply) {
-  return reply.status == "00" && reply.bad_sums == 0 && reply.lines.size() == 1;
+/// The clock [ms] in a reply to TM1, if it can be relied on.
+std::optional<std::uint32_t> timeIn(const scip::Message& reply) try {
+  if (reply.status != "00" || reply.bad_sums > 0 || reply.lines.size() != 1) return std::nullopt;
+  return scip::decodeClock(reply.lines[0]);
+} catch (const scip::BadFrame&) {
+  return std::nullopt;
 }
 
 }  // namespace
@@ -25,9 +31,10 @@ void calibrate(Link& link, DeviceClock& clock, const std::function<double()>& no
   for (int i = 0; status == "00" && i < kTimes; ++i) {
     const double sent = now();
     const scip::Message reply = link.ask("TM1", answer_timeout);
-    if (!tellsTime(reply)) continue;
-    clock.calibrate(scip::decodeClock(reply.lines[0]), sent, reply.first_byte);
-    ++heard;
+    if (const std::optional<std::uint32_t> time = timeIn(reply)) {
+      clock.calibrate(*time, sent, reply.first_byte);
+      ++heard;
+    }
   }
   link.ask("TM2", answer_timeout);
   if (heard > 0) return;
