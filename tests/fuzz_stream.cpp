@@ -22,7 +22,7 @@ using fuzzing::require;
 namespace {
 
 constexpr double kPatience = 60;  // [s] never waited: the port does not fall silent before it is lost
-constexpr std::array kAsked{"MD0044005501000", "ME0044005000000", "MS0000003003000", "MD0044072501100"};
+constexpr std::array kAsked{"MD0044005501000", "ME0044005000000", "MD0100030003000", "MD0044072501100"};
 constexpr std::uint32_t kLongestPiece = 400;  // [bytes]
 
 /// A port on which bytes come, whatever is written to it; then it is lost.
@@ -59,7 +59,7 @@ std::string readAll(l::ScipStream& stream) {
   return text;
 }
 
-/// What MRPT is told: always three characters of distance, whatever the sensor was asked for.
+/// What MRPT is told: the very numbers.
 void checkToldScan(const std::string& told, const std::string& command, const s::Rotation& rotation) {
   const std::size_t numbers = rotation.distances.size() + rotation.intensities.size();
   const auto scan = frames::read(told, command, numbers);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <stdexcept>
 
 #include "scip/code.h"
 
@@ -23,7 +24,9 @@ bool isStart(const std::string& command) { return scip::request(command).has_val
 }  // namespace
 
 ScipStream::ScipStream(Link& link, const Sensor& sensor, const scip::Request& request, double answer_timeout)
-    : link_(link), sensor_(sensor), request_(request), answer_timeout_(answer_timeout) {}
+    : link_(link), sensor_(sensor), request_(request), answer_timeout_(answer_timeout) {
+  if (request.form == scip::Form::kShort) throw std::invalid_argument("MRPT does not know MS");
+}
 
 std::optional<Arrival> ScipStream::await(double timeout) {
   const std::optional<scip::Message> message = link_.next(timeout);

@@ -34,7 +34,7 @@ struct Arrival {
 /// A stream of whole, good replies. Neither Read nor Write throws through MRPT; rethrow() does.
 class ScipStream : public mrpt::io::CStream {
  public:
-  /// The link must outlive it.
+  /// The link must outlive it. Throws std::invalid_argument for the short form, which MRPT does not know.
   ScipStream(Link& link, const Sensor& sensor, const scip::Request& request, double answer_timeout);
 
   /// Waits so long [s] for the sensor to send something. A scan then lies ready to be read.
