@@ -202,6 +202,21 @@ TEST(DeviceClock, CalibrationFindsWhatEveryScanIsLateBy) {
   }
 }
 
+TEST(DeviceClock, AScanMayHaveBegunBeforeItsSensorToldTheTime) {
+  l::DeviceClock clock(l::TimeMode::kEnvelope);
+  constexpr double kSince = 1000;  // [s] host's time at which the sensor's clock was 0
+  constexpr double kLeast = 0.07;
+  constexpr double kSend = 0.027;
+  clock.calibrate(490, kSince + 0.490, kSince + 0.490);
+  for (std::uint32_t start = 450; start < 2000; start += 100) {
+    EXPECT_NEAR(clock.stamp(start, kSince + 1e-3 * start + kLeast + kSend, kLeast), kSince + 1e-3 * start,
+                1e-6);
+  }
+  EXPECT_TRUE(clock.state().calibrated);
+  EXPECT_NEAR(clock.state().send_delay, kSend, 1e-6);
+  EXPECT_EQ(clock.state().resets, 0U);
+}
+
 TEST(DeviceClock, CalibrationAfterARebootStartsAnew) {
   Follower follower(sim::kTcp);
   follower.run(60);

@@ -8,6 +8,7 @@ namespace kurumaisu::laser {
 namespace {
 
 constexpr std::int64_t kWrap = std::int64_t{1} << 24U;  // [ms]
+constexpr std::int64_t kTurnMost = 1000;                // [ms] of a mirror
 constexpr double kMillisecond = 1e-3;                   // [s]
 constexpr double kEarly = 0.02;      // [s] below the line: no delay, one of the clocks was set
 constexpr double kDriftMax = 0.005;  // of a sensor's clock, while it was not heard
@@ -94,7 +95,8 @@ double DeviceClock::read(std::uint32_t clock, double host) {
   if (!last_) {
     last_ = Reading{clock, clock, host};
   } else {
-    const std::int64_t ahead = (std::int64_t{clock} - last_->clock + kWrap) % kWrap;
+    std::int64_t ahead = (std::int64_t{clock} - last_->clock + kWrap) % kWrap;
+    if (last_->told && ahead > kWrap - kTurnMost) ahead -= kWrap;
     const double unheard = (host - last_->host) / kMillisecond - static_cast<double>(ahead);
     const double wraps = std::max(0.0, std::round(unheard / static_cast<double>(kWrap)));
     last_ = Reading{clock, last_->device + ahead + static_cast<std::int64_t>(wraps) * kWrap, host};
@@ -135,6 +137,7 @@ void DeviceClock::calibrate(std::uint32_t clock, double sent, double received) {
     ++state_.resets;
     device = read(clock, host);
   }
+  last_->told = true;
   if (calibration_ && doubt > calibration_->doubt && device - calibration_->point.x < kCalibrationAge) return;
   calibration_ = Calibration{{device, host - device}, doubt};
 }

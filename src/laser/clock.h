@@ -66,6 +66,7 @@ class DeviceClock {
     std::uint32_t clock = 0;
     std::int64_t device = 0;  // [ms] clock, counted on where it wraps
     double host = 0;          // [s]
+    bool told = false;        // by calibrate(): a scan under way began before
   };
   struct Stamped {
     double host = 0;  // [s] first byte
