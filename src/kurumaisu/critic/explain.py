@@ -13,7 +13,7 @@ from kurumaisu.critic import misfit, naming, replay, words
 from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import MATERIAL, moved_share
+from kurumaisu.critic.material import FELT, MATERIAL, felt_share, moved_share
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
@@ -57,7 +57,8 @@ def criticism(
     best = found.best
     shares = {name: moved_share(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
     gains = worth is not None and worth.log_density_per_sample.lo90 > 0
-    matters = {name for name, share in shares.items() if gains and share >= MATERIAL}
+    felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
+    matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     kind = _kind(found, matters)
     causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
     settings = best.settings if kind in ("named", "confounded") else ()

@@ -41,11 +41,11 @@ def occam_plane(z: FloatArray) -> FloatArray:
 
 @cache
 def _table(dimensions: int) -> tuple[FloatArray, FloatArray]:
-    log_x = np.linspace(np.log(Z_LOW), np.log(Z_HIGH), 40001)
+    log_x = np.linspace(np.log(Z_LOW), np.log(Z_HIGH), 8001)
     x = np.exp(log_x)
     usual = np.where(x < Z_USUAL, _USUAL / np.log(Z_USUAL / Z_LOW), (1 - _USUAL) / np.log(Z_HIGH / Z_USUAL))
     log_weight = np.log(log_x[1] - log_x[0]) + np.log(usual)
-    grid = np.concatenate([np.linspace(0, 20, 201), np.geomspace(21, 0.99 * Z_HIGH, 150)])
+    grid = np.concatenate([np.linspace(0, 20, 101), np.geomspace(21, 0.99 * Z_HIGH, 60)])
     costs = np.array([-logsumexp(_log_mean_density(z, x, dimensions) + log_weight) for z in grid])
     return grid, costs
 
