@@ -93,6 +93,13 @@ def test_short_steps_do_not_cancel():
 )
 def test_bad_input_is_refused(change, message):
     times, poses = run(6, 1)
-    arguments = {"poses": poses, "times": times, "columns": np.zeros((18, 1)), "activity": np.ones(6), **NOISE, **change}
+    arguments = {
+        "poses": poses,
+        "times": times,
+        "columns": np.zeros((18, 1)),
+        "activity": np.ones(6),
+        **NOISE,
+        **change,
+    }
     with pytest.raises(ValueError, match=message):
         whiten(**arguments)

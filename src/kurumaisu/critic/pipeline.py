@@ -9,15 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.critic import explain, gain, naming, noise, sanity
-from kurumaisu.critic.drive import Drive, prepare
+from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
+from kurumaisu.critic.prior import odds
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.verdict import write_verdict
 from kurumaisu.errors import Error
-from kurumaisu.params import Model, follow_commands, load_model
+from kurumaisu.params import follow_commands, load_model
 
 Progress = Callable[[str], None]
 
@@ -46,15 +47,18 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
     first = Problem(train, model, _scatter(rough, empty, recording.truth, project=True).estimate().noise)
     found = naming.search(first, progress)
     progress("estimating the noise again, beside what was found")
-    final = _scatter(first, found.best, recording.truth, project=True).estimate(first.noise).noise
+    scatter = _scatter(first, found.best, recording.truth, project=True)
+    final = scatter.estimate(first.noise).noise
+    growth = scatter.growth(final, odds(len(found.p)))
+    final = growth.noise if growth.p > 1 / 2 else final
     problem = Problem(train, model, final, first.terms)
-    found = naming.search(problem, progress)
+    found = naming.search(problem, progress, found.best)
 
     progress("measuring the gain on drives held out")
     baseline = _scatter(rough, empty, recording.truth, project=False).estimate(final).noise
     splits = gain.folds(train, test)
     worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
-    return explain.criticism(recording, problem, found, worth, train + test)
+    return explain.criticism(recording, problem, found, growth, worth, train + test)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:

@@ -20,11 +20,16 @@ _MORE = 0.7
 
 def log_prior(size: int, of: int) -> float:
     """Return the log prior of a set of so many effects out of so many that could show."""
-    each = _MORE / max(of, 1)
+    each = odds(of)
     return float(size * np.log(each) + (of - size) * np.log1p(-each))
 
 
-def occam(z: FloatArray, sides: int = 2) -> FloatArray:
+def odds(of: int) -> float:
+    """Return the prior odds of one effect out of so many that could show."""
+    return _MORE / max(of, 1)
+
+
+def occam(z: FloatArray | float, sides: int = 2) -> FloatArray:
     """Return what an amplitude that shows with |z| standard deviations costs, in nats, elementwise.
 
     z^2 / 2 less the log of the Bayes factor that the prior gives; sides: 1 where only one sign is possible.

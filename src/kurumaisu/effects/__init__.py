@@ -170,6 +170,7 @@ __all__ = [
     "BASE",
     "LASER",
     "WORLD",
+    "BaseEffect",
     "BeamEffect",
     "Beams",
     "Chain",
