@@ -29,13 +29,15 @@ class Naming:
 
     fits: all refitted sets, best first; log_posterior of each (not normalised); p: posterior per effect;
     confounded: sets of effects of which one acts, but the data do not say which; false_alarm: share of null draws,
-    on this very design, with evidence at least as strong as the best single effect's.
+    on this very design, with evidence at least as strong as the best single effect's; enough: there are more data than
+    could be fitted by the catalogue as a whole.
     """
 
     fits: tuple[Fit, ...]
     p: dict[str, float]
     confounded: tuple[tuple[str, ...], ...]
     false_alarm: float
+    enough: bool = True
 
     @property
     def best(self) -> Fit:
@@ -94,7 +96,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
         return float(sum(w for w, fit in zip(weights, ranked, strict=True) if fit.ids & wanted))
 
     p = {name: p_any([name]) for name in sorted({candidate.id for candidate in problem.candidates})}
-    return Naming(tuple(ranked), p, _confounded(ranked, weights, p, p_any), _false_alarm(nothing))
+    return Naming(tuple(ranked), p, _confounded(ranked, weights, p, p_any), _false_alarm(nothing), nothing.enough)
 
 
 def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:

@@ -51,7 +51,7 @@ _CEILING = dict.fromkeys(vars(START), 3.0) | {"sd_w": 10.0, "tau": 20.0, "slow_t
 ONE_COLOUR = ("position_sd", "heading_sd", "sd_v", "sd_lateral", "sd_w", "tau")
 _SECOND = ("slow_v", "slow_lateral", "slow_w", "slow_tau")
 _WORTH = 4.0  # [nat] from which a second colour is believed: it has four parameters
-_SAME = 1e-3  # share of a column beyond those before it that makes it one of its own
+_SAME = 0.03  # share of a column beyond those before it that makes it one of its own
 
 
 def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
@@ -158,10 +158,11 @@ class Scatter:
 
 
 def _independent(columns: FloatArray) -> FloatArray:
-    """Return which columns (rows, k) are not nearly made of others."""
+    """Return which columns (rows, k) are not nearly made of others; so few that most rows are left for the noise."""
     norms = np.linalg.norm(columns, axis=0)
     loud = np.flatnonzero(norms > 0)
     if not len(loud):
         return np.array([], dtype=int)
     _, triangle, order = qr(columns[:, loud] / norms[loud], mode="economic", pivoting=True)
-    return np.asarray(np.sort(loud[order[np.abs(np.diag(triangle)) > _SAME**0.5]]))
+    sizes = np.abs(np.diag(triangle))
+    return np.asarray(np.sort(loud[order[: len(sizes)][sizes > _SAME][: len(columns) // 3]]))

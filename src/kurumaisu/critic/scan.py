@@ -16,6 +16,7 @@ from kurumaisu.types import FloatArray
 
 ALIKE = 0.9995  # correlation of columns from which no drive like these tells their effects apart
 _JOINT = 0.6  # correlation from which three changes are tried together: two may cancel
+_ENOUGH = 3  # residuals per parameter of the catalogue, at least
 _STAND_IN = 0.3  # correlation from which one effect may pass for another
 _SWAPS = 3  # changes to a set at most
 
@@ -37,6 +38,7 @@ class Screen:
         self.terms: tuple[Term, ...] = problem.terms
         self.fixed = [candidate for candidate in problem.candidates if candidate.fixed]
         y, columns = problem.linearised(centre.terms, centre.values, self.terms)
+        self.enough = len(y) > _ENOUGH * len(self.terms)
         self.gram, self.b = columns.T @ columns, columns.T @ y
         norms = np.sqrt(np.maximum(np.diag(self.gram), 1e-18))
         self.correlation = self.gram / np.outer(norms, norms)

@@ -36,6 +36,8 @@ def headline(verdict: Verdict, found: Naming, matters: set[str]) -> str:
         return f"Nothing can be named: {listed} is suspected, but too little was recorded to test it on data held out."
     if found.best.ids and not matters:
         return f"Nothing that matters: {listed} is detectable, but too small to gain anything."
+    if not found.enough:
+        return "Nothing can be named: too little was recorded to tell effects from noise."
     nearest = max(found.p, key=lambda name: found.p[name])
     if found.p[nearest] >= naming.RIVAL:
         return f"Nothing can be named: noise explains these drives as well. The nearest suspect is {nearest}."
