@@ -70,7 +70,8 @@ def criticism(
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     kind = _kind(found, matters)
     causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
-    if growth.p >= naming.NAMED:
+    # Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
+    if growth.p >= naming.NAMED and all(drive.source != "odom" for drive in drives):
         kind, causes = "named", (*causes, Cause(process_noise(problem).id, growth.p, {}, growth.gain_nats))
     settings = best.settings if kind in ("named", "confounded") else ()
     verdict = Verdict(
