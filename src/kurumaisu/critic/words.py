@@ -9,8 +9,9 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic import naming
+from kurumaisu.critic.catalogue import Term
 from kurumaisu.critic.drive import Drive
-from kurumaisu.critic.evidence import Fit, Problem, Term
+from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import HORIZON, MATERIAL
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.story import Rival
@@ -35,6 +36,8 @@ def headline(verdict: Verdict, found: Naming, matters: set[str]) -> str:
         return f"Nothing can be named: {listed} is suspected, but too little was recorded to test it on data held out."
     if found.best.ids and not matters:
         return f"Nothing that matters: {listed} is detectable, but too small to gain anything."
+    if not found.enough:
+        return "Nothing can be named: too little was recorded to tell effects from noise."
     nearest = max(found.p, key=lambda name: found.p[name])
     if found.p[nearest] >= naming.RIVAL:
         return f"Nothing can be named: noise explains these drives as well. The nearest suspect is {nearest}."
@@ -60,7 +63,8 @@ def details(
             f"{term.id}: {term.parameter.name} {e.estimate:.3g}{unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
             f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."
         )
-    wander = np.degrees(problem.noise.sd_w * np.sqrt(2 * problem.noise.tau * _MINUTE))
+    n = problem.noise
+    wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
     said.append(f"The yaw rate fluctuates at random: the heading wanders by {wander:.1f} deg (sd) in a minute.")
     alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
     said.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")

@@ -57,7 +57,7 @@ from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting
 
 # What the critic looks for.
-CRITICISED: tuple[type[Effect], ...] = (
+BASE: tuple[type[BaseEffect], ...] = (
     GainV,
     GainW,
     LeftRightGain,
@@ -68,10 +68,6 @@ CRITICISED: tuple[type[Effect], ...] = (
     LagV,
     LagW,
     ProcessNoise,
-)
-
-BASE: tuple[type[BaseEffect], ...] = (
-    *CRITICISED,
     DacZeroF,
     DacZeroS,
     DacQuantisation,
@@ -172,9 +168,9 @@ def _chosen(settings: tuple[EffectSetting, ...]) -> list[tuple[type[Mechanism], 
 __all__ = [
     "ALL",
     "BASE",
-    "CRITICISED",
     "LASER",
     "WORLD",
+    "BaseEffect",
     "BeamEffect",
     "Beams",
     "Chain",
