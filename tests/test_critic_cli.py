@@ -21,7 +21,7 @@ def drives(tmp_path):
 
 def test_a_recording_gives_a_verdict_a_model_and_a_report(drives, tmp_path, capsys):
     output = tmp_path / "out"
-    assert main([str(drives), "-o", str(output)]) == 0
+    assert main([str(drives), "-o", str(output)]) == 3
     said = capsys.readouterr().out
     assert "verdict: named" in said
     assert "base.gain_v: gain 0.0" in said
@@ -46,7 +46,7 @@ def spoil(path, old, new):
 def test_bad_input_is_named_and_nothing_is_written(drives, tmp_path, capsys, change, message):
     change(drives)
     output = tmp_path / "out"
-    assert main([str(drives), "-o", str(output)]) == 2
+    assert main([str(drives), "-o", str(output)]) == 1
     said = capsys.readouterr().err
     assert message in said
     assert "Traceback" not in said
@@ -54,5 +54,5 @@ def test_bad_input_is_named_and_nothing_is_written(drives, tmp_path, capsys, cha
 
 
 def test_a_path_that_is_not_there(tmp_path, capsys):
-    assert main([str(tmp_path / "nowhere")]) == 2
+    assert main([str(tmp_path / "nowhere")]) == 1
     assert "nowhere" in capsys.readouterr().err

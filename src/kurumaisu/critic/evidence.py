@@ -55,25 +55,25 @@ class Fit:
         return settings_of(self.terms, self.values)
 
 
-def catalogue(model: Model) -> tuple[Term, ...]:
-    """Return a term for every parameter of every effect that changes the mean motion."""
+def catalogue(model: Model, ids: frozenset[str] | None = None) -> tuple[Term, ...]:
+    """Return a term for every parameter of every effect that changes the mean motion; ids: of these effects only."""
     own = {setting.id: setting.parameters for setting in model.effects}
     return tuple(
         Term(effect.id, parameter, own.get(effect.id, {}).get(parameter.name, parameter.null))
         for effect in effects.CRITICISED
-        if not effect.random
+        if not effect.random and (ids is None or effect.id in ids)
         for parameter in effect.parameters
     )
 
 
 class Problem:
-    """Drives, model and noise: everything but the choice of effects."""
+    """Drives, model, noise, and which effects may act (ids; None for all): everything but which of them do."""
 
-    def __init__(self, drives: Sequence[Drive], model: Model, noise: Noise) -> None:
+    def __init__(self, drives: Sequence[Drive], model: Model, noise: Noise, ids: frozenset[str] | None = None) -> None:
         self.drives = drives
         self.model = model
         self.noise = noise
-        self.terms = catalogue(model)
+        self.terms = catalogue(model, ids)
 
     def of(self, ids: Iterable[str]) -> tuple[Term, ...]:
         """Return the terms of effects in the catalogue's order."""

@@ -22,11 +22,18 @@ from kurumaisu.params import Model, follow_commands, load_model
 Progress = Callable[[str], None]
 
 
-def criticise(recording: Recording, model_file: Path, progress: Progress, *, assume_law: bool = False) -> Criticism:
+def criticise(
+    recording: Recording,
+    model_file: Path,
+    progress: Progress,
+    *,
+    assume_law: bool = False,
+    ids: frozenset[str] | None = None,
+) -> Criticism:
     """Return the criticism of a model by a recording whose runs have reference poses.
 
     Without voltages the model is "velocity follows command", unless the recording names a model or assume_law says
-    that the robot has the model's voltage law.
+    that the robot has the model's voltage law. ids: the effects that may be named; None for all that are criticised.
     Raise Error when a run has no reference, or nothing that drove the robot.
     """
     model = load_model(model_file)
@@ -41,16 +48,16 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
         return explain.invalid(recording, model, wrong)
 
     progress("estimating the noise")
-    empty = Problem(train, model, noise.START).fit((), {})
-    first = _noise(train, model, empty, recording.truth, project=True)
-    found = naming.search(Problem(train, model, first), progress)
+    empty = Problem(train, model, noise.START, ids).fit((), {})
+    first = _noise(train, model, empty, recording.truth, ids)
+    found = naming.search(Problem(train, model, first, ids), progress)
     progress("estimating the noise again, beside what was found")
-    final = _noise(train, model, found.best, recording.truth, project=True)
-    problem = Problem(train, model, final)
+    final = _noise(train, model, found.best, recording.truth, ids)
+    problem = Problem(train, model, final, ids)
     found = naming.search(problem, progress)
 
     progress("measuring the gain on drives held out")
-    baseline = _noise(train, model, empty, recording.truth, project=False)
+    baseline = _noise(train, model, empty, recording.truth, frozenset())
     splits = gain.folds(train, test)
     worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
     return explain.criticism(recording, problem, found, worth, train + test)
@@ -68,13 +75,13 @@ def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
 
 
 def _noise(
-    drives: list[Drive], model: Model, fit: Fit, truth: tuple[float, float] | None, *, project: bool
+    drives: list[Drive], model: Model, fit: Fit, truth: tuple[float, float] | None, ids: frozenset[str] | None
 ) -> noise.Noise:
-    """Return the noise about a fit, with all effects of the catalogue projected out or none."""
-    problem = Problem(drives, model, noise.START)
+    """Return the noise about a fit, with the effects of some ids projected out; None for all that are criticised."""
+    problem = Problem(drives, model, noise.START, ids)
     residuals = [drive.measured - problem.simulated(drive, fit.settings) for drive in drives]
     columns = [
-        problem.simulated_columns(drive, fit) if project else np.empty((residual.size, 0))
+        problem.simulated_columns(drive, fit) if problem.terms else np.empty((residual.size, 0))
         for drive, residual in zip(drives, residuals, strict=True)
     ]
     return noise.estimate(drives, residuals, columns, truth)
