@@ -49,13 +49,13 @@ def _parser() -> argparse.ArgumentParser:
     add("recordings", type=Path, nargs="+", metavar="RECORDING", help=what)
     add("-o", "--output", type=Path, default=Path("criticism"), metavar="FOLDER", help="write here (criticism)")
     add("--model", type=Path, metavar="FILE", help="model to criticise (the recording's, else md100.yaml)")
-    add("--runs", type=_list, default=(), metavar="A,B", help="use only these runs; patterns like drive_* count")
-    pattern = "effects by id or pattern like base.lag_*; may be given again"
-    add("--only", type=_list, action="extend", default=[], metavar="IDS", help=f"look only for these {pattern}")
-    add("--without", type=_list, action="extend", default=[], metavar="IDS", help=f"do not look for these {pattern}")
+    add("--runs", type=name_list, default=(), metavar="A,B", help="use only these runs; patterns like drive_* count")
+    add_effects(parser)
     add("--seed", type=int, default=1, help="of the particle filter that makes a missing reference (1)")
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--jobs", type=_count, default=1, metavar="N", help="recordings at a time on this machine (1)")
+    where.add_argument(
+        "--jobs", type=whole_number, default=1, metavar="N", help="recordings at a time on this machine (1)"
+    )
     where.add_argument("--dask", metavar="ADDRESS", help="run on the Dask cluster whose scheduler is there")
     add("--json", action="store_true", help="print the verdict as JSON; of several, one line for each recording")
     add("--table", type=Path, metavar="FILE.csv", help="write the results as a table, one row for each recording")
@@ -64,19 +64,28 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def add_effects(parser: argparse.ArgumentParser) -> None:
+    """Add --only and --without, for selection.effect_ids."""
+    for option, words in (("--only", "look only for"), ("--without", "do not look for")):
+        words = f"{words} these effects, by id or pattern like base.lag_*; may be given again"
+        parser.add_argument(option, type=name_list, action="extend", default=[], metavar="IDS", help=words)
+
+
 def version() -> str:
     """Return the package's version."""
     return str(ElementTree.parse(shipped("package.xml")).findtext("version"))
 
 
-def _list(text: str) -> tuple[str, ...]:
+def name_list(text: str) -> tuple[str, ...]:
+    """Return the names in a,b. Raise ArgumentTypeError for an empty one."""
     parts = tuple(part.strip() for part in text.split(","))
     if not all(parts):
         raise argparse.ArgumentTypeError(f"a name is empty: {text!r}")
     return parts
 
 
-def _count(text: str) -> int:
+def whole_number(text: str) -> int:
+    """Return a whole number from 1. Raise ArgumentTypeError for anything else."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"must be a whole number from 1: {text!r}")
     return int(text)

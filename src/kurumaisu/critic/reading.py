@@ -37,8 +37,8 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
         laser = laser or mount
         check_run(run, laser, faults)
         runs.append(run)
-    _require_use(path, runs, meta, faults)
-    train, test = _split(meta_file, meta, [run.name for run in runs], partly=bool(wanted))
+    require_use(path, runs, meta, faults)
+    train, test = split(meta_file, meta, [run.name for run in runs], partly=bool(wanted))
     return Recording(
         name=path.resolve().stem if path.is_file() else path.resolve().name,
         runs=tuple(runs),
@@ -108,7 +108,9 @@ def _run_name(source: Path) -> str:
     return rawlog_name(source) if is_rawlog(source) else source.stem
 
 
-def _split(meta_file: Path, meta: Meta, names: list[str], *, partly: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def split(
+    meta_file: Path | str, meta: Meta, names: list[str], *, partly: bool
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the runs to fit and the runs to judge by; partly: not all runs were read."""
     for key, chosen in (("train", meta.train), ("test", meta.test)):
         for name in chosen if not partly else ():
@@ -121,7 +123,7 @@ def _split(meta_file: Path, meta: Meta, names: list[str], *, partly: bool) -> tu
     return train, tuple(name for name in meta.test if name in names)
 
 
-def _require_use(path: Path, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
+def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
     """Raise Error unless a run says something about base or laser; note the runs that do not."""
     useless = [run for run in runs if not usable(run)]
     for run in useless:

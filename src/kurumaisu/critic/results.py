@@ -108,7 +108,7 @@ def _row(outcome: Outcome) -> dict[str, str | float | int]:
     if verdict is None:
         return row
     row["output"] = str(outcome.job.output)
-    row["causes"] = "; ".join(_causes(verdict))
+    row["causes"] = "; ".join(causes(verdict))
     row["p"] = "; ".join(f"{cause.p:.3f}" for cause in verdict.causes)
     row["confounded"] = "; ".join(" | ".join(group) for group in verdict.confounded)
     row["unknown"] = "; ".join(f"{item.channel} over {item.covariate}: {item.shape}" for item in verdict.unknown)
@@ -120,7 +120,8 @@ def _row(outcome: Outcome) -> dict[str, str | float | int]:
     return row
 
 
-def _causes(verdict: Verdict) -> list[str]:
+def causes(verdict: Verdict) -> list[str]:
+    """Return each cause with its parameters, on one line."""
     return [
         f"{cause.id} "
         + ", ".join(f"{name} {e.estimate:.3g}{'' if e.unit == '1' else f' {e.unit}'}" for name, e in values)
@@ -140,6 +141,6 @@ def _what(outcome: Outcome) -> str:
         return outcome.error
     if verdict.verdict == "invalid_data":
         return verdict.problems[0] if verdict.problems else ""
-    told = [*_causes(verdict), *(f"one of {', '.join(group)}" for group in verdict.confounded)]
+    told = [*causes(verdict), *(f"one of {', '.join(group)}" for group in verdict.confounded)]
     told += [f"{item.channel} over {item.covariate}" for item in verdict.unknown]
     return "; ".join(told)

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable, Sequence
+
+from kurumaisu.errors import Error, one_line
 
 
 def main() -> int:
@@ -15,7 +18,16 @@ def main() -> int:
     if name == "watch":
         from kurumaisu.ros import critic_watch
 
-        return critic_watch.main(arguments)
+        return _told(critic_watch.main, arguments)
     from kurumaisu.critic import cli
 
     return cli.main()
+
+
+def _told(command: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> int:
+    """Run a command; say what was wrong with its input on one line."""
+    try:
+        return command(arguments)
+    except Error as error:
+        print(f"critic: {one_line(error)}", file=sys.stderr)
+        return 1
