@@ -80,7 +80,7 @@ def on_dask(jobs: Sequence[Job], address: str, display: Display) -> Iterator[Out
     try:
         for job in jobs:
             futures[client.submit(run_quietly, _absolute(job), pure=False, retries=0)] = job
-        for future in as_completed(list(futures)):
+        for future in as_completed(list(futures), loop=client.loop):
             outcome = _outcome(future, futures[future])
             display.end(outcome)
             yield outcome
