@@ -67,7 +67,7 @@ def _criticise(options: argparse.Namespace) -> int:
             results.write_table(options.table, outcomes)
     if not options.json:
         _print(outcomes, many=len(jobs) > 1)
-    return _code(outcomes)
+    return exit_code(outcomes)
 
 
 def _run(jobs: list[Job], options: argparse.Namespace, shown: Display, done: dict[str, Outcome]) -> None:
@@ -141,7 +141,7 @@ def _print(outcomes: Sequence[Outcome], *, many: bool) -> None:
             print(f"report: {outcome.job.output / 'report.html'}")
 
 
-def _code(outcomes: Sequence[Outcome]) -> int:
+def exit_code(outcomes: Sequence[Outcome]) -> int:
     """Return 1 when any failed, else the largest."""
     codes = [outcome.code for outcome in outcomes]
     return ERROR if ERROR in codes else max(codes)
