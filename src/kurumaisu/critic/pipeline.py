@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic import explain, gain, naming, noise, sanity
+from kurumaisu.critic import explain, gain, naming, next_experiment, noise, sanity
 from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.explain import Criticism
@@ -53,7 +53,9 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
     baseline = _noise(train, model, empty, recording.truth, project=False)
     splits = gain.folds(train, test)
     worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
-    return explain.criticism(recording, problem, found, worth, train + test)
+    progress("planning the next drive")
+    proposal = next_experiment.propose(problem, found, next_experiment.drives())
+    return explain.criticism(recording, problem, found, worth, train + test, proposal)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:

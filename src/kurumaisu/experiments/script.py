@@ -81,7 +81,7 @@ class Script:
     @property
     def seconds(self) -> float:
         """Duration [s], without the ways between places."""
-        return sum(part.seconds for part in (*self.phases, *self.places))
+        return sum(phase.seconds for phase in self.phases) + sum(place.seconds for place in self.places)
 
 
 def names() -> tuple[str, ...]:
@@ -124,6 +124,11 @@ def _box(section: settings.Section) -> Box:
     box = Box(**{name: section.number(name, at_least=0) for name in ("ahead", "behind", "left", "right")})
     section.end()
     return box
+
+
+def base_limits() -> Limits:
+    """Return what base_node lets pass, launch/base_node.yaml."""
+    return _limits(settings.load(shipped("launch/base_node.yaml")).section("limits"))
 
 
 def _limits(section: settings.Section) -> Limits:

@@ -18,9 +18,9 @@ def reach(chassis: Chassis) -> float:
 
 
 def obstructed(box: Box, start: FloatArray, margin: float, walls: FloatArray) -> FloatArray:
-    """Return the walls (k, 4), out of (m, 4) of x and y of both ends [m], that reach into the box grown by a margin [m].
+    """Return the walls (k, 4) out of (m, 4) that reach into the box grown by a margin [m].
 
-    start (3,): where the experiment begins, in the frame of the walls.
+    walls: x and y of both ends [m]; start (3,): where the experiment begins, in the frame of the walls.
     """
     ends = walls.reshape(-1, 2)
     seen = geometry.between(start, np.column_stack([ends, np.zeros(len(ends))]))[:, :2].reshape(-1, 2, 2)

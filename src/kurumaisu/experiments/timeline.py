@@ -16,7 +16,7 @@ PERIOD = 0.02  # [s] between the samples of a path: the control loop of the base
 
 @dataclass(frozen=True)
 class Phase:
-    """What is asked for during so many seconds; the first `ramp` [s] of them lead over linearly from what was before."""
+    """What is asked for during so many seconds; the first `ramp` [s] lead over linearly from what was before."""
 
     seconds: float
     target: tuple[float, ...]
