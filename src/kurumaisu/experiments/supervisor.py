@@ -136,8 +136,12 @@ class Supervisor:
             self.stop("time ran backwards")
             self._due, self._end = now, np.inf
         elif now - self._last > self._care.clock_jump:
-            self.stop(f"time leapt by {now - self._last:.2f} s")
+            self._leap(now - self._last)
         self._last = now
+
+    def _leap(self, seconds: float) -> None:
+        if self.stage is Stage.RUNNING:
+            self.stop(f"time leapt by {seconds:.2f} s")
 
     def _wait(self, now: float) -> None:
         absent = [source for source in self._sources if source not in self._poses]

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from kurumaisu.params import load_model, shipped
 from kurumaisu.ros.experiment_drive import run_drive
 from kurumaisu.ros.experiment_ground import Ground
 from kurumaisu.ros.experiment_places import run_places
+
+_LONGEST = 10.0  # [s] of wall time for stopping when killed
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -44,22 +47,32 @@ def _run(script: Script, options: argparse.Namespace) -> str:
     care = read_care(settings.load(options.settings))
     model = load_model(options.model)
     stop = _Stop()
-    ground = Ground(script, model.chassis, care, options.world)
-    if script.kind == "places":
-        return run_places(script, care, ground, stop, options.bag)
-    return run_drive(script, care, model, ground, stop, options.bag)
+    try:
+        ground = Ground(script, model.chassis, care, options.world)
+        if script.kind == "places":
+            return run_places(script, care, ground, stop, options.bag)
+        return run_drive(script, care, model, ground, stop, options.bag)
+    finally:
+        stop.heeded.set()
 
 
 class _Stop:
     """Whether somebody wants it to end: Ctrl-C, kill, rosnode kill."""
 
     def __init__(self) -> None:
+        self.heeded = threading.Event()
         self._signalled = False
+        rospy.on_shutdown(self._shut_down)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._note)
 
     def __call__(self) -> bool:
         return self._signalled or rospy.is_shutdown()
+
+    def _shut_down(self) -> None:
+        """Keep the topics open until the chair has been told to stop: rosnode kill closes them after this."""
+        self._signalled = True
+        self.heeded.wait(_LONGEST)
 
     def _note(self, _number: int, _frame: object) -> None:
         self._signalled = True

@@ -20,7 +20,7 @@ from kurumaisu.experiments import Script, base_limits
 from kurumaisu.experiments.supervisor import Care, Stage, Supervisor
 from kurumaisu.msg import Voltages
 from kurumaisu.params import Model
-from kurumaisu.ros.experiment_ground import Ground, publishers, subscribers
+from kurumaisu.ros.experiment_ground import Ground, hearers, publishers
 from kurumaisu.ros.recorder import Recorder
 from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.types import FloatArray
@@ -40,7 +40,7 @@ def run_drive(
     others = publishers(topic)
     if others:
         raise Error(f"{topic} is published already, by {', '.join(others)}")
-    if not subscribers(topic):
+    if not hearers(topic, care.patience):
         raise Error(f"nobody hears {topic}")
     recorder = Recorder(bag, RECORDED) if bag is not None else None
     try:
@@ -76,7 +76,6 @@ class _Driver:
     def run(self, stop: Callable[[], bool]) -> str:
         """Publish until the supervisor has ended; return its outcome."""
         deadline = np.inf
-        rospy.core.add_preshutdown_hook(lambda _reason: self._publish(self._supervisor.rest))
         while self._supervisor.stage is not Stage.ENDED and time.monotonic() < deadline:
             if stop() and deadline == np.inf:
                 deadline = time.monotonic() + _LATE

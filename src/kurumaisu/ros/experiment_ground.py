@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rosgraph
@@ -17,6 +18,7 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 
 TRUTH, ODOM = "ground_truth", "odom"
+_GLANCE = 0.1  # [s] of wall time between questions to the master
 
 
 class Ground:
@@ -26,6 +28,8 @@ class Ground:
         """world: a file, 'none', or None for the simulator's. Raise Error when it cannot be read."""
         self._script = script
         self._margin = reach(chassis) + care.margin
+        # What is started together with this comes up at its own pace.
+        _until(lambda: bool(publishers(TRUTH) or publishers(ODOM)), care.patience)
         file = world if world is not None else self._simulated()
         self._walls = load_world(Path(file)).obstacles if file not in (None, "none") else None
 
@@ -55,14 +59,21 @@ class Ground:
         return next((world for world in found if isinstance(world, str)), None)
 
 
+def hearers(topic: str, patience: float) -> Sequence[str]:
+    """Return the nodes that hear a topic, as soon as one does; after so many seconds of wall time none may."""
+    _until(lambda: bool(_nodes(topic, 1)), patience)
+    return _nodes(topic, 1)
+
+
+def _until(condition: Callable[[], bool], patience: float) -> None:
+    deadline = time.monotonic() + patience
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(_GLANCE)
+
+
 def publishers(topic: str) -> Sequence[str]:
     """Return the nodes that publish a topic. Raise Error when the master does not answer."""
     return _nodes(topic, 0)
-
-
-def subscribers(topic: str) -> Sequence[str]:
-    """Return the nodes that hear a topic. Raise Error when the master does not answer."""
-    return _nodes(topic, 1)
 
 
 def _nodes(topic: str, side: int) -> Sequence[str]:
