@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu.critic import replay
+from kurumaisu.critic.catalogue import Term
 from kurumaisu.critic.drive import Drive, prepare
-from kurumaisu.critic.evidence import Problem, Term, settings_of
+from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.noise import Noise
 from kurumaisu.critic.recording import Run, Series
 from kurumaisu.experiments import Script, nominal_path, samples
@@ -24,13 +25,13 @@ from kurumaisu.experiments.timeline import PERIOD
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-NOTHING = 0.05  # [nat] less than that is no information: a hundred runs would hardly decide
+NOTHING = 0.25  # [nat] less than that is no information: thirty runs would not decide
 PRIOR = 3.0  # sd of a parameter about its null before any data, in units of its scale
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """Terms with values, and the covariance (k, k) of the values, per scale: what is in doubt about them."""
+    """Terms with values, and the covariance (k, k) of those that are not fixed, per step: what is in doubt."""
 
     terms: tuple[Term, ...]
     values: FloatArray
@@ -41,11 +42,6 @@ class Explanation:
         """Return the effects that it blames."""
         return frozenset(term.id for term in self.terms)
 
-    @property
-    def settings(self) -> tuple[EffectSetting, ...]:
-        """Return the effects as a model file has them."""
-        return settings_of(self.terms, self.values)
-
 
 @dataclass(frozen=True)
 class Prediction:
@@ -54,6 +50,11 @@ class Prediction:
     mean: FloatArray
     slopes: FloatArray
     covariance: FloatArray
+
+
+def possible(script: Script, model: Model) -> bool:
+    """Return False for voltages where a model has none."""
+    return script.kind != "sweep" or model.law_name != "identity"
 
 
 def planned(script: Script, model: Model, settings: Sequence[EffectSetting]) -> Drive:
@@ -74,11 +75,25 @@ def planned(script: Script, model: Model, settings: Sequence[EffectSetting]) -> 
 
 def predict(drive: Drive, model: Model, noise: Noise, explanation: Explanation) -> Prediction:
     """Return what an explanation says of a drive."""
-    problem = Problem([drive], model, noise)
     terms, values = explanation.terms, explanation.values
-    mean = -problem.residual(terms, values)
-    slopes = problem.columns(terms, values, terms) if terms else np.empty((len(mean), 0))
-    return Prediction(mean, slopes, explanation.covariance)
+    residual, slopes = Problem([drive], model, noise, ()).linearised(terms, values, free(terms))
+    return Prediction(-residual, slopes, explanation.covariance)
+
+
+def doubt(problem: Problem, terms: Sequence[Term], values: FloatArray) -> FloatArray:
+    """Return the covariance (k, k), per step, that the drives of a problem leave of the terms that are not fixed."""
+    slopes = problem.columns(terms, values, free(terms))
+    return np.asarray(np.linalg.inv(slopes.T @ slopes + prior(free(terms))))
+
+
+def free(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Return the terms whose values can be fitted."""
+    return tuple(term for term in terms if not term.fixed)
+
+
+def prior(terms: Sequence[Term]) -> FloatArray:
+    """Return the inverse covariance (k, k) of terms before any data, per step."""
+    return np.diag([(term.step / PRIOR) ** 2 for term in terms])
 
 
 def divergence(a: Prediction, b: Prediction) -> float:
@@ -94,14 +109,14 @@ def divergence(a: Prediction, b: Prediction) -> float:
     return max(nats, 0.0)
 
 
-def left_over(signal: FloatArray, slopes: FloatArray) -> float:
+def left_over(signal: FloatArray, slopes: FloatArray, known: FloatArray) -> float:
     """Return z^2 (1 - rho^2) / 2 [nat] of a whitened signal (n,): what parameters of slopes (n, k) cannot imitate.
 
-    The parameters are as free as PRIOR lets them be.
+    known (k, k): inverse covariance of the parameters before.
     """
-    gram = slopes.T @ slopes + np.eye(slopes.shape[1]) / PRIOR**2
     b = slopes.T @ signal
-    return max(0.5 * float(signal @ signal - b @ np.linalg.solve(gram, b)), 0.0)
+    nats = 0.5 * float(signal @ signal - b @ np.linalg.solve(slopes.T @ slopes + known, b))
+    return max(nats, 0.0)
 
 
 def _spread(slopes: FloatArray, covariance: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from kurumaisu.critic import design, naming
 from kurumaisu.critic.design import Explanation
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.verdict import NextExperiment
 from kurumaisu.experiments import Script, names, shipped_script
 from kurumaisu.types import FloatArray
@@ -54,8 +55,9 @@ def propose(problem: Problem, found: Naming, scripts: Sequence[Script]) -> Propo
     if len(fits) < 2:
         return Proposal()
     open_ids = sorted(frozenset.union(*(f.ids for f in fits)) - frozenset.intersection(*(f.ids for f in fits)))
-    rivals = [_explanation(problem, fit) for fit in fits]
-    options = [_option(problem, script, rivals, weights) for script in scripts if _possible(script, problem)]
+    rivals = [Explanation(f.terms, f.values, design.doubt(problem, f.terms, f.values)) for f in fits]
+    possible = [script for script in scripts if design.possible(script, problem.model)]
+    options = [_option(problem, script, fits[0], rivals, weights) for script in possible]
     options.sort(key=lambda option: -option.worth / option.script.seconds)
     listed = " or ".join([", ".join(open_ids[:-1]), open_ids[-1]] if len(open_ids) > 1 else open_ids)
     if not options or max(option.nats for option in options) < design.NOTHING:
@@ -70,26 +72,26 @@ def propose(problem: Problem, found: Naming, scripts: Sequence[Script]) -> Propo
 
 
 def remaining(problem: Problem, found: Naming) -> tuple[list[Fit], FloatArray]:
-    """Return the explanations that are not much less probable than the best one, and their posterior, (h,)."""
-    of = len({term.id for term in problem.terms})
-    logs = np.array([fit.score + naming.log_prior(len(fit.ids), of) for fit in found.fits])
-    order = [i for i in np.argsort(-logs)[:_RIVALS] if logs[i] >= logs.max() + np.log(naming.RIVAL)]
-    return [found.fits[i] for i in order], np.exp(logs[order] - logsumexp(logs[order]))
+    """Return the explanations that are not much less probable than the best one, and their posterior, (h,).
+
+    Of the ways in which the same effects may act, the most probable one stands for all.
+    """
+    of = len({candidate.id for candidate in problem.candidates})
+    best: dict[frozenset[str], tuple[float, Fit]] = {}
+    for fit in found.fits:
+        log = fit.score + log_prior(len(fit.ids), of)
+        if fit.ids not in best or log > best[fit.ids][0]:
+            best[fit.ids] = (log, fit)
+    ranked = sorted(best.values(), key=lambda pair: -pair[0])[:_RIVALS]
+    kept = [(log, fit) for log, fit in ranked if log >= ranked[0][0] + np.log(naming.RIVAL)]
+    logs = np.array([log for log, _ in kept])
+    return [fit for _, fit in kept], np.exp(logs - logsumexp(logs))
 
 
-def _possible(script: Script, problem: Problem) -> bool:
-    """Return False for voltages where there are none."""
-    return script.kind != "sweep" or problem.model.law_name != "identity"
-
-
-def _explanation(problem: Problem, fit: Fit) -> Explanation:
-    slopes = problem.columns(fit.terms, fit.values, fit.terms) if fit.terms else np.empty((1, 0))
-    known = slopes.T @ slopes + np.eye(len(fit.terms)) / design.PRIOR**2
-    return Explanation(fit.terms, fit.values, np.linalg.inv(known))
-
-
-def _option(problem: Problem, script: Script, rivals: Sequence[Explanation], weights: FloatArray) -> Option:
-    drive = design.planned(script, problem.model, rivals[0].settings)
+def _option(
+    problem: Problem, script: Script, likeliest: Fit, rivals: Sequence[Explanation], weights: FloatArray
+) -> Option:
+    drive = design.planned(script, problem.model, likeliest.settings)
     said = [design.predict(drive, problem.model, problem.noise, rival) for rival in rivals]
     pairs = np.array([[design.divergence(a, b) if a is not b else 0.0 for b in said] for a in said])
     # The truth is each of them with its posterior; the rival it has to beat is each other one, likewise.

@@ -7,7 +7,7 @@ import argparse
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,9 @@ from scipy.special import ndtr
 
 from kurumaisu import settings
 from kurumaisu.critic import design
+from kurumaisu.critic.catalogue import Candidate, Term, candidates, catalogue
 from kurumaisu.critic.design import Explanation
-from kurumaisu.critic.evidence import Problem, Term
+from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.next_experiment import drives
 from kurumaisu.critic.noise import Noise
@@ -74,27 +75,32 @@ def cause(model: Model, text: str) -> Explanation:
     Raise Error for an id that the critic does not look for, and for a size that is none.
     """
     name, _, size = text.partition("=")
-    problem = Problem([], model, noise())
-    terms = problem.of([name])
-    if not terms:
-        known = ", ".join(dict.fromkeys(term.id for term in problem.terms))
-        raise Error(f"{name!r} is no effect whose drives can be planned: {known}")
-    values = np.array([_typical(term) for term in terms])
+    ways = candidates(catalogue(model), model)
+    chosen = max((way for way in ways if way.id == name), key=lambda way: len(way.terms), default=None)
+    if chosen is None:
+        raise Error(f"{name!r} is no effect on the base: {', '.join(dict.fromkeys(way.id for way in ways))}")
+    values = np.array([_typical(term) for term in chosen.terms])
     if size:
-        try:
-            values[0] = float(size)
-        except ValueError as error:
-            raise Error(f"{text!r}: the size must be a number") from error
-        values[1:] = [term.null for term in terms[1:]]
-        first = terms[0].parameter
-        if not first.lower <= values[0] <= first.upper:
-            raise Error(f"{text!r}: {first.name} must be {first.lower:g} to {first.upper:g} {first.unit}")
-    return Explanation(terms, values, np.zeros((len(terms), len(terms))))
+        values[0] = _size(text, size, chosen)
+        values[1:] = [term.null for term in chosen.terms[1:]]
+    count = len(design.free(chosen.terms))
+    return Explanation(chosen.terms, values, np.zeros((count, count)))
+
+
+def _size(text: str, size: str, chosen: Candidate) -> float:
+    try:
+        value = float(size)
+    except ValueError as error:
+        raise Error(f"{text!r}: the size must be a number") from error
+    p = chosen.terms[0].parameter
+    if not p.lower <= value <= p.upper:
+        raise Error(f"{text!r}: {p.name} must be {p.lower:g} to {p.upper:g} {p.unit}")
+    return value
 
 
 def plan(model: Model, assumed: Noise, causes: Sequence[Explanation]) -> list[Row]:
     """Return the experiments, the quickest first: one cause against nothing, or one against another, either way."""
-    rows = [_row(script, model, assumed, causes) for script in drives() if _possible(script, model)]
+    rows = [_row(script, model, assumed, causes) for script in drives() if design.possible(script, model)]
     return sorted(rows, key=lambda row: (row.seconds, -row.nats))
 
 
@@ -111,29 +117,25 @@ def table(question: Sequence[str], rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def _possible(script: Script, model: Model) -> bool:
-    return script.kind != "sweep" or model.law_name != "identity"
-
-
 def _row(script: Script, model: Model, assumed: Noise, causes: Sequence[Explanation]) -> Row:
     drive = design.planned(script, model, ())
-    problem = Problem([drive], model, assumed)
-    silent = problem.residual((), np.empty(0))
+    # An effect with a threshold shows by a whole step of its typical size, if at all.
+    terms = tuple(replace(term, step=1.0) for term in catalogue(model))
+    problem = Problem([drive], model, assumed, terms)
+    silent, slopes = problem.linearised((), np.empty(0), terms)
     signals = [silent - problem.residual(one.terms, one.values) for one in causes]
-    slopes = problem.columns((), np.empty(0), problem.terms)
 
     def against(signal: FloatArray, names: frozenset[str]) -> float:
-        return design.left_over(signal, slopes[:, [term.id in names for term in problem.terms]])
+        use = [i for i, term in enumerate(terms) if term.id in names]
+        return design.left_over(signal, slopes[:, use], design.prior([terms[i] for i in use]))
 
+    nats, rival = against(signals[0], frozenset()), None
     if len(causes) == 1:
-        nats = against(signals[0], frozenset())
-        others = [frozenset([name]) for name in sorted({t.id for t in problem.terms} - causes[0].ids)]
-        rival = min(((next(iter(o)), against(signals[0], o)) for o in others), key=lambda pair: pair[1])
+        others = {term.id for term in terms} - causes[0].ids
+        rival = min(((name, against(signals[0], frozenset([name]))) for name in others), key=lambda pair: pair[::-1])
     else:
         nats = min(against(signals[0], causes[1].ids), against(signals[1], causes[0].ids))
-        rival = None
-    runs = repeats(nats)
-    return Row(script, nats, power(nats), script.seconds * runs, rival)
+    return Row(script, nats, power(nats), script.seconds * repeats(nats), rival)
 
 
 def power(nats: float) -> float:
@@ -152,6 +154,9 @@ def repeats(nats: float) -> float:
 
 
 def _typical(term: Term) -> float:
+    """Return the value of a term that stands for its effect's usual size."""
+    if term.fixed:
+        return term.parameter.lower
     size = term.null + term.parameter.scale
     return size if size <= term.parameter.upper else term.null - term.parameter.scale
 

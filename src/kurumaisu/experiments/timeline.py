@@ -11,6 +11,7 @@ import numpy as np
 from kurumaisu import _core
 from kurumaisu.types import FloatArray
 
+_SAME = 1e-9  # [s] less than any clock resolves
 PERIOD = 0.02  # [s] between the samples of a path: the control loop of the base
 
 
@@ -25,17 +26,18 @@ class Phase:
 
 def samples(phases: Sequence[Phase], period: float) -> FloatArray:
     """Return rows (n, 1 + targets) of t [s] and what is asked for, each held until the next; the last one is rest."""
-    knots, values = [0.0], [(0.0,) * len(phases[0].target)]
-    for phase in phases:
-        begin = knots[-1]
-        # Two knots at one time are a step: np.interp takes the later one from there on.
-        knots += [begin + phase.ramp, begin + phase.seconds]
-        values += [phase.target, phase.target]
-    end = knots[-1]
+    end = sum(phase.seconds for phase in phases)
     t = period * np.arange(round(end / period))
-    at = np.array(values)
-    rows = np.column_stack([t, *(np.interp(t + 1e-9, knots, at[:, i]) for i in range(at.shape[1]))])
-    return np.vstack([rows, [end, *np.zeros(at.shape[1])]])
+    asked = np.zeros((len(t) + 1, len(phases[0].target)))
+    begin, before = 0.0, np.zeros(asked.shape[1])
+    for phase in phases:
+        first = np.searchsorted(t, begin - _SAME)
+        elapsed = np.maximum(t[first:] - begin, 0.0)
+        share = np.minimum(elapsed / phase.ramp, 1.0) if phase.ramp > 0 else np.ones(len(elapsed))
+        asked[first:-1] = before + share[:, np.newaxis] * (np.array(phase.target) - before)
+        begin, before = begin + phase.seconds, np.array(phase.target)
+    asked[-1] = 0.0
+    return np.column_stack([np.append(t, end), asked])
 
 
 def nominal_path(phases: Sequence[Phase]) -> FloatArray:
