@@ -15,6 +15,7 @@ NAMES = (
     "arena",
     "stageros",
     "critic",
+    "next_experiment",
     "laser",
     "laser_clock",
     "faults",
