@@ -16,11 +16,25 @@ from kurumaisu.params import load_model, shipped
 from kurumaisu.world import load_world
 
 CARE = read_care(settings.load(shipped("launch/experiment_node.yaml")))
-CONTRACT = (
-    "standstill steering_sweep straight_three_speeds spin_both_ways spin_three_speeds circles_slow_fast "
-    "forward_reverse_turns steps_big steps_small square_wave_w creep reversal_from_turns there_and_back "
-    "wall_five_distances wall_yawed room_poses warmup_static"
-).split()
+CONTRACT = [
+    "standstill",
+    "steering_sweep",
+    "straight_three_speeds",
+    "spin_both_ways",
+    "spin_three_speeds",
+    "circles_slow_fast",
+    "forward_reverse_turns",
+    "steps_big",
+    "steps_small",
+    "square_wave_w",
+    "creep",
+    "reversal_from_turns",
+    "there_and_back",
+    "wall_five_distances",
+    "wall_yawed",
+    "room_poses",
+    "warmup_static",
+]
 GOOD = {
     "kind": "drive",
     "good_for": "a test",

@@ -133,7 +133,7 @@ def _commands(choose: Callable[[np.random.Generator], tuple[float, float]], rng:
 
 
 def _run(name: str, command: FloatArray, fault: Fault, rng: np.random.Generator) -> Run:
-    stamps = np.round(np.arange(0.0, command[-1, 0] + 1.0, _POSES), 6)
+    stamps = _POSES * np.arange(round((command[-1, 0] + 1.0) / _POSES))
     noise = draw_rates(USUAL, round((stamps[-1] + 3.0) / STEP), rng)
     setting = Setting(command, np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)]), stamps, noise)
     poses, _ = drive(setting, (fault,))

@@ -140,5 +140,5 @@ class Rehearsal:
             command=None if command is None else Series.of_table(command, "v", "w"),
             voltage=None if voltage is None else Series.of_table(voltage[:, : 3 + len(known)], "v_f", "v_s", *known),
             pose=Series.of_table(seen, "x", "y", "theta"),
-            scan=Series.of_table(ranges, *beams) if len(ranges) else None,
+            scan=Series.of_table(ranges, *beams) if len(ranges) and np.isfinite(ranges[:, 1:]).any() else None,
         )
