@@ -209,6 +209,12 @@ def test_leaving_the_box_stops_it(run):
     stopped(run, "the chair left the box of the experiment")
 
 
+def test_poses_that_are_not_numbers_do_not_count(run):
+    run.go(2.0)
+    run.go(0.6, (np.nan, 0.0, 0.0))
+    assert run.supervisor.outcome == "poses on ground_truth, odom are lost"
+
+
 def test_the_box_is_seen_from_where_it_began(tmp_path):
     supervisor = Supervisor(script_of(tmp_path), CARE, ["ground_truth"], lambda _pose: "")
     begin = np.array([5.0, 5.0, np.pi / 2])

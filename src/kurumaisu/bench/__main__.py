@@ -16,6 +16,7 @@ NAMES = (
     "stageros",
     "critic",
     "next_experiment",
+    "experiments_doc",
     "laser",
     "laser_clock",
     "faults",

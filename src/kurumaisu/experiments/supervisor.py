@@ -100,7 +100,9 @@ class Supervisor:
         return (0.0,) * (self._rows.shape[1] - 1)
 
     def see(self, source: str, t: float, pose: FloatArray) -> None:
-        """Take a pose (3,) that came at a time [s]."""
+        """Take a pose (3,) that came at a time [s]; one that is not finite did not come."""
+        if not np.isfinite(pose).all():
+            return
         self._poses[source] = (t, pose)
         if source != self._sources[0]:
             return
@@ -157,7 +159,8 @@ class Supervisor:
             self.stop(f"no poses on {', '.join(lost)}" if lost else "the chair does not stand")
 
     def _lost(self, now: float) -> list[str]:
-        return [name for name, (t, _) in self._poses.items() if now - t > self._care.pose_timeout]
+        known = [name for name in self._sources if name in self._poses]
+        return [name for name in known if now - self._poses[name][0] > self._care.pose_timeout]
 
     def _watch_poses(self, now: float) -> None:
         lost = self._lost(now)

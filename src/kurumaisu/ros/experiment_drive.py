@@ -28,7 +28,8 @@ from kurumaisu.types import FloatArray
 COMMAND, VOLTAGE = "cmd_vel", "voltages"
 RECORDED = ("cmd_vel", "voltages", "odom", "scan", "ground_truth")
 _GLANCE = 0.002  # [s] of wall time between looks at the clock
-_LATE = 5.0  # [s] of wall time after Ctrl-C for zero to be published; time may stand
+_LEAVE = 0.2  # [s] of wall time for a message to leave
+_LATE = 3.0  # [s] of wall time after Ctrl-C for zero to be published; time may stand
 
 
 def run_drive(
@@ -85,6 +86,9 @@ class _Driver:
             if said is not None:
                 self._publish(said)
             time.sleep(_GLANCE)
+        if self._supervisor.stage is not Stage.ENDED:  # time stands: zero for when it goes on
+            self._publish(self._supervisor.rest)
+            time.sleep(_LEAVE)
         return self._supervisor.outcome
 
     def _publish(self, values: tuple[float, ...]) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import time
+import xmlrpc.client
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,7 +14,9 @@ import rosgraph
 import rospy
 
 from kurumaisu.errors import Error
+from kurumaisu.ros.experiment_ground import publishers
 
+_GLANCE = 0.05  # [s] of wall time
 _PATIENCE = 20.0  # [s] of wall time for a process to start or to end
 
 
@@ -47,10 +50,19 @@ class Recorder:
     def _wait_until_heard(self, topics: Sequence[str], node: str) -> None:
         deadline = time.monotonic() + _PATIENCE
         while self._process.poll() is None and time.monotonic() < deadline:
-            heard = {topic for topic, nodes in rosgraph.Master(rospy.get_name()).getSystemState()[1] if node in nodes}
-            if heard >= set(topics):
+            if _connected(node) >= {topic for topic in topics if publishers(topic)}:
                 return
-            time.sleep(0.05)
+            time.sleep(_GLANCE)
         self._process.kill()
         self._process.wait()
         raise Error(f"{self._path}: rosbag record does not start")
+
+
+def _connected(node: str) -> set[str]:
+    """Return the topics from which a node receives; the master knows only what it asked for."""
+    try:
+        uri = rosgraph.Master(rospy.get_name()).lookupNode(node)
+        links = xmlrpc.client.ServerProxy(uri).getBusInfo(rospy.get_name())[2]
+    except (OSError, rosgraph.MasterException, xmlrpc.client.Error):
+        return set()  # not yet
+    return {str(link[4]) for link in links if link[2] == "i" and link[5]}
