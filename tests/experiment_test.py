@@ -10,6 +10,7 @@ import unittest
 from pathlib import Path
 
 import numpy as np
+import rosgraph
 import rospy
 import yaml
 from geometry_msgs.msg import Point, Pose, Twist
@@ -119,6 +120,7 @@ class Experiment(unittest.TestCase):
         subprocess.run(["rosnode", "kill", "/victim"], check=True, capture_output=True, timeout=30)
         assert "slow: interrupted" in self.end(process, 1)
         self.stopped_properly()
+        assert "/victim" not in str(rosgraph.Master("/experiment_test").getSystemState())
 
     def test_nothing_is_published_while_time_stands(self):
         pause = rospy.ServiceProxy("pause", SetBool)

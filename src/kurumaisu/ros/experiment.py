@@ -18,7 +18,7 @@ from kurumaisu.experiments import Script, load_script, names, shipped_script
 from kurumaisu.experiments.supervisor import read_care
 from kurumaisu.params import load_model, shipped
 from kurumaisu.ros.experiment_drive import run_drive
-from kurumaisu.ros.experiment_ground import Ground
+from kurumaisu.ros.experiment_ground import Ground, wait_until_gone
 from kurumaisu.ros.experiment_places import run_places
 
 _LONGEST = 10.0  # [s] of wall time for stopping when killed
@@ -54,6 +54,8 @@ def _run(script: Script, options: argparse.Namespace) -> str:
         return run_drive(script, care, model, ground, stop, options.bag)
     finally:
         stop.heeded.set()
+        if stop.killed:  # ROS signs off in a thread of its own, which the end of the program would cut short
+            wait_until_gone(_LONGEST)
 
 
 class _Stop:
@@ -61,6 +63,7 @@ class _Stop:
 
     def __init__(self) -> None:
         self.heeded = threading.Event()
+        self.killed = False  # by ROS
         self._signalled = False
         rospy.on_shutdown(self._shut_down)
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -71,7 +74,7 @@ class _Stop:
 
     def _shut_down(self) -> None:
         """Keep the topics open until the chair has been told to stop: rosnode kill closes them after this."""
-        self._signalled = True
+        self.killed = self._signalled = True
         self.heeded.wait(_LONGEST)
 
     def _note(self, _number: int, _frame: object) -> None:

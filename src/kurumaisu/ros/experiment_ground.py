@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import rosgraph
 import rospy
@@ -76,10 +77,18 @@ def publishers(topic: str) -> Sequence[str]:
     return _nodes(topic, 0)
 
 
+def wait_until_gone(patience: float) -> None:
+    """Return when the master knows nothing of this node any more, or after so many seconds of wall time."""
+    _until(lambda: not any(rospy.get_name() in nodes for side in _state() for _, nodes in side), patience)
+
+
 def _nodes(topic: str, side: int) -> Sequence[str]:
+    name = rospy.resolve_name(topic)
+    return [node for known, nodes in _state()[side] if known == name for node in nodes if node != rospy.get_name()]
+
+
+def _state() -> Any:
     try:
-        state = rosgraph.Master(rospy.get_name()).getSystemState()[side]
+        return rosgraph.Master(rospy.get_name()).getSystemState()
     except (OSError, rosgraph.MasterException) as error:
         raise Error(f"the ROS master does not answer: {error}") from error
-    name = rospy.resolve_name(topic)
-    return [node for known, nodes in state if known == name for node in nodes if node != rospy.get_name()]

@@ -9,6 +9,7 @@ import time
 import xmlrpc.client
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import rosgraph
 import rospy
@@ -62,7 +63,7 @@ def _connected(node: str) -> set[str]:
     """Return the topics from which a node receives; the master knows only what it asked for."""
     try:
         uri = rosgraph.Master(rospy.get_name()).lookupNode(node)
-        links = xmlrpc.client.ServerProxy(uri).getBusInfo(rospy.get_name())[2]
+        answer: Any = xmlrpc.client.ServerProxy(uri).getBusInfo(rospy.get_name())
     except (OSError, rosgraph.MasterException, xmlrpc.client.Error):
         return set()  # not yet
-    return {str(link[4]) for link in links if link[2] == "i" and link[5]}
+    return {str(link[4]) for link in answer[2] if link[2] == "i" and link[5]}
