@@ -100,7 +100,7 @@ def test_a_wrong_command_line_is_told_from_wrong_data(drives, options):
 
 
 def test_patterns_choose_effects():
-    sought = {effect.id for effect in effects.CRITICISED if not effect.random}
+    sought = {effect.id for effect in effects.BASE if not effect.random}
     assert effect_ids([], []) is None
     assert effect_ids(["base.lag_*", "base.delay"], ["*_w"]) == {"base.lag_v", "base.delay"}
     assert effect_ids([], ["base.lag_*", "laser.*"]) == sought - {"base.lag_v", "base.lag_w"}

@@ -15,6 +15,7 @@ from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.extended import process_noise
 from kurumaisu.critic.material import MATERIAL, moved_share
 from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.next_experiment import Proposal
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
 from kurumaisu.critic.verdict import Cause, Gain, Kind, Verdict
@@ -51,7 +52,12 @@ def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Crit
 
 
 def criticism(
-    recording: Recording, problem: Problem, found: Naming, worth: Gain | None, drives: Sequence[Drive]
+    recording: Recording,
+    problem: Problem,
+    found: Naming,
+    worth: Gain | None,
+    drives: Sequence[Drive],
+    proposal: Proposal,
 ) -> Criticism:
     """Return the criticism after a search; worth: the gain on held-out drives, None when nothing was found."""
     best = found.best
@@ -66,6 +72,7 @@ def criticism(
         causes=causes,
         confounded=found.confounded if kind != "none" else (),
         problems=recording.problems,
+        next_experiment=proposal.experiment,
         gain=worth,
     )
     story = Story(
@@ -83,6 +90,7 @@ def criticism(
         rivals=words.rivals(found),
         noise=_noise(problem),
         unexplained=(*words.suspects(found), *misfit.remaining(problem, best)),
+        next_drive=proposal.sentence,
     )
     return Criticism(verdict, story, problem.model, (*settings, process_noise(problem.noise)))
 
@@ -98,7 +106,8 @@ def _kind(found: Naming, matters: set[str]) -> Kind:
 
 
 def _cause(problem: Problem, found: Naming, name: str) -> Cause:
-    without = problem.fit(found.best.ids - {name}, {})
+    rest = {candidate for candidate in found.best.candidates if candidate.id != name}
+    without = problem.fit_candidates(rest, found.best.start)
     parameters = {
         term.parameter.name: words.estimate(problem.model, term, value, sd)
         for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True)

@@ -22,8 +22,8 @@ examples:
   critic day_1/ day_2/ --output out               several: out/day_1/report.html, ...
   critic recordings/ --jobs 8 --table all.csv     a folder of recordings, eight at a time
   critic recordings/ --dask tcp://head:8786       on a Dask cluster that is there
-  critic experiment NAME, critic plan, critic watch: other commands, each with its own --help; a recording of such a
-                                                  name is ./watch
+  critic experiment, critic plan, critic rehearse, critic watch: other commands, each with its own --help;
+                                                  a recording of such a name is ./watch
 
 exit codes:
   0  none: nothing that is both detectable and large enough to matter

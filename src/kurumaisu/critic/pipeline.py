@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic import explain, gain, naming, noise, sanity
-from kurumaisu.critic.drive import Drive, prepare
+from kurumaisu.critic import explain, gain, naming, next_experiment, noise, sanity
+from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
@@ -17,7 +17,7 @@ from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.verdict import write_verdict
 from kurumaisu.errors import Error
-from kurumaisu.params import Model, follow_commands, load_model
+from kurumaisu.params import follow_commands, load_model
 
 Progress = Callable[[str], None]
 
@@ -48,19 +48,22 @@ def criticise(
         return explain.invalid(recording, model, wrong)
 
     progress("estimating the noise")
-    empty = Problem(train, model, noise.START, ids).fit((), {})
-    first = _noise(train, model, empty, recording.truth, ids)
-    found = naming.search(Problem(train, model, first, ids), progress)
+    rough = Problem(train, model, noise.START, ids=ids)
+    empty = rough.fit((), {})
+    first = Problem(train, model, _scatter(rough, empty, recording.truth, project=True).estimate().noise, ids=ids)
+    found = naming.search(first, progress)
     progress("estimating the noise again, beside what was found")
-    final = _noise(train, model, found.best, recording.truth, ids)
-    problem = Problem(train, model, final, ids)
+    final = _scatter(first, found.best, recording.truth, project=True).estimate(first.noise).noise
+    problem = Problem(train, model, final, first.terms, ids)
     found = naming.search(problem, progress)
 
     progress("measuring the gain on drives held out")
-    baseline = _noise(train, model, empty, recording.truth, frozenset())
+    baseline = _scatter(rough, empty, recording.truth, project=False).estimate(final).noise
     splits = gain.folds(train, test)
     worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
-    return explain.criticism(recording, problem, found, worth, train + test)
+    progress("planning the next drive")
+    proposal = next_experiment.propose(problem, found, next_experiment.drives())
+    return explain.criticism(recording, problem, found, worth, train + test, proposal)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
@@ -74,14 +77,11 @@ def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
     write_extended(folder / "extended.yaml", model_file, criticism.model, criticism.settings, criticism.story.recording)
 
 
-def _noise(
-    drives: list[Drive], model: Model, fit: Fit, truth: tuple[float, float] | None, ids: frozenset[str] | None
-) -> noise.Noise:
-    """Return the noise about a fit, with the effects of some ids projected out; None for all that are criticised."""
-    problem = Problem(drives, model, noise.START, ids)
-    residuals = [drive.measured - problem.simulated(drive, fit.settings) for drive in drives]
+def _scatter(problem: Problem, fit: Fit, truth: tuple[float, float] | None, *, project: bool) -> noise.Scatter:
+    """Return what is left about a fit, with all effects of the catalogue projected out or none."""
+    residuals = [drive.measured - problem.simulated(drive, fit.settings) for drive in problem.drives]
     columns = [
-        problem.simulated_columns(drive, fit) if problem.terms else np.empty((residual.size, 0))
-        for drive, residual in zip(drives, residuals, strict=True)
+        problem.simulated_columns(drive, fit) if project and problem.terms else np.empty((residual.size, 0))
+        for drive, residual in zip(problem.drives, residuals, strict=True)
     ]
-    return noise.estimate(drives, residuals, columns, truth)
+    return noise.Scatter(problem.drives, residuals, columns, truth)

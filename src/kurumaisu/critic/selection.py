@@ -22,7 +22,7 @@ def effect_ids(only: Sequence[str], without: Sequence[str]) -> frozenset[str] | 
     if not only and not without:
         return None
     catalogue = tuple(effect.id for effect in effects.ALL)
-    sought = tuple(effect.id for effect in effects.CRITICISED if not effect.random)
+    sought = tuple(effect.id for effect in effects.BASE if not effect.random)
     wanted: set[str] = set() if only else set(sought)
     for pattern in only:
         found = set(matching("--only", pattern, catalogue, "effect")) & set(sought)

@@ -6,8 +6,17 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 
 from kurumaisu.errors import Error, one_line
+
+# Other commands, by the first word, and where their main is.
+_PARTS = {
+    "experiment": "kurumaisu.ros.experiment",
+    "plan": "kurumaisu.critic.plan",
+    "rehearse": "kurumaisu.critic.rehearse",
+    "watch": "kurumaisu.ros.critic_watch",
+}
 
 
 def main() -> int:
@@ -15,10 +24,9 @@ def main() -> int:
     # The same sums in the same order, however many cores there are and however many recordings run at once.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     name, arguments = (sys.argv[1] if len(sys.argv) > 1 else ""), sys.argv[2:]
-    if name == "watch":
-        from kurumaisu.ros import critic_watch
-
-        return _told(critic_watch.main, arguments)
+    if name in _PARTS:
+        command: Callable[[Sequence[str]], int] = import_module(_PARTS[name]).main
+        return _told(command, arguments)
     from kurumaisu.critic import cli
 
     return cli.main()
