@@ -13,6 +13,7 @@ from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
+from kurumaisu.critic.prior import odds
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.verdict import write_verdict
@@ -53,9 +54,12 @@ def criticise(
     first = Problem(train, model, _scatter(rough, empty, recording.truth, project=True).estimate().noise, ids=ids)
     found = naming.search(first, progress)
     progress("estimating the noise again, beside what was found")
-    final = _scatter(first, found.best, recording.truth, project=True).estimate(first.noise).noise
+    scatter = _scatter(first, found.best, recording.truth, project=True)
+    final = scatter.estimate(first.noise).noise
+    growth = scatter.growth(final, odds(len(found.p)))
+    final = growth.noise if growth.p > 1 / 2 else final
     problem = Problem(train, model, final, first.terms, ids)
-    found = naming.search(problem, progress)
+    found = naming.search(problem, progress, found.best)
 
     progress("measuring the gain on drives held out")
     baseline = _scatter(rough, empty, recording.truth, project=False).estimate(final).noise
@@ -63,7 +67,7 @@ def criticise(
     worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
     progress("planning the next drive")
     proposal = next_experiment.propose(problem, found, next_experiment.drives())
-    return explain.criticism(recording, problem, found, worth, train + test, proposal)
+    return explain.criticism(recording, problem, found, growth, worth, train + test, proposal)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:

@@ -92,9 +92,6 @@ BASE: tuple[type[BaseEffect], ...] = (
     ClockScale,
 )
 
-# What the critic looks for, too; kept as a name of its own for what is not yet criticised.
-CRITICISED: tuple[type[BaseEffect], ...] = BASE
-
 WORLD: tuple[type[WorldEffect], ...] = (MapError,)
 
 # What the simulator can run.
@@ -171,9 +168,9 @@ def _chosen(settings: tuple[EffectSetting, ...]) -> list[tuple[type[Mechanism], 
 __all__ = [
     "ALL",
     "BASE",
-    "CRITICISED",
     "LASER",
     "WORLD",
+    "BaseEffect",
     "BeamEffect",
     "Beams",
     "Chain",
