@@ -49,7 +49,13 @@ PYTHON_RULES = [
     Rule(r"kurumaisu/(?!bench/|demo/)", r"kurumaisu\.(bench|demo)(\.|$)", "nothing rests on a benchmark or the demo"),
     Rule(r"kurumaisu/(effects|world)/", r"kurumaisu\.sim(\.|$)", "the simulator rests on effects and world"),
     Rule(r"kurumaisu/world/", r"kurumaisu\.effects(\.|$)", "a world knows no chair"),
-    Rule(r"kurumaisu/(critic|sim|world)/", rf"{CONCRETE}|effect id", "it iterates over effects.ALL and names none"),
+    Rule(r"kurumaisu/(effects|sim|world)/", r"kurumaisu\.experiments(\.|$)", "an experiment is done to the simulator"),
+    Rule(r"kurumaisu/experiments/", r"kurumaisu\.(sim|effects)(\.|$)", "a script does not know who runs it"),
+    Rule(
+        r"kurumaisu/(critic|experiments|sim|world)/",
+        rf"{CONCRETE}|effect id",
+        "it iterates over effects.ALL and names none",
+    ),
     Rule(r"kurumaisu/\w+\.py", r"kurumaisu\.(sim|world|viewer)(\.|$)", "what all share rests on nothing"),
 ]
 CPP_RULES = [
@@ -142,6 +148,9 @@ PLANTED = {
     "src/kurumaisu/critic/n.py": "from kurumaisu.effects import LagV",
     "src/kurumaisu/critic/o.py": "from kurumaisu import effects\neffects.LagV",
     "src/kurumaisu/critic/o2.py": "chosen = 'base.lag_v'",
+    "src/kurumaisu/sim/o3.py": "from kurumaisu import experiments",
+    "src/kurumaisu/experiments/o4.py": "from kurumaisu.sim import plant",
+    "src/kurumaisu/experiments/o5.py": "import rospy",
     "src/kurumaisu/world/p.py": "from kurumaisu import effects",
     "src/kurumaisu/geometry.py": "from kurumaisu.sim import plant",
     "src/kurumaisu/sim/q.py": "from kurumaisu.bench import table",

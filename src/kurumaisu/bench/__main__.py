@@ -15,6 +15,8 @@ NAMES = (
     "arena",
     "stageros",
     "critic",
+    "next_experiment",
+    "experiments_doc",
     "laser",
     "laser_clock",
     "faults",

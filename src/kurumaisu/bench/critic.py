@@ -96,13 +96,13 @@ def _row(table: Table, label: str, effect: str | None, draws: Sequence[_Draw]) -
     table.row(
         label,
         str(n),
-        *(_share(k, n) for k in (right, wrong, a_set, n - right - wrong - a_set)),
-        _share(sum(covered), len(covered)) if covered else "-",
+        *(share(k, n) for k in (right, wrong, a_set, n - right - wrong - a_set)),
+        share(sum(covered), len(covered)) if covered else "-",
         float(np.median([draw.cpu for draw in draws])),
     )
 
 
-def _share(k: int, n: int) -> str:
+def share(k: int, n: int) -> str:
     """Return a share with its exact (Clopper-Pearson) 90 % interval."""
     low = beta.ppf(0.05, k, n - k + 1) if k else 0.0
     high = beta.ppf(0.95, k + 1, n - k) if k < n else 1.0

@@ -61,13 +61,16 @@ class Candidate:
         return all(term.fixed for term in self.terms)
 
 
-def catalogue(model: Model) -> tuple[Term, ...]:
-    """Return a term for every parameter of every effect that changes the mean motion and has a size to fit."""
+def catalogue(model: Model, ids: frozenset[str] | None = None) -> tuple[Term, ...]:
+    """Return a term for every parameter of every effect that changes the mean motion and has a size to fit.
+
+    ids: of these effects only.
+    """
     own = {setting.id: setting.parameters for setting in model.effects}
     return tuple(
         Term(effect.id, parameter, own.get(effect.id, {}).get(parameter.name, parameter.null))
         for effect in effects.BASE
-        if not effect.random and not effect.choices
+        if not effect.random and not effect.choices and (ids is None or effect.id in ids)
         for parameter in effect.parameters
     )
 
@@ -141,13 +144,13 @@ def _typical_step(term: Term, norm: Callable[[float], float]) -> float | None:
     return sign * min(high, largest)
 
 
-def candidates(terms: Sequence[Term], model: Model) -> tuple[Candidate, ...]:
-    """Return the ways in which the effects of these terms may act, and those that can only act or not."""
+def candidates(terms: Sequence[Term], model: Model, ids: frozenset[str] | None = None) -> tuple[Candidate, ...]:
+    """Return the ways in which the effects of these terms may act, and those that can act or not; ids: among these."""
     found: list[Candidate] = []
     own = {setting.id for setting in model.effects}
     for effect in effects.BASE:
         if effect.choices and effect.id not in own:
-            found += _choices(effect)
+            found += _choices(effect) if ids is None or effect.id in ids else []
             continue
         amplitudes = [term for term in terms if term.id == effect.id and not term.shape]
         shapes = [term for term in terms if term.id == effect.id and term.shape]

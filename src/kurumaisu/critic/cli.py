@@ -1,74 +1,147 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""critic RECORDING: say what a model gets wrong about a measured robot."""
+"""critic RECORDING...: say what a model gets wrong about a measured robot."""
 
 from __future__ import annotations
 
 import argparse
+import os
+import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic import pipeline
-from kurumaisu.critic.explain import Criticism
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.reference import with_reference
+from kurumaisu.critic import batch, find, results
+from kurumaisu.critic.display import Display, display
+from kurumaisu.critic.job import ERROR, Job, Outcome, run
+from kurumaisu.critic.options import parse
+from kurumaisu.critic.selection import effect_ids
+from kurumaisu.critic.verdict import Verdict
 from kurumaisu.errors import Error, one_line
-from kurumaisu.params import shipped
 
-_WIDTH = 100  # characters of a line of progress
+INTERRUPTED = 130  # 128 + SIGINT, as a shell has it
+_BROKEN_PIPE = 141  # 128 + SIGPIPE
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Criticise a recording; return 0, or 2 when the input cannot be used."""
-    options = _parser().parse_args(arguments)
+    """Criticise recordings; return the exit code, which critic --help explains."""
+    options = parse(arguments)
     try:
-        criticism = run(options.recording, options.output, options.model, options.seed)
+        code = _criticise(options)
+        sys.stdout.flush()
+        return code
     except Error as error:
         print(f"critic: {one_line(error)}", file=sys.stderr)
-        return 2
-    print(summary(criticism))
-    print(f"report: {options.output / 'report.html'}")
-    return 0
+        return ERROR
+    except KeyboardInterrupt:
+        print("critic: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # who listened has heard enough; nor must Python complain when it flushes at its end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return _BROKEN_PIPE
 
 
-def run(recording_path: Path, output: Path, model: Path | None, seed: int) -> Criticism:
-    """Read, criticise and write into a folder. Raise Error naming what is wrong with the input."""
-
-    def progress(message: str) -> None:
-        """Overwrite one line of a terminal; elsewhere keep every line."""
-        start, end = ("\r\033[K", "") if sys.stderr.isatty() else ("", "\n")
-        print(f"{start}critic: {message}"[:_WIDTH], end=end, file=sys.stderr, flush=True)
-
-    progress(f"reading {recording_path}")
-    recording = read_recording(recording_path)
-    recording = with_reference(recording, seed, progress)
-    model_file = model or recording.model or shipped("launch/md100.yaml")
-    criticism = pipeline.criticise(recording, model_file, progress, assume_law=model is not None)
-    pipeline.write(criticism, model_file, output)
-    if sys.stderr.isatty():
-        print("\r\033[K", end="", file=sys.stderr, flush=True)
-    return criticism
+def tell(job: Job) -> Verdict:
+    """Criticise one recording, showing progress, print the answer and return it. Raise Error where there is none."""
+    shown = display(sys.stderr, 1, quiet=False)
+    (outcome,) = _here(job, shown)
+    shown.close()
+    if outcome.verdict is None:
+        raise Error(outcome.error)
+    _print([outcome], many=False)
+    return outcome.verdict
 
 
-def summary(criticism: Criticism) -> str:
-    """Return the verdict for a terminal."""
-    verdict, story = criticism.verdict, criticism.story
-    lines = [f"verdict: {verdict.verdict}", story.headline, *(f"  {detail}" for detail in story.details)]
-    if verdict.gain is not None:
-        density = verdict.gain.log_density_per_sample
-        interval = f"90 % {density.lo90:+.3f} to {density.hi90:+.3f}"
-        lines.append(f"gain on held-out data: {density.gain:+.3f} nats per sample ({interval})")
-        lines += [
-            f"  {name}: rms error {error.baseline:.3f} -> {error.extended:.3f} {error.unit}"
-            for name, error in verdict.gain.rmse.items()
-        ]
-    return "\n".join(lines)
+def _criticise(options: argparse.Namespace) -> int:
+    """Do it all. Raise Error for what is wrong before a recording is read."""
+    jobs = _jobs(options)
+    _check_places(options.output, options.table)
+    shown = display(sys.stderr, len(jobs), quiet=options.quiet)
+    done: dict[str, Outcome] = {}
+    try:
+        _run(jobs, options, shown, done)
+    finally:
+        shown.close()
+        outcomes = [done[job.name] for job in jobs if job.name in done]
+        if options.table:
+            results.write_table(options.table, outcomes)
+    if not options.json:
+        _print(outcomes, many=len(jobs) > 1)
+    return exit_code(outcomes)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="critic", description="Say what a model gets wrong about a measured robot.")
-    parser.add_argument("recording", type=Path, help="a bag, a folder of runs or CSV tables, or an MRPT rawlog")
-    parser.add_argument("-o", "--output", type=Path, default=Path("criticism"), help="folder to write into")
-    parser.add_argument("--model", type=Path, help="model to criticise (default: the recording's, else md100.yaml)")
-    parser.add_argument("--seed", type=int, default=1, help="of the particle filter that makes a missing reference")
-    return parser
+def _run(jobs: list[Job], options: argparse.Namespace, shown: Display, done: dict[str, Outcome]) -> None:
+    """Fill in outcomes by name as they come; print JSON in the order of the jobs, as soon as all before are there."""
+    alone = len(jobs) == 1
+    printed = 0
+    for outcome in _outcomes(jobs, options, shown):
+        done[outcome.job.name] = outcome
+        _complain(outcome, shown, many=not alone)
+        while options.json and printed < len(jobs) and jobs[printed].name in done:
+            ready = done[jobs[printed].name]
+            printed += 1
+            if not (alone and ready.verdict is None):
+                shown.close()
+                print(results.as_json(ready, alone=alone), flush=True)
+
+
+def _jobs(options: argparse.Namespace) -> list[Job]:
+    found = find.recordings(options.recordings, options.output)
+    if not found:
+        raise Error(f"{options.recordings[0]}: holds no recording")
+    asked = Job(
+        Path(), Path(), "", options.model, options.runs, effect_ids(options.only, options.without), options.seed
+    )
+    if len(found) == 1:
+        return [replace(asked, recording=found[0], output=options.output, name=found[0].name)]
+    return [
+        replace(asked, recording=path, output=options.output / name, name=name)
+        for path, name in zip(found, find.names(found), strict=True)
+    ]
+
+
+def _check_places(output: Path, table: Path | None) -> None:
+    """Raise Error for what could not be written after hours of work."""
+    if output.exists() and not output.is_dir():
+        raise Error(f"--output: {output}: is a file, not a folder")
+    if table is not None and (table.is_dir() or not table.absolute().parent.is_dir()):
+        raise Error(f"--table: {table}: {'is a folder' if table.is_dir() else 'there is no such folder'}")
+
+
+def _outcomes(jobs: list[Job], options: argparse.Namespace, shown: Display) -> Iterator[Outcome]:
+    if options.dask:
+        return batch.on_dask(jobs, options.dask, shown)
+    return batch.on_processes(jobs, options.jobs, shown) if len(jobs) > 1 else _here(jobs[0], shown)
+
+
+def _here(only: Job, shown: Display) -> Iterator[Outcome]:
+    """Yield the outcome of a single job, run in this process."""
+    shown.start(only.name)
+    outcome = run(only, lambda message: shown.tell(only.name, message))
+    shown.end(outcome)
+    yield outcome
+
+
+def _complain(outcome: Outcome, shown: Display, *, many: bool) -> None:
+    """Say on the standard error what went wrong."""
+    if outcome.error:
+        shown.close()
+        print(outcome.trace, end="", file=sys.stderr)
+        print(f"critic: {f'{outcome.job.name}: ' if many else ''}{outcome.error}", file=sys.stderr, flush=True)
+
+
+def _print(outcomes: Sequence[Outcome], *, many: bool) -> None:
+    if many:
+        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
+        print(results.table(outcomes, width))
+        return
+    for outcome in outcomes:
+        if outcome.verdict is not None:
+            print(results.summary(outcome.verdict, outcome.headline, outcome.details))
+            print(f"report: {outcome.job.output / 'report.html'}")
+
+
+def exit_code(outcomes: Sequence[Outcome]) -> int:
+    """Return 1 when any failed, else the largest."""
+    codes = [outcome.code for outcome in outcomes]
+    return ERROR if ERROR in codes else max(codes)

@@ -53,13 +53,19 @@ class Problem:
     """Drives, model and noise: everything but the choice of effects."""
 
     def __init__(
-        self, drives: Sequence[Drive], model: Model, noise: Noise, terms: tuple[Term, ...] | None = None
+        self,
+        drives: Sequence[Drive],
+        model: Model,
+        noise: Noise,
+        terms: tuple[Term, ...] | None = None,
+        ids: frozenset[str] | None = None,
     ) -> None:
-        """Take terms: those that such drives can show, where somebody has found them out already."""
+        """Take terms: those that such drives can show, where somebody has found them out; ids: effects that may act."""
         self.drives = drives
         self.model = model
         self.noise = noise
         self._terms = terms
+        self.ids = ids
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
@@ -72,12 +78,12 @@ class Problem:
             moved = np.concatenate([self._whitened(drive, settings) for drive in self.drives])
             return float(np.linalg.norm(moved - here))
 
-        return showing(catalogue(self.model), norm)
+        return showing(catalogue(self.model, self.ids), norm)
 
     @cached_property
     def candidates(self) -> tuple[Candidate, ...]:
         """Return the ways in which effects may act that these drives can show."""
-        return candidates(self.terms, self.model)
+        return candidates(self.terms, self.model, self.ids)
 
     def simulated(self, drive: Drive, settings: Sequence[EffectSetting]) -> FloatArray:
         """Return the simulated body increments of a drive, (m, 3)."""

@@ -15,6 +15,7 @@ from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.extended import process_noise
 from kurumaisu.critic.material import FELT, MATERIAL, felt_share, moved_share
 from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.next_experiment import Proposal
 from kurumaisu.critic.noise import Growth
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
@@ -58,6 +59,7 @@ def criticism(
     growth: Growth,
     worth: Gain | None,
     drives: Sequence[Drive],
+    proposal: Proposal,
 ) -> Criticism:
     """Return the criticism after a search.
 
@@ -71,7 +73,8 @@ def criticism(
     kind = _kind(found, matters)
     causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
     # Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
-    if growth.p >= naming.NAMED and all(drive.source != "odom" for drive in drives):
+    asked = problem.ids is None or process_noise(problem).id in problem.ids
+    if asked and growth.p >= naming.NAMED and all(drive.source != "odom" for drive in drives):
         kind, causes = "named", (*causes, Cause(process_noise(problem).id, growth.p, {}, growth.gain_nats))
     settings = best.settings if kind in ("named", "confounded") else ()
     verdict = Verdict(
@@ -79,6 +82,7 @@ def criticism(
         causes=causes,
         confounded=found.confounded if kind != "none" else (),
         problems=recording.problems,
+        next_experiment=proposal.experiment,
         gain=worth,
     )
     story = Story(
@@ -96,6 +100,7 @@ def criticism(
         rivals=words.rivals(found),
         noise=_noise(problem),
         unexplained=(*words.suspects(found), *misfit.remaining(problem, best)),
+        next_drive=proposal.sentence,
     )
     return Criticism(verdict, story, problem.model, (*settings, process_noise(problem)))
 

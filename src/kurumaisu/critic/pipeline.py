@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic import explain, gain, naming, noise, sanity
+from kurumaisu.critic import explain, gain, naming, next_experiment, noise, sanity
 from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.explain import Criticism
@@ -23,11 +23,18 @@ from kurumaisu.params import follow_commands, load_model
 Progress = Callable[[str], None]
 
 
-def criticise(recording: Recording, model_file: Path, progress: Progress, *, assume_law: bool = False) -> Criticism:
+def criticise(
+    recording: Recording,
+    model_file: Path,
+    progress: Progress,
+    *,
+    assume_law: bool = False,
+    ids: frozenset[str] | None = None,
+) -> Criticism:
     """Return the criticism of a model by a recording whose runs have reference poses.
 
     Without voltages the model is "velocity follows command", unless the recording names a model or assume_law says
-    that the robot has the model's voltage law.
+    that the robot has the model's voltage law. ids: the effects that may be named; None for all that are criticised.
     Raise Error when a run has no reference, or nothing that drove the robot.
     """
     model = load_model(model_file)
@@ -42,23 +49,25 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
         return explain.invalid(recording, model, wrong)
 
     progress("estimating the noise")
-    rough = Problem(train, model, noise.START)
+    rough = Problem(train, model, noise.START, ids=ids)
     empty = rough.fit((), {})
-    first = Problem(train, model, _scatter(rough, empty, recording.truth, project=True).estimate().noise)
+    first = Problem(train, model, _scatter(rough, empty, recording.truth, project=True).estimate().noise, ids=ids)
     found = naming.search(first, progress)
     progress("estimating the noise again, beside what was found")
     scatter = _scatter(first, found.best, recording.truth, project=True)
     final = scatter.estimate(first.noise).noise
     growth = scatter.growth(final, odds(len(found.p)))
     final = growth.noise if growth.p > 1 / 2 else final
-    problem = Problem(train, model, final, first.terms)
+    problem = Problem(train, model, final, first.terms, ids)
     found = naming.search(problem, progress, found.best)
 
     progress("measuring the gain on drives held out")
     baseline = _scatter(rough, empty, recording.truth, project=False).estimate(final).noise
     splits = gain.folds(train, test)
     worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
-    return explain.criticism(recording, problem, found, growth, worth, train + test)
+    progress("planning the next drive")
+    proposal = next_experiment.propose(problem, found, next_experiment.drives())
+    return explain.criticism(recording, problem, found, growth, worth, train + test, proposal)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
@@ -76,7 +85,7 @@ def _scatter(problem: Problem, fit: Fit, truth: tuple[float, float] | None, *, p
     """Return what is left about a fit, with all effects of the catalogue projected out or none."""
     residuals = [drive.measured - problem.simulated(drive, fit.settings) for drive in problem.drives]
     columns = [
-        problem.simulated_columns(drive, fit) if project else np.empty((residual.size, 0))
+        problem.simulated_columns(drive, fit) if project and problem.terms else np.empty((residual.size, 0))
         for drive, residual in zip(problem.drives, residuals, strict=True)
     ]
     return noise.Scatter(problem.drives, residuals, columns, truth)

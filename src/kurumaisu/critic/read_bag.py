@@ -50,7 +50,7 @@ def read_bag_run(path: Path, topics: dict[str, str], faults: Faults) -> Run:
             series["scan"], fan = _scan(where, topic, faults)
         elif part in PARTS:
             columns, rows = messages.COLUMNS[part], np.asarray(topic.rows, dtype=np.float64)
-            if part == "voltage" and not rows[:, 2:].any():
+            if part == "voltage" and not np.nan_to_num(rows[:, 2:]).any():
                 columns, rows = columns[:2], rows[:, :2]
             series[part] = clean(Table(where, topic.times(), rows, columns, "message", 1), faults)
         else:

@@ -22,6 +22,11 @@ def is_rawlog(path: Path) -> bool:
     return path.is_file() and (path.suffix == ".rawlog" or path.name.endswith(".rawlog.gz"))
 
 
+def rawlog_name(path: Path) -> str:
+    """Return the name of a rawlog's run."""
+    return path.name.split(".")[0]
+
+
 def read_rawlog_run(path: Path, faults: Faults) -> tuple[Run, LaserMount]:
     """Read a rawlog: the run, and the mounting and fan of its laser. Raise Error for what MRPT cannot read."""
     try:
@@ -30,7 +35,7 @@ def read_rawlog_run(path: Path, faults: Faults) -> tuple[Run, LaserMount]:
         raise Error(f"{path}: this build has no reader of rawlogs: {error}") from error
     except (OSError, RuntimeError, ValueError) as error:
         raise Error(one_line(error)) from error  # it names the file
-    run = to_run(path.name.split(".")[0], t, odom, np.asarray(ranges, dtype=np.float64), faults)
+    run = to_run(rawlog_name(path), t, odom, np.asarray(ranges, dtype=np.float64), faults)
     x, y, yaw = fan.base_from_laser
     return run, LaserMount(x, y, yaw, fan.angle_min, fan.angle_increment, ranges.shape[1])
 

@@ -12,14 +12,16 @@ from kurumaisu.critic.clean import Faults
 from kurumaisu.critic.meta import Meta, read_meta
 from kurumaisu.critic.read_bag import read_bag_run, resolve
 from kurumaisu.critic.read_csv import QUERY, is_csv_run, read_csv_run, read_queries
-from kurumaisu.critic.read_rawlog import is_rawlog, read_rawlog_run
+from kurumaisu.critic.read_rawlog import is_rawlog, rawlog_name, read_rawlog_run
 from kurumaisu.critic.recording import LaserMount, Recording, Run
+from kurumaisu.critic.selection import matching
 from kurumaisu.errors import Error
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
     """Read a folder of runs, one folder of CSV tables, one bag or one rawlog.
 
+    wanted: names of runs, or patterns like drive_*; only those are read and used; empty takes all.
     Raise Error naming file, line and column, topic or key for anything that cannot be read, and saying what
     is missing when nothing can be done with what was read.
     """
@@ -30,13 +32,13 @@ def read_recording(path: Path) -> Recording:
     faults = Faults()
     laser = meta.laser
     runs = []
-    for source in _sources(path):
+    for source in _chosen(_sources(path), wanted):
         run, mount = _read_run(source, meta, faults)
         laser = laser or mount
         check_run(run, laser, faults)
         runs.append(run)
-    _require_use(path, runs, meta, faults)
-    train, test = _split(meta_file, meta, [run.name for run in runs])
+    require_use(path, runs, meta, faults)
+    train, test = split(meta_file, meta, [run.name for run in runs], partly=bool(wanted))
     return Recording(
         name=path.resolve().stem if path.is_file() else path.resolve().name,
         runs=tuple(runs),
@@ -90,19 +92,38 @@ def _read_run(source: Path, meta: Meta, faults: Faults) -> tuple[Run, LaserMount
     return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
 
 
-def _split(meta_file: Path, meta: Meta, names: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the runs to fit and the runs to judge by."""
+def _chosen(sources: list[Path], wanted: Sequence[str]) -> list[Path]:
+    """Return the sources of the runs that are wanted, in their own order."""
+    if not wanted:
+        return sources
+    names = [_run_name(source) for source in sources]
+    kept = {name for pattern in wanted for name in matching("--runs", pattern, names, "run")}
+    return [source for source, name in zip(sources, names, strict=True) if name in kept]
+
+
+def _run_name(source: Path) -> str:
+    """Return the name that a run of this source has."""
+    if source.is_dir():
+        return source.resolve().name
+    return rawlog_name(source) if is_rawlog(source) else source.stem
+
+
+def split(
+    meta_file: Path | str, meta: Meta, names: list[str], *, partly: bool
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the runs to fit and the runs to judge by; partly: not all runs were read."""
     for key, chosen in (("train", meta.train), ("test", meta.test)):
-        for name in chosen:
+        for name in chosen if not partly else ():
             if name not in names:
                 raise Error(f"{meta_file}: {key}: there is no run {name!r}; there are: {', '.join(names)}")
-    train = meta.train or tuple(name for name in names if name not in meta.test)
+    train = tuple(name for name in meta.train or names if name in names and name not in meta.test)
     if not train:
-        raise Error(f"{meta_file}: train: no run is left to fit: all are in test")
-    return train, meta.test
+        where = "--runs" if partly else f"{meta_file}: train"
+        raise Error(f"{where}: no run is left to fit: all are in test")
+    return train, tuple(name for name in meta.test if name in names)
 
 
-def _require_use(path: Path, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
+def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
     """Raise Error unless a run says something about base or laser; note the runs that do not."""
     useless = [run for run in runs if not usable(run)]
     for run in useless:

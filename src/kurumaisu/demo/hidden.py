@@ -11,6 +11,7 @@ import yaml
 
 from kurumaisu import effects
 from kurumaisu.critic import cli
+from kurumaisu.critic.job import Job
 from kurumaisu.critic.recording import Run, Series
 from kurumaisu.critic.write_csv import write_csv_run
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
@@ -34,10 +35,9 @@ def run(folder: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
     secret = draw(rng)
     record(folder / "hidden_drives", secret, rng)
-    answer = cli.run(folder / "hidden_drives", folder, None, seed=seed)
-    print(cli.summary(answer))
+    answer = cli.tell(Job(folder / "hidden_drives", folder, seed=seed))
     size = ", ".join(f"{name} {value:.3g}" for name, value in secret.parameters.items())
-    right = [cause.id for cause in answer.verdict.causes] == [secret.id]
+    right = [cause.id for cause in answer.causes] == [secret.id]
     print(f"what was hidden (seed {seed}): {secret.id}, {size}: {'found' if right else 'NOT found'}")
 
 

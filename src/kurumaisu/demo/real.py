@@ -6,10 +6,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from kurumaisu.critic import cli
+from kurumaisu.critic.job import Job
 
 SENA = Path("/usr/share/mrpt/datasets/2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog")
 
 
 def run(folder: Path, seed: int) -> None:
     """Print what the critic says of SENA's odometry. Raise Error where the log is not installed."""
-    print(cli.summary(cli.run(SENA, folder, None, seed=seed)))
+    cli.tell(Job(SENA, folder, seed=seed))

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A recording with something hidden in it, the truth about it, and its twin without."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from kurumaisu.critic.recording import Recording
+
+KINDS = ("null", "single", "pair", "triple", "unknown", "wrong", "confounded")
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What was hidden.
+
+    kind: of KINDS; ids: of the contract, in order; parameters: by id, what the usual equation calls the sizes (an
+    equivalent where form is 'other'); z: whitened norm of the whole signal; z_alone: of each id's share in it;
+    z_rival: what remains of the signal beside the nearest rival, whose id is rival; z_form: what the usual equation
+    leaves of it; channel, covariate: where something outside the catalogue shows, and what it follows; problem:
+    what is wrong with wrong data; accepted: sets of ids of which each explains the signal to within z 3.
+    """
+
+    kind: str
+    ids: tuple[str, ...] = ()
+    parameters: dict[str, dict[str, float]] = field(default_factory=dict)
+    z: float = 0.0
+    z_alone: dict[str, float] = field(default_factory=dict)
+    z_rival: float = float("inf")
+    rival: str = ""
+    z_form: float = 0.0
+    channel: str = ""
+    covariate: str = ""
+    problem: str = ""
+    accepted: tuple[tuple[str, ...], ...] = ()
+
+
+@dataclass(frozen=True)
+class Case:
+    """recording: what the critic is given; null: the same drives and noise with nothing hidden; seed: of both."""
+
+    recording: Recording
+    null: Recording
+    truth: Truth
+    seed: int
+
+
+@dataclass(frozen=True)
+class Ask:
+    """What to hide.
+
+    kind: of KINDS; ids: of the contract, or the name of something unknown or wrong, empty for a random choice;
+    z: whitened norm, None for one log-uniform in 5 to 60; form: 'plain' equations or 'other' ones;
+    regime: name in noise.REGIMES, None for a random one; design: name in drives.DESIGNS, None for a rich one.
+    """
+
+    kind: str
+    ids: tuple[str, ...] = ()
+    z: float | None = None
+    form: str = "other"
+    regime: str | None = None
+    design: str | None = None

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sizes for a wanted z, and what the nearest rival leaves of a signal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from kurumaisu.bench.hidden.base_case import Scale
+from kurumaisu.bench.hidden.base_catalogue import BASE
+from kurumaisu.bench.hidden.motion import Fault, Sizes
+from kurumaisu.bench.hidden.noise import Regime
+from kurumaisu.bench.hidden.whitening import Path, Whitener
+from kurumaisu.types import FloatArray
+
+# Every id with a mean signal that a size can scale; the same list for everything that is hidden.
+RIVALS = tuple(name for name, hidden in BASE.items() if hidden.scaled and name != "base.process_noise")
+_RANDOM = np.random.default_rng  # seeds below are fixed: rivals are the same for all recordings
+
+
+def scaled_to(wanted: float, worth: Callable[[float], float], start: float, most: float) -> float:
+    """Return the size, of the sign of start and at most `most`, whose worth is nearest to the wanted one.
+
+    A secant in logarithms: worth is nearly a power of the size for everything that is hidden here.
+    """
+    sign, size = np.sign(start), min(abs(start), most)
+    low, high = 0.0, most
+    for _ in range(8):
+        z = worth(float(sign * size))
+        if abs(z / wanted - 1) < 0.02 or (z < wanted and size >= most):
+            break
+        if z < wanted:
+            low = size
+        else:
+            high = size
+        guess = size * (wanted / z) if z > 0 else 2 * size
+        inside = low < guess < high
+        size = guess if inside else (min(most, 2 * size) if z < wanted and high >= most else (low + high) / 2)
+    return float(sign * size)
+
+
+def size_for(scale: Scale, make: Callable[[Sizes], Fault], sizes: Sizes, most: float, wanted: float) -> Sizes:
+    """Return the sizes with `size` such that the fault's z is the wanted one."""
+
+    def worth(size: float) -> float:
+        return float(np.linalg.norm(scale.signals([[make({**sizes, "size": size})]])))
+
+    return {**sizes, "size": scaled_to(wanted, worth, sizes["size"], most)}
+
+
+def rival_faults() -> dict[str, list[Fault]]:
+    """Return each rival at its typical size, in its usual form; those with a free shape in several."""
+    out: dict[str, list[Fault]] = {}
+    for name in RIVALS:
+        hidden = BASE[name]
+        shapes = [{"size": hidden.typical, **hidden.extra(_RANDOM(seed))} for seed in range(3)]
+        if name == "base.slope":
+            shapes = [{"size": hidden.typical, "bearing": bearing} for bearing in (0.0, np.pi / 2)]
+        if name == "base.saturation":
+            shapes = [{**shapes[0], "axis": float(axis)} for axis in (0, 1)]
+        many = shapes if len(shapes[0]) > 1 else shapes[:1]
+        out[name] = [hidden.fault(shape, "plain") for shape in many]
+    return out
+
+
+def left_beside(signal: FloatArray, columns: Mapping[str, FloatArray]) -> dict[str, float]:
+    """Return the norm of what each name's columns (samples, k), fitted alone, leave of a signal."""
+    out = {}
+    for name, column in columns.items():
+        kept = column[:, np.linalg.norm(column, axis=0) > 1e-9]
+        fit = np.linalg.lstsq(kept, signal, rcond=None)[0]
+        out[name] = float(np.linalg.norm(signal - kept @ fit))
+    return out
+
+
+def rival_columns(scale: Scale, names: Sequence[str]) -> dict[str, FloatArray]:
+    """Return whitened columns of rivals at typical sizes."""
+    faults = {name: forms for name, forms in rival_faults().items() if name in names}
+    flat = scale.signals([[fault] for forms in faults.values() for fault in forms])
+    out, at = {}, 0
+    for name, forms in faults.items():
+        out[name] = flat[:, at : at + len(forms)]
+        at += len(forms)
+    return out
+
+
+def spread_z(path: Path, regime: Regime, grown: FloatArray) -> float:
+    """Return the root of twice the mean log likelihood ratio of noise whose amplitude has grown, (runs, n - 1) times.
+
+    Drawn under the grown noise 16 times, from the filter that knows it.
+    """
+    usual = Whitener(path, regime)
+    louder_path = Path(path.times, path.poses, path.gate * grown)
+    louder = Whitener(louder_path, regime)
+    rng = _RANDOM(0)
+    draws = louder.colour(rng.standard_normal((*path.poses.shape, 16)))
+    squares = [float((filter_.whiten(draws) ** 2).sum()) / 16 for filter_ in (usual, louder)]
+    ratio = 0.5 * (squares[0] - squares[1]) + 0.5 * (usual.log_determinant - louder.log_determinant)
+    return float(np.sqrt(2 * max(ratio, 0.0)))

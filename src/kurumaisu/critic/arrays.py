@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The critic on arrays: no files, no bags, no ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.checks import check_run
+from kurumaisu.critic.clean import Faults, Table, clean
+from kurumaisu.critic.explain import Criticism
+from kurumaisu.critic.meta import Meta
+from kurumaisu.critic.read_csv import OPTIONAL, REQUIRED
+from kurumaisu.critic.reading import require_use, split
+from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.reference import with_reference
+from kurumaisu.critic.selection import effect_ids
+from kurumaisu.errors import Error
+from kurumaisu.params import shipped
+from kurumaisu.types import FloatArray
+
+Tables = Mapping[str, ArrayLike]
+
+
+def criticise_arrays(
+    runs: Mapping[str, Tables],
+    meta: Meta | None = None,
+    *,
+    only: Sequence[str] = (),
+    without: Sequence[str] = (),
+    seed: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Criticism:
+    """Criticise a model by drives that are arrays; the same rows in CSV tables give the same verdict.
+
+    runs: by name, tables whose first column is t [s]: command (n, 3) of t, v, w; voltage (n, 3) of t, v_f, v_s, or
+    (n, 5) with the v, w that they stand for; pose (n, 4) of t, x, y, theta; odom (n, 6) of t, x, y, theta, v, w; scan
+    (n, 1 + beams); any other name: a covariate, (n, 2). SI units, radians. meta: what meta.yaml would say.
+    only, without: ids or patterns of effects; seed: of the particle filter that makes a missing reference.
+    Raise Error naming run and table, or effect, for what cannot be used.
+    """
+    ids = effect_ids(only, without)
+    recording = with_reference(recording_of("arrays", runs, meta or Meta()), seed, progress)
+    return pipeline.criticise(recording, recording.model or shipped("launch/md100.yaml"), progress, ids=ids)
+
+
+def recording_of(name: str, runs: Mapping[str, Tables], meta: Meta) -> Recording:
+    """Return arrays as a recording, cleaned as tables are. Raise Error naming what does not fit."""
+    faults = Faults()
+    made = [run_of(run, tables, faults) for run, tables in runs.items()]
+    if not made:
+        raise Error(f"{name}: no run is given")
+    for run in made:
+        check_run(run, meta.laser, faults)
+    require_use(name, made, meta, faults)
+    train, test = split(f"{name}: meta", meta, list(runs), partly=False)
+    return Recording(
+        name=name,
+        runs=tuple(made),
+        train=train,
+        test=test,
+        model=meta.model,
+        world=meta.world,
+        laser=meta.laser,
+        truth=meta.truth,
+        problems=tuple(faults.notes),
+        invalid=tuple(faults.invalid),
+    )
+
+
+def run_of(name: str, tables: Tables, faults: Faults) -> Run:
+    """Return the tables of one drive as a run; faults gets what was found wrong. Raise Error naming a misshapen one."""
+    parts: dict[str, Series | None] = {}
+    covariates: dict[str, Series] = {}
+    for part, given in tables.items():
+        where = f"{name}/{part}"
+        rows = _rows(where, given)
+        columns = _columns(where, part, rows.shape[1] - 1)
+        table = Table(where, rows[:, 0], rows[:, 1:], columns, "row", 0)
+        series = clean(table, faults, ranges=part == "scan")
+        if part in REQUIRED:
+            parts[part] = series
+        elif series is not None:
+            covariates[part] = series
+    return Run(
+        name=name,
+        command=parts.get("command"),
+        voltage=parts.get("voltage"),
+        pose=parts.get("pose"),
+        odom=parts.get("odom"),
+        scan=parts.get("scan"),
+        covariates=covariates,
+    )
+
+
+def _rows(where: str, given: ArrayLike) -> FloatArray:
+    try:
+        rows = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise Error(f"{where}: is no array of numbers: {error}") from error
+    if rows.ndim != 2 or rows.shape[1] < 2:
+        raise Error(f"{where}: must have rows of t and at least one number; its shape is {rows.shape}")
+    return rows
+
+
+def _columns(where: str, part: str, count: int) -> tuple[str, ...]:
+    """Return the names of a table's columns after t."""
+    if part == "scan":
+        return tuple(f"r{i}" for i in range(count))
+    if part == "covariate":
+        raise Error(f"{where}: give each covariate under its own name")
+    required = REQUIRED.get(part, (part,))
+    for columns in (required, (*required, *OPTIONAL.get(part, ()))):
+        if len(columns) == count:
+            return columns
+    raise Error(f"{where}: must have the columns t, {', '.join(required)}; it has {count + 1} columns")

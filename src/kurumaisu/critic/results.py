@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the command critic says: of one recording in words, of many as a table; for programs as JSON and CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from kurumaisu.critic.display import printable
+from kurumaisu.critic.job import Outcome
+from kurumaisu.critic.verdict import Gain, Verdict, to_json
+from kurumaisu.errors import Error
+
+COLUMNS = (
+    "recording",
+    "verdict",
+    "causes",
+    "p",
+    "confounded",
+    "unknown",
+    "gain_nats_per_sample",
+    "gain_lo90",
+    "gain_hi90",
+    "problems",
+    "seconds",
+    "exit",
+    "error",
+    "output",
+)
+
+
+def summary(verdict: Verdict, headline: str, details: Sequence[str]) -> str:
+    """Return the verdict in words."""
+    lines = [f"verdict: {verdict.verdict}", headline, *(f"  {detail}" for detail in details)]
+    if verdict.gain is not None:
+        lines += _gain(verdict.gain)
+    return "\n".join(map(printable, lines))
+
+
+def _gain(gain: Gain) -> list[str]:
+    density = gain.log_density_per_sample
+    interval = f"90 % {density.lo90:+.3f} to {density.hi90:+.3f}"
+    return [
+        f"gain on held-out data: {density.gain:+.3f} nats per sample ({interval})",
+        *(
+            f"  {name}: rms error {error.baseline:.3f} -> {error.extended:.3f} {error.unit}"
+            for name, error in gain.rmse.items()
+        ),
+    ]
+
+
+def as_json(outcome: Outcome, *, alone: bool) -> str:
+    """Return one line of JSON: the verdict where it is the only one, else with the recording's name around it."""
+    verdict = None if outcome.verdict is None else to_json(outcome.verdict)
+    if alone and verdict is not None:
+        return json.dumps(verdict, ensure_ascii=False, allow_nan=False)
+    told = {
+        "recording": str(outcome.job.recording),
+        "output": None if verdict is None else str(outcome.job.output),
+        "exit": outcome.code,
+        "seconds": round(outcome.seconds, 1),
+        "error": outcome.error or None,
+        "verdict": verdict,
+    }
+    return json.dumps(told, ensure_ascii=False, allow_nan=False)
+
+
+def table(outcomes: Sequence[Outcome], width: int) -> str:
+    """Return a table of outcomes for people, each line at most so wide, and a line that counts the verdicts."""
+    rows = [("recording", "verdict", "gain", "what")]
+    rows += [(outcome.job.name, outcome.word, _gain_cell(outcome.verdict), _what(outcome)) for outcome in outcomes]
+    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    lines = [
+        f"{row[0]:<{widths[0]}}  {row[1]:<{widths[1]}}  {row[2]:>{widths[2]}}  {row[3]}".rstrip()[:width]
+        for row in ([printable(cell) for cell in row] for row in rows)
+    ]
+    words = [outcome.word for outcome in outcomes]
+    counts = ", ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(sorted(words)))
+    return "\n".join([*lines, f"{len(outcomes)} recordings: {counts}"])
+
+
+def write_table(path: Path, outcomes: Sequence[Outcome]) -> None:
+    """Write a CSV table, one row for each outcome, whole or not at all. Raise Error when it cannot be written."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(_row(outcome) for outcome in outcomes)
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_text(text.getvalue(), encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        raise Error(f"--table: {path}: {error.strerror}") from error
+
+
+def _row(outcome: Outcome) -> dict[str, str | float | int]:
+    row: dict[str, str | float | int] = {
+        "recording": str(outcome.job.recording),
+        "verdict": outcome.word,
+        "seconds": f"{outcome.seconds:.1f}",
+        "exit": outcome.code,
+        "error": outcome.error,
+    }
+    verdict = outcome.verdict
+    if verdict is None:
+        return row
+    row["output"] = str(outcome.job.output)
+    row["causes"] = "; ".join(causes(verdict))
+    row["p"] = "; ".join(f"{cause.p:.3f}" for cause in verdict.causes)
+    row["confounded"] = "; ".join(" | ".join(group) for group in verdict.confounded)
+    row["unknown"] = "; ".join(f"{item.channel} over {item.covariate}: {item.shape}" for item in verdict.unknown)
+    row["problems"] = "; ".join(verdict.problems)
+    if verdict.gain is not None:
+        density = verdict.gain.log_density_per_sample
+        row["gain_nats_per_sample"], row["gain_lo90"] = f"{density.gain:.4f}", f"{density.lo90:.4f}"
+        row["gain_hi90"] = f"{density.hi90:.4f}"
+    return row
+
+
+def causes(verdict: Verdict) -> list[str]:
+    """Return each cause with its parameters, on one line."""
+    return [
+        f"{cause.id} "
+        + ", ".join(f"{name} {e.estimate:.3g}{'' if e.unit == '1' else f' {e.unit}'}" for name, e in values)
+        for cause in verdict.causes
+        for values in [cause.parameters.items()]
+    ]
+
+
+def _gain_cell(verdict: Verdict | None) -> str:
+    return "" if verdict is None or verdict.gain is None else f"{verdict.gain.log_density_per_sample.gain:+.3f}"
+
+
+def _what(outcome: Outcome) -> str:
+    """Return in short what is behind the verdict."""
+    verdict = outcome.verdict
+    if verdict is None:
+        return outcome.error
+    if verdict.verdict == "invalid_data":
+        return verdict.problems[0] if verdict.problems else ""
+    told = [*causes(verdict), *(f"one of {', '.join(group)}" for group in verdict.confounded)]
+    told += [f"{item.channel} over {item.covariate}" for item in verdict.unknown]
+    return "; ".join(told)

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Names and patterns that a user gives, against what there is: effects by --only and --without, runs by --runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+
+from kurumaisu import effects
+from kurumaisu.errors import Error
+
+_NEAR = 0.6  # share of letters in common from which a name is suggested
+
+
+def effect_ids(only: Sequence[str], without: Sequence[str]) -> frozenset[str] | None:
+    """Return the ids of the effects that may be named, by ids or patterns like base.lag_*; None for all.
+
+    Raise Error for a pattern that is none of the catalogue, naming near ones, for one of which the critic looks for
+    nothing, and when nothing is left.
+    """
+    if not only and not without:
+        return None
+    catalogue = tuple(effect.id for effect in effects.ALL)
+    sought = tuple(effect.id for effect in effects.BASE if not effect.random)
+    wanted: set[str] = set() if only else set(sought)
+    for pattern in only:
+        found = set(matching("--only", pattern, catalogue, "effect")) & set(sought)
+        if not found:
+            raise Error(f"--only: the critic does not look for {pattern}; it looks for: {', '.join(sought)}")
+        wanted |= found
+    for pattern in without:
+        wanted -= set(matching("--without", pattern, catalogue, "effect"))
+    if not wanted:
+        raise Error("--without: leaves no effect to look for")
+    return frozenset(wanted)
+
+
+def matching(option: str, pattern: str, names: Sequence[str], what: str) -> list[str]:
+    """Return the names that a pattern matches. Raise Error, with near names, when there is none."""
+    found = [name for name in names if fnmatchcase(name, pattern)]
+    if found:
+        return found
+    near = get_close_matches(pattern, names, n=3, cutoff=_NEAR) or [n for n in names if pattern and pattern in n][:3]
+    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(names)}"
+    raise Error(f"{option}: there is no {what} {pattern!r}; {hint}")

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The critic on arrays, and the window that a watch keeps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kurumaisu.bench.critic import recording
+from kurumaisu.critic.arrays import criticise_arrays, recording_of
+from kurumaisu.critic.clean import Faults
+from kurumaisu.critic.meta import Meta
+from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.rolling import Rolled, Rolling
+from kurumaisu.critic.window import Heard, Window
+from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.errors import Error
+from kurumaisu.params import shipped
+
+META = Meta(truth=(0.005, 0.005))
+
+
+def arrays(runs):
+    parts = ("command", "voltage", "pose")
+    return {
+        run.name: {part: np.column_stack([getattr(run, part).t, getattr(run, part).values]) for part in parts}
+        for run in runs
+    }
+
+
+def test_arrays_are_the_same_recording_as_their_tables(tmp_path):
+    runs = recording(None, 0.0, 3, 10.0).runs
+    for run in runs:
+        write_csv_run(tmp_path / run.name, run)
+    (tmp_path / "meta.yaml").write_text("truth: {position_sd: 0.005, heading_sd: 0.005}\n")
+    of_arrays = recording_of(tmp_path.name, arrays(runs), META)
+    of_tables = read_recording(tmp_path)
+    for one, other in zip(of_arrays.runs, of_tables.runs, strict=True):
+        for part in ("command", "voltage", "pose"):
+            np.testing.assert_array_equal(getattr(one, part).values, getattr(other, part).values)
+            assert getattr(one, part).columns == getattr(other, part).columns
+    assert replace(of_arrays, runs=()) == replace(of_tables, runs=())
+
+
+@pytest.mark.parametrize(("size", "verdict", "causes"), [(0.1, "named", ["base.gain_v"]), (0.0, "none", [])])
+def test_a_verdict_from_arrays(size, verdict, causes):
+    runs = arrays(recording("base.gain_v", size, 5, 10.0).runs[:2])
+    found = criticise_arrays(runs, META, only=["base.gain_*"]).verdict
+    assert (found.verdict, [cause.id for cause in found.causes]) == (verdict, causes)
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ({"pose": np.zeros((5, 3))}, "run/pose: must have the columns t, x, y, theta; it has 3 columns"),
+        ({"pose": np.zeros(5)}, r"run/pose: must have rows of t .* its shape is \(5,\)"),
+        ({"pose": [["a", 1.0]]}, "run/pose: is no array of numbers"),
+        ({"tyre": np.zeros((5, 3))}, "run/tyre: must have the columns t, tyre"),
+        ({"pose": np.arange(20.0).reshape(5, 4)}, "nothing to criticise a model with: run has only pose"),
+    ],
+)
+def test_arrays_that_cannot_be_used_are_named(tables, message):
+    with pytest.raises(Error, match=message):
+        criticise_arrays({"run": tables})
+
+
+def test_a_window_forgets_what_is_old_but_not_the_command_that_still_holds():
+    window = Window(("command", "pose"), 10.0, 1_000_000)
+    window.add("command", 0.0, (0.5, 0.0))
+    window.add("command", 1.0, (0.7, 0.0))
+    for t in range(31):
+        window.add("pose", float(t), (0.1 * t, 0.0, 0.0))
+    run = window.run("window", Faults())
+    assert run.pose.t.tolist() == list(range(20, 31))
+    assert window.heard("command") == Heard(1, 0.0, 1.0)
+    window.add("command", 30.5, (0.0, 0.0))
+    assert window.run("window", Faults()).command.t.tolist() == [1.0, 30.5]
+
+
+def test_a_window_stays_within_its_memory_and_begins_anew_when_the_clock_is_set_back():
+    window = Window(("scan",), 1e9, 100_000)
+    for t in range(1000):
+        window.add("scan", float(t), np.zeros(682))
+    assert 10 < window.heard("scan").rows <= 100_000 / (682 * 8)
+    assert window.heard("scan").newest == 999.0
+    window.add("scan", 998.5, np.zeros(682))  # late, no more
+    assert window.heard("scan").rows > 10
+    window.add("scan", 5.0, np.zeros(682))
+    assert window.heard("scan") == Heard(1, 0.0, 5.0)
+
+
+def test_a_rolling_verdict_outlives_its_process():
+    rolling = Rolling(shipped("launch/md100.yaml"), frozenset({"base.gain_v"}))
+    data = recording(None, 0.0, 3, 10.0)
+
+    def answer():
+        rolling.start(data, 0.0)
+        said = None
+        while said is None:
+            rolling._worker.connection.poll(1.0)
+            said = rolling.answer(0.0)
+        assert not rolling.busy
+        return said
+
+    rolling._worker._process.kill()
+    assert answer() == Rolled(None, "no verdict: its process was ended by SIGKILL (out of memory?)")
+    assert answer().verdict.verdict == "none"
+    rolling.start(data, 0.0)
+    assert rolling.answer(299.0) is None
+    assert rolling.answer(301.0) == Rolled(None, "no verdict: given up after 300 s")
+    rolling.close()
