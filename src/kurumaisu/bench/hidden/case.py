@@ -17,8 +17,8 @@ class Truth:
     kind: of KINDS; ids: of the contract, in order; parameters: by id, what the usual equation calls the sizes (an
     equivalent where form is 'other'); z: whitened norm of the whole signal; z_alone: of each id's share in it;
     z_rival: what remains of the signal beside the nearest rival, whose id is rival; z_form: what the usual equation
-    leaves of it; channel, covariate: where something outside the catalogue shows, and what it follows; problem:
-    what is wrong with wrong data; accepted: sets of ids of which each explains the signal to within z 3;
+    leaves of it; channel, covariates: where something outside the catalogue shows, and what it is
+    right to say that it follows; problem: what is wrong with wrong data; accepted: sets of ids of which each explains the signal to within z 3;
     background: ids that the null has, too, which are right to name and right to leave out.
     """
 
@@ -31,7 +31,7 @@ class Truth:
     rival: str = ""
     z_form: float = 0.0
     channel: str = ""
-    covariate: str = ""
+    covariates: tuple[str, ...] = ()
     problem: str = ""
     accepted: tuple[tuple[str, ...], ...] = ()
     background: tuple[str, ...] = ()

@@ -39,7 +39,7 @@ class Draw:
 def make_laser(ask: Ask, seed: int, folder: Path) -> Case:
     """Return a case of laser or world; its world file is written into folder."""
     what, where, how = (np.random.default_rng([seed, 10 + i]) for i in range(3))
-    ids = ask.ids or _random_ids({"null": 0, "single": 1, "pair": 2, "triple": 3}[ask.kind], what)
+    ids = ask.ids or _random_ids({"null": 0, "single": 1, "pair": 2, "triple": 3, "confounded": 1}[ask.kind], what)
     backdrop = BACKDROPS[ask.regime] if ask.regime in BACKDROPS else draw_backdrop(how)
     regime = draw_regime(how) if ask.regime is None else USUAL
     regime = replace(regime, position_sd=min(regime.position_sd, 0.01), heading_sd=min(regime.heading_sd, 0.005))
@@ -151,21 +151,21 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
     plain = [scale.signal(LASER[name].fault(sizes[name], "plain")) for name in means]
     rivals = scale.rivals([name for name in MEANS if name not in ids and (scale.tour.moving or not LASER[name].moving)])
     gram = scale.gram(np.concatenate([np.stack([*own, *plain], axis=-1), *rivals.values()], axis=-1))
-    at, left = 2 * len(means), {}
+    at, rest = 2 * len(means), dict[str, float]()
     for name, columns in rivals.items():
         those = list(range(at, at + columns.shape[-1]))
-        left[name] = min(_left(gram, len(means), [*_all_but(len(means), i), *those]) for i in range(len(means)))
+        rest[name] = min(left(gram, len(means), [*_all_but(len(means), i), *those]) for i in range(len(means)))
         at += columns.shape[-1]
-    nearest = min(left, key=lambda name: left[name])
-    alone = {name: _left(gram, [i], _all_but(len(means), i)) for i, name in enumerate(means)}
-    same = tuple((name,) for name, rest in left.items() if rest < _SAME) if len(ids) == 1 else ()
+    nearest = min(rest, key=lambda name: rest[name])
+    alone = {name: left(gram, [i], _all_but(len(means), i)) for i, name in enumerate(means)}
+    same = tuple((name,) for name, z in rest.items() if z < _SAME) if len(ids) == 1 else ()
     return replace(
         truth,
-        z=float(np.hypot(_left(gram, len(means), []), np.linalg.norm(list(odd.values())))),
+        z=float(np.hypot(left(gram, len(means), []), np.linalg.norm(list(odd.values())))),
         z_alone={**alone, **odd},
-        z_rival=left[nearest],
+        z_rival=rest[nearest],
         rival=nearest,
-        z_form=_left(gram, len(means), range(len(means), 2 * len(means))),
+        z_form=left(gram, len(means), range(len(means), 2 * len(means))),
         accepted=(ids, *same),
     )
 
@@ -181,7 +181,7 @@ def _all_but(count: int, i: int) -> list[int]:
     return [j for j in range(count) if j != i]
 
 
-def _left(gram: FloatArray, signal: int | Sequence[int], columns: Sequence[int]) -> float:
+def left(gram: FloatArray, signal: int | Sequence[int], columns: Sequence[int]) -> float:
     """Return the norm of what columns leave of the sum of signals: those listed, or the first so many."""
     ones = np.zeros(len(gram))
     ones[list(range(signal)) if isinstance(signal, int) else list(signal)] = 1.0

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -26,8 +27,7 @@ def weighted_pixels(c: Scans, s: Sizes) -> Scans:
     return _mixed(c, s, lambda share: 0.5 - 0.5 * np.cos(np.pi * share))
 
 
-def _mixed(c: Scans, s: Sizes, shape: object) -> Scans:
-    assert callable(shape)
+def _mixed(c: Scans, s: Sizes, shape: Callable[[FloatArray], FloatArray]) -> Scans:
     chance, share = _draws(c, s, 2)
     beside = np.concatenate([c.readings[:, 1:], c.readings[:, -1:]], axis=1)
     with np.errstate(invalid="ignore"):

@@ -3,26 +3,95 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.base_make import make_base
-from kurumaisu.bench.hidden.case import Ask, Case
+from kurumaisu.bench.hidden.case import KINDS, Ask, Case, Truth
+from kurumaisu.bench.hidden.confounded import CONFOUNDED
 from kurumaisu.bench.hidden.laser_case import make_laser
 from kurumaisu.bench.hidden.laser_catalogue import LASER
+from kurumaisu.bench.hidden.rooms import draw_room, world_text
+from kurumaisu.bench.hidden.strange_case import strange_base, strange_laser
+from kurumaisu.bench.hidden.unknown import STRANGE_BASE, STRANGE_LASER
+from kurumaisu.bench.hidden.wrong import WRONG, spoilt
 from kurumaisu.errors import Error
 
 
 def make(ask: Ask, seed: int, folder: Path | None = None) -> Case:
     """Return the case of a seed; folder: where a laser's world file goes, needed for those.
 
-    Raise Error for an id that is not in the contract, and for a laser without a folder.
+    Raise Error for a kind or a name that does not exist, and for a laser without a folder.
     """
+    _check(ask)
+    what = np.random.default_rng([seed, 40])
+    if ask.kind == "wrong":
+        return _make_wrong(ask, seed, folder, what)
+    if ask.kind == "unknown":
+        laser = ask.ids[0] in STRANGE_LASER if ask.ids else ask.family == "laser"
+        return strange_laser(ask, seed, _given(folder, ask)) if laser else strange_base(ask, seed)
+    if ask.kind == "confounded":
+        ask = _confounded(ask, what)
     if all(name in BASE for name in ask.ids) and (ask.ids or ask.family == "base"):
         return make_base(ask, seed)
-    wrong = [name for name in ask.ids if name not in LASER]
-    if wrong:
-        raise Error(f"hidden: {wrong[0]!r} is not an id of the {'laser' if wrong[0] in BASE else 'contract'}")
+    return make_laser(ask, seed, _given(folder, ask))
+
+
+def names_of(kind: str, family: str) -> tuple[str, ...]:
+    """Return what can be hidden in cases of a kind, of the base or of the laser."""
+    if kind == "wrong":
+        return tuple(name for name, wrong in WRONG.items() if wrong.laser == (family == "laser"))
+    if kind == "unknown":
+        return tuple(STRANGE_LASER if family == "laser" else STRANGE_BASE)
+    if kind == "confounded":
+        return tuple(dict.fromkeys(name for name, _ in CONFOUNDED if (name in BASE) == (family == "base")))
+    return tuple(LASER if family == "laser" else BASE)
+
+
+def _check(ask: Ask) -> None:
+    if ask.kind not in KINDS:
+        raise Error(f"hidden: kind: {ask.kind!r} is none of {', '.join(KINDS)}")
+    there = [*names_of(ask.kind, "base"), *names_of(ask.kind, "laser")]
+    for name in ask.ids:
+        if name not in there:
+            raise Error(
+                f"hidden: {name!r} cannot be hidden in a case of kind {ask.kind!r}; there are: {', '.join(there)}"
+            )
+    if len({name in BASE for name in ask.ids}) > 1 and ask.kind in ("pair", "triple"):
+        raise Error(f"hidden: {', '.join(ask.ids)}: are not all of the base or all of the laser")
+
+
+def _given(folder: Path | None, ask: Ask) -> Path:
     if folder is None:
         raise Error(f"hidden: {', '.join(ask.ids) or 'a laser'}: needs a folder for its world file")
-    return make_laser(ask, seed, folder)
+    return folder
+
+
+def _confounded(ask: Ask, rng: np.random.Generator) -> Ask:
+    """Return the ask with an id and a design that hides it, of those there are for what is asked."""
+    fit = [
+        (name, design)
+        for name, design in CONFOUNDED
+        if (name in ask.ids if ask.ids else (name in BASE) == (ask.family == "base")) and ask.design in (None, design)
+    ]
+    if not fit:
+        raise Error(f"hidden: design: {ask.design!r} hides nothing of {', '.join(ask.ids) or ask.family}")
+    name, design = fit[rng.integers(len(fit))]
+    return replace(ask, ids=(name,), design=design, form="plain")
+
+
+def _make_wrong(ask: Ask, seed: int, folder: Path | None, rng: np.random.Generator) -> Case:
+    names = names_of("wrong", ask.family)
+    name = ask.ids[0] if ask.ids else str(names[rng.integers(len(names))])
+    wrong = WRONG[name]
+    good = replace(ask, kind="null", ids=())
+    null = (make_laser(good, seed, _given(folder, ask)) if wrong.laser else make_base(good, seed)).null
+    found = spoilt(null, name, rng)
+    if name == "wrong map":
+        other = _given(folder, ask) / f"hidden_{seed}_wrong.world"
+        other.write_text(world_text("another room", draw_room(np.random.default_rng([seed, 41]))), encoding="utf-8")
+        found = replace(found, world=other)
+    return Case(found, null, Truth("wrong", problem=name), seed)
