@@ -15,11 +15,12 @@ class Truth:
     """What was hidden.
 
     kind: of KINDS; ids: of the contract, in order; parameters: by id, what the usual equation calls the sizes (an
-    equivalent where form is 'other'); z: whitened norm of the whole signal; z_alone: of each id's share in it;
-    z_rival: what remains of the signal beside the nearest rival, whose id is rival; z_form: what the usual equation
-    leaves of it; channel, covariates: where something outside the catalogue shows, and what it is
-    right to say that it follows; problem: what is wrong with wrong data; accepted: sets of ids of which each explains the signal to within z 3;
-    background: ids that the null has, too, which are right to name and right to leave out.
+    equivalent where form is 'other'); z: whitened norm of the whole signal, of an unknown one what the whole catalogue
+    leaves of it; z_alone: of each id's share in it; z_rival: what remains of the signal beside the nearest rival, whose
+    id is rival; z_form: what the usual equation leaves of it; channel, covariates: where something outside the
+    catalogue shows, and what it is right to say that it follows; problem: what is wrong with wrong data; accepted: sets
+    of ids of which each explains the signal to within z 3; background: ids that the null has, too, which are right to
+    name and right to leave out.
     """
 
     kind: str
