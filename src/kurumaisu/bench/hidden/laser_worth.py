@@ -25,7 +25,7 @@ from kurumaisu.bench.hidden.scanning import MOUNT, Scans, expected
 from kurumaisu.bench.hidden.tours import Tour
 from kurumaisu.types import BoolArray, FloatArray
 
-_PART = 0.01
+_PART = 1e-5
 _OBLIQUE = 0.2  # least cosine of the incidence that counts
 _SELDOM = 1e-4  # share of readings that are wild anyway
 EVERY = 5  # of the scans, the first of so many is looked at and stands for all
@@ -44,7 +44,7 @@ class LaserScale:
     def signal(self, fault: Fault) -> FloatArray:
         """Return the change of the mean readings (s, b) [m].
 
-        Of what moves beams it is that of a hundredth of the size, times a hundred, so that hardly any leave their wall.
+        Of what moves beams it is that of a tiny part of the size, scaled up, so that hardly any leave their wall.
         """
         part = _PART if fault.form.stage == "aim" and fault.form != LASER["laser.tilt"].plain else 1.0
         changed = expected(self.tour, [Fault(fault.form, {**fault.sizes, "size": part * fault.sizes["size"]})], EVERY)

@@ -141,7 +141,7 @@ def read(scans: Scans, faults: Sequence[Fault]) -> FloatArray:
     scans = staged(scans, faults, "unit")
     hit = np.isfinite(scans.ranges)
     scans = replace(scans, readings=np.where(hit, scans.mean + scans.sd * scans.unit, np.inf))
-    scans = staged(scans, faults, "outlier")
+    scans = staged(staged(scans, faults, "outlier"), faults, "grid")
     rounded = laws.LASER_STEP * np.rint(scans.readings / laws.LASER_STEP)
     gated = np.where(rounded > laws.LASER_FAR, np.inf, np.where(rounded < laws.LASER_NEAR, np.nan, rounded))
     return np.asarray(np.round(gated, 6))
