@@ -15,7 +15,6 @@ from kurumaisu.bench.hidden.sizing import left_beside, size_for
 from kurumaisu.bench.hidden.whitening import Path, Whitener, deviation
 from kurumaisu.errors import Error
 
-
 WITHOUT = ("base.sign", "base.steering_law", "base.process_noise")  # a size to choose, or a mean
 MEANS = [name for name in BASE if name not in WITHOUT]
 

@@ -16,6 +16,8 @@ from kurumaisu.bench.hidden.rays import cast
 from kurumaisu.bench.hidden.rooms import corners, draw_room, edges, world_text
 from kurumaisu.bench.hidden.scanning import expected
 from kurumaisu.bench.hidden.tours import draw_tour
+from kurumaisu.bench.hidden.write import TABLES, write_case
+from kurumaisu.critic.reading import read_recording
 from kurumaisu.world import load_world
 
 
@@ -163,3 +165,21 @@ def test_strange_readings_are_left_by_the_whole_catalogue(name, tmp_path):
 def test_wrong_scans_differ_from_their_null(name, tmp_path):
     case = make(Ask("wrong", (name,), regime="clean", design="room"), 14, tmp_path)
     assert not same(case.recording, case.null) or case.recording.world != case.null.world
+
+
+def test_a_case_is_read_back_as_it_was_written(tmp_path):
+    case = make(Ask("null", family="laser", regime="clean", design="room"), 15, tmp_path)
+    write_case(tmp_path / "case", case.recording, case.truth)
+    again = read_recording(tmp_path / "case")
+    assert same(again, case.recording)
+    assert again.laser == case.recording.laser
+    assert again.truth == pytest.approx(case.recording.truth)
+    assert again.world.read_text() == case.recording.world.read_text()
+
+
+@pytest.mark.parametrize("damage", TABLES)
+def test_damaged_tables_are_not_what_they_were(damage, tmp_path):
+    case = make(Ask("null", regime="usual"), 16)
+    write_case(tmp_path / "case", case.recording, damage=damage)
+    t = np.loadtxt(tmp_path / "case/run_1/pose.csv", delimiter=",", skiprows=1)[:, 0]
+    assert np.any(np.diff(t) <= 0)
