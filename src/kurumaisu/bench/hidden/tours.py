@@ -68,9 +68,11 @@ def draw_tour(design: str, regime: Regime, rng: np.random.Generator) -> Tour:
     legs: list[Leg] = []
     start, first = 0.0, None
     for run in range(3):
-        poses = np.column_stack([rng.uniform(-1.5, 1.5, 4), rng.uniform(-1.0, 1.0, 4), rng.uniform(-np.pi, np.pi, 4)])
+        turned = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.uniform(-2.2, 2.2, 4))  # less than the reader doubts
+        poses = np.column_stack([rng.uniform(-1.5, 1.5, 4), rng.uniform(-1.0, 1.0, 4), turned])
         first = poses[0] if first is None else first
         poses[-1] = first if run == 2 else poses[-1]
+        poses[:, 2] = np.unwrap(poses[:, 2])
         legs.append(_stops(poses, start, 20, truth, rng))
         start = float(legs[-1].stamps[-1]) + rng.uniform(60, 200)
     return Tour(room, tuple(legs), truth, moving=False)
