@@ -1,14 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The generator of hidden faults: its noise, its z, its nulls, and that a seed says all."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.bench.hidden.base_case import draw_drives
+from kurumaisu.bench.hidden import Ask, make, names_of
+from kurumaisu.bench.hidden.base_case import Scale, draw_drives, gates
 from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.motion import STEP, Setting, drive
+from kurumaisu.bench.hidden.motion import STEP, Setting, drive, integrate
 from kurumaisu.bench.hidden.noise import REGIMES, Colour, Regime, draw_rates
+from kurumaisu.bench.hidden.sizing import left_beside, size_for
+from kurumaisu.bench.hidden.whitening import Path, Whitener, deviation
+from kurumaisu.errors import Error
+
+WITHOUT = ("base.sign", "base.steering_law", "base.process_noise")  # a size to choose, or a mean
+MEANS = [name for name in BASE if name not in WITHOUT]
 
 
 def same(one, other):
@@ -23,7 +31,8 @@ def test_a_seed_says_all():
     ask = Ask("pair")
     first, again, other = make(ask, 3), make(ask, 3), make(ask, 4)
     assert same(first.recording, again.recording)
-    assert first.truth == again.truth
+    assert first.truth.ids == again.truth.ids
+    assert first.truth.z == pytest.approx(again.truth.z, rel=1e-9)
     assert not same(first.recording, other.recording)
 
 
@@ -65,12 +74,132 @@ def test_what_the_reference_sees_of_a_null_is_drive_and_noise_only():
         assert np.all(np.abs(left.mean(axis=0)) < 4 * left.std(axis=0) / np.sqrt(len(left)))
 
 
+@pytest.fixture(scope="module")
+def scale():
+    return Scale(draw_drives("rich", REGIMES["usual"], np.random.default_rng(8)))
+
+
 @pytest.mark.parametrize("form", ["plain", "other"])
-@pytest.mark.parametrize("name", BASE)
-def test_every_base_id_reaches_the_z_that_was_asked_for(name, form):
-    truth = make(Ask("single", (name,), z=15.0, form=form, regime="usual"), 8).truth
-    assert truth.ids == (name,)
-    if BASE[name].scaled:
-        assert truth.z == pytest.approx(15.0, rel=0.1)
-    if form == "plain" and name != "base.process_noise":
-        assert truth.z_form < 1e-6
+@pytest.mark.parametrize("name", MEANS)
+def test_every_base_id_reaches_the_z_that_is_asked_for(name, form, scale):
+    hidden = BASE[name]
+    make_fault = lambda sizes: hidden.fault(sizes, form)  # noqa: E731
+    sizes = size_for(scale, make_fault, hidden.draw(np.random.default_rng(9)), hidden.most, 15.0)
+    assert np.linalg.norm(scale.signals([[make_fault(sizes)]])) == pytest.approx(15.0, rel=0.1)
+
+
+@pytest.mark.parametrize("name", WITHOUT)
+def test_what_has_no_size_or_no_mean_is_there(name):
+    case = make(Ask("single", (name,), z=15.0, regime="usual"), 8)
+    assert case.truth.z > 14
+    assert not same(case.recording, case.null)
+
+
+def test_z_is_that_of_a_dense_covariance():
+    """The filter's z against the covariance of poses made of every noise increment on a fine grid."""
+    regime = Regime((Colour((0.02, 0.01, 0.05), 0.4), Colour((0.01, 0.002, 0.02), 2.0)), 0.004, 0.006)
+    command = np.array([[0.0, 0.5, 0.3], [2.0, -0.3, 0.4], [3.5, 0.0, 0.0]])
+    stamps = np.arange(0.0, 4.0, 0.1)
+    setting = Setting(command, np.array([0.3, -0.2, 0.7]), stamps)
+    nominal, rates = drive(setting, ())
+    fault = BASE["base.gain_w"].fault({"size": 0.05}, "plain")
+    signal = deviation(nominal, drive(setting, [fault])[0])
+    whitener = Whitener(Path(stamps, nominal[None], gates(rates.moving, stamps)[None]), regime)
+    z = np.linalg.norm(whitener.whiten(signal[None, :, :, None]))
+    assert z == pytest.approx(dense_z(signal, setting, rates, regime), rel=0.02)
+
+
+def dense_z(signal, setting, rates, regime):
+    path, heading = integrate(rates), rates.headings()
+    t, stamps = rates.t, setting.stamps
+    n = 3 * len(stamps)
+    covariance = np.tile([regime.position_sd**2, regime.position_sd**2, regime.heading_sd**2], len(stamps)) * np.eye(n)
+    middle = (path[1:] + path[:-1]) / 2
+    response = np.zeros((3, len(stamps), 3, len(t)))  # channel of noise; stamp; x, y, heading; cell
+    for k, stamp in enumerate(stamps):
+        at = middle[min(round(stamp / STEP), len(t) - 1)]
+        past = (t < stamp) * rates.moving * STEP
+        response[0, k] = past * np.stack([np.cos(heading), np.sin(heading), 0 * t])
+        response[1, k] = past * np.stack([-np.sin(heading), np.cos(heading), 0 * t])
+        response[2, k] = past * np.stack([-(at[1] - middle[:, 1]), at[0] - middle[:, 0], 1 + 0 * t])
+    for colour in regime.colours:
+        kernel = np.exp(-np.abs(t[:, None] - t[None]) / colour.tau)
+        for channel, sd in enumerate(colour.sd):
+            flat = response[channel].reshape(n, -1)
+            covariance += sd**2 * flat @ kernel @ flat.T
+    start = np.concatenate([np.eye(3)] * len(stamps))  # a drive begins where it begins; turns move what follows
+    start[0::3, 2] = -(nominal_of(setting)[:, 1] - setting.start[1])
+    start[1::3, 2] = nominal_of(setting)[:, 0] - setting.start[0]
+    weight = np.linalg.inv(covariance)
+    flat = signal.ravel()
+    left = flat - start @ np.linalg.solve(start.T @ weight @ start, start.T @ weight @ flat)
+    return np.sqrt(left @ weight @ left)
+
+
+def nominal_of(setting):
+    return drive(setting, ())[0]
+
+
+def test_the_noise_whitens_to_unit_white():
+    """What the drives of a null deviate from their noise-free twins is what the filter expects."""
+    regime = REGIMES["two colours"]
+    drives = draw_drives("rich", regime, np.random.default_rng(4), seconds=40.0)
+    scale = Scale(drives)
+    left = [
+        deviation(nominal_of(replace(setting, noise=None)), drive(setting, ())[0] + error)
+        for setting, error in zip(drives.settings, drives.errors, strict=True)
+    ]
+    white = scale.whitener.whiten(np.stack(left)[..., None])[:, 0]
+    assert white.std() == pytest.approx(1.0, abs=0.06)
+    assert abs(np.corrcoef(white[:-3], white[3:])[0, 1]) < 0.1
+    white_again = scale.whitener.whiten(scale.whitener.colour(np.ones((3, len(drives.settings[0].stamps), 3, 2))))
+    np.testing.assert_allclose(white_again, 1.0, atol=1e-6)
+
+
+def test_z_left_beside_a_rival_is_the_projection():
+    rng = np.random.default_rng(6)
+    signal, columns = rng.standard_normal(50), rng.standard_normal((50, 2))
+    q = np.linalg.qr(columns)[0]
+    left = np.sqrt(signal @ signal - ((q.T @ signal) ** 2).sum())
+    assert left_beside(signal, {"rival": columns})["rival"] == pytest.approx(left)
+
+
+def test_an_exact_pair_is_known_as_such():
+    truth = make(Ask("single", ("base.cross_w_to_v",), z=20.0), 9).truth
+    assert truth.rival == "base.marker_y"
+    assert truth.z_rival < 0.5
+    assert ("base.marker_y",) in truth.accepted
+
+
+@pytest.mark.parametrize("name", names_of("unknown", "base"))
+def test_what_is_in_no_catalogue_is_left_by_all_of_it(name):
+    truth = make(Ask("unknown", (name,), z=8.0, regime="usual"), 10).truth
+    assert truth.ids == ()
+    assert truth.z == pytest.approx(8.0, rel=0.1)
+    assert truth.z_rival >= truth.z * 0.99
+
+
+@pytest.mark.parametrize("name", names_of("wrong", "base"))
+def test_wrong_data_differ_from_their_null(name):
+    case = make(Ask("wrong", (name,)), 11)
+    assert not all(
+        np.array_equal(getattr(a, part).t, getattr(b, part).t)
+        and np.array_equal(getattr(a, part).values, getattr(b, part).values)
+        for a, b in zip(case.recording.runs, case.null.runs, strict=True)
+        for part in ("command", "voltage", "pose")
+    )
+    assert all(np.all(np.diff(run.pose.t) > 0) for run in case.recording.runs)
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (Ask("singel"), "singel"),
+        (Ask("single", ("base.nothing",)), "base.nothing"),
+        (Ask("single", ("laser.tilt",)), "folder"),
+        (Ask("pair", ("laser.tilt", "base.gain_v")), "all of the base"),
+    ],
+)
+def test_what_cannot_be_hidden_is_said(ask, message):
+    with pytest.raises(Error, match=message):
+        make(ask, 1)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import beta
 
-from kurumaisu.bench import hidden_effect
+from kurumaisu.bench import critic_table, hidden_effect
 from kurumaisu.bench.hidden_effect import Disturbance
 from kurumaisu.bench.table import Table
 from kurumaisu.critic import pipeline
@@ -24,12 +24,18 @@ _SIZES = (0.1, 0.3, 1.0)  # of the sizes that hidden_effect draws
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table; every draw has its own seed, size and drives."""
+    """Print the table; every draw has its own seed, size and drives.
+
+    Without --kind nine effects of the base in three sizes; with it what is asked for, hidden by bench/hidden.
+    """
     parser = argparse.ArgumentParser(prog="bench critic")
     parser.add_argument("--draws", type=int, default=4, help="recordings per effect and size; 0: none")
     parser.add_argument("--nulls", type=int, default=20, help="recordings without an effect, per kind of noise")
     parser.add_argument("--seed", type=int, default=1000)
+    critic_table.options_of(parser)
     options = parser.parse_args(arguments)
+    if options.kind:
+        return critic_table.run(options)
     rng = np.random.default_rng(options.seed)
     title = f"{_RUNS} drives of 60 s, reference at 10 Hz; share (90 % interval) of the recordings"
     headings = ("named right     ", "misnamed        ", "a set           ", "nothing         ", "interval covers ")

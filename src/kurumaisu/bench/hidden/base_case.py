@@ -72,12 +72,12 @@ class Scale:
         """Drive without noise and faults once, and work out the filter."""
         self.drives = drives
         self._settings = [replace(setting, noise=None) for setting in drives.settings]
-        self._nominal, gates = [], []
+        self._nominal, moved = [], []
         for setting in self._settings:
             poses, rates = drive(setting, ())
             self._nominal.append(poses)
-            gates.append(_gates(rates.moving, setting.stamps))
-        self.path = Path(self._settings[0].stamps, np.stack(self._nominal), np.stack(gates))
+            moved.append(gates(rates.moving, setting.stamps))
+        self.path = Path(self._settings[0].stamps, np.stack(self._nominal), np.stack(moved))
         self.whitener = Whitener(self.path, drives.regime)
 
     def deviations(self, faults: Sequence[Fault]) -> FloatArray:
@@ -95,13 +95,13 @@ class Scale:
         for setting in self._settings:
             ones = replace(setting, noise=np.ones((round((setting.stamps[-1] + 3.0) / STEP), 3)))
             rates = drive(ones, (fault,))[1]
-            loud = _gates(rates.moving * rates.noise[:, 0], setting.stamps)
-            usual = _gates(rates.moving, setting.stamps)
+            loud = gates(rates.moving * rates.noise[:, 0], setting.stamps)
+            usual = gates(rates.moving, setting.stamps)
             out.append(np.where(usual > 0, loud / np.maximum(usual, 1e-12), 1.0))
         return np.stack(out)
 
 
-def _gates(moving: FloatArray, stamps: FloatArray) -> FloatArray:
+def gates(moving: FloatArray, stamps: FloatArray) -> FloatArray:
     """Return the root mean square of a gate between stamps."""
     sums = np.concatenate([[0.0], np.cumsum(moving**2)]) * STEP
     at = np.interp(stamps, STEP * np.arange(len(sums)), sums)

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import lfilter
@@ -144,14 +146,13 @@ def caster_swing(r: Rates, s: Sizes) -> Rates:
     return replace(r, w=r.w + _kicks(r, s, lambda way: np.exp(-(way**2) / (1.27 * s["length"] ** 2))))
 
 
-def _kicks(r: Rates, s: Sizes, shape: object) -> FloatArray:
-    assert callable(shape)
+def _kicks(r: Rates, s: Sizes, shape: Callable[[FloatArray], FloatArray]) -> FloatArray:
     out = np.zeros_like(r.v)
     way = np.concatenate([[0.0], np.cumsum(np.abs(r.v)) * STEP])
     driving = np.flatnonzero(r.v != 0)
     turning = np.flatnonzero(r.asked_w != 0)
     turns = driving[1:][np.sign(r.v[driving[1:]]) != np.sign(r.v[driving[:-1]])]
-    for start, end in zip(turns, [*turns[1:], len(out)], strict=True):
+    for start, end in pairwise([*turns, len(out)]):
         last = np.searchsorted(turning, start) - 1
         if last >= 0:
             middle = (way[start:end] + way[start + 1 : end + 1]) / 2 - way[start]

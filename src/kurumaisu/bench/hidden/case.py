@@ -15,10 +15,12 @@ class Truth:
     """What was hidden.
 
     kind: of KINDS; ids: of the contract, in order; parameters: by id, what the usual equation calls the sizes (an
-    equivalent where form is 'other'); z: whitened norm of the whole signal; z_alone: of each id's share in it;
-    z_rival: what remains of the signal beside the nearest rival, whose id is rival; z_form: what the usual equation
-    leaves of it; channel, covariate: where something outside the catalogue shows, and what it follows; problem:
-    what is wrong with wrong data; accepted: sets of ids of which each explains the signal to within z 3.
+    equivalent where form is 'other'); z: whitened norm of the whole signal, of an unknown one what the whole catalogue
+    leaves of it; z_alone: of each id's share in it; z_rival: what remains of the signal beside the nearest rival, whose
+    id is rival; z_form: what the usual equation leaves of it; channel, covariates: where something outside the
+    catalogue shows, and what it is right to say that it follows; problem: what is wrong with wrong data; accepted: sets
+    of ids of which each explains the signal to within z 3; background: ids that the null has, too, which are right to
+    name and right to leave out.
     """
 
     kind: str
@@ -30,9 +32,10 @@ class Truth:
     rival: str = ""
     z_form: float = 0.0
     channel: str = ""
-    covariate: str = ""
+    covariates: tuple[str, ...] = ()
     problem: str = ""
     accepted: tuple[tuple[str, ...], ...] = ()
+    background: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,9 @@ class Ask:
 
     kind: of KINDS; ids: of the contract, or the name of something unknown or wrong, empty for a random choice;
     z: whitened norm, None for one log-uniform in 5 to 60; form: 'plain' equations or 'other' ones;
-    regime: name in noise.REGIMES, None for a random one; design: name in drives.DESIGNS, None for a rich one.
+    regime: name in noise.REGIMES, or for lasers in backdrop.BACKDROPS, None for a random one;
+    design: name in drives.DESIGNS, or for lasers 'room', 'wall' or 'drive', None for a rich one;
+    family: 'base' or 'laser', which are ids drawn at random from.
     """
 
     kind: str
@@ -60,3 +65,4 @@ class Ask:
     form: str = "other"
     regime: str | None = None
     design: str | None = None
+    family: str = "base"

@@ -1,114 +1,97 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Cases by seed: what is hidden, how large, in which drives, under which noise; the same seed gives the same case."""
+"""One door to all cases: by kind, ids and seed."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.bench.hidden import sizing
-from kurumaisu.bench.hidden.base_case import Scale, draw_drives, recording
 from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.case import Ask, Case, Truth
-from kurumaisu.bench.hidden.motion import Fault, Sizes
-from kurumaisu.bench.hidden.noise import REGIMES, draw_regime
-from kurumaisu.types import FloatArray
-
-Z_RANGE = (5.0, 60.0)
-_SAME = 3.0  # a set of ids that leaves less than this z of the signal explains it
-_COUNT = {"null": 0, "single": 1, "pair": 2, "triple": 3}
-
-
-def make_base(ask: Ask, seed: int) -> Case:
-    """Return a case of the base: nothing, one id, two or three, drawn at random unless the ask names them."""
-    what, where, how = (np.random.default_rng([seed, i]) for i in range(3))
-    ids = ask.ids or _random_ids(_COUNT[ask.kind], what)
-    regime = REGIMES[ask.regime] if ask.regime else draw_regime(how)
-    drives = draw_drives(ask.design, regime, where)
-    scale = Scale(drives)
-    sizes: dict[str, Sizes] = {}
-    for name in ids:
-        wanted = ask.z or float(np.exp(what.uniform(*np.log(Z_RANGE))))
-        sizes[name] = _sizes(name, scale, ask.form, wanted, what)
-    faults = [BASE[name].fault(sizes[name], ask.form) for name in ids]
-    name = f"hidden {seed}"
-    null = recording(name, drives, ())
-    found = recording(name, drives, faults) if faults else null
-    return Case(found, null, _truth(ask, scale, sizes), seed)
+from kurumaisu.bench.hidden.base_make import make_base
+from kurumaisu.bench.hidden.case import KINDS, Ask, Case, Truth
+from kurumaisu.bench.hidden.confounded import CONFOUNDED
+from kurumaisu.bench.hidden.laser_case import make_laser
+from kurumaisu.bench.hidden.laser_catalogue import LASER
+from kurumaisu.bench.hidden.rooms import draw_room, world_text
+from kurumaisu.bench.hidden.strange_case import strange_base, strange_laser
+from kurumaisu.bench.hidden.unknown import STRANGE_BASE, STRANGE_LASER
+from kurumaisu.bench.hidden.wrong import WRONG, spoilt
+from kurumaisu.errors import Error
 
 
-def _random_ids(count: int, rng: np.random.Generator) -> tuple[str, ...]:
-    """Return different ids of which a size can be chosen, in the catalogue's order."""
-    names = [name for name, hidden in BASE.items() if hidden.scaled]
-    chosen = rng.choice(len(names), size=count, replace=False)
-    return tuple(names[i] for i in sorted(chosen))
+def make(ask: Ask, seed: int, folder: Path | None = None) -> Case:
+    """Return the case of a seed; folder: where a laser's world file goes, needed for those.
+
+    Raise Error for a kind or a name that does not exist, and for a laser without a folder.
+    """
+    _check(ask)
+    what = np.random.default_rng([seed, 40])
+    if ask.kind == "wrong":
+        return _make_wrong(ask, seed, folder, what)
+    if ask.kind == "unknown":
+        laser = ask.ids[0] in STRANGE_LASER if ask.ids else ask.family == "laser"
+        return strange_laser(ask, seed, _given(folder, ask)) if laser else strange_base(ask, seed)
+    if ask.kind == "confounded":
+        ask = _confounded(ask, what)
+    if all(name in BASE for name in ask.ids) and (ask.ids or ask.family == "base"):
+        return make_base(ask, seed)
+    return make_laser(ask, seed, _given(folder, ask))
 
 
-def _sizes(name: str, scale: Scale, form: str, wanted: float, rng: np.random.Generator) -> Sizes:
-    hidden = BASE[name]
-    sizes = hidden.draw(rng)
-    if not hidden.scaled:
-        return sizes
-    if name == "base.process_noise":
-        size = sizing.scaled_to(wanted, lambda size: _spread_z(scale, hidden.fault({"size": size}, form)), 1.0, 20.0)
-        return {"size": size}
-    return sizing.size_for(scale, lambda given: hidden.fault(given, form), sizes, hidden.most, wanted)
+def names_of(kind: str, family: str) -> tuple[str, ...]:
+    """Return what can be hidden in cases of a kind, of the base or of the laser."""
+    if kind == "wrong":
+        return tuple(name for name, wrong in WRONG.items() if wrong.laser == (family == "laser"))
+    if kind == "unknown":
+        return tuple(STRANGE_LASER if family == "laser" else STRANGE_BASE)
+    if kind == "confounded":
+        return tuple(dict.fromkeys(name for name, _ in CONFOUNDED if (name in BASE) == (family == "base")))
+    return tuple(LASER if family == "laser" else BASE)
 
 
-def _spread_z(scale: Scale, fault: Fault) -> float:
-    """Return the z of a fault in the amplitude of the noise."""
-    return sizing.spread_z(scale.path, scale.drives.regime, scale.growth(fault))
+def _check(ask: Ask) -> None:
+    if ask.kind not in KINDS:
+        raise Error(f"hidden: kind: {ask.kind!r} is none of {', '.join(KINDS)}")
+    there = [*names_of(ask.kind, "base"), *names_of(ask.kind, "laser")]
+    for name in ask.ids:
+        if name not in there:
+            raise Error(
+                f"hidden: {name!r} cannot be hidden in a case of kind {ask.kind!r}; there are: {', '.join(there)}"
+            )
+    if len({name in BASE for name in ask.ids}) > 1 and ask.kind in ("pair", "triple"):
+        raise Error(f"hidden: {', '.join(ask.ids)}: are not all of the base or all of the laser")
 
 
-def _truth(ask: Ask, scale: Scale, sizes: dict[str, Sizes]) -> Truth:
-    ids = tuple(sizes)
-    parameters = {name: BASE[name].names(sizes[name]) for name in ids}
-    means = [name for name in ids if name != "base.process_noise"]
-    if not means:
-        z = _spread_z(scale, BASE[ids[0]].fault(sizes[ids[0]], ask.form)) if ids else 0.0
-        return Truth(ask.kind, ids, parameters, z=z, z_alone=dict.fromkeys(ids, z), accepted=(ids,) if ids else ())
-    faults = [BASE[name].fault(sizes[name], ask.form) for name in means]
-    plain = [BASE[name].fault(sizes[name], "plain") for name in means]
-    # All together, then each without the others, then each by its usual equation.
-    signals = scale.signals([faults, *([fault] for fault in faults), *([fault] for fault in plain)])
-    whole, own = signals[:, 0], signals[:, 1 : 1 + len(faults)]
-    usual = {"usual": signals[:, 1 + len(faults) :]}
-    rivals = sizing.rival_columns(scale, [name for name in sizing.RIVALS if name not in ids])
-    left = _left(whole, own, rivals)
-    nearest = min(left, key=lambda name: left[name])
-    return Truth(
-        ask.kind,
-        ids,
-        parameters,
-        z=float(np.linalg.norm(whole)),
-        z_alone=_alone(means, own),
-        z_rival=left[nearest],
-        rival=nearest,
-        z_form=sizing.left_beside(whole, usual)["usual"],
-        accepted=_accepted(ids, left),
-    )
+def _given(folder: Path | None, ask: Ask) -> Path:
+    if folder is None:
+        raise Error(f"hidden: {', '.join(ask.ids) or 'a laser'}: needs a folder for its world file")
+    return folder
 
 
-def _left(whole: FloatArray, own: FloatArray, rivals: dict[str, FloatArray]) -> dict[str, float]:
-    """Return what a rival leaves of the signal in the place of whichever one of the hidden ids it replaces best."""
-    left = {}
-    for name, column in rivals.items():
-        instead = [np.column_stack([np.delete(own, i, axis=1), column]) for i in range(own.shape[1])]
-        left[name] = min(sizing.left_beside(whole, {"": columns}).get("", np.inf) for columns in instead)
-    return left
+def _confounded(ask: Ask, rng: np.random.Generator) -> Ask:
+    """Return the ask with an id and a design that hides it, of those there are for what is asked."""
+    fit = [
+        (name, design)
+        for name, design in CONFOUNDED
+        if (name in ask.ids if ask.ids else (name in BASE) == (ask.family == "base")) and ask.design in (None, design)
+    ]
+    if not fit:
+        raise Error(f"hidden: design: {ask.design!r} hides nothing of {', '.join(ask.ids) or ask.family}")
+    name, design = fit[rng.integers(len(fit))]
+    return replace(ask, ids=(name,), design=design, form="plain")
 
 
-def _alone(names: Sequence[str], own: FloatArray) -> dict[str, float]:
-    """Return what is left of each signal beside the others."""
-    if len(names) == 1:
-        return {names[0]: float(np.linalg.norm(own))}
-    others = [np.delete(own, i, axis=1) for i in range(len(names))]
-    return {name: sizing.left_beside(own[:, i], {"": others[i]})[""] for i, name in enumerate(names)}
-
-
-def _accepted(ids: tuple[str, ...], left: dict[str, float]) -> tuple[tuple[str, ...], ...]:
-    """Return the truth, and for a single id those rivals that leave nothing that could be seen."""
-    if len(ids) > 1 or not BASE[ids[0]].scaled:
-        return (ids,)
-    return (ids, *((name,) for name, rest in left.items() if rest < _SAME))
+def _make_wrong(ask: Ask, seed: int, folder: Path | None, rng: np.random.Generator) -> Case:
+    names = names_of("wrong", ask.family)
+    name = ask.ids[0] if ask.ids else str(names[rng.integers(len(names))])
+    wrong = WRONG[name]
+    good = replace(ask, kind="null", ids=())
+    null = (make_laser(good, seed, _given(folder, ask)) if wrong.laser else make_base(good, seed)).null
+    found = spoilt(null, name, rng)
+    if name == "wrong map":
+        other = _given(folder, ask) / f"hidden_{seed}_wrong.world"
+        other.write_text(world_text("another room", draw_room(np.random.default_rng([seed, 41]))), encoding="utf-8")
+        found = replace(found, world=other)
+    return Case(found, null, Truth("wrong", problem=name), seed)

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The critic and simple baselines on hidden faults of all kinds, as one table."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from itertools import repeat
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from kurumaisu.bench.hidden import Ask, make, names_of
+from kurumaisu.bench.hidden.baselines import BASELINES
+from kurumaisu.bench.hidden.score import Score, calibration_error, score, scored_names, share
+from kurumaisu.bench.table import Table
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.verdict import Verdict
+from kurumaisu.errors import Error
+from kurumaisu.params import shipped
+
+KINDS = {
+    "base": ("single", "base"),
+    "laser": ("single", "laser"),
+    "pairs": ("pair", "base"),
+    "triples": ("triple", "base"),
+    "laser-pairs": ("pair", "laser"),
+    "unknown": ("unknown", "base"),
+    "laser-unknown": ("unknown", "laser"),
+    "wrong": ("wrong", "base"),
+    "laser-wrong": ("wrong", "laser"),
+    "confounded": ("confounded", "base"),
+    "laser-confounded": ("confounded", "laser"),
+    "null": ("null", "base"),
+    "laser-null": ("null", "laser"),
+}
+RIGHT = {
+    "single": "exact set",
+    "pair": "exact set",
+    "triple": "exact set",
+    "null": "nothing named",
+    "unknown": "right covariate in the first three, nothing named",
+    "wrong": "invalid_data, or the id that says the same",
+    "confounded": "a set with the truth, of ids that all explain it",
+}
+
+
+@dataclass(frozen=True)
+class Job:
+    """One draw: what is asked for, its seed, and whether the baselines answer, too."""
+
+    ask: Ask
+    seed: int
+    baselines: bool
+
+
+def options_of(parser: argparse.ArgumentParser) -> None:
+    """Add the options of this table."""
+    parser.add_argument("--kind", choices=sorted(KINDS), help="what is hidden; without it the short table of old")
+    parser.add_argument("--effects", nargs="+", default=(), help="ids, or names of unknown or wrong things; all")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--form", choices=("plain", "other"), default="other", help="equations that hide an id")
+    parser.add_argument("--z", type=float, help="whitened norm; without it log-uniform in 5 to 60")
+    parser.add_argument("--baselines", action="store_true", help="rows of the baselines, too (base only)")
+    parser.add_argument("--log", type=Path, help="file for one JSON line per draw: truth and answer")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the table of one kind. Raise Error for a name that this kind does not know."""
+    kind, family = KINDS[options.kind]
+    rows = tuple(options.effects) or (("",) if kind in ("null", "pair", "triple") else names_of(kind, family))
+    headings = ("right           ", "misnamed        ", "confounded      ", "unknown         ", "nothing         ")
+    title = f"{options.kind}, seeds from {options.seed}; right: {RIGHT[kind]}; shares with 90 % intervals"
+    table = Table(title, "hidden", "number", *headings, "interval covers ", "median z", "CPU [s]")
+    baselines = options.baselines and family == "base"
+    scores: dict[str, list[Score]] = {}
+    with TemporaryDirectory() as folder, ProcessPoolExecutor(options.jobs) as pool:
+        for i, name in enumerate(rows):
+            ask = Ask(kind, (name,) if name else (), options.z, options.form, family=family)
+            jobs = [Job(ask, options.seed + options.draws * i + k, baselines) for k in range(options.draws)]
+            answers = list(pool.map(_answers, jobs, repeat(folder)))
+            _log(options.log, jobs, answers)
+            for answer in answers:
+                for who, one in answer.items():
+                    scores.setdefault(who, []).append(one)
+            if name:
+                _row(table, name, [answer["critic"] for answer in answers])
+    for who, all_of in scores.items():
+        _row(table, f"all: {who}", all_of)
+        if kind in ("single", "pair", "triple"):
+            hard = [one for one in all_of if one.truth.z >= 10 and one.truth.z_rival >= 6]
+            _row(table, f"  z >= 10, rival's z >= 6: {who}", hard)
+    _summary(scores["critic"])
+    return 0
+
+
+def _answers(job: Job, folder: str) -> dict[str, Score]:
+    """Return the scores of the critic and, if asked, of the baselines."""
+    case = make(job.ask, job.seed, Path(folder))
+    start = time.process_time()
+    out = {"critic": score(case.truth, _criticised(case.recording), time.process_time() - start)}
+    for name, baseline in BASELINES.items() if job.baselines else ():
+        start = time.process_time()
+        named = baseline(case.recording)
+        out[name] = scored_names(case.truth, named, time.process_time() - start)
+    return out
+
+
+def _criticised(recording: Recording) -> Verdict:
+    try:
+        return pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None).verdict
+    except Error as error:
+        return Verdict("invalid_data", problems=(str(error),))
+
+
+def _row(table: Table, label: str, scores: Sequence[Score]) -> None:
+    n = len(scores)
+    covered = [hit for one in scores for hit in one.covered]
+    flags = ("right", "misnamed", "confounded", "unknown", "nothing")
+    table.row(
+        label,
+        str(n),
+        *(share(sum(getattr(one, flag) for one in scores), n) for flag in flags),
+        share(sum(covered), len(covered)),
+        float(np.median([one.truth.z for one in scores])) if scores else float("nan"),
+        float(np.median([one.cpu for one in scores])) if scores else float("nan"),
+    )
+
+
+def _summary(scores: Sequence[Score]) -> None:
+    stated = [pair for one in scores for pair in one.stated]
+    sure = [right for p, right in stated if p >= 0.95]
+    print(f"\nof {len(stated)} causes named: calibration error {calibration_error(stated):.3f}; ", end="")
+    print(f"right when p >= 0.95: {share(sum(sure), len(sure))}, {len(sure)} of them")
+
+
+def _log(path: Path | None, jobs: Sequence[Job], answers: Sequence[dict[str, Score]]) -> None:
+    if path is None:
+        return
+    with path.open("a", encoding="utf-8") as stream:
+        for line in _lines(jobs, answers):
+            stream.write(line + "\n")
+
+
+def _lines(jobs: Sequence[Job], answers: Sequence[dict[str, Score]]) -> Iterator[str]:
+    for job, answer in zip(jobs, answers, strict=True):
+        one = answer["critic"]
+        truth = {key: value for key, value in asdict(one.truth).items() if value}
+        yield json.dumps({"seed": job.seed, "right": one.right, "answer": one.words, "truth": truth})

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a hidden fault of a laser is worth: z against the noise of readings and the errors of the reference's poses.
+
+Mean signals: the readings' noise is known, neighbours' correlation and the scans' common mode included; each stop, or
+each scan of a drive, has an error of its pose with the stated deviations, which takes its part of the signal away.
+Beams that come to meet another box have jumped, and those more than 78 degrees oblique hardly come back: both count
+as nothing.
+The offsets of single beams, where the background has them, and rounding other than its variance are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+from scipy.stats import norm, t
+
+from kurumaisu.bench.hidden import laws
+from kurumaisu.bench.hidden.backdrop import Backdrop
+from kurumaisu.bench.hidden.laser_catalogue import LASER
+from kurumaisu.bench.hidden.motion import Fault, Sizes
+from kurumaisu.bench.hidden.scanning import MOUNT, Scans, expected
+from kurumaisu.bench.hidden.tours import Tour
+from kurumaisu.types import BoolArray, FloatArray
+
+_PART = 1e-5
+_OBLIQUE = 0.2  # least cosine of the incidence that counts
+_SELDOM = 1e-4  # share of readings that are wild anyway
+EVERY = 5  # of the scans, the first of so many is looked at and stands for all
+
+
+class LaserScale:
+    """What faults are worth on a given tour."""
+
+    def __init__(self, tour: Tour, backdrop: Backdrop) -> None:
+        """Look once without faults."""
+        self.tour, self._backdrop = tour, backdrop
+        self.nominal = expected(tour, (), EVERY)
+        self._seen = seen(self.nominal)
+        self.count = sum(len(leg.stamps) for leg in tour.legs) / len(self.nominal.stamps)
+
+    def signal(self, fault: Fault) -> FloatArray:
+        """Return the change of the mean readings (s, b) [m].
+
+        Of what moves beams it is that of a tiny part of the size, scaled up, so that hardly any leave their wall.
+        """
+        part = _PART if fault.form.stage == "aim" and fault.form != LASER["laser.tilt"].plain else 1.0
+        changed = expected(self.tour, [Fault(fault.form, {**fault.sizes, "size": part * fault.sizes["size"]})], EVERY)
+        same = self._seen & (changed.box == self.nominal.box)
+        return np.where(same, changed.mean - self.nominal.mean, 0.0) / part
+
+    def gram(self, signals: FloatArray) -> FloatArray:
+        """Return the products (k, k) of whitened signals (s, b, k): z squared on the diagonal."""
+        sd = np.hypot(self.nominal.sd, 0.001 / np.sqrt(12))
+        effects = np.where(self._seen[..., None], self._pose_columns(), 0.0)
+        white = _unchained(np.concatenate([signals, effects], axis=2) / sd[..., None], self._backdrop.beam_rho)
+        # Stops stand still, so one scan says what all of its stop do; scans of a drive have each a pose of their own.
+        weight = 1.0 if self.tour.moving else self.count
+        k = signals.shape[2]
+        products = weight * np.einsum("sbi,sbj->sij", white, white, optimize=True)
+        rest = self._taken(products, k)
+        return np.asarray(products[:, :k, :k].sum(axis=0) - rest) * (self.count if self.tour.moving else 1.0)
+
+    def _taken(self, products: FloatArray, k: int) -> FloatArray:
+        """Return the products' part that errors of poses and of whole scans explain, (k, k)."""
+        group = np.unique(self.nominal.stop, return_inverse=True)[1]
+        scans, groups = len(group), int(group.max()) + 1
+        effects = 3 if self._backdrop.common_sd == 0 else 4
+        place = np.column_stack([3 * group[:, None] + np.arange(3), 3 * groups + np.arange(scans)])[:, :effects]
+        size = 3 * groups + (scans if effects == 4 else 0)
+        rows = np.repeat(place[:, :, None], effects, axis=2).ravel()
+        columns = np.repeat(place[:, None, :], effects, axis=1).ravel()
+        inner = sparse.coo_matrix(
+            (products[:, k : k + effects, k : k + effects].ravel(), (rows, columns)), (size, size)
+        )
+        outer = np.zeros((size, k))
+        np.add.at(outer, place, products[:, k : k + effects, :k])
+        position, heading = self.tour.truth
+        prior = np.tile([position**-2, position**-2, heading**-2], groups)
+        whole = sparse.diags(prior) if effects == 3 else sparse.block_diag([sparse.diags(prior), self._whole(scans)])
+        solved = splu(sparse.csc_matrix(inner + whole)).solve(outer)
+        return np.asarray(outer.T @ solved)
+
+    def _whole(self, scans: int) -> sparse.spmatrix:
+        """Return the precision of the scans' common mode among the scans looked at."""
+        keep = self._backdrop.common_rho ** (EVERY if self.tour.moving else 1)
+        middle = np.full(scans, 1 + keep**2)
+        middle[[0, -1]] = 1.0
+        side = np.full(scans - 1, -keep)
+        return sparse.diags([side, middle, side], [-1, 0, 1]) / ((1 - keep**2) * self._backdrop.common_sd**2)
+
+    def _pose_columns(self) -> FloatArray:
+        """Return what 1 m of x, 1 m of y, 1 rad of heading of base_link, and 1 m of a whole scan do, (s, b, 4)."""
+        c = self.nominal
+        ux, uy = np.cos(c.angles), np.sin(c.angles)
+        nx, ny = c.normal[..., 0], c.normal[..., 1]
+        facing = nx * ux + ny * uy
+        facing = np.where(self._seen, facing, 1.0)
+        lever_x, lever_y = -np.sin(c.headings) * MOUNT[0], np.cos(c.headings) * MOUNT[0]
+        reach = np.where(np.isfinite(c.ranges), c.ranges, 0.0)
+        turned_x = lever_x[:, None] - reach * uy
+        turned_y = lever_y[:, None] + reach * ux
+        return np.stack(
+            [-nx / facing, -ny / facing, -(nx * turned_x + ny * turned_y) / facing, np.ones_like(ux)], axis=-1
+        )
+
+    def rivals(self, names: Sequence[str]) -> dict[str, FloatArray]:
+        """Return the signals (s, b, k) of rivals at typical sizes, those with a free shape in several."""
+        out = {}
+        for name in names:
+            if name == "world.map_error":
+                out[name] = self._walls()
+            else:
+                faults = [LASER[name].fault(shape, "plain") for shape in _shapes(name)]
+                out[name] = np.stack([self.signal(fault) for fault in faults], axis=-1)
+        return out
+
+    def _walls(self) -> FloatArray:
+        """Return what moving each wall by 5 mm along x and y does."""
+        columns, c = [], self.nominal
+        facing = c.normal[..., 0] * np.cos(c.angles) + c.normal[..., 1] * np.sin(c.angles)
+        facing = np.where(self._seen, facing, 1.0)
+        for i in range(len(self.tour.room)):
+            for axis in range(2):
+                columns.append(np.where(self._seen & (c.box == i), 0.005 * c.normal[..., axis] / facing, 0.0))
+        return np.stack(columns, axis=-1)
+
+
+def _shapes(name: str) -> list[Sizes]:
+    hidden = LASER[name]
+    base = {"size": hidden.typical, **hidden.extra(np.random.default_rng(0))}
+    free = {
+        "laser.warmup": [{"tau": tau} for tau in (200.0, 600.0, 1800.0)],
+        "laser.cyclic": [
+            {"wavelength": wave, "phase": phase} for wave in (0.8, 1.4, 2.5) for phase in (0.0, np.pi / 2)
+        ],
+        "laser.tilt": [{"bearing": bearing} for bearing in (0.0, np.pi / 4, np.pi / 2)],
+        "laser.beam_bias": [{"phase": phase} for phase in (0.0, np.pi / 2)],
+    }
+    return [{**base, **shape} for shape in free.get(name, [{}])]
+
+
+def _unchained(columns: FloatArray, rho: float) -> FloatArray:
+    """Return columns (s, b, k) with the neighbours' AR(1) correlation taken out."""
+    if rho == 0:
+        return columns
+    out = columns.copy()
+    out[:, 1:] = (columns[:, 1:] - rho * columns[:, :-1]) / np.sqrt(1 - rho**2)
+    return out
+
+
+def seen(scans: Scans) -> BoolArray:
+    """Return which beams (s, b) have a reading that counts."""
+    return np.isfinite(scans.ranges) & (scans.mean < laws.LASER_FAR) & (scans.cosine > _OBLIQUE)
+
+
+def spread_z(nominal: Scans, changed: Scans, count: float) -> float:
+    """Return z of another deviation of the readings: the root of twice the log likelihood ratio that is expected."""
+    q = (changed.sd / nominal.sd)[seen(nominal)]
+    return float(np.sqrt(count * (q**2 - 1 - 2 * np.log(q)).sum()))
+
+
+def odd_z(name: str, sizes: Sizes, nominal: Scans, count: float) -> float:
+    """Return z of what is neither mean nor deviation, by its likelihood ratio per reading."""
+    valid = np.isfinite(nominal.ranges) & (nominal.mean < laws.LASER_FAR)
+    readings, size = count * valid.sum(), sizes["size"]
+    near = nominal.ranges[:, :-1], nominal.ranges[:, 1:]
+    with np.errstate(invalid="ignore"):
+        jumps = count * (valid[:, :-1] & valid[:, 1:] & (np.abs(near[0] - near[1]) > 0.1)).sum()
+    beyond = count * (valid & (nominal.mean > 1 / max(size, 1e-9))).sum()
+    common = 1 + size**2 * (np.where(valid, nominal.sd, np.inf) ** -2).sum(axis=1)
+    worth = {
+        "laser.mixed_pixels": lambda: 2 * jumps * _bernoulli(size),
+        "laser.dropout": lambda: 2 * readings * _bernoulli(size),
+        "laser.crosstalk": lambda: 2 * readings * sizes["width"] / (2 * np.pi) * _bernoulli(size),
+        "laser.saturation": lambda: 2 * beyond * -np.log(_SELDOM),
+        "laser.quantisation": lambda: 2 * readings * np.log(max(size / 0.001, 1.0)),
+        "laser.common_mode": lambda: count * (common - 1 - np.log(common)).sum(),
+        "laser.beam_correlation": lambda: -readings * np.log(1 - min(size, 0.99) ** 2),
+        "laser.heavy_tails": lambda: 2 * readings * _tails(size),
+    }
+    return float(np.sqrt(worth[name]()))
+
+
+def _bernoulli(p: float) -> float:
+    p = min(max(p, 1e-9), 1 - 1e-9)
+    return float(p * np.log(p / _SELDOM) + (1 - p) * np.log((1 - p) / (1 - _SELDOM)))
+
+
+def _tails(inverse_nu: float) -> float:
+    nu = 1 / inverse_nu
+    x = np.linspace(-60, 60, 24001)
+    scale = np.sqrt((nu - 2) / nu)
+    log_t = t.logpdf(x, nu, scale=scale)
+    return float(np.sum(np.exp(log_t) * (log_t - norm.logpdf(x))) * (x[1] - x[0]))
+
+
+MEANS = tuple(name for name, hidden in LASER.items() if hidden.by == "mean")

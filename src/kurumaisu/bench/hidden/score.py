@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What an answer is worth against the truth of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import beta
+
+from kurumaisu.bench.hidden.case import Truth
+from kurumaisu.bench.hidden.wrong import WRONG
+from kurumaisu.critic.verdict import Verdict
+
+
+@dataclass(frozen=True)
+class Score:
+    """One answer: right for its kind, and what else it was; covered: of intervals whose parameter has a truth.
+
+    stated: probability and truth of each cause named; cpu [s]; z, z_rival of the case; words: of the answer, short.
+    """
+
+    right: bool
+    misnamed: bool
+    confounded: bool
+    unknown: bool
+    nothing: bool
+    covered: tuple[bool, ...]
+    stated: tuple[tuple[float, bool], ...]
+    cpu: float
+    truth: Truth
+    words: str
+
+
+def score(truth: Truth, verdict: Verdict, cpu: float) -> Score:
+    """Return the score of a verdict."""
+    named = {cause.id for cause in verdict.causes} - set(truth.background)
+    wanted = set(truth.ids)
+    also = set(WRONG[truth.problem].also) if truth.problem else set()
+    return Score(
+        right=_right(truth, verdict, named),
+        misnamed=bool(named - wanted - also),
+        confounded=verdict.verdict == "confounded",
+        unknown=bool(verdict.unknown) or verdict.verdict == "unknown",
+        nothing=verdict.verdict == "none",
+        covered=_covered(truth, verdict),
+        stated=tuple((cause.p, cause.id in wanted | also) for cause in verdict.causes if cause.id in named),
+        cpu=cpu,
+        truth=truth,
+        words=_words(verdict),
+    )
+
+
+def scored_names(truth: Truth, named: frozenset[str], cpu: float) -> Score:
+    """Return the score of a baseline, which can only name."""
+    right = named == set(truth.ids) if truth.kind in ("null", "single", "pair", "triple") else False
+    words = " ".join(sorted(named))
+    return Score(right, bool(named - set(truth.ids)), False, False, not named, (), (), cpu, truth, words)
+
+
+def _right(truth: Truth, verdict: Verdict, named: set[str]) -> bool:
+    """Return whether an answer is what the kind of case calls for."""
+    if truth.kind == "wrong":
+        also = set(WRONG[truth.problem].also)
+        return verdict.verdict == "invalid_data" or (bool(named) and named <= also)
+    if truth.kind == "unknown":
+        return not named and any(_follows(truth, u.channel, u.covariate) for u in verdict.unknown[:3])
+    if truth.kind == "confounded":
+        allowed = {name for ids in truth.accepted for name in ids}
+        return any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
+    clean = verdict.verdict not in ("unknown", "invalid_data", "confounded") and not verdict.unknown
+    discrete = truth.ids == ("base.sign",) and verdict.verdict == "invalid_data"
+    return discrete or (clean and named == set(truth.ids))
+
+
+def _follows(truth: Truth, channel: str, covariate: str) -> bool:
+    """Return whether an answer's words name the channel and one of the covariates."""
+    return truth.channel in channel and any(word == covariate or word in covariate.split() for word in truth.covariates)
+
+
+def _covered(truth: Truth, verdict: Verdict) -> tuple[bool, ...]:
+    out = []
+    for cause in verdict.causes:
+        for name, value in truth.parameters.get(cause.id, {}).items():
+            if name in cause.parameters:
+                interval = cause.parameters[name]
+                out.append(interval.lo90 <= value <= interval.hi90)
+    return tuple(out)
+
+
+def _words(verdict: Verdict) -> str:
+    parts = [f"{cause.id} {cause.p:.2f}" for cause in verdict.causes]
+    parts += ["{" + ", ".join(group) + "}" for group in verdict.confounded]
+    parts += [f"{unknown.channel} by {unknown.covariate}" for unknown in verdict.unknown]
+    parts += [problem[:60] for problem in verdict.problems[:1]]
+    return f"{verdict.verdict}: {'; '.join(parts)}".rstrip(": ")
+
+
+def share(k: int, n: int) -> str:
+    """Return a share with its exact (Clopper-Pearson) 90 % interval, or a dash of none."""
+    if n == 0:
+        return "-"
+    low = beta.ppf(0.05, k, n - k + 1) if k else 0.0
+    high = beta.ppf(0.95, k + 1, n - k) if k < n else 1.0
+    return f"{k / n:.2f} ({low:.2f}-{high:.2f})"
+
+
+def calibration_error(stated: Sequence[tuple[float, bool]]) -> float:
+    """Return the mean distance of stated probabilities from the shares that were right, in bins, by number."""
+    if not stated:
+        return float("nan")
+    p, right = np.array([pair[0] for pair in stated]), np.array([pair[1] for pair in stated], dtype=float)
+    bins = np.digitize(p, [0.5, 0.8, 0.9, 0.95, 0.99])
+    return float(sum(np.abs((p - right)[bins == i].sum()) for i in np.unique(bins)) / len(p))
