@@ -15,6 +15,7 @@ NAMES = (
     "arena",
     "stageros",
     "critic",
+    "sanity",
     "laser",
     "laser_clock",
     "faults",

@@ -1,49 +1,124 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Data that are wrong rather than surprising: signs and units that one transform would mend. Never fitted, said."""
+"""Stage 0: data that are wrong rather than surprising. They are said, with the transform that would mend them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.critic import replay
-from kurumaisu.critic.drive import Drive
+from kurumaisu.critic import sanity_input, sanity_pose, sanity_rates, sanity_rows, sanity_times, sanity_volts
+from kurumaisu.critic.clean import Faults
+from kurumaisu.critic.drive import from_voltages
+from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.sanity_input import Match
+from kurumaisu.critic.sanity_pose import Course
+from kurumaisu.critic.sanity_rates import Rates
 from kurumaisu.params import Model
 
-_MENDS = 0.25  # share of the squared residual that a suspected transform must leave at most
 
-_TRANSFORMS: dict[str, Callable[[Drive], Drive]] = {
-    "the yaw rate of the input has the wrong sign": lambda d: replace(d, w=-d.w),
-    "the forward speed of the input has the wrong sign": lambda d: replace(d, v=-d.v),
-    "the yaw rate of the input is in degrees": lambda d: replace(d, w=np.radians(d.w)),
-    "the heading of the reference pose is in degrees": lambda d: _pose(d, [0, 1, 2], [1, 1, np.pi / 180]),
-    "the reference pose is in millimetres": lambda d: _pose(d, [0, 1, 2], [1e-3, 1e-3, 1]),
-    "x and y of the reference pose are swapped": lambda d: _pose(d, [1, 0, 2], [1, 1, 1]),
-    "x of the reference pose has the wrong sign": lambda d: _pose(d, [0, 1, 2], [-1, 1, 1]),
-    "y of the reference pose has the wrong sign": lambda d: _pose(d, [0, 1, 2], [1, -1, 1]),
-}
+def examine(recording: Recording, model: Model) -> Faults:
+    """Return what is wrong with the runs to fit and to judge by, in words that begin with the run's name."""
+    faults = Faults()
+    for run in recording.runs:
+        for words in _of_run(run, model):
+            faults.add(f"{run.name}: {words}", fatal=True)
+    return faults
 
 
-def suspicions(drives: Sequence[Drive], model: Model) -> list[str]:
-    """Return what seems wrong with the data, in words; empty when nothing does."""
-    as_given = sum(_misfit(drive, model) for drive in drives)
-    found = {}
-    for words, transform in _TRANSFORMS.items():
-        share = sum(_misfit(transform(drive), model) for drive in drives) / max(as_given, 1e-12)
-        if share < _MENDS:
-            found[words] = share
-    best = sorted(found, key=lambda words: found[words])[:1]
-    return [f"{words}: with that undone, {found[words]:.1%} of the squared residual remains" for words in best]
+def _of_run(run: Run, model: Model) -> list[str]:
+    untimely = sanity_times.words(run)
+    if untimely or run.pose is None or len(run.pose.t) < 3:
+        return untimely
+    found = sanity_pose.course(run.pose)
+    pose = _mended(run.pose, found)
+    words = [*_jump_words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
+    known = []
+    for name, part in _inputs(run):
+        rates = _rates(part, pose)
+        if rates is not None:
+            words += _against(name, part, pose, rates, model)
+            asked = rates[0] if name != "voltage" else _from_volts(run, rates[1], model)
+            known.append((name, sanity_input.compare(asked, rates[1], name), _number(*rates)))
+    heading = sanity_pose.heading_words(found, *_agreement(found.factor, known)) if found is not None else None
+    words += _one(heading)
+    for name, match, number in known:
+        words += match.words
+        told = sanity_input.sign_and_unit(match, number, name)
+        reflected = found is not None and found.factor < 0
+        words += [word for word in told if not (reflected and "wrong sign" in word)]
+    return list(dict.fromkeys(words))
 
 
-def _pose(drive: Drive, order: list[int], factors: list[float]) -> Drive:
-    return replace(drive, poses=drive.poses[:, order] * factors)
+def _one(words: str | None) -> list[str]:
+    return [] if words is None else [words]
 
 
-def _misfit(drive: Drive, model: Model) -> float:
-    """Return the squared residual of dx and dtheta, each in units of what was measured."""
-    residual = drive.measured - replay.increments(drive, model, ())
-    size = np.sqrt(np.mean(drive.measured**2, axis=0))
-    return float(np.sum((residual[:, [0, 2]] / np.maximum(size[[0, 2]], 1e-9)) ** 2))
+def _inputs(run: Run) -> list[tuple[str, Series]]:
+    parts = (("command", run.command), ("voltage", run.voltage), ("odometry", run.odom))
+    return [(name, part) for name, part in parts if part is not None and len(part.t) > 1]
+
+
+def _against(name: str, part: Series, pose: Series, rates: tuple[Rates, Rates], model: Model) -> list[str]:
+    """Return what is wrong with poses in the light of an input, or with the input itself."""
+    words = sanity_volts.words(part, rates[1], model) if name == "voltage" else []
+    for check in (
+        sanity_rows.frozen(pose, *rates),
+        sanity_rows.held(pose, rates[1]),
+        sanity_rows.coarse(pose, rates[1]),
+    ):
+        words += _one(check)
+    return words
+
+
+def _from_volts(run: Run, driven: Rates, model: Model) -> Rates:
+    assert run.voltage is not None
+    t, v, w = from_voltages(run.voltage, run.command, model)
+    return sanity_rates.of_input(t, np.column_stack([v, w]), driven.t)
+
+
+def _mended(pose: Series, found: Course | None) -> Series:
+    """Return the poses with the heading that their course suggests."""
+    if found is None or found.right or found.agreement < 0.85:
+        return pose
+    values = pose.values.copy()
+    values[:, 2] = found.factor * values[:, 2] + found.offset
+    return replace(pose, values=values)
+
+
+def _rates(part: Series, pose: Series) -> tuple[Rates, Rates] | None:
+    """Return what was asked for and what was driven on one grid, None where there is too little of both."""
+    t = sanity_rates.grid(min(part.t[0], pose.t[0]), max(part.t[-1], pose.t[-1]))
+    if len(t) < 100:
+        return None
+    by_poses = "theta" in part.columns
+    asked = sanity_rates.of_poses(part, t) if by_poses else sanity_rates.of_input(part.t, part.values[:, :2], t)
+    if by_poses:
+        asked.values[(t < part.t[0]) | (t > part.t[-1])] = np.nan
+    driven = sanity_rates.of_poses(pose, t)
+    driven.values[(t < pose.t[0]) | (t > pose.t[-1])] = np.nan
+    return (asked, driven) if _number(asked, driven) >= 8 else None
+
+
+def _number(asked: Rates, driven: Rates) -> float:
+    """Return how many independent samples both have in common."""
+    known = np.isfinite(asked.values + driven.values).all(axis=1)
+    return float(known.sum() * sanity_rates.STEP / sanity_rates.SPAN)
+
+
+def _agreement(factor: float, known: list[tuple[str, Match, float]]) -> tuple[bool | None, bool | None]:
+    """Return whether the heading as given turns, and the robot goes ahead, as the first input asks for."""
+    for _, match, _ in known:
+        ahead, turns = (bool(c > 0) if abs(c) > 0.5 else None for c in match.correlation)
+        return (turns if turns is None or factor > 0 else not turns), ahead
+    return None, None
+
+
+def _jump_words(pose: Series) -> list[str]:
+    lasting, _ = sanity_pose.jumps(pose)
+    if not lasting:
+        return []
+    i = lasting[0]
+    size = float(np.hypot(*(pose.values[i, :2] - pose.values[i - 1, :2])))
+    times = "once" if len(lasting) == 1 else f"{len(lasting)} times"
+    return [f"the reference pose jumps {times} (first: {size:.2g} m at t = {pose.t[i]:.6g} s): relocalised?"]
