@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 import argparse
-from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from scipy.stats import beta
 
-from kurumaisu.bench import drives, wrong_data
+from kurumaisu.bench import drives, wrong_data, wrong_scans
 from kurumaisu.bench.table import Table
 from kurumaisu.critic import sanity
 from kurumaisu.critic.checks import check_run
@@ -33,50 +35,62 @@ def main(arguments: Sequence[str] | None = None) -> int:
     table = Table(
         "one drive of 40-120 s; 90 % intervals", "fault", "number", "called invalid   ", "with the right words"
     )
-    chosen = [name for name in wrong_data.SPOILT if options.only in name]
-    for k, name in enumerate(chosen):
+    faults = {**wrong_data.SPOILT, **wrong_scans.SPOILT}
+    for k, (name, (_, word)) in enumerate(faults.items()):
+        if options.only not in name:
+            continue
         said = [said_of(name, [options.seed, k, i]) for i in range(options.draws)]
-        word = wrong_data.SPOILT[name][1]
         right = [any(word in line for line in lines) for lines in said]
         table.row(name, str(len(said)), share(sum(map(bool, said)), len(said)), share(sum(right), len(said)))
         for i, lines in enumerate(said):
             if options.show and not right[i]:
-                print(
-                    "   ",
-                    [options.seed, k, i],
-                    drives.draw(np.random.default_rng([options.seed, k, i]), easy=True),
-                    lines,
-                )
-    wrong = Counter[str]()
-    for i in range(options.good):
-        lines = said_of(None, [options.seed, 999, i])
-        case = drives.draw(np.random.default_rng([options.seed, 999, i]))
-        wrong[case.effect or "none"] += bool(lines)
-        if lines and options.show:
-            print("   ", i, case, lines)
-    table.row("none (good data)", str(options.good), share(wrong.total(), options.good), "-")
+                print("   ", i, drives.draw(np.random.default_rng([options.seed, k, i]), easy=True), lines)
+    for name in ("", "with scans") if options.good else ():
+        said = [said_of(name, [options.seed, 999 + bool(name), i]) for i in range(options.good)]
+        for i, lines in enumerate(said):
+            if options.show and lines:
+                print("   ", i, drives.draw(np.random.default_rng([options.seed, 999 + bool(name), i])), lines)
+        table.row(f"none (good data) {name}", str(options.good), share(sum(map(bool, said)), options.good), "-")
     return 0
 
 
-def said_of(fault: str | None, seed: Sequence[int]) -> list[str]:
-    """Return what is said of a drive with a fault or without."""
+def said_of(fault: str, seed: Sequence[int]) -> list[str]:
+    """Return what is said of a drive with a fault, or with none: "", or "with scans"."""
     rng = np.random.default_rng(seed)
-    case = drives.draw(rng, easy=fault is not None)
+    case = drives.draw(rng, easy=fault in wrong_data.SPOILT)
     tables = drives.make(case, rng)
     given = ["command", "pose"] if rng.random() < 0.5 else ["command", "voltage", "pose"]
-    if fault is not None:
+    sight = None
+    if fault in wrong_data.SPOILT:
         tables = wrong_data.SPOILT[fault][0](tables, rng)
-        given = [*given[:1], "voltage", "pose"] if "voltage" in fault else given
-        if "voltage" in fault and rng.random() < 0.5:
-            given = ["voltage", "pose"]
+        if "voltage" in fault:
+            given = ["voltage", "pose"] if rng.random() < 0.5 else ["command", "voltage", "pose"]
         elif "command" in fault:
             given = ["command", "pose"]
+    elif fault:
+        off = rng.normal(size=3) * [0.03, 0.03, 0.03]
+        sight = wrong_scans.look(tables, rng, off, float(rng.uniform(0.002, 0.02)))
+        if fault in wrong_scans.SPOILT:
+            sight = wrong_scans.SPOILT[fault][0](sight, rng)
+    return said_of_tables(tables, given, sight)
+
+
+def said_of_tables(tables: drives.Tables, given: Sequence[str], sight: wrong_scans.Sight | None) -> list[str]:
+    """Return what forbids a verdict, as reader and critic say it."""
     faults = Faults()
     run = run_of(tables, given, faults)
-    check_run(run, None, faults)
-    recording = Recording("r", (run,), train=(run.name,))
-    model = load_model(shipped("launch/md100.yaml"))
-    return [*faults.invalid, *sanity.examine(recording, model).invalid]
+    laser = sight.laser if sight is not None else None
+    with TemporaryDirectory() as folder:
+        world = None
+        if sight is not None:
+            beams = tuple(f"r{i}" for i in range(sight.scans.shape[1] - 1))
+            rows = Rows("scan.csv", sight.scans[:, 0], sight.scans[:, 1:], beams, "line", 2)
+            run = replace(run, scan=clean(rows, faults, ranges=True))
+            world = Path(folder) / "place.world"
+            wrong_scans.write_world(world, sight.walls)
+        check_run(run, laser, faults)
+        recording = Recording("r", (run,), train=(run.name,), world=world, laser=laser)
+        return [*faults.invalid, *sanity.examine(recording, load_model(shipped("launch/md100.yaml"))).invalid]
 
 
 def run_of(tables: drives.Tables, parts: Sequence[str], faults: Faults) -> Run:

@@ -7,23 +7,55 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.critic import sanity_input, sanity_pose, sanity_rates, sanity_rows, sanity_times, sanity_volts
+from kurumaisu.critic import (
+    sanity_input,
+    sanity_jumps,
+    sanity_map,
+    sanity_pose,
+    sanity_rates,
+    sanity_rows,
+    sanity_scan,
+    sanity_times,
+    sanity_volts,
+)
 from kurumaisu.critic.clean import Faults
 from kurumaisu.critic.drive import from_voltages
-from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
 from kurumaisu.critic.sanity_input import Match
 from kurumaisu.critic.sanity_pose import Course
 from kurumaisu.critic.sanity_rates import Rates
 from kurumaisu.params import Model
+from kurumaisu.types import FloatArray
+from kurumaisu.world import load_world
 
 
 def examine(recording: Recording, model: Model) -> Faults:
     """Return what is wrong with the runs to fit and to judge by, in words that begin with the run's name."""
     faults = Faults()
+    segments = _segments(recording)
     for run in recording.runs:
-        for words in _of_run(run, model):
-            faults.add(f"{run.name}: {words}", fatal=True)
+        words = _of_run(run, model)
+        for told in [*words, *_of_scans(run, recording.laser, model, None if words else segments)]:
+            faults.add(f"{run.name}: {told}", fatal=True)
     return faults
+
+
+def _segments(recording: Recording) -> FloatArray | None:
+    """Return the walls of the recording's map; None where it has none, or nothing to compare it with."""
+    usable = recording.laser is not None and any(run.scan is not None for run in recording.runs)
+    return load_world(recording.world).segments if recording.world is not None and usable else None
+
+
+def _of_scans(run: Run, laser: LaserMount | None, model: Model, segments: FloatArray | None) -> list[str]:
+    """Return what is wrong with scans; segments (m, 4) of the map [m], None to leave it out."""
+    if run.scan is None or len(run.scan.t) < 2:
+        return []
+    words = sanity_scan.words(run.scan, run.pose, laser, model.laser.range_max)
+    if words or laser is None or segments is None or run.pose is None or run.pose_source != "measured":
+        return words
+    ends = model.laser.error.mean(np.array([0.0, 1.0]))
+    error = np.array([ends[1] - ends[0], ends[0]])
+    return _one(sanity_map.words(run.scan, run.pose, laser, segments, error))
 
 
 def _of_run(run: Run, model: Model) -> list[str]:
@@ -32,7 +64,8 @@ def _of_run(run: Run, model: Model) -> list[str]:
         return untimely
     found = sanity_pose.course(run.pose)
     pose = _mended(run.pose, found)
-    words = [*_jump_words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
+    words = [*sanity_jumps.words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
+    words += _one(sanity_pose.folded(run.pose))
     known = []
     for name, part in _inputs(run):
         rates = _rates(part, pose)
@@ -112,13 +145,3 @@ def _agreement(factor: float, known: list[tuple[str, Match, float]]) -> tuple[bo
         ahead, turns = (bool(c > 0) if abs(c) > 0.5 else None for c in match.correlation)
         return (turns if turns is None or factor > 0 else not turns), ahead
     return None, None
-
-
-def _jump_words(pose: Series) -> list[str]:
-    lasting, _ = sanity_pose.jumps(pose)
-    if not lasting:
-        return []
-    i = lasting[0]
-    size = float(np.hypot(*(pose.values[i, :2] - pose.values[i - 1, :2])))
-    times = "once" if len(lasting) == 1 else f"{len(lasting)} times"
-    return [f"the reference pose jumps {times} (first: {size:.2g} m at t = {pose.t[i]:.6g} s): relocalised?"]

@@ -16,15 +16,18 @@ from kurumaisu.types import BoolArray, FloatArray
 
 _LATE = 1.5  # [s] motion may come after its command by this much: a delay and a lag
 _EARLY = -0.15  # [s] but not before it
+_DRIFT = 0.006  # share of a drive by which a clock that runs at another speed is off, on the mean: 1.2 % at the end
 _LONGEST = 120.0  # [s] shifts of clocks that are tried
 _SCALES = np.exp(np.linspace(np.log(0.4), np.log(2.5), 185))  # of one clock against the other, in steps of 1 %
 _SCALE = 0.05  # clocks may differ by this share
+_PIECES = 240.0  # [s] of a drive that are compared
 _PIECE = 100.0  # [s] of the drive that the scales are tried on
 _WIN = 15.0  # nats by which another reading of the data must win
 _ALIKE = 0.7  # least correlation of a reading that is said
 _LEAST = (0.02, 0.02)  # [m/s], [rad/s] sd of an input below which it says nothing
 _PLAIN = (0.2, 5.0)  # factors between asked and driven that the catalogue explains, unless they are a unit's
-_NEAR = 0.2  # relative distance from a unit's factor
+_NEAR = 0.2  # relative distance from a unit's factor, where the catalogue has factors like it
+_ROUGHLY = 0.7  # and where it has none: an effect may come on top
 # driven / asked: what it means. Of the length in v, of the angle in w, of the time in both.
 _UNITS_V = {
     1000.0: "positions look like millimetres: try 0.001 * x, y",
@@ -57,6 +60,8 @@ class Match:
 
 def compare(asked: Rates, driven: Rates, name: str) -> Match:
     """Return how the motion follows an input of a name, and in words what is wrong with either."""
+    asked, driven = _beginning(asked, driven)
+    drift = _DRIFT * float(driven.t[-1] - driven.t[0])
     pairs = _pairs(asked.values, driven.values)
     lags = pairs[0][0].lags
     straight, crossed = _total(pairs, swapped=False), _total(pairs, swapped=True)
@@ -68,7 +73,7 @@ def compare(asked: Rates, driven: Rates, name: str) -> Match:
     at = int(np.argmax(np.where(possible, total, -1.0)))
     best = int(np.argmax(total))
     strong = _strongest(pairs, best, swapped) > _ALIKE
-    if (lags[best] < _EARLY or lags[best] > _LATE) and total[best] > total[at] + _WIN and strong:
+    if not _EARLY - drift < lags[best] < _LATE + drift and total[best] > total[at] + _WIN and strong:
         words.append(
             _shift_words(name, float(lags[best]), _strongest(pairs, best, swapped), _strongest(pairs, at, swapped))
         )
@@ -79,6 +84,14 @@ def compare(asked: Rates, driven: Rates, name: str) -> Match:
         words.append(_swap_words(name, pairs, at))
     match = _lines(asked, driven, float(lags[at]), swapped)
     return Match(*match, words=tuple(words))
+
+
+def _beginning(asked: Rates, driven: Rates) -> tuple[Rates, Rates]:
+    """Return the first minutes in which something was asked for: later on, clocks may have drifted apart."""
+    size = np.nan_to_num(np.abs(asked.values)).sum(axis=1) * np.isfinite(driven.values).all(axis=1)
+    started = int(np.argmax(size > 0.3 * size.max(initial=0.0)))
+    piece = slice(max(0, started - round(30 / STEP)), started + round(_PIECES / STEP))
+    return Rates(asked.t[piece], asked.values[piece]), Rates(driven.t[piece], driven.values[piece])
 
 
 def _pairs(asked: FloatArray, driven: FloatArray) -> list[list[Likeness]]:
@@ -206,7 +219,7 @@ def _unit_words(size: float, alike: float, units: dict[float, str], channel: int
     outside = not _PLAIN[0] <= size <= _PLAIN[1]
     quantity = ("forward", "turning")[channel]
     measured = f"{quantity} {size:.4g} times as fast as asked for"
-    if near and (outside or alike > 0.9):
+    if (near and alike > 0.9) or (outside and abs(np.log(size / unit)) < _ROUGHLY):
         return [f"{units[unit]}; {measured}"]
     if size > 2 * _PLAIN[1] or size < _PLAIN[0] / 2:
         return [f"{measured}: no unit that is known here; are both in SI units?"]

@@ -15,7 +15,6 @@ _LEVER = 0.15  # [m] a marker may be off the axle by about this: slower turns in
 _AGREES = 0.85  # resultant length from which course and heading agree [1]
 _WIN = 15.0  # nats by which another reading of the heading must win
 _OFF = np.radians(15.0)  # a heading that is off by less than this may be a real misalignment
-_FAR = 10.0  # robust sd of the reference that a jump exceeds
 _TURNS = {
     1.0: "",
     -1.0: "reflected",
@@ -49,6 +48,44 @@ class Course:
 
 def course(pose: Series) -> Course | None:
     """Return what the heading says of the direction of travel, None where too little was driven."""
+    windows = _windows(pose)
+    if windows is None:
+        return None
+    along, middle, weight = windows
+    resultants = {k: np.sum(weight * np.exp(2j * (along - k * middle))) / weight.sum() for k in _TURNS}
+    number = _independent(weight)
+    best = max(resultants, key=lambda k: abs(resultants[k]))
+    if not _clearly(abs(resultants[best]), abs(resultants[1.0]), number):
+        best = 1.0
+    offset = float(np.angle(resultants[best])) / 2
+    ahead = float(np.sum(weight * (np.cos(along - best * middle - offset) > 0)) / weight.sum())
+    return Course(best, offset, float(abs(resultants[best])), ahead, float(abs(resultants[1.0])), len(weight))
+
+
+def folded(pose: Series) -> str | None:
+    """Tell of a heading that agrees with the course now as it is, now with the other sign."""
+    windows = _windows(pose)
+    if windows is None:
+        return None
+    along, middle, weight = windows
+    cosines = [np.cos(2 * (along - sign * middle)) for sign in (1, -1)]
+    each = [float(weight @ cosine / weight.sum()) for cosine in cosines]
+    either = float(weight @ np.maximum(*cosines) / weight.sum())
+    shares = [float(weight @ (cosines[i] > cosines[1 - i]) / weight.sum()) for i in range(2)]
+    if (
+        max(each) > _AGREES
+        or min(shares) < 0.1
+        or not _clearly(either, 0.5 * (1 + max(each)), _independent(weight) / 2)
+    ):
+        return None
+    return (
+        f"heading of the reference pose looks folded, as if its sign were lost: it agrees with the course to "
+        f"{either:.2f} when its sign may change from place to place, else to {max(each):.2f}; record atan2, not acos"
+    )
+
+
+def _windows(pose: Series) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return course and heading [rad] and weight of stretches that were driven, None where they are too few."""
     t, xy, theta = _thinned(pose)
     step, turn = np.diff(xy, axis=0), np.diff(theta)
     way = np.hypot(*step.T)
@@ -57,17 +94,8 @@ def course(pose: Series) -> Course | None:
     clear &= (way > _LEVER * np.minimum(np.abs(turn), 2.0)) | (np.abs(turn) > 10)
     if clear.sum() < 10:
         return None
-    along = np.arctan2(step[clear, 1], step[clear, 0])
-    middle = (theta[:-1] + turn / 2)[clear]
     weight = np.minimum(way[clear], np.quantile(way[clear], 0.9))
-    resultants = {k: np.sum(weight * np.exp(2j * (along - k * middle))) / weight.sum() for k in _TURNS}
-    number = _independent(weight)
-    best = max(resultants, key=lambda k: abs(resultants[k]))
-    if not _clearly(abs(resultants[best]), abs(resultants[1.0]), number):
-        best = 1.0
-    offset = float(np.angle(resultants[best])) / 2
-    ahead = float(np.sum(weight * (np.cos(along - best * middle - offset) > 0)) / weight.sum())
-    return Course(best, offset, float(abs(resultants[best])), ahead, float(abs(resultants[1.0])), int(clear.sum()))
+    return np.arctan2(step[clear, 1], step[clear, 0]), (theta[:-1] + turn / 2)[clear], weight
 
 
 def _clearly(agreement: float, plain: float, number: float) -> bool:
@@ -128,29 +156,3 @@ def _reflected(found: Course, turns_agree: bool | None, goes_ahead: bool | None)
             else "x of the reference pose has the wrong sign: try -x"
         )
     return name if turns_agree else f"{name} (or else heading counts clockwise)"
-
-
-def jumps(pose: Series) -> tuple[list[int], list[int]]:
-    """Return rows after which the position goes on from elsewhere, and rows that alone are elsewhere."""
-    xy, dt = pose.values[:, :2], np.diff(pose.t)
-    if len(xy) < 20:
-        return [], []
-    step = np.diff(xy, axis=0)
-    usual = _running_median(step / dt[:, None]) * dt[:, None]
-    odd = np.hypot(*(step - usual).T)
-    fast = float(np.quantile(np.hypot(*step.T) / dt, 0.95))
-    limit = np.maximum(_FAR * max(position_noise(pose), 1e-9) * 1.5, 1.5 * fast * np.maximum(dt, float(np.median(dt))))
-    lasting: list[int] = []
-    single: list[int] = []
-    for i in np.flatnonzero(odd > np.maximum(limit, 1e-6)):
-        before = np.median(xy[max(0, i - 3) : i + 1] - xy[i], axis=0)
-        after = np.median(xy[i + 1 : i + 5] - xy[i + 1], axis=0) + step[i]
-        here = lasting if np.hypot(*(after - before)) > 0.6 * odd[i] and len(xy) - i > 5 and i >= 4 else single
-        here.append(int(i) + 1)
-    return lasting, single
-
-
-def _running_median(rows: FloatArray, half: int = 4) -> FloatArray:
-    padded = np.pad(rows, ((half, half), (0, 0)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0)
-    return np.asarray(np.median(windows, axis=-1))

@@ -75,6 +75,11 @@ def _wrong(name: str, raw: FloatArray, line: _Line, reference: float) -> str | N
         if abs(line.offset) < 300 or not known:
             return f"{name} looks like mV, not V: {measured}; try {name} / 1000"
         return f"{name} looks like mV, reference voltage included: {measured}; try ({name} - {line.offset:.0f}) / 1000"
+    if line.correlation < -_ALIKE:
+        alike = f"correlation {line.correlation:.2f} with the voltage expected"
+        return (
+            f"{name} has the wrong sign ({'forward speed' if name == _NAMES[0] else 'yaw rate'}): {alike}; try -{name}"
+        )
     middle = line.offset if known else float(np.median(raw))
     if abs(middle) > 0.5 * reference and abs(middle) > 0.8:
         return (
