@@ -28,6 +28,9 @@ from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 
+# A reference may be written twice as often as it measures, but not this often.
+_REPEATS = 3.0
+
 
 def examine(recording: Recording, model: Model) -> Faults:
     """Return what is wrong with the runs to fit and to judge by, in words that begin with the run's name."""
@@ -95,9 +98,10 @@ def _inputs(run: Run) -> list[tuple[str, Series]]:
 def _against(name: str, part: Series, pose: Series, rates: tuple[Rates, Rates], model: Model) -> list[str]:
     """Return what is wrong with poses in the light of an input, or with the input itself."""
     words = sanity_volts.words(part, rates[1], model) if name == "voltage" else []
+    times = sanity_rows.repeats(pose, rates[1])
+    words += [sanity_rows.held(times)] if times > _REPEATS else []
     for check in (
         sanity_rows.frozen(pose, *rates),
-        sanity_rows.held(pose, rates[1]),
         sanity_rows.coarse(pose, rates[1]),
     ):
         words += _one(check)

@@ -34,7 +34,7 @@ _UNITS_V = {
     100.0: "positions look like centimetres: try 0.01 * x, y",
     1e-3: "the speed asked for looks like mm/s: try 0.001 * v",
     1e-2: "the speed asked for looks like cm/s: try 0.01 * v",
-    1 / 3.6: "the speed asked for looks like km/h: try v / 3.6",
+    1 / 3.6: "the speed asked for looks like km/h (or a wheel's rad/s): try v / 3.6",
     3.6: "the speed driven looks like km/h: try x, y / 3.6",
 }
 _UNITS_W = {

@@ -11,18 +11,28 @@ from kurumaisu.types import FloatArray
 
 _FAR = 10.0  # robust sd of the reference that a jump exceeds
 _TURN = 0.6  # [rad] between two poses, least jump of a heading
+_BUNCH = 4.0
 _HALF = 0.4  # [rad] from half a turn
 
 
 def words(pose: Series) -> list[str]:
     """Return what jumps, in words."""
-    if len(pose.t) < 20:
+    new = fresh(pose)
+    if len(new.t) < 20:
         return []
-    return [line for line in (_position(pose), _heading(pose)) if line is not None]
+    # Where rows were written faster than measured, several measurements may arrive as one step.
+    slack = _BUNCH if len(new.t) < 0.8 * len(pose.t) else 1.0
+    return [line for line in (_position(new, slack), _heading(new)) if line is not None]
 
 
-def _position(pose: Series) -> str | None:
-    lasting, _ = jumps(pose)
+def fresh(pose: Series) -> Series:
+    """Return the poses without those that only repeat the one before, as of a slow reference written fast."""
+    new = np.r_[True, (np.diff(pose.values[:, :3], axis=0) != 0).any(axis=1)]
+    return Series(pose.t[new], pose.values[new], pose.columns)
+
+
+def _position(pose: Series, slack: float) -> str | None:
+    lasting, _ = jumps(pose, slack)
     if not lasting:
         return None
     i = lasting[0]
@@ -36,7 +46,7 @@ def _heading(pose: Series) -> str | None:
     usual = float(np.quantile(np.abs(step) / dt, 0.95)) * np.maximum(dt, float(np.median(dt)))
     noise = 1.4826 * float(np.median(np.abs(np.diff(theta, n=3)))) / np.sqrt(20)
     odd = np.flatnonzero(np.abs(step) > np.maximum(np.maximum(2 * usual, 1.5 * _FAR * noise), _TURN))
-    odd = np.array([i for i in odd if _lasts(theta, int(i))], dtype=int)
+    odd = np.array([i for i in odd if i >= 4 and _lasts(theta, int(i))], dtype=int)
     if not len(odd) or float(np.median(usual)) > _TURN:
         return None
     first = f"first: {step[odd[0]]:+.3g} rad at t = {pose.t[odd[0] + 1]:.6g} s"
@@ -57,7 +67,7 @@ def _times(rows: list[int]) -> str:
     return "once" if len(rows) == 1 else f"{len(rows)} times"
 
 
-def jumps(pose: Series) -> tuple[list[int], list[int]]:
+def jumps(pose: Series, slack: float = 1.0) -> tuple[list[int], list[int]]:
     """Return rows after which the position goes on from elsewhere, and rows that alone are elsewhere."""
     xy, dt = pose.values[:, :2], np.diff(pose.t)
     if len(xy) < 20:
@@ -66,7 +76,9 @@ def jumps(pose: Series) -> tuple[list[int], list[int]]:
     usual = _running_median(step / dt[:, None]) * dt[:, None]
     odd = np.hypot(*(step - usual).T)
     fast = float(np.quantile(np.hypot(*step.T) / dt, 0.95))
-    limit = np.maximum(_FAR * max(position_noise(pose), 1e-9) * 1.5, 1.5 * fast * np.maximum(dt, float(np.median(dt))))
+    limit = np.maximum(
+        _FAR * max(position_noise(pose), 1e-9) * 1.5, 1.5 * slack * fast * np.maximum(dt, float(np.median(dt)))
+    )
     lasting: list[int] = []
     single: list[int] = []
     for i in np.flatnonzero(odd > np.maximum(limit, 1e-6)):

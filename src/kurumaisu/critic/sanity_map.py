@@ -17,10 +17,11 @@ from kurumaisu.types import FloatArray
 _SCANS, _BEAMS = 40, 120  # that are looked at
 _FAR = 100.0  # [m]
 _TOLERANCE = (0.15, 0.03)  # [m] and share of the range: an error of pose, mounting or range that is no other world
-_GOOD = 0.5  # share of readings that agree, from which nothing is said
-_WIN = 0.2  # share by which another reading of the data must agree better
+_GOOD = 0.8  # share of readings that agree, from which nothing is said
+_HALF = 0.4  # share from which nothing is said unless another reading agrees better
+_WIN = 0.15  # share by which another reading of the data must agree better
 _AGREES = 0.6  # least share for a reading that is said
-_SHIFTS = np.concatenate([-np.geomspace(0.5, 30, 25)[::-1], np.geomspace(0.5, 30, 25)])  # [s]
+_SHIFTS = np.setdiff1d(np.arange(-30.0, 30.5, 0.5), [0.0])  # [s]
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ def words(scan: Series, pose: Series, laser: LaserMount, segments: FloatArray, m
     found = max(_readings(check, view), key=lambda pair: pair[0], default=(0.0, ""))
     if found[0] < max(_AGREES, plain + _WIN):
         found = max(found, _moved(check, view, segments), key=lambda pair: pair[0])
+    if plain > _HALF and found[0] < plain + _WIN:
+        return None
     share = f"as given {plain:.0%} of the readings are where the map has a wall"
     if found[0] > max(_AGREES, plain + _WIN):
         return f"{found[1]}; {share}, then {found[0]:.0%}"
@@ -175,7 +178,7 @@ def _late(check: _Check, view: _View) -> Iterator[tuple[float, str]]:
         inside = (view.times + by >= first) & (view.times + by <= last)
         if inside.sum() > 0.5 * len(view.times):
             other = _View(view.times[inside] + by, view.bearings, view.ranges[inside])
-            yield check.agreement(other), f"clocks of scans and poses differ: try t of the scans {by:+.2g} s"
+            yield check.agreement(other), f"clocks of scans and poses differ: try t of the scans {by:+.3g} s"
 
 
 def _shuffled(check: _Check, view: _View) -> Iterator[tuple[float, str]]:

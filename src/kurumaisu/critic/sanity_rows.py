@@ -49,14 +49,18 @@ def _runs(flags: BoolArray) -> tuple[IntArray, IntArray]:
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
 
 
-def held(pose: Series, driven: Rates) -> str | None:
-    """Tell of poses that were written several times under new times, while the robot moved."""
+def repeats(pose: Series, driven: Rates) -> float:
+    """Return how many times each pose was written under new times while the robot moved, on the mean."""
     still = _still(pose)
     speed = np.nan_to_num(np.abs(driven.values)).max(axis=1)
     moving = np.interp(pose.t[:-1], driven.t, speed) > 0.05
-    if moving.sum() < 20 or still[moving].mean() < 0.4 or not _exact(pose):
-        return None
-    times = 1 / (1 - min(still[moving].mean(), 0.99))
+    if moving.sum() < 20 or not _exact(pose):
+        return 1.0
+    return float(1 / (1 - min(still[moving].mean(), 0.99)))
+
+
+def held(times: float) -> str:
+    """Return the words for poses that repeat so many times."""
     return f"poses repeat under new times, each {times:.2g} times on the mean, while the robot moves: keep the first"
 
 
