@@ -21,6 +21,7 @@ _GOOD = 0.8  # share of readings that agree, from which nothing is said
 _HALF = 0.4  # share from which nothing is said unless another reading agrees better
 _WIN = 0.15  # share by which another reading of the data must agree better
 _AGREES = 0.6  # least share for a reading that is said
+_MOVED = 0.75  # least share for a map that was moved
 _SHIFTS = np.setdiff1d(np.arange(-30.0, 30.5, 0.5), [0.0])  # [s]
 
 
@@ -63,9 +64,9 @@ def _moved(check: _Check, view: _View, segments: FloatArray) -> tuple[float, str
     best = (0.0, "")
     for fitted in nearest_maps(check.points(view), segments):
         best = max(best, (check.with_map(fitted.segments).agreement(view), fitted.words))
-        if best[0] > _AGREES + 0.1:
-            break
-    return best
+        if best[0] > _MOVED:
+            return best
+    return (0.0, "")  # among so many places some fits by chance
 
 
 class _Check:
