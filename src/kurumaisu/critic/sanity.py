@@ -67,22 +67,20 @@ def _of_run(run: Run, model: Model) -> list[str]:
         return untimely
     found = sanity_pose.course(run.pose)
     pose = _mended(run.pose, found)
-    words = [*sanity_jumps.words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
-    words += _one(sanity_pose.folded(run.pose))
+    inputs = [(name, part, rates) for name, part in _inputs(run) if (rates := _rates(part, pose)) is not None]
     known = []
-    for name, part in _inputs(run):
-        rates = _rates(part, pose)
-        if rates is not None:
-            words += _against(name, part, pose, rates, model)
-            asked = rates[0] if name != "voltage" else _from_volts(run, rates[1], model)
-            known.append((name, sanity_input.compare(asked, rates[1], name), _number(*rates)))
-    heading = sanity_pose.heading_words(found, *_agreement(found.factor, known)) if found is not None else None
-    words += _one(heading)
+    for name, _, rates in inputs:
+        asked = rates[0] if name != "voltage" else _from_volts(run, rates[1], model)
+        known.append((name, sanity_input.compare(asked, rates[1], name), _number(*rates)))
+    words = _one(sanity_pose.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
+    words += [*sanity_jumps.words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
+    words += _one(sanity_pose.folded(run.pose))
+    told = [line for name, part, rates in inputs for line in _against(name, part, pose, rates, model)]
     for name, match, number in known:
-        words += match.words
-        told = sanity_input.sign_and_unit(match, number, name)
-        reflected = found is not None and found.factor < 0
-        words += [word for word in told if not (reflected and "wrong sign" in word)]
+        told += [*match.words, *sanity_input.sign_and_unit(match, number, name)]
+    # Of poses that are mirrored every input seems to have the wrong sign.
+    reflected = found is not None and found.factor < 0
+    words += [line for line in told if not (reflected and "wrong sign" in line)]
     return list(dict.fromkeys(words))
 
 

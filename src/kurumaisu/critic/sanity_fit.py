@@ -17,16 +17,18 @@ _CELLS = 128  # on either side of the middle
 _TURNS = np.radians(np.arange(0, 360, 6))
 _SCALES = (1.0, 0.5, 2.0, 0.1, 10.0, 0.01, 100.0, 1e-3, 1e3)
 _POINTS = 1500  # that are fitted
+_HARDLY = 0.05  # share of the size of what is seen, by which a map may move: poses or mounting are a little off
 _ROUNDS = 25
 _KEPT = 0.7  # share of the points that are nearest to a wall, in the fit
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A map as it would have to lie: segments (m, 4) [m], and the words for it."""
+    """A map as it would have to lie: segments (m, 4) [m], the words for it, and whether it hardly moved."""
 
     segments: FloatArray
     words: str
+    small: bool
 
 
 def nearest_maps(points: FloatArray, segments: FloatArray) -> Iterator[Fitted]:
@@ -41,7 +43,9 @@ def nearest_maps(points: FloatArray, segments: FloatArray) -> Iterator[Fitted]:
             changed = _changed(walls, 0.0, scale, mirrored)
             turn, shift = _finer(few, changed, *_best_turn(few, changed))
             moved = (_changed(segments.reshape(-1, 2), turn, scale, mirrored) + shift).reshape(-1, 4)
-            yield Fitted(moved, _words(turn, scale, mirrored, shift))
+            same = scale == 1.0 and not mirrored
+            far = float(np.abs(moved - segments).max()) if same else np.inf
+            yield Fitted(moved, _words(turn, scale, mirrored, shift), far < _HARDLY * size)
 
 
 def _best_turn(points: FloatArray, walls: FloatArray) -> tuple[float, FloatArray]:

@@ -21,6 +21,7 @@ _GOOD = 0.8  # share of readings that agree, from which nothing is said
 _HALF = 0.4  # share from which nothing is said unless another reading agrees better
 _WIN = 0.15  # share by which another reading of the data must agree better
 _AGREES = 0.6  # least share for a reading that is said
+_ASIDE = np.radians(12.0)  # a smaller turn is an error of the mounting or of the poses, not of the data
 _MOVED = 0.75  # least share for a map that was moved
 _SHIFTS = np.setdiff1d(np.arange(-30.0, 30.5, 0.5), [0.0])  # [s]
 
@@ -63,6 +64,8 @@ def _moved(check: _Check, view: _View, segments: FloatArray) -> tuple[float, str
     """Return how well the scans agree with the map moved, and the words for it."""
     best = (0.0, "")
     for fitted in nearest_maps(check.points(view), segments):
+        if fitted.small:
+            continue
         best = max(best, (check.with_map(fitted.segments).agreement(view), fitted.words))
         if best[0] > _MOVED:
             return best
@@ -156,8 +159,10 @@ def _turned(check: _Check, view: _View) -> Iterator[tuple[float, str]]:
             best = max(best, (check.agreement(replace(view, bearings=bearings + by + fine)), float(by + fine)))
         degrees = np.degrees(best[1])
         turn = f"the laser looks {degrees:.0f} deg aside: try angle_min or yaw {best[1]:+.3g}"
-        if not mirrored:
+        if not mirrored and abs(by) > _ASIDE:
             yield best[0], turn
+        elif not mirrored:
+            continue  # an error of the mounting, which the catalogue has
         else:
             also = f", and {turn}" if abs(degrees) > 4 else ""
             yield best[0], f"beams are counted the other way round (clockwise): try r reversed{also}"
