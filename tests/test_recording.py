@@ -84,12 +84,20 @@ def test_repeated_rows_are_dropped_and_told(folder):
     whole = read_recording(folder).runs[0]
     path = folder / "run_1" / "pose.csv"
     lines = lines_of(path)
-    rewrite(path, [*lines[:31], *lines[11:31], *lines[31:]])
+    rewrite(path, [*lines[:31], *lines[27:31], *lines[31:]])
     recording = read_recording(folder)
     np.testing.assert_array_equal(recording.runs[0].pose.values, whole.pose.values)
-    (problem,) = recording.problems
-    assert problem.startswith("run_1/pose.csv: 20 rows are repeated: the first is kept (first: line 32, t = ")
+    (problem,) = [text for text in recording.problems if "repeated" in text]
+    assert problem.startswith("run_1/pose.csv: 4 rows are repeated: the first is kept (first: line 32, t = ")
     assert recording.invalid == ()
+
+
+def test_many_repeated_rows_forbid_a_verdict(folder):
+    path = folder / "run_1" / "pose.csv"
+    lines = lines_of(path)
+    rewrite(path, [*lines[:31], *lines[11:31], *lines[31:]])
+    recording = read_recording(folder)
+    assert "run_1/pose.csv: repeats its rows: drop the copies (20 of 120)" in recording.invalid
 
 
 def test_a_swapped_pair_of_rows_is_sorted_and_told(folder):

@@ -17,6 +17,7 @@ NAMES = (
     "critic",
     "next_experiment",
     "experiments_doc",
+    "sanity",
     "laser",
     "laser_clock",
     "faults",

@@ -97,7 +97,7 @@ def _repeated(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
     same, conflict = np.zeros(len(table.t), dtype=bool), np.zeros(len(table.t), dtype=bool)
     same[order] = ~starts & equal
     conflict[order] = ~starts & ~equal
-    _report(table, same, faults, "repeated: the first is kept", "is mostly repeated rows", 0.5)
+    _report(table, same, faults, "repeated: the first is kept", "repeats its rows: drop the copies")
     _report(table, conflict, faults, "at a time already given: the first is kept", "contradicts itself")
     repeated: BoolArray = (same | conflict)[kept]
     return repeated

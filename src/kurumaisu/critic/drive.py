@@ -17,6 +17,7 @@ from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
 GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
+LONGEST = 100_000.0  # [s] a day: what is longer has its times in another unit, and its grid would fill the memory
 # [s] least time between reference poses. Closer ones add cost, hardly information; and odometry is itself measured:
 # over short intervals its noise, in the input and in the residual alike, would pass for a gain below 1 (errors in
 # variables), while over long ones it averages out.
@@ -83,6 +84,10 @@ def prepare(run: Run, model: Model, interval: float | None = None) -> Drive:
         raise Error(
             f"{run.name}: has {len(pose_times)} reference poses after the first {source}; at least 3 are needed"
         )
+    if pose_times[-1] - min(times[0], pose_times[0]) > LONGEST:
+        raise Error(
+            f"{run.name}: lasts {pose_times[-1] - min(times[0], pose_times[0]):.6g} s: are its times in seconds?"
+        )
     edges = np.arange(min(times[0], pose_times[0]), pose_times[-1] + GRID, GRID)
     return Drive(
         name=run.name,
@@ -113,7 +118,7 @@ def split(drive: Drive, parts: int) -> list[Drive]:
 def _inputs(run: Run, model: Model) -> tuple[str, FloatArray, FloatArray, FloatArray]:
     """Return the source and its samples t, v, w, each held until the next: voltages, else commands, else odometry."""
     if run.voltage is not None:
-        return ("voltage", *_from_voltages(run.voltage, run.command, model))
+        return ("voltage", *from_voltages(run.voltage, run.command, model))
     if run.command is not None:
         return "command", run.command.t, run.command.column("v"), run.command.column("w")
     if run.odom is not None:
@@ -121,7 +126,8 @@ def _inputs(run: Run, model: Model) -> tuple[str, FloatArray, FloatArray, FloatA
     raise Error(f"{run.name}: has neither voltages nor commands nor odometry")
 
 
-def _from_voltages(voltage: Series, command: Series | None, model: Model) -> tuple[FloatArray, FloatArray, FloatArray]:
+def from_voltages(voltage: Series, command: Series | None, model: Model) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return t [s] and the rates v, w that voltages stand for, all (n,); a command tells the signs meant."""
     rates = []
     for law, volts, rate in ((model.translation, "v_f", "v"), (model.steering, "v_s", "w")):
         sign = np.full(len(voltage.t), np.nan)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from kurumaisu.critic.noise import Growth
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
 from kurumaisu.critic.verdict import Cause, Gain, Kind, Verdict
+from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
@@ -47,7 +48,7 @@ def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Crit
         details=tuple(problems),
         pose_source=_pose_source(recording),
         provenance=_provenance(),
-        overlays=tuple(_overlay(run, model, None, held_out=False) for run in recording.runs),
+        overlays=tuple(_overlays(recording, model)),
     )
     return Criticism(verdict, story, model, ())
 
@@ -143,6 +144,15 @@ def _misfits(problem: Problem, found: Naming) -> tuple[Misfit, ...]:
     """Return a figure per effect of the best set; where that is empty, of the effect that comes nearest."""
     fit = found.best if found.best.ids else next(fit for fit in found.fits if fit.ids)
     return misfit.figures(problem, fit.settings, sorted(fit.ids))
+
+
+def _overlays(recording: Recording, model: Model) -> Iterator[Overlay]:
+    """Yield a picture of every run that is whole enough for one."""
+    for run in recording.runs:
+        try:
+            yield _overlay(run, model, None, held_out=False)
+        except Error:
+            continue
 
 
 def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *, held_out: bool) -> Overlay:

@@ -40,13 +40,12 @@ def criticise(
     model = load_model(model_file)
     if not assume_law and recording.model is None and all(run.voltage is None for run in recording.runs):
         model = follow_commands(model)
+    wrong = [*recording.invalid, *sanity.examine(recording, model).invalid]
+    if wrong:
+        return explain.invalid(recording, model, wrong)
     drives = {run.name: prepare(run, model) for run in recording.runs}
     train = [drives[name] for name in recording.train]
     test = [drives[name] for name in recording.test]
-
-    wrong = [*recording.invalid, *sanity.suspicions(train, model)]
-    if wrong:
-        return explain.invalid(recording, model, wrong)
 
     progress("estimating the noise")
     rough = Problem(train, model, noise.START, ids=ids)

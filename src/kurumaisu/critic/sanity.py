@@ -1,49 +1,149 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Data that are wrong rather than surprising: signs and units that one transform would mend. Never fitted, said."""
+"""Stage 0: data that are wrong rather than surprising. They are said, with the transform that would mend them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.critic import replay
-from kurumaisu.critic.drive import Drive
+from kurumaisu.critic import (
+    sanity_input,
+    sanity_jumps,
+    sanity_map,
+    sanity_pose,
+    sanity_rates,
+    sanity_rows,
+    sanity_scan,
+    sanity_times,
+    sanity_volts,
+)
+from kurumaisu.critic.clean import Faults
+from kurumaisu.critic.drive import from_voltages
+from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
+from kurumaisu.critic.sanity_input import Match
+from kurumaisu.critic.sanity_pose import Course
+from kurumaisu.critic.sanity_rates import Rates
 from kurumaisu.params import Model
+from kurumaisu.types import FloatArray
+from kurumaisu.world import load_world
 
-_MENDS = 0.25  # share of the squared residual that a suspected transform must leave at most
-
-_TRANSFORMS: dict[str, Callable[[Drive], Drive]] = {
-    "the yaw rate of the input has the wrong sign": lambda d: replace(d, w=-d.w),
-    "the forward speed of the input has the wrong sign": lambda d: replace(d, v=-d.v),
-    "the yaw rate of the input is in degrees": lambda d: replace(d, w=np.radians(d.w)),
-    "the heading of the reference pose is in degrees": lambda d: _pose(d, [0, 1, 2], [1, 1, np.pi / 180]),
-    "the reference pose is in millimetres": lambda d: _pose(d, [0, 1, 2], [1e-3, 1e-3, 1]),
-    "x and y of the reference pose are swapped": lambda d: _pose(d, [1, 0, 2], [1, 1, 1]),
-    "x of the reference pose has the wrong sign": lambda d: _pose(d, [0, 1, 2], [-1, 1, 1]),
-    "y of the reference pose has the wrong sign": lambda d: _pose(d, [0, 1, 2], [1, -1, 1]),
-}
+# A reference may be written twice as often as it measures, but not this often.
+_REPEATS = 3.0
 
 
-def suspicions(drives: Sequence[Drive], model: Model) -> list[str]:
-    """Return what seems wrong with the data, in words; empty when nothing does."""
-    as_given = sum(_misfit(drive, model) for drive in drives)
-    found = {}
-    for words, transform in _TRANSFORMS.items():
-        share = sum(_misfit(transform(drive), model) for drive in drives) / max(as_given, 1e-12)
-        if share < _MENDS:
-            found[words] = share
-    best = sorted(found, key=lambda words: found[words])[:1]
-    return [f"{words}: with that undone, {found[words]:.1%} of the squared residual remains" for words in best]
+def examine(recording: Recording, model: Model) -> Faults:
+    """Return what is wrong with the runs to fit and to judge by, in words that begin with the run's name."""
+    faults = Faults()
+    segments = _segments(recording)
+    for run in recording.runs:
+        words = _of_run(run, model)
+        for told in [*words, *_of_scans(run, recording.laser, model, None if words else segments)]:
+            faults.add(f"{run.name}: {told}", fatal=True)
+    return faults
 
 
-def _pose(drive: Drive, order: list[int], factors: list[float]) -> Drive:
-    return replace(drive, poses=drive.poses[:, order] * factors)
+def _segments(recording: Recording) -> FloatArray | None:
+    """Return the walls of the recording's map; None where it has none, or nothing to compare it with."""
+    usable = recording.laser is not None and any(run.scan is not None for run in recording.runs)
+    return load_world(recording.world).segments if recording.world is not None and usable else None
 
 
-def _misfit(drive: Drive, model: Model) -> float:
-    """Return the squared residual of dx and dtheta, each in units of what was measured."""
-    residual = drive.measured - replay.increments(drive, model, ())
-    size = np.sqrt(np.mean(drive.measured**2, axis=0))
-    return float(np.sum((residual[:, [0, 2]] / np.maximum(size[[0, 2]], 1e-9)) ** 2))
+def _of_scans(run: Run, laser: LaserMount | None, model: Model, segments: FloatArray | None) -> list[str]:
+    """Return what is wrong with scans; segments (m, 4) of the map [m], None to leave it out."""
+    if run.scan is None or len(run.scan.t) < 2:
+        return []
+    words = sanity_scan.words(run.scan, run.pose, laser, model.laser.range_max)
+    if words or laser is None or segments is None or run.pose is None or run.pose_source != "measured":
+        return words
+    ends = model.laser.error.mean(np.array([0.0, 1.0]))
+    error = np.array([ends[1] - ends[0], ends[0]])
+    return _one(sanity_map.words(run.scan, run.pose, laser, segments, error))
+
+
+def _of_run(run: Run, model: Model) -> list[str]:
+    untimely = sanity_times.words(run)
+    if untimely or run.pose is None or len(run.pose.t) < 3:
+        return untimely
+    found = sanity_pose.course(run.pose)
+    pose = _mended(run.pose, found)
+    inputs = [(name, part, rates) for name, part in _inputs(run) if (rates := _rates(part, pose)) is not None]
+    known = []
+    for name, _, rates in inputs:
+        asked = rates[0] if name != "voltage" else _from_volts(run, rates[1], model)
+        known.append((name, sanity_input.compare(asked, rates[1], name), _number(*rates)))
+    words = _one(sanity_pose.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
+    words += [*sanity_jumps.words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
+    words += _one(sanity_pose.folded(run.pose))
+    told = [line for name, part, rates in inputs for line in _against(name, part, pose, rates, model)]
+    for name, match, number in known:
+        told += [*match.words, *sanity_input.sign_and_unit(match, number, name)]
+    # Of poses that are mirrored every input seems to have the wrong sign.
+    reflected = found is not None and found.factor < 0
+    words += [line for line in told if not (reflected and "wrong sign" in line)]
+    return list(dict.fromkeys(words))
+
+
+def _one(words: str | None) -> list[str]:
+    return [] if words is None else [words]
+
+
+def _inputs(run: Run) -> list[tuple[str, Series]]:
+    parts = (("command", run.command), ("voltage", run.voltage), ("odometry", run.odom))
+    return [(name, part) for name, part in parts if part is not None and len(part.t) > 1]
+
+
+def _against(name: str, part: Series, pose: Series, rates: tuple[Rates, Rates], model: Model) -> list[str]:
+    """Return what is wrong with poses in the light of an input, or with the input itself."""
+    words = sanity_volts.words(part, rates[1], model) if name == "voltage" else []
+    times = sanity_rows.repeats(pose, rates[1])
+    words += [sanity_rows.held(times)] if times > _REPEATS else []
+    for check in (
+        sanity_rows.frozen(pose, *rates),
+        sanity_rows.coarse(pose, rates[1]),
+    ):
+        words += _one(check)
+    return words
+
+
+def _from_volts(run: Run, driven: Rates, model: Model) -> Rates:
+    assert run.voltage is not None
+    t, v, w = from_voltages(run.voltage, run.command, model)
+    return sanity_rates.of_input(t, np.column_stack([v, w]), driven.t)
+
+
+def _mended(pose: Series, found: Course | None) -> Series:
+    """Return the poses with the heading that their course suggests."""
+    if found is None or found.right or found.agreement < 0.85:
+        return pose
+    values = pose.values.copy()
+    values[:, 2] = found.factor * values[:, 2] + found.offset
+    return replace(pose, values=values)
+
+
+def _rates(part: Series, pose: Series) -> tuple[Rates, Rates] | None:
+    """Return what was asked for and what was driven on one grid, None where there is too little of both."""
+    t = sanity_rates.grid(min(part.t[0], pose.t[0]), max(part.t[-1], pose.t[-1]))
+    if len(t) < 100:
+        return None
+    by_poses = "theta" in part.columns
+    asked = sanity_rates.of_poses(part, t) if by_poses else sanity_rates.of_input(part.t, part.values[:, :2], t)
+    if by_poses:
+        asked.values[(t < part.t[0]) | (t > part.t[-1])] = np.nan
+    driven = sanity_rates.of_poses(pose, t)
+    driven.values[(t < pose.t[0]) | (t > pose.t[-1])] = np.nan
+    return (asked, driven) if _number(asked, driven) >= 8 else None
+
+
+def _number(asked: Rates, driven: Rates) -> float:
+    """Return how many independent samples both have in common."""
+    known = np.isfinite(asked.values + driven.values).all(axis=1)
+    return float(known.sum() * sanity_rates.STEP / sanity_rates.SPAN)
+
+
+def _agreement(factor: float, known: list[tuple[str, Match, float]]) -> tuple[bool | None, bool | None]:
+    """Return whether the heading as given turns, and the robot goes ahead, as the first input asks for."""
+    for _, match, _ in known:
+        ahead, turns = (bool(c > 0) if abs(c) > 0.5 else None for c in match.correlation)
+        return (turns if turns is None or factor > 0 else not turns), ahead
+    return None, None

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Wrong data are recognised, whatever effect the robot has besides; good data with large effects are not wrong."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kurumaisu.bench import drives, sanity, wrong_data, wrong_scans
+from kurumaisu.critic import sanity_fit, sanity_rates, sanity_rows
+from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.recording import Series
+from kurumaisu.critic.sanity import examine
+from kurumaisu.params import load_model, shipped
+
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.mark.parametrize("fault", wrong_data.SPOILT)
+def test_wrong_data_are_said_with_what_would_mend_them(fault):
+    assert any(wrong_data.SPOILT[fault][1] in line for line in sanity.said_of(fault, [41]))
+
+
+def case(effect, size, style="joystick"):
+    return drives.Case(style, effect, size, noise=1.0, tau=0.3, pose_sd=0.005, seconds=60.0, rate=10.0)
+
+
+@pytest.mark.parametrize("effect", drives.EFFECTS)
+def test_a_large_effect_is_not_wrong_data(effect):
+    largest, signed, _ = drives.EFFECTS[effect]
+    for sign in (-1, 1) if signed else (1,):
+        tables = drives.make(case(effect, sign * largest), np.random.default_rng(3))
+        assert sanity.said_of_tables(tables, ["command", "voltage", "pose"], None) == []
+
+
+@pytest.mark.parametrize("style", drives.STYLES)
+def test_nothing_is_wrong_with_a_good_drive_of_any_style(style):
+    tables = drives.make(case(None, 0.0, style), np.random.default_rng(4))
+    assert sanity.said_of_tables(tables, ["command", "voltage", "pose"], None) == []
+
+
+QUICK = (
+    "map shifted",
+    "beams reversed",
+    "laser at 180 deg",
+    "fan in degrees",
+    "ranges in cm",
+    "stuck",
+    "all 0",
+    "constant",
+)
+
+
+@pytest.mark.parametrize("fault", QUICK)
+def test_wrong_scans_and_maps_are_said(fault):
+    """Words may differ where two readings of the data fit alike; that something is wrong must be said."""
+    assert sanity.said_of(fault, [52])
+
+
+@pytest.mark.parametrize("seed", [61, 62])
+def test_good_scans_are_not_wrong(seed):
+    assert sanity.said_of("with scans", [seed]) == []
+
+
+def test_the_lag_of_white_noise_behind_itself_is_found():
+    rng = np.random.default_rng(1)
+    a = rng.normal(size=2000)
+    found = sanity_rates.likeness(np.roll(a, 7), a, (0.01, 0.01), 5.0)
+    at = int(np.argmax(found.nats))
+    assert found.lags[at] == pytest.approx(0.7)
+    assert found.correlation[at] == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("step", "found"), [(0.25, 0.25), (0.05, 0.05), (None, 0.0)])
+def test_the_grid_of_numbers_is_found(step, found):
+    values = np.random.default_rng(2).normal(size=5000)
+    on_grid = values if step is None else np.round(values / step) * step
+    assert sanity_rows.grid_of(on_grid) == pytest.approx(found, rel=1e-3)
+
+
+def test_a_map_is_moved_back_to_where_the_points_are():
+    rng = np.random.default_rng(5)
+    walls = wrong_scans.place(rng, np.zeros(2))
+    ends = walls.reshape(-1, 2)
+    points = np.concatenate([a + rng.random((20, 1)) * (b - a) for a, b in ends.reshape(-1, 2, 2)])
+    c, s = np.cos(0.7), np.sin(0.7)
+    moved = (ends @ np.array([[c, s], [-s, c]]) + [3.0, -1.0]).reshape(-1, 4)
+    fitted = next(sanity_fit.nearest_maps(points, moved))
+    assert np.abs(fitted.segments - walls).max() < 0.05
+
+
+def test_rows_that_repeat_a_stretch_are_found_and_standing_still_is_not():
+    rng = np.random.default_rng(6)
+    rows = rng.normal(size=(100, 3))
+    rows[30:60] = rows[30]  # rest
+    series = Series(np.arange(100) / 10, rows, ("x", "y", "theta"))
+    assert sanity_rows.blocks(series, "pose") is None
+    rows[80:95] = rows[5:20]
+    assert "15 rows from t = 8 s on are those from t = 0.5 s on" in sanity_rows.blocks(series, "pose")
+
+
+def test_nothing_is_wrong_with_a_real_bag():
+    name = "scan_tools/demo.bag"
+    if not (DATA / name).is_file():
+        pytest.skip(f"{DATA / name} is not there")
+    recording = read_recording(DATA / name)
+    assert recording.invalid == ()
+    assert examine(recording, load_model(shipped("launch/md100.yaml"))).invalid == []
