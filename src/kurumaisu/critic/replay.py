@@ -27,7 +27,7 @@ def motion(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> eff
     random = {effect.id for effect in effects.ALL if effect.random}
     extended = extend(model, settings)
     mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in random))
-    return plant.Plant(mean, GRID, np.random.default_rng(0)).from_rates(drive.v, drive.w, heading)
+    return plant.Plant(mean, GRID, np.random.default_rng(0)).from_rates(drive.v, drive.w, heading, drive.known)
 
 
 def path(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
