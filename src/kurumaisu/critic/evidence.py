@@ -3,67 +3,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.special import logsumexp
 
-from kurumaisu import effects
-from kurumaisu.critic import replay
+from kurumaisu.critic import replay, solve
+from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalogue, settings_of, showing
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.noise import Noise, whitened
-from kurumaisu.effects import Parameter
+from kurumaisu.critic.prior import Z_USUAL, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-# Amplitude prior of an effect: log-uniform in z, the whitened norm of its signal, on both sides. Below 3 nobody
-# can see it; with a broad Gaussian instead, "none" is over-confident.
-_Z_LOW, _Z_HIGH = 3.0, 3000.0
-_STEP = 0.2  # finite differences, in units of a parameter's scale
-
-
-@dataclass(frozen=True)
-class Term:
-    """One parameter of one effect as the critic may fit it; null: its value in the model criticised."""
-
-    id: str
-    parameter: Parameter
-    null: float
+_DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
+_STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a refit may start
 
 
 @dataclass(frozen=True)
 class Fit:
     """A set of effects, fitted.
 
-    values and sds per term of the set; log_likelihood relative to any other fit of the same problem;
-    score: log evidence, that is log_likelihood less the Occam factors.
+    candidates: the way in which each acts; values and sds per term of the set; settings: the effects as a model file
+    has them; log_likelihood relative to any other fit of the same problem; score: log evidence, that is
+    log_likelihood less the Occam factors.
     """
 
-    ids: frozenset[str]
+    candidates: frozenset[Candidate]
     terms: tuple[Term, ...]
     values: FloatArray
     sds: FloatArray
+    settings: tuple[EffectSetting, ...]
     log_likelihood: float
     score: float
 
     @property
-    def settings(self) -> tuple[EffectSetting, ...]:
-        """Return the effects as a model file has them."""
-        return settings_of(self.terms, self.values)
+    def ids(self) -> frozenset[str]:
+        """Return the effects."""
+        return frozenset(candidate.id for candidate in self.candidates)
 
-
-def catalogue(model: Model) -> tuple[Term, ...]:
-    """Return a term for every parameter of every effect that changes the mean motion."""
-    own = {setting.id: setting.parameters for setting in model.effects}
-    return tuple(
-        Term(effect.id, parameter, own.get(effect.id, {}).get(parameter.name, parameter.null))
-        for effect in effects.CRITICISED
-        if not effect.random
-        for parameter in effect.parameters
-    )
+    @property
+    def start(self) -> dict[Key, float]:
+        """Return the values by term, from which another fit may start."""
+        return {term.key: float(value) for term, value in zip(self.terms, self.values, strict=True)}
 
 
 class Problem:
@@ -73,24 +56,32 @@ class Problem:
         self.drives = drives
         self.model = model
         self.noise = noise
-        self.terms = catalogue(model)
 
-    def of(self, ids: Iterable[str]) -> tuple[Term, ...]:
-        """Return the terms of effects in the catalogue's order."""
-        chosen = set(ids)
-        return tuple(term for term in self.terms if term.id in chosen)
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """Return the terms that these drives can show."""
+        here = self.residual((), np.empty(0))
+
+        def norm(settings: tuple[EffectSetting, ...]) -> float:
+            moved = np.concatenate([self._whitened(drive, settings) for drive in self.drives])
+            return float(np.linalg.norm(moved - here))
+
+        return showing(catalogue(self.model), norm)
+
+    @cached_property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """Return the ways in which effects may act that these drives can show."""
+        return candidates(self.terms, self.model)
 
     def simulated(self, drive: Drive, settings: Sequence[EffectSetting]) -> FloatArray:
         """Return the simulated body increments of a drive, (m, 3)."""
         return replay.increments(drive, self.model, settings)
 
     def simulated_columns(self, drive: Drive, fit: Fit) -> FloatArray:
-        """Return the derivative of the simulated increments by every term at a fit, per scale, (3 m, k)."""
+        """Return the derivative of the simulated increments by every term at a fit, per step, (3 m, k)."""
         here = self.simulated(drive, fit.settings)
-        moved = [
-            (self.simulated(drive, settings), step) for settings, step in self._moves(fit.terms, fit.values, self.terms)
-        ]
-        return np.column_stack([(increments - here).ravel() / step for increments, step in moved])
+        moves = self._moves(fit.terms, fit.values, self.terms)
+        return np.column_stack([(self.simulated(drive, settings) - here).ravel() / share for settings, share in moves])
 
     def residual(self, terms: Sequence[Term], values: FloatArray) -> FloatArray:
         """Return the whitened residual with these parameters, (rows,)."""
@@ -98,56 +89,126 @@ class Problem:
         return np.concatenate([self._whitened(drive, settings) for drive in self.drives])
 
     def columns(self, terms: Sequence[Term], values: FloatArray, of: Sequence[Term]) -> FloatArray:
-        """Return minus the derivative of the residual by each term of `of` at a fit, per scale, (rows, k)."""
-        here = self.residual(terms, values)
-        out = np.empty((len(here), len(of)))
-        for j, (settings, step) in enumerate(self._moves(terms, values, of)):
-            moved = np.concatenate([self._whitened(drive, settings) for drive in self.drives])
-            out[:, j] = (here - moved) / step
-        return out
+        """Return minus the derivative of the residual by each term of `of` at a fit, per step, (rows, k)."""
+        return self.linearised(terms, values, of)[1]
 
-    def fit(self, ids: Iterable[str], start: dict[str, float]) -> Fit:
-        """Return the nonlinear fit of a set of effects; start: a first guess per id, else half a scale off null."""
-        terms = self.of(ids)
+    def linearised(
+        self, terms: Sequence[Term], values: FloatArray, of: Sequence[Term]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the whitened residual (rows,) at a fit and minus its derivative by each term of `of`, per step."""
+        here, moves = settings_of(terms, values), list(self._moves(terms, values, of))
+        parts = []
+        for drive in self.drives:
+            simulated = self.simulated(drive, here)
+            rows = [(drive.measured - simulated).ravel()]
+            rows += [(self.simulated(drive, settings) - simulated).ravel() / share for settings, share in moves]
+            parts.append(whitened(drive, np.column_stack(rows), self.noise)[0])
+        both = np.concatenate(parts)
+        return both[:, 0], both[:, 1:]
+
+    def fit(self, ids: Iterable[str], start: Mapping[Key, float]) -> Fit:
+        """Return the nonlinear fit of a set of effects with all their parameters; start: a first guess by term."""
+        chosen = set(ids)
+        whole: dict[str, Candidate] = {}
+        for candidate in self.candidates:
+            if candidate.id in chosen and len(candidate.terms) >= len(getattr(whole.get(candidate.id), "terms", ())):
+                whole[candidate.id] = candidate
+        return self.fit_candidates(whole.values(), start)
+
+    def fit_candidates(self, chosen: Iterable[Candidate], start: Mapping[Key, float]) -> Fit:
+        """Return the nonlinear fit of a set of candidates; start: a first guess by term, else it is searched for."""
+        ordered = sorted(chosen, key=lambda candidate: candidate.id)
+        terms = tuple(term for candidate in ordered for term in candidate.terms)
         if not terms:
             y = self.residual((), np.empty(0))
             likelihood = -0.5 * float(y @ y)
-            return Fit(frozenset(), (), np.empty(0), np.empty(0), likelihood, likelihood)
+            return Fit(frozenset(), (), np.empty(0), np.empty(0), (), likelihood, likelihood)
+        solution = solve.least_squares(self, terms, self._start(terms, start))
+        costs = self._occam(ordered, terms, solution)
+        return Fit(
+            frozenset(ordered),
+            terms,
+            solution.values,
+            solution.sds,
+            replay.completed(self.model, settings_of(terms, solution.values)),
+            -solution.cost,
+            -solution.cost - costs,
+        )
+
+    def _start(self, terms: Sequence[Term], start: Mapping[Key, float]) -> FloatArray:
+        """Return first values: those given; for others, one after the other, the best of some steps from null."""
         lower = np.array([term.parameter.lower for term in terms])
         upper = np.array([term.parameter.upper for term in terms])
-        scale = np.array([term.parameter.scale for term in terms])
-        guess = [start.get(term.id, term.null + 0.5 * term.parameter.scale) for term in terms]
-        solution = least_squares(
-            lambda values: self.residual(terms, values),
-            np.clip(guess, lower + 0.01 * scale, upper - 0.01 * scale),
-            bounds=(lower, upper),
-            x_scale=scale,
-            diff_step=1e-3,
-            max_nfev=30,
-            ftol=1e-5,
-            xtol=1e-5,
-        )
-        # The solver's own steps are too small for a delay between samples of the grid: differentiate once more.
-        slopes = self.columns(terms, solution.x, terms)
-        sds = np.sqrt(np.diag(covariance(slopes.T @ slopes))) * scale
-        likelihood = -float(solution.cost)
-        z = np.abs(solution.x - [term.null for term in terms]) / sds
-        return Fit(frozenset(ids), terms, solution.x, sds, likelihood, likelihood - float(occam(z).sum()))
+        values = np.array([start.get(term.key, term.null) for term in terms])
+        values = np.clip(values, lower, upper)
+        for i, term in enumerate(terms):
+            if term.key in start or term.shape or term.fixed:
+                continue
+            guesses = [term.null + sign * n * term.step * term.parameter.scale for n in _STARTS for sign in (1, -1)]
+            tried = [np.where(np.arange(len(values)) == i, guess, values) for guess in guesses]
+            inside = [guess for guess in tried if lower[i] <= guess[i] <= upper[i]] or [values]
+            values = min(inside, key=lambda guess: float(np.sum(self.residual(terms, guess) ** 2)))
+        return values
+
+    def _occam(self, chosen: Sequence[Candidate], terms: Sequence[Term], solution: solve.Solution) -> float:
+        """Return what the set costs, in nats: Laplace's approximation about the fit, with the prior of each signal."""
+        cost, free = 0.0, []
+        for candidate in chosen:
+            cost += float(np.log(candidate.ways))
+            own = [i for i, term in enumerate(terms) if term.id == candidate.id and not term.fixed]
+            loud = [i for i in own if not terms[i].shape]
+            free += loud
+            cost += sum(_shape_cost(terms[i], solution, i) for i in own if terms[i].shape)
+            cost += self._amplitudes(terms, solution, loud)
+        if len(free) > 1:
+            unit = solution.slopes[:, free] / np.maximum(np.linalg.norm(solution.slopes[:, free], axis=0), 1e-9)
+            cost += 0.5 * float(np.linalg.slogdet(unit.T @ unit + np.eye(len(free)) / Z_USUAL**2)[1])
+            cost -= self._within(terms, solution, chosen)
+        return cost
+
+    def _amplitudes(self, terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> float:
+        """Return the cost of one effect's amplitudes by the size of its signal at the fit."""
+        moved = np.array(solution.values)
+        if not loud:
+            return 0.0
+        for i in loud:
+            moved[i] = terms[i].null
+        signal = float(np.linalg.norm(self.residual(terms, moved) - solution.residual))
+        if len(loud) == 2:
+            return float(occam_plane(np.array(signal)))
+        p = terms[loud[0]].parameter
+        return float(occam(np.array(signal), 1 if terms[loud[0]].null in (p.lower, p.upper) else 2)) * len(loud)
+
+    def _within(self, terms: Sequence[Term], solution: solve.Solution, chosen: Sequence[Candidate]) -> float:
+        """Return the part of the log determinant that an effect with two amplitudes has by itself: z counts it."""
+        total = 0.0
+        for candidate in chosen:
+            own = [i for i, t in enumerate(terms) if t.id == candidate.id and not t.fixed and not t.shape]
+            if len(own) > 1:
+                unit = solution.slopes[:, own] / np.maximum(np.linalg.norm(solution.slopes[:, own], axis=0), 1e-9)
+                total += 0.5 * float(np.linalg.slogdet(unit.T @ unit + np.eye(len(own)) / Z_USUAL**2)[1])
+        return total
 
     def _moves(
         self, terms: Sequence[Term], values: FloatArray, of: Sequence[Term]
     ) -> Iterator[tuple[tuple[EffectSetting, ...], float]]:
-        """Yield, for each term of `of`, the fit's settings with that term moved, and the step in units of its scale."""
-        known = {(term.id, term.parameter.name): i for i, term in enumerate(terms)}
+        """Yield, for each term of `of`, the settings with that term moved, and the move in units of its step.
+
+        A term of the fit is moved a little; another one by a whole step, because less may not show at all.
+        """
+        known = {term.key: i for i, term in enumerate(terms)}
         for term in of:
-            i = known.get((term.id, term.parameter.name))
+            i = known.get(term.key)
+            p = term.parameter
             at = term.null if i is None else float(values[i])
-            step = _STEP if at + _STEP * term.parameter.scale <= term.parameter.upper else -_STEP
-            moved = at + step * term.parameter.scale
+            share = 1.0 if i is None else _DERIVATIVE
+            if not p.lower <= at + share * term.step * p.scale <= p.upper:
+                share = -share
+            moved = at + share * term.step * p.scale
             if i is None:
-                yield settings_of((*terms, term), np.append(values, moved)), step
+                yield settings_of((*terms, term), np.append(values, moved)), share
             else:
-                yield settings_of(terms, np.where(np.arange(len(values)) == i, moved, values)), step
+                yield settings_of(terms, np.where(np.arange(len(values)) == i, moved, values)), share
 
     def _whitened(self, drive: Drive, settings: tuple[EffectSetting, ...]) -> FloatArray:
         residual = drive.measured - self.simulated(drive, settings)
@@ -155,35 +216,13 @@ class Problem:
 
 
 def covariance(gram: FloatArray) -> FloatArray:
-    """Return the covariance of parameters, in units of their scales, for G = J'J with columns per scale.
+    """Return the covariance of parameters, in units of their steps, for G = J'J with columns per step.
 
-    A weak prior of 100 scales keeps it finite where the data do not determine a parameter at all.
+    A weak prior of 1000 steps keeps it finite where the data do not determine a parameter at all.
     """
-    return np.asarray(np.linalg.inv(gram + 1e-4 * np.eye(len(gram))))
+    return np.asarray(np.linalg.inv(gram + 1e-6 * np.eye(len(gram))))
 
 
-def occam(z: FloatArray) -> FloatArray:
-    """Return what a term that lies |z| standard deviations from its null costs, in nats, elementwise.
-
-    z^2 / 2 less the log of the Bayes factor that the amplitude prior gives.
-    """
-    grid, costs = _occam_table()
-    return np.asarray(np.interp(np.abs(z), grid, costs))
-
-
-@cache
-def _occam_table() -> tuple[FloatArray, FloatArray]:
-    log_x = np.linspace(np.log(_Z_LOW), np.log(_Z_HIGH), 40001)
-    x = np.exp(log_x)
-    log_weight = np.log(log_x[1] - log_x[0]) - np.log(2 * np.log(_Z_HIGH / _Z_LOW))
-    grid = np.concatenate([np.linspace(0, 20, 201), np.geomspace(21, 0.99 * _Z_HIGH, 100)])
-    costs = [-logsumexp(np.logaddexp(-0.5 * (z - x) ** 2, -0.5 * (z + x) ** 2) + log_weight) for z in grid]
-    return grid, np.array(costs)
-
-
-def settings_of(terms: Sequence[Term], values: FloatArray) -> tuple[EffectSetting, ...]:
-    """Return the effects of fitted terms as a model file has them."""
-    by_id: dict[str, dict[str, float]] = {}
-    for term, value in zip(terms, values, strict=True):
-        by_id.setdefault(term.id, {})[term.parameter.name] = float(value)
-    return tuple(EffectSetting(name, parameters) for name, parameters in by_id.items())
+def _shape_cost(term: Term, solution: solve.Solution, i: int) -> float:
+    """Return the cost of a shape, whose prior is normal about its null with its scale; see solve for its misfit."""
+    return float(np.log(np.hypot(1.0, term.parameter.scale / solution.sds[i])))

@@ -98,7 +98,8 @@ def _kind(found: Naming, matters: set[str]) -> Kind:
 
 
 def _cause(problem: Problem, found: Naming, name: str) -> Cause:
-    without = problem.fit(found.best.ids - {name}, {})
+    rest = {candidate for candidate in found.best.candidates if candidate.id != name}
+    without = problem.fit_candidates(rest, found.best.start)
     parameters = {
         term.parameter.name: words.estimate(problem.model, term, value, sd)
         for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True)

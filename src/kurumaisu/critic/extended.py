@@ -16,7 +16,7 @@ from kurumaisu.params import EffectSetting, Model, load_model
 
 def process_noise(noise: Noise) -> EffectSetting:
     """Return the estimated noise of the rates as the effect that the simulator draws it from."""
-    (random,) = (effect.id for effect in effects.CRITICISED if effect.random)
+    (random,) = (effect.id for effect in effects.BASE if effect.random)
     return EffectSetting(random, {"sd_v": noise.sd_v, "sd_w": noise.sd_w, "tau": noise.tau})
 
 

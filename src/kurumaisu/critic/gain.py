@@ -51,11 +51,10 @@ def measure(model: Model, splits: Sequence[Fold], fit: Fit, baseline: Noise, ext
     baseline, extended: the noise that either model needs to explain the training data; a model that is wrong pays
     for it with wide predictions or with surprises.
     """
-    start = {term.id: float(value) for term, value in zip(fit.terms, fit.values, strict=True)}
     density: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     errors: dict[float, tuple[list[FloatArray], list[FloatArray]]] = {horizon: ([], []) for horizon in HORIZONS}
     for fold in splits:
-        refit = Problem(fold.train, model, extended).fit(fit.ids, start)
+        refit = Problem(fold.train, model, extended).fit_candidates(fit.candidates, fit.start)
         for drive in fold.test:
             for side, (settings, noise) in enumerate((((), baseline), (refit.settings, extended))):
                 density[side].extend(_blocks(drive, _log_density(drive, model, settings, noise)))

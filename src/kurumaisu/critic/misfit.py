@@ -30,7 +30,7 @@ def figures(problem: Problem, settings: Sequence[EffectSetting], ids: Iterable[s
 
     The other effects of the fit are in, so each figure shows one cause alone.
     """
-    by_id = {effect.id: effect for effect in effects.CRITICISED}
+    by_id = {effect.id: effect for effect in effects.BASE}
     return tuple(_figure(problem, settings, by_id[name]) for name in ids)
 
 
@@ -63,7 +63,7 @@ def remaining(problem: Problem, fit: Fit) -> tuple[str, ...]:
     return tuple(said) or ("The residual follows neither the rates asked for nor their changes.",)
 
 
-def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[effects.Effect]) -> Misfit:
+def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[effects.BaseEffect]) -> Misfit:
     others = tuple(setting for setting in settings if setting.id != effect.id)
     channel = 0 if effect.shows_in is Rate.V else 2
     x, residual, added = (

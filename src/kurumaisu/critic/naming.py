@@ -3,21 +3,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic.evidence import Fit, Problem, covariance, occam
+from kurumaisu.critic.catalogue import Candidate, Key
+from kurumaisu.critic.evidence import Fit, Problem
+from kurumaisu.critic.prior import log_prior
+from kurumaisu.critic.scan import Screen
 from kurumaisu.types import FloatArray
 
 NAMED = 0.9  # posterior from which a cause is named
 RIVAL = 0.05  # posterior from which an effect counts as a rival of another
-_PRIOR = 0.1  # of any one effect to be at work, before the data
-_LARGEST = 3  # effects in a set that the linear scan tries; larger sets grow from the best ones
-_REFITS = 8  # sets refitted after each scan
+_REFITS = 10  # sets refitted after each scan
+_CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
+_ROUNDS = 8  # scans at most
 NULLS = 2000  # draws of the null calibration
 
 
@@ -43,126 +45,94 @@ class Naming:
     @property
     def named(self) -> tuple[str, ...]:
         """Return the effects of the best set that are certain enough to be named."""
-        return tuple(term.id for term in self.best.terms if self.p[term.id] >= NAMED)
+        return tuple(name for name in sorted(self.best.ids) if self.p[name] >= NAMED)
+
+
+Chosen = frozenset[Candidate]
 
 
 def search(problem: Problem, progress: Callable[[str], None]) -> Naming:
     """Scan sets of effects linearly, refit the promising ones, and go on from the best until it stays the best."""
-    ids = tuple(dict.fromkeys(term.id for term in problem.terms))
-    empty = problem.fit((), {})
-    fits: dict[frozenset[str], Fit] = {empty.ids: empty}
-    centre = empty
+    count = len({candidate.id for candidate in problem.candidates})
+    empty = problem.fit_candidates((), {})
+    fits: dict[Chosen, Fit] = {empty.candidates: empty}
 
-    def try_sets(guesses: Iterable[tuple[frozenset[str], dict[str, float]]]) -> Fit:
+    def worth(fit: Fit) -> float:
+        return fit.score + log_prior(len(fit.candidates), count)
+
+    def try_sets(guesses: Iterable[tuple[Chosen, Mapping[Key, float]]]) -> Fit:
         for chosen, start in guesses:
             if chosen not in fits:
-                progress(f"fitting {', '.join(sorted(chosen))}")
-                fits[chosen] = problem.fit(chosen, start)
-        return max(fits.values(), key=lambda fit: fit.score + log_prior(len(fit.ids), len(ids)))
+                progress(f"fitting {', '.join(sorted(candidate.id for candidate in chosen))}")
+                fits[chosen] = problem.fit_candidates(chosen, start)
+        return max(fits.values(), key=worth)
 
-    while True:
-        best = try_sets((guess.ids, guess.start) for guess in _scan(problem, centre, ids))
-        if best is centre:  # the last word is by fits: could any other effect stand in for one of these?
-            best = try_sets(_swaps(best, ids))
+    centre = empty
+    first = screen = Screen(problem, centre)
+    for _ in range(_ROUNDS):
+        guesses = screen.guesses()
+        near = [guess for guess in guesses[:_REFITS] if guess.score > guesses[0].score - _CLOSE]
+        best = try_sets((guess.chosen, guess.start) for guess in near)
+        if best is centre:  # the last word is by fits: could others stand in, and does each have to be there?
+            best = try_sets(_neighbours(problem, screen, best))
         if best is centre:
             break
         centre = best
-    ranked = sorted(fits.values(), key=lambda fit: -(fit.score + log_prior(len(fit.ids), len(ids))))
-    weights = _weights(ranked, ids)
+        screen = Screen(problem, centre)
+    ranked = sorted(fits.values(), key=lambda fit: -worth(fit))
+    weights = np.array([worth(fit) for fit in ranked])
+    weights = np.exp(weights - logsumexp(weights))
 
     def p_any(names: Iterable[str]) -> float:
-        return float(sum(w for w, fit in zip(weights, ranked, strict=True) if fit.ids & set(names)))
+        wanted = set(names)
+        return float(sum(w for w, fit in zip(weights, ranked, strict=True) if fit.ids & wanted))
 
-    p = {name: p_any([name]) for name in ids}
-    return Naming(tuple(ranked), p, _confounded(ranked[0], p, p_any), _false_alarm(problem, empty, ids))
-
-
-def log_prior(size: int, of: int) -> float:
-    """Return the log prior of a set of so many effects out of so many."""
-    return float(size * np.log(_PRIOR) + (of - size) * np.log1p(-_PRIOR))
+    p = {name: p_any([name]) for name in sorted({candidate.id for candidate in problem.candidates})}
+    return Naming(tuple(ranked), p, _confounded(ranked, weights, p, p_any), _false_alarm(problem, first))
 
 
-def _swaps(fit: Fit, ids: tuple[str, ...]) -> Iterator[tuple[frozenset[str], dict[str, float]]]:
-    for one in sorted(fit.ids):
-        for other in ids:
-            if other not in fit.ids:
-                kept = {term.id: float(value) for term, value in zip(fit.terms, fit.values, strict=True)}
-                yield fit.ids - {one} | {other}, kept
+def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
+    """Yield the set without each of its effects, with what can only act or not, and with each rival instead."""
+    kept = fit.start
+    for one in sorted(fit.candidates, key=lambda candidate: candidate.id):
+        yield fit.candidates - {one}, kept
+        for other in problem.candidates:
+            if other.id not in fit.ids - {one.id} and other not in fit.candidates and screen.related(one, other):
+                yield fit.candidates - {one} | {other}, kept
+    for other in screen.fixed:
+        if other.id not in fit.ids and screen.mends(other):
+            yield fit.candidates | {other}, kept
 
 
-@dataclass(frozen=True)
-class _Guess:
-    ids: frozenset[str]
-    start: dict[str, float]
-    score: float
+def _confounded(
+    ranked: Sequence[Fit], weights: FloatArray, p: dict[str, float], p_any: Callable[[Iterable[str]], float]
+) -> tuple[tuple[str, ...], ...]:
+    """Return, for each uncertain effect of the best set, the set with those that could stand in, if one must act."""
+    best = ranked[0]
+    groups: list[set[str]] = []
+    for name in sorted(best.ids):
+        if p[name] >= NAMED:
+            continue
+        without = best.ids - {name}
+        group = {name}
+        for fit, weight in zip(ranked, weights, strict=True):
+            if name not in fit.ids and weight > RIVAL / 5 and len(fit.ids & without) >= len(without) - 1:
+                group |= {other for other in fit.ids - best.ids if p[other] >= RIVAL}
+        groups.append(group)
+    merged: list[set[str]] = []
+    for group in groups:
+        meeting = [other for other in merged if other & group]
+        merged = [other for other in merged if not other & group] + [group.union(*meeting)]
+    return tuple(tuple(sorted(group)) for group in merged if len(group) > 1 and p_any(group) >= NAMED)
 
 
-def _scan(problem: Problem, centre: Fit, ids: tuple[str, ...]) -> list[_Guess]:
-    """Return the most probable sets of up to _LARGEST changes, from columns linearised at a fit.
-
-    A change adds an effect to the fit's set or takes one out, so that swaps are found: two effects may cancel.
-    """
-    columns = problem.columns(centre.terms, centre.values, problem.terms)
-    y = problem.residual(centre.terms, centre.values)
-    gram, b = columns.T @ columns, columns.T @ y
-    guesses = []
-    for size in range(_LARGEST + 1):
-        for changes in combinations(ids, size):
-            chosen = centre.ids.symmetric_difference(changes)
-            guess = _linear(problem, centre, chosen, gram, b)
-            if guess is not None:
-                guesses.append(guess)
-    guesses.sort(key=lambda guess: -(guess.score + log_prior(len(guess.ids), len(ids))))
-    return guesses[:_REFITS]
-
-
-def _linear(problem: Problem, centre: Fit, chosen: frozenset[str], gram: FloatArray, b: FloatArray) -> _Guess | None:
-    """Return a set's estimate and score by the linearisation; None where a parameter leaves its bounds."""
-    fitted = {(term.id, term.parameter.name): value for term, value in zip(centre.terms, centre.values, strict=True)}
-    known = np.array(
-        [(fitted.get((t.id, t.parameter.name), t.null) - t.null) / t.parameter.scale for t in problem.terms]
-    )
-    use = np.array([term.id in chosen for term in problem.terms])
-    # All offsets from null: those of effects taken out of the fit fall back to 0 and return to the residual.
-    target = b + gram @ known
-    if not use.any():
-        return _Guess(chosen, {}, -0.5 * float(known @ gram @ known) - float(b @ known))
-    inverse = covariance(gram[np.ix_(use, use)])
-    offsets = inverse @ target[use]
-    terms = [term for term, used in zip(problem.terms, use, strict=True) if used]
-    values = [term.null + x * term.parameter.scale for term, x in zip(terms, offsets, strict=True)]
-    if any(not t.parameter.lower <= v <= t.parameter.upper for t, v in zip(terms, values, strict=True)):
-        return None
-    step = np.zeros(len(known))
-    step[use] = offsets
-    step -= known
-    gained = float(b @ step) - 0.5 * float(step @ gram @ step)
-    z = offsets / np.sqrt(np.diag(inverse))
-    start = {term.id: value for term, value in zip(terms, values, strict=True)}
-    return _Guess(chosen, start, gained - float(occam(z).sum()))
-
-
-def _weights(fits: Sequence[Fit], ids: tuple[str, ...]) -> FloatArray:
-    """Return the posterior of each fit, all together 1."""
-    weights = np.array([fit.score + log_prior(len(fit.ids), len(ids)) for fit in fits])
-    return np.asarray(np.exp(weights - logsumexp(weights)))
-
-
-def _confounded(best: Fit, p: dict[str, float], p_any: Callable[[Iterable[str]], float]) -> tuple[tuple[str, ...], ...]:
-    """Return the best set's uncertain effects with the rivals that could stand in for them, if one of them must act."""
-    uncertain = sorted(name for name in best.ids if p[name] < NAMED)
-    rivals = sorted(name for name in p if name not in best.ids and p[name] >= RIVAL)
-    group = tuple(uncertain + rivals)
-    return (group,) if uncertain and len(group) > 1 and p_any(group) >= NAMED else ()
-
-
-def _false_alarm(problem: Problem, empty: Fit, ids: tuple[str, ...]) -> float:
+def _false_alarm(problem: Problem, screen: Screen) -> float:
     """Return how often noise alone, b ~ N(0, G), gives a single effect the evidence that the data give the best one."""
-    columns = problem.columns((), np.empty(0), problem.terms)
-    norms = np.linalg.norm(columns, axis=0)
-    seen = np.maximum(norms, 1e-9)
-    correlation = (columns / seen).T @ (columns / seen)
-    observed = columns.T @ problem.residual((), np.empty(0)) / seen
-    roots = np.linalg.cholesky(correlation + 1e-9 * np.eye(len(seen)))
-    draws = np.random.default_rng(0).standard_normal((NULLS, len(seen))) @ roots.T
+    loud = [i for i, term in enumerate(screen.terms) if not term.shape]
+    if not loud:
+        return 1.0
+    correlation = screen.correlation[np.ix_(loud, loud)]
+    observed = screen.b[loud] / np.sqrt(np.maximum(np.diag(screen.gram)[loud], 1e-18))
+    roots = np.linalg.cholesky(correlation + 1e-6 * np.eye(len(loud)))
+    draws = np.random.default_rng(0).standard_normal((NULLS, len(loud))) @ roots.T
     return float(np.mean(np.abs(draws).max(axis=1) >= np.abs(observed).max()))

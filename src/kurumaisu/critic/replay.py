@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -17,28 +18,57 @@ from kurumaisu.types import FloatArray
 
 def extend(model: Model, settings: Sequence[EffectSetting]) -> Model:
     """Return the model with these effects in place of its own of the same id."""
-    given = {setting.id for setting in settings}
-    return replace(model, effects=(*(own for own in model.effects if own.id not in given), *settings))
+    whole = completed(model, settings)
+    given = {setting.id for setting in whole}
+    return replace(model, effects=(*(own for own in model.effects if own.id not in given), *whole))
+
+
+def completed(model: Model, settings: Sequence[EffectSetting]) -> tuple[EffectSetting, ...]:
+    """Return the effects with every parameter: those that are not given as the model has them, or absent."""
+    own = {setting.id: setting.parameters for setting in model.effects}
+    whole = []
+    for setting in settings:
+        parameters = {p.name: p.null for p in effects.by_id(setting.id).parameters}
+        whole.append(EffectSetting(setting.id, {**parameters, **own.get(setting.id, {}), **setting.parameters}))
+    return tuple(whole)
 
 
 def motion(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> effects.Motion:
     """Return the motion of the simulated chair on the drive's grid, without random effects."""
-    heading = float(drive.poses[0, 2])  # the grid begins at the first pose, or a little before it
-    random = {effect.id for effect in effects.ALL if effect.random}
-    extended = extend(model, settings)
-    mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in random))
-    return plant.Plant(mean, GRID, np.random.default_rng(0)).from_rates(drive.v, drive.w, heading, drive.known)
+    return _driven(drive, model, settings)[1]
 
 
 def path(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
-    """Return the simulated poses at the reference's times, (m + 1, 3), starting at the first reference pose."""
-    poses = plant.path(motion(drive, model, settings), np.zeros(3))
-    grid = drive.start + GRID * np.arange(len(poses))
-    at = geometry.interpolate(grid, poses, drive.times)
+    """Return the simulated reference at its times, (m + 1, 3), starting at the first measured pose."""
+    at = _seen(drive, model, settings)
     return geometry.compose(drive.poses[0], geometry.between(at[0], at))
 
 
 def increments(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return the simulated body increments between the reference's times, (m, 3)."""
-    at = path(drive, model, settings)
+    at = _seen(drive, model, settings)
     return geometry.between(at[:-1], at[1:])
+
+
+def _seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
+    """Return what the reference measures of the simulated chair at its times, (m + 1, 3), in a frame of its own."""
+    chair, motion = _driven(drive, model, settings)
+    poses = plant.path(motion, np.zeros(3))
+    times = GRID * np.arange(len(poses))  # since the start: a clock that runs fast is right at the start
+    if not chair.effects.reference:
+        return geometry.interpolate(drive.start + times, poses, drive.times)
+    seen = chair.seen(effects.Reference(times, poses, np.zeros_like(poses)))
+    return geometry.interpolate(drive.start + seen.times, seen.poses, drive.times)
+
+
+def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:
+    extended = extend(model, settings)
+    mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in _random()))
+    chair = plant.Plant(mean, GRID, np.random.default_rng(0))
+    heading = float(drive.poses[0, 2])  # the grid begins at the first pose, or a little before it
+    return chair, chair.from_rates(drive.v, drive.w, heading, drive.known)
+
+
+@cache
+def _random() -> frozenset[str]:
+    return frozenset(effect.id for effect in effects.ALL if effect.random)

@@ -96,9 +96,11 @@ class Context:
 
 
 class BaseEffect(Mechanism):
-    """An effect somewhere in the drive chain."""
+    """An effect somewhere in the drive chain. shows_in, follows: where a residual drawn over it shows its shape."""
 
     stage: ClassVar[Stage]
+    shows_in: ClassVar[Rate]
+    follows: ClassVar[Follows]
 
     def __init__(self, values: Mapping[str, float], context: Context) -> None:
         super().__init__(values)
@@ -107,9 +109,6 @@ class BaseEffect(Mechanism):
 
 class Effect(BaseEffect, ABC):
     """An effect on the rates, with the state it has reached."""
-
-    shows_in: ClassVar[Rate]
-    follows: ClassVar[Follows]
 
     @abstractmethod
     def apply(self, motion: Motion) -> Motion:

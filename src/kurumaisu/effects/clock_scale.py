@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.effects.base import Parameter, Reference, ReferenceEffect
+from kurumaisu.effects.base import Follows, Parameter, Rate, Reference, ReferenceEffect
 
 
 class ClockScale(ReferenceEffect):
@@ -16,6 +16,8 @@ class ClockScale(ReferenceEffect):
     sentence = "the reference's clock and that of the commands run at different speeds"
     formula = "t · (1 + scale), rates / (1 + scale)"
     source = "assumed: computers without a common clock; 0.01-0.5 %"
+    shows_in = Rate.V
+    follows = Follows.V_CHANGE
 
     def apply(self, reference: Reference) -> Reference:
         """Stretch the times."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.effects.base import Parameter, Stage, VoltageEffect, Volts
+from kurumaisu.effects.base import Follows, Parameter, Rate, Stage, VoltageEffect, Volts
 
 
 class DacQuantisation(VoltageEffect):
@@ -17,6 +17,8 @@ class DacQuantisation(VoltageEffect):
     sentence = "the voltages come in steps of the D/A converter"
     formula = "step · round(V / step)"
     source = "resolution of any D/A converter; 1-5 mV"
+    shows_in = Rate.W
+    follows = Follows.W
 
     def apply(self, volts: Volts) -> Volts:
         """Round V_f and V_s."""

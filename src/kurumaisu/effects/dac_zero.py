@@ -3,7 +3,7 @@
 
 from dataclasses import replace
 
-from kurumaisu.effects.base import Parameter, Stage, VoltageEffect, Volts
+from kurumaisu.effects.base import Follows, Parameter, Rate, Stage, VoltageEffect, Volts
 
 _OFFSET = (Parameter("offset", "V", null=0.0, scale=0.01, lower=-0.5, upper=0.5),)
 
@@ -17,6 +17,8 @@ class DacZeroF(VoltageEffect):
     sentence = "the translation voltage is off by a constant"
     formula = "V_f + offset"
     source = "offset error of any D/A converter; 2-20 mV"
+    shows_in = Rate.V
+    follows = Follows.V
 
     def apply(self, volts: Volts) -> Volts:
         """Shift V_f."""
@@ -32,6 +34,8 @@ class DacZeroS(VoltageEffect):
     sentence = "the steering voltage is off by a constant"
     formula = "V_s + offset"
     source = "offset error of any D/A converter; 2-20 mV"
+    shows_in = Rate.W
+    follows = Follows.W
 
     def apply(self, volts: Volts) -> Volts:
         """Shift V_s."""

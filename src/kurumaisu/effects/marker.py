@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.effects.base import Parameter, Reference, ReferenceEffect
+from kurumaisu.effects.base import Follows, Parameter, Rate, Reference, ReferenceEffect
 from kurumaisu.geometry import compose
 
 
@@ -24,6 +24,8 @@ class MarkerX(ReferenceEffect):
     sentence = "the reference measures a point in front of or behind base_link"
     formula = "pose ⊕ (x, 0, 0): u + x · w"
     source = "geometry; 10-50 mm"
+    shows_in = Rate.V
+    follows = Follows.W
 
     def apply(self, reference: Reference) -> Reference:
         """Shift forward."""
@@ -38,6 +40,8 @@ class MarkerY(ReferenceEffect):
     sentence = "the reference measures a point beside base_link"
     formula = "pose ⊕ (0, y, 0): v − y · w"
     source = "geometry; 10-50 mm"
+    shows_in = Rate.V
+    follows = Follows.W
 
     def apply(self, reference: Reference) -> Reference:
         """Shift to the left."""

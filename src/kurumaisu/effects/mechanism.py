@@ -33,7 +33,8 @@ class Mechanism:
     """One way in which a real chair or laser departs from equations (1)-(4).
 
     sentence: for the report; formula: what apply does, in the symbols of docs/effects.md; source: where the form is
-    known from.
+    known from. separable: each parameter is a peculiarity by itself (one per axis), so one may act without the other.
+    choices: where not empty, the only parameters that a critic considers: the effect acts so, or not at all.
     """
 
     id: ClassVar[str]
@@ -41,6 +42,8 @@ class Mechanism:
     sentence: ClassVar[str]
     formula: ClassVar[str]
     source: ClassVar[str]
+    separable: ClassVar[bool] = False
+    choices: ClassVar[tuple[Mapping[str, float], ...]] = ()
     random: ClassVar[bool] = False  # it draws noise, so its mean effect is none, or not the whole of it
 
     def __init__(self, values: Mapping[str, float]) -> None:

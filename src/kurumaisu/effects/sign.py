@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 
-# 57.3 is degrees for radians
+_DEGREES = 57.29577951308232  # in a radian
 _FACTORS = {"null": 1.0, "scale": 1.0, "lower": -60.0, "upper": 60.0}
 
 
@@ -22,6 +22,14 @@ class Sign(Effect):
     sentence = "an axis is reversed, swapped with the other, or in another unit"
     formula = "factor_v · ((1 − swap) · v + swap · w), factor_w · ((1 − swap) · w + swap · v), as numbers"
     source = "wrong wiring or units; −1, 57.3 or 1/57.3, swap 1"
+    choices = (
+        {"factor_v": -1.0, "factor_w": 1.0, "swap": 0.0},
+        {"factor_v": 1.0, "factor_w": -1.0, "swap": 0.0},
+        {"factor_v": -1.0, "factor_w": -1.0, "swap": 0.0},
+        {"factor_v": 1.0, "factor_w": _DEGREES, "swap": 0.0},
+        {"factor_v": 1.0, "factor_w": 1 / _DEGREES, "swap": 0.0},
+        {"factor_v": 1.0, "factor_w": 1.0, "swap": 1.0},
+    )
     shows_in = Rate.W
     follows = Follows.W
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu._core import AxisInverse, AxisLaw, Branch
-from kurumaisu.effects.base import Context, Parameter, Stage, VoltageEffect, Volts
+from kurumaisu.effects.base import Context, Follows, Parameter, Rate, Stage, VoltageEffect, Volts
 
 
 class SteeringLaw(VoltageEffect):
@@ -19,6 +19,9 @@ class SteeringLaw(VoltageEffect):
     sentence = "the steering law's intercepts have the other sign"
     formula = "w of V_s by (2) with intercepts · (1 − 2 flip)"
     source = "paper, equation (2): as printed, its two branches overlap"
+    choices = ({"flip": 1.0},)
+    shows_in = Rate.W
+    follows = Follows.W
 
     def __init__(self, values: Mapping[str, float], context: Context) -> None:
         super().__init__(values, context)

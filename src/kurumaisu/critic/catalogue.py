@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the critic may fit: the parameters of the catalogue, and which of them these drives can show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.effects import Parameter
+from kurumaisu.params import EffectSetting, Model
+from kurumaisu.types import FloatArray
+
+Key = tuple[str, str]  # id and parameter
+_SHOWS = 3.0  # whitened norm from which a parameter can be seen at all
+_TYPICAL = 8.0  # whitened norm of the step by which a parameter is judged
+_HALVINGS = 6  # of the log of a step between one that shows too little and one that shows too much
+_FARTHEST = 2.0**7  # scales
+
+
+@dataclass(frozen=True)
+class Term:
+    """One parameter of one effect as the critic may fit it.
+
+    null: its value in the model criticised; step: from there to where it shows typically, in units of its scale;
+    shape: it changes how another parameter of the effect shows, and nothing by itself.
+    """
+
+    id: str
+    parameter: Parameter
+    null: float
+    step: float = 0.2
+    shape: bool = False
+
+    @property
+    def key(self) -> Key:
+        """Return the id and the parameter's name."""
+        return self.id, self.parameter.name
+
+    @property
+    def fixed(self) -> bool:
+        """Tell whether there is nothing to fit."""
+        return self.parameter.lower == self.parameter.upper
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One way in which an effect may act: terms that are fitted, or fixed ones. ways: how many the effect has."""
+
+    id: str
+    terms: tuple[Term, ...]
+    ways: int
+
+    @property
+    def fixed(self) -> bool:
+        """Tell whether there is nothing to fit."""
+        return all(term.fixed for term in self.terms)
+
+
+def catalogue(model: Model) -> tuple[Term, ...]:
+    """Return a term for every parameter of every effect that changes the mean motion and has a size to fit."""
+    own = {setting.id: setting.parameters for setting in model.effects}
+    return tuple(
+        Term(effect.id, parameter, own.get(effect.id, {}).get(parameter.name, parameter.null))
+        for effect in effects.BASE
+        if not effect.random and not effect.choices
+        for parameter in effect.parameters
+    )
+
+
+def settings_of(terms: Sequence[Term], values: FloatArray) -> tuple[EffectSetting, ...]:
+    """Return the effects of these terms; parameters that have none are left to the model."""
+    by_id: dict[str, dict[str, float]] = {}
+    for term, value in zip(terms, values, strict=True):
+        by_id.setdefault(term.id, {})[term.parameter.name] = float(value)
+    return tuple(EffectSetting(name, parameters) for name, parameters in by_id.items())
+
+
+Norm = Callable[[tuple[EffectSetting, ...]], float]
+
+
+def showing(terms: Iterable[Term], norm: Norm) -> tuple[Term, ...]:
+    """Return the terms that these drives can show, with their steps; norm: of the change that settings make."""
+    by_id: dict[str, list[Term]] = {}
+    for term in terms:
+        by_id.setdefault(term.id, []).append(term)
+    return tuple(term for own in by_id.values() for term in _showing(own, norm))
+
+
+def _showing(own: Sequence[Term], norm: Norm) -> Iterator[Term]:
+    """Yield those of one effect: amplitudes first, then the shapes, which show beside an amplitude only."""
+    nulls = np.array([term.null for term in own])
+
+    def at(moves: dict[int, float]) -> float:
+        values = nulls.copy()
+        for i, step in moves.items():
+            values[i] += step * own[i].parameter.scale
+        return norm(settings_of(own, values))
+
+    found: dict[int, Term] = {}
+    for i, term in enumerate(own):
+        step = _typical_step(term, lambda step, i=i: at({i: step}))  # type: ignore[misc]
+        if step is not None:
+            found[i] = replace(term, step=step)
+    yield from found.values()
+    for i, term in enumerate(own):
+        if i not in found and term.null != 0 and found:
+            loud = {j: other.step for j, other in found.items()}
+            if abs(at({**loud, i: 0.5}) - at(loud)) > 1e-3:
+                yield replace(term, step=0.2, shape=True)
+
+
+def _typical_step(term: Term, norm: Callable[[float], float]) -> float | None:
+    """Return the step whose change has about the norm _TYPICAL; the largest one that shows, or None."""
+    p = term.parameter
+    room = (p.upper - term.null) / p.scale
+    sign = 1.0 if room > 0 else -1.0
+    largest = min(abs(room if room > 0 else (p.lower - term.null) / p.scale), _FARTHEST)
+    high = min(0.25, largest)
+    low = 0.0
+    while norm(sign * high) < _TYPICAL:
+        if high >= largest:
+            return sign * high if norm(sign * high) >= _SHOWS else None
+        low, high = high, min(2 * high, largest)
+    low = low or high / 2**12
+    for _ in range(_HALVINGS):
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if norm(sign * middle) >= _TYPICAL else (middle, high)
+    return sign * high
+
+
+def candidates(terms: Sequence[Term], model: Model) -> tuple[Candidate, ...]:
+    """Return the ways in which the effects of these terms may act, and those that can only act or not."""
+    found: list[Candidate] = []
+    own = {setting.id for setting in model.effects}
+    for effect in effects.BASE:
+        if effect.choices and effect.id not in own:
+            found += _choices(effect)
+            continue
+        amplitudes = [term for term in terms if term.id == effect.id and not term.shape]
+        shapes = [term for term in terms if term.id == effect.id and term.shape]
+        if not amplitudes:
+            continue
+        sizes = range(1, len(amplitudes) + 1) if effect.separable else [len(amplitudes)]
+        subsets = [subset for size in sizes for subset in combinations(amplitudes, size)]
+        found += [Candidate(effect.id, (*subset, *shapes), len(subsets)) for subset in subsets]
+    return tuple(found)
+
+
+def _choices(effect: type[effects.BaseEffect]) -> Iterator[Candidate]:
+    for choice in effect.choices:
+        terms = (
+            Term(effect.id, replace(parameter, lower=choice[parameter.name], upper=choice[parameter.name]), parameter.null)
+            for parameter in effect.parameters
+        )
+        yield Candidate(effect.id, tuple(terms), len(effect.choices))

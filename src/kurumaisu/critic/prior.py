@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is believed before the data: how large an effect shows, and how many act at once."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from scipy.special import i0e, logsumexp
+
+from kurumaisu.types import FloatArray
+
+# Amplitude prior of an effect: log-uniform in z, the whitened norm of its signal. Below 3 nobody can see it; with a
+# broad Gaussian instead, "none" is over-confident. Beyond 50 little is left, for what is wrong beyond doubt.
+Z_LOW, Z_USUAL, Z_HIGH = 3.0, 50.0, 5000.0
+_USUAL = 0.9  # share of the prior up to Z_USUAL
+# Odds of one more effect at work, shared by all that the drives could show: half of all chairs have none.
+_MORE = 0.7
+
+
+def log_prior(size: int, of: int) -> float:
+    """Return the log prior of a set of so many effects out of so many that could show."""
+    each = _MORE / max(of, 1)
+    return float(size * np.log(each) + (of - size) * np.log1p(-each))
+
+
+def occam(z: FloatArray, sides: int = 2) -> FloatArray:
+    """Return what an amplitude that shows with |z| standard deviations costs, in nats, elementwise.
+
+    z^2 / 2 less the log of the Bayes factor that the prior gives; sides: 1 where only one sign is possible.
+    """
+    grid, costs = _table(1)
+    return np.asarray(np.interp(np.abs(z), grid, costs) - np.log(2 / sides))
+
+
+def occam_plane(z: FloatArray) -> FloatArray:
+    """Return what two amplitudes that show with |z| together cost, every direction being as likely, elementwise."""
+    grid, costs = _table(2)
+    return np.asarray(np.interp(np.abs(z), grid, costs))
+
+
+@cache
+def _table(dimensions: int) -> tuple[FloatArray, FloatArray]:
+    log_x = np.linspace(np.log(Z_LOW), np.log(Z_HIGH), 40001)
+    x = np.exp(log_x)
+    usual = np.where(x < Z_USUAL, _USUAL / np.log(Z_USUAL / Z_LOW), (1 - _USUAL) / np.log(Z_HIGH / Z_USUAL))
+    log_weight = np.log(log_x[1] - log_x[0]) + np.log(usual)
+    grid = np.concatenate([np.linspace(0, 20, 201), np.geomspace(21, 0.99 * Z_HIGH, 150)])
+    costs = np.array([-logsumexp(_log_mean_density(z, x, dimensions) + log_weight) for z in grid])
+    return grid, costs
+
+
+def _log_mean_density(z: float, x: FloatArray, dimensions: int) -> FloatArray:
+    """Return the log of exp(-|estimate - signal|^2 / 2) averaged over the signal's directions."""
+    if dimensions == 1:
+        return np.asarray(np.logaddexp(-0.5 * (z - x) ** 2, -0.5 * (z + x) ** 2) - np.log(2))
+    return np.asarray(-0.5 * (z - x) ** 2 + np.log(i0e(z * x)))
