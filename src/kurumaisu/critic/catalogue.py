@@ -153,7 +153,11 @@ def candidates(terms: Sequence[Term], model: Model) -> tuple[Candidate, ...]:
 def _choices(effect: type[effects.BaseEffect]) -> Iterator[Candidate]:
     for choice in effect.choices:
         terms = (
-            Term(effect.id, replace(parameter, lower=choice[parameter.name], upper=choice[parameter.name]), parameter.null)
+            Term(
+                effect.id,
+                replace(parameter, lower=choice[parameter.name], upper=choice[parameter.name]),
+                parameter.null,
+            )
             for parameter in effect.parameters
         )
         yield Candidate(effect.id, tuple(terms), len(effect.choices))

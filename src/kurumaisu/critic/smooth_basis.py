@@ -27,21 +27,26 @@ _ORDERS = (1, 2)
 class Basis:
     """The curves over one covariate.
 
-    knots: of the hats, empty where periodic; constant: what the covariate needs to be computed; constants: that as a
-    parameter; samples: per drive, its values on the grid (n,), inf where there is none yet; priors: covariances of the
-    coefficients, (k, k) each, of a curve whose mean square over the drives is 1.
+    knots: of the hats, empty where periodic; constants: the parameter that the covariate needs to be computed, if any;
+    priors: covariances of the coefficients, (k, k) each, of a curve whose mean square over the drives is 1;
+    low, high: the covariate lies between them in 95 % of the time that the chair moves.
     """
 
     covariate: str
     knots: FloatArray
     constants: dict[str, float]
-    samples: tuple[FloatArray, ...]
     priors: tuple[FloatArray, ...]
+    low: float
+    high: float
 
     @property
     def size(self) -> int:
         """Return the number of coefficients."""
         return len(self.knots) or 1 + 2 * _HARMONICS
+
+    def samples(self, motion: effects.Motion) -> FloatArray:
+        """Return the covariate of a motion from its start on, (n,); inf where there is none yet."""
+        return _samples(self.covariate, self.constants, motion)
 
     def matrix(self, at: FloatArray) -> FloatArray:
         """Return the basis at values of the covariate (n,), (n, k)."""
@@ -64,9 +69,7 @@ def bases(drives: Sequence[Drive], model: Model, settings: Sequence[EffectSettin
     extras = set.intersection(*(set(drive.known) for drive in drives)) - {"x", "y", "heading", "v_f", "v_s"}
     for name in (*effects.COVARIATES, *sorted(extras)):
         constants = _constants(name, drives, model)
-        samples = tuple(
-            np.asarray(effects.Follower(name, next(iter(constants.values()), 0.0)).values(motion)) for motion in motions
-        )
+        samples = [_samples(name, constants, motion) for motion in motions]
         moving = [(motion.v != 0) | (motion.w != 0) for motion in motions]
         pooled = np.concatenate([values[moved] for values, moved in zip(samples, moving, strict=True)])
         known = pooled[np.isfinite(pooled)]
@@ -77,7 +80,12 @@ def bases(drives: Sequence[Drive], model: Model, settings: Sequence[EffectSettin
         if not period and len(knots) < 3:
             continue
         matrix = _matrix(knots, period, pooled)
-        yield Basis(name, knots, constants, samples, tuple(_priors(knots, matrix)))
+        low, high = np.quantile(known, [0.025, 0.975])
+        yield Basis(name, knots, constants, tuple(_priors(knots, matrix)), float(low), float(high))
+
+
+def _samples(name: str, constants: dict[str, float], motion: effects.Motion) -> FloatArray:
+    return np.asarray(effects.Follower(name, next(iter(constants.values()), 0.0)).values(motion))
 
 
 def _constants(name: str, drives: Sequence[Drive], model: Model) -> dict[str, float]:

@@ -56,7 +56,7 @@ class Sensitivity:
         return np.asarray(low + self._share * (high - low))
 
     def _differences(self, sums: FloatArray) -> FloatArray:
-        return np.diff(self._at(sums), axis=0)
+        return np.asarray(np.diff(self._at(sums), axis=0))
 
 
 def _sum(steps: FloatArray) -> FloatArray:

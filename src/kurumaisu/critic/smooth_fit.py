@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A set of effects and a curve, fitted together by simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kurumaisu.critic import replay
+from kurumaisu.critic.catalogue import settings_of
+from kurumaisu.critic.drive import Drive
+from kurumaisu.critic.evidence import Fit, Problem
+from kurumaisu.critic.noise import Noise
+from kurumaisu.critic.smooth import Curve, columns, raw_columns
+from kurumaisu.params import EffectSetting, Model
+from kurumaisu.types import FloatArray
+
+_ROUNDS = 3  # from columns linearised anew; the curve itself is linear in all but the path it leads to
+
+
+@dataclass(frozen=True)
+class Extension:
+    """fit: of the catalogue's effects beside the curve; coefficients of the curve and their covariance.
+
+    prior: covariance of the coefficients before the data.
+    """
+
+    fit: Fit
+    curve: Curve
+    prior: FloatArray
+    coefficients: FloatArray
+    covariance: FloatArray
+
+    @property
+    def unknown(self) -> EffectSetting:
+        """Return the curve as a model file has it."""
+        return EffectSetting(self.curve.id, self.curve.basis.parameters(self.coefficients))
+
+    @property
+    def settings(self) -> tuple[EffectSetting, ...]:
+        """Return all effects as a model file has them."""
+        return (*self.fit.settings, self.unknown)
+
+
+def extend(problem: Problem, fit: Fit, curve: Curve, prior: FloatArray) -> Extension:
+    """Return a set's fit and a curve's coefficients, each beside the other."""
+    curve = replace(curve, columns=slice(0, curve.basis.size))
+    values, vectors = np.linalg.eigh(prior)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    extension = Extension(fit, curve, prior, np.zeros(curve.basis.size), prior)
+    for _ in range(_ROUNDS):
+        extension = _step(problem, extension, root)
+    return extension
+
+
+def again(extension: Extension, drives: Sequence[Drive], model: Model, noise: Noise) -> Extension:
+    """Return the extension fitted to other drives."""
+    problem = Problem(drives, model, noise)
+    fit = problem.fit_candidates(extension.fit.candidates, extension.fit.start)
+    return extend(problem, fit, extension.curve, extension.prior)
+
+
+def simulated_columns(problem: Problem, drive: Drive, extension: Extension) -> FloatArray:
+    """Return the derivative of a drive's increments by all effects of the catalogue and by the curve, (3 m, k)."""
+    own = Problem(problem.drives, replay.extend(problem.model, [extension.unknown]), problem.noise, problem.terms)
+    known = own.simulated_columns(drive, extension.fit)
+    return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [extension.curve])])
+
+
+def _step(problem: Problem, extension: Extension, root: FloatArray) -> Extension:
+    fit = extension.fit
+    beside = Problem(problem.drives, replay.extend(problem.model, [extension.unknown]), problem.noise, problem.terms)
+    y, slopes = beside.linearised(fit.terms, fit.values, fit.terms)
+    own = columns(problem, fit.settings, [extension.curve]) @ root
+    k = slopes.shape[1]
+    design = np.hstack([slopes, own])
+    target = y + columns(problem, fit.settings, [extension.curve]) @ extension.coefficients
+    precision = design.T @ design + np.diag(np.append(np.full(k, 1e-6), np.ones(own.shape[1])))
+    covariance = np.linalg.inv(precision)
+    solved = covariance @ (design.T @ target)
+    return replace(
+        extension,
+        fit=_moved(problem, fit, solved[:k], np.sqrt(np.diag(covariance)[:k])),
+        coefficients=root @ solved[k:],
+        covariance=root @ covariance[k:, k:] @ root.T,
+    )
+
+
+def _moved(problem: Problem, fit: Fit, steps: FloatArray, sds: FloatArray) -> Fit:
+    """Return the fit with its values moved, within their bounds; steps, sds per step of a term."""
+    if not fit.terms:
+        return fit
+    unit = np.array([term.step * term.parameter.scale for term in fit.terms])
+    lower, upper = (np.array([getattr(term.parameter, side) for term in fit.terms]) for side in ("lower", "upper"))
+    values = np.clip(fit.values + steps * unit, lower, upper)
+    settings = replay.completed(problem.model, settings_of(fit.terms, values))
+    return replace(fit, values=values, sds=sds * unit, settings=settings)
