@@ -128,14 +128,18 @@ void bindKalman(py::module_& m) {
   m.def(
       "whiten",
       [](const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
-         double position_sd, double heading_sd, const Eigen::Vector3d& process_sd, double process_tau) {
-        const auto out = k::whiten(poses, times, columns, {position_sd, heading_sd, process_sd, process_tau});
+         const Eigen::VectorXd& activity, double position_sd, double heading_sd,
+         const Eigen::Matrix<double, 2, 3>& process_sd, const Eigen::Vector2d& process_tau) {
+        const k::Colour fast{process_sd.row(0).transpose(), process_tau[0]};
+        const k::Colour slow{process_sd.row(1).transpose(), process_tau[1]};
+        const auto out = k::whiten(poses, times, columns, activity, {position_sd, heading_sd, fast, slow});
         return py::make_tuple(out.columns, out.log_determinants);
       },
-      py::arg("poses"), py::arg("times"), py::arg("columns"), py::kw_only(), py::arg("position_sd"),
-      py::arg("heading_sd"), py::arg("process_sd"), py::arg("process_tau"),
+      py::arg("poses"), py::arg("times"), py::arg("columns"), py::arg("activity"), py::kw_only(),
+      py::arg("position_sd"), py::arg("heading_sd"), py::arg("process_sd"), py::arg("process_tau"),
       "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and log determinants "
-      "(n,).");
+      "(n,). activity (n,): factors on the noise of the rates, whose two colours are rows of process_sd (2, "
+      "3).");
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "kalman/whiten.h"
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -9,8 +10,11 @@ namespace kurumaisu {
 namespace {
 
 using Matrix3 = Eigen::Matrix3d;
-using State = Eigen::Matrix<double, 6, 6>;       // of e_k (pose error, map frame) and u_k (rate error)
-using Increments = Eigen::Matrix<double, 3, 6>;  // e_k, u_k to one increment
+// Of e_k (pose error, map frame) and u_k (rate error, one of each colour).
+template <int kColours>
+using State = Eigen::Matrix<double, 3 + 3 * kColours, 3 + 3 * kColours>;
+template <int kColours>
+using Increments = Eigen::Matrix<double, 3, 3 + 3 * kColours>;  // e_k, u_k to one increment
 
 /// Discrete Ornstein-Uhlenbeck process of unit variance over dt, with its integral over the interval.
 struct OuStep {
@@ -54,7 +58,7 @@ Jacobians jacobians(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 }
 
 void check(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
-           const MotionNoise& noise) {
+           const Eigen::VectorXd& activity, const MotionNoise& noise) {
   const Eigen::Index n = poses.rows() - 1;
   if (n < 1 || poses.cols() != 3) throw std::invalid_argument("poses must have shape (n + 1, 3), n > 0");
   if (times.size() != n + 1) throw std::invalid_argument("times and poses must have the same length");
@@ -62,61 +66,86 @@ void check(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eig
   if (!((times.tail(n) - times.head(n)).array() > 0).all()) {
     throw std::invalid_argument("times must increase");
   }
-  if (!(noise.position_sd > 0 && noise.heading_sd > 0 && noise.process_tau > 0) ||
-      !(noise.process_sd.array() > 0).all()) {
+  if (activity.size() != n || !(activity.array() >= 0).all()) {
+    throw std::invalid_argument("activity must have one factor per increment, none negative");
+  }
+  if (!(noise.position_sd > 0 && noise.heading_sd > 0 && noise.fast.tau > 0 && noise.slow.tau > 0) ||
+      !(noise.fast.sd.array() > 0).all() || !(noise.slow.sd.array() >= 0).all()) {
     throw std::invalid_argument("every noise parameter must be positive");
   }
 }
 
-}  // namespace
-
-Whitened whiten(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
-                const MotionNoise& noise) {
-  check(poses, times, columns, noise);
+template <int kColours>
+Whitened filter(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
+                const Eigen::VectorXd& activity, const MotionNoise& noise) {
+  constexpr int kSize = 3 + 3 * kColours;
   const Eigen::Index n = poses.rows() - 1;
   const Matrix3 pose_cov = Eigen::Vector3d(noise.position_sd, noise.position_sd, noise.heading_sd)
                                .array()
                                .square()
                                .matrix()
                                .asDiagonal();
-  const Matrix3 rate_cov = noise.process_sd.array().square().matrix().asDiagonal();
+  const std::array<Colour, 2> colours{noise.fast, noise.slow};
+  std::array<Matrix3, kColours> rate_cov;
+  State<kColours> cov = State<kColours>::Zero();
+  cov.template topLeftCorner<3, 3>() = pose_cov;
+  for (int c = 0; c < kColours; ++c) {
+    rate_cov[c] = colours[c].sd.array().square().matrix().asDiagonal();
+    cov.template block<3, 3>(3 + 3 * c, 3 + 3 * c) = rate_cov[c];
+  }
 
   Whitened out{Eigen::MatrixXd(columns.rows(), columns.cols()), Eigen::VectorXd(n)};
-  State cov = State::Zero();
-  cov.topLeftCorner<3, 3>() = pose_cov;
-  cov.bottomRightCorner<3, 3>() = rate_cov;
-  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(6, columns.cols());
+  using Mean = Eigen::Matrix<double, kSize, Eigen::Dynamic>;
+  Mean mean = Mean::Zero(kSize, columns.cols());
+  Eigen::Matrix<double, 3, Eigen::Dynamic> innovation(3, columns.cols());
 
   for (Eigen::Index k = 0; k < n; ++k) {
-    const Jacobians j = jacobians(poses.row(k).transpose(), poses.row(k + 1).transpose());
-    const OuStep ou = ouStep(times[k + 1] - times[k], noise.process_tau);
+    Jacobians j = jacobians(poses.row(k).transpose(), poses.row(k + 1).transpose());
+    j.motion *= activity[k];
 
-    Increments h;
-    h << j.from, ou.reach * j.motion;
-    const Matrix3 fresh =  // of e_{k+1} and of the integral's noise
-        j.to * pose_cov * j.to.transpose() + j.motion * (ou.var_integral * rate_cov) * j.motion.transpose();
-    const Matrix3 innovation_cov = h * cov * h.transpose() + fresh;
-    const Eigen::LLT<Matrix3> llt(innovation_cov);
+    // Next state (e_{k+1}, u_{k+1}): a new pose error, and rate errors that decay; h: the state to this increment.
+    Increments<kColours> h;
+    h.template leftCols<3>() = j.from;
+    State<kColours> q = State<kColours>::Zero();
+    q.template topLeftCorner<3, 3>() = pose_cov;
+    Eigen::Matrix<double, kSize, 1> keep = Eigen::Matrix<double, kSize, 1>::Zero();
+    Eigen::Matrix<double, kSize, 3> shared;  // noise that the next state and this increment have in common
+    shared.template topRows<3>() = pose_cov * j.to.transpose();
+    Matrix3 fresh = j.to * pose_cov * j.to.transpose();
+    for (int c = 0; c < kColours; ++c) {
+      const OuStep ou = ouStep(times[k + 1] - times[k], colours[c].tau);
+      h.template middleCols<3>(3 + 3 * c) = ou.reach * j.motion;
+      q.template block<3, 3>(3 + 3 * c, 3 + 3 * c) = ou.var_u * rate_cov[c];
+      keep.template segment<3>(3 + 3 * c).setConstant(ou.decay);
+      shared.template middleRows<3>(3 + 3 * c) = ou.cov * rate_cov[c] * j.motion.transpose();
+      fresh += j.motion * (ou.var_integral * rate_cov[c]) * j.motion.transpose();
+    }
+
+    const Eigen::Matrix<double, kSize, 3> seen = cov * h.transpose();
+    const Eigen::LLT<Matrix3> llt(h * seen + fresh);
     if (llt.info() != Eigen::Success) throw std::invalid_argument("the increments' covariance is singular");
-    const Eigen::MatrixXd innovation = columns.middleRows(3 * k, 3) - h * mean;
+    innovation.noalias() = columns.middleRows(3 * k, 3) - h * mean;
     out.columns.middleRows(3 * k, 3) = llt.matrixL().solve(innovation);
     out.log_determinants[k] = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
 
-    // Next state (e_{k+1}, u_{k+1}) and its covariance with this increment.
-    State f = State::Zero();
-    f.bottomRightCorner<3, 3>() = ou.decay * Matrix3::Identity();
-    State q = State::Zero();
-    q.topLeftCorner<3, 3>() = pose_cov;
-    q.bottomRightCorner<3, 3>() = ou.var_u * rate_cov;
-    Eigen::Matrix<double, 6, 3> cross = f * cov * h.transpose();
-    cross.topRows<3>() += pose_cov * j.to.transpose();
-    cross.bottomRows<3>() += ou.cov * rate_cov * j.motion.transpose();
-    const Eigen::Matrix<double, 6, 3> gain = llt.solve(cross.transpose()).transpose();
-    mean = f * mean + gain * innovation;
-    cov = f * cov * f.transpose() + q - gain * cross.transpose();
+    const Eigen::Matrix<double, kSize, 3> cross = keep.asDiagonal() * seen + shared;
+    const Eigen::Matrix<double, kSize, 3> gain = llt.solve(cross.transpose()).transpose();
+    mean = (keep.asDiagonal() * mean).eval();
+    mean.noalias() += gain * innovation;
+    cov = (keep.asDiagonal() * cov * keep.asDiagonal()).eval() + q - gain * cross.transpose();
     cov = 0.5 * (cov + cov.transpose()).eval();
   }
   return out;
+}
+
+}  // namespace
+
+Whitened whiten(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
+                const Eigen::VectorXd& activity, const MotionNoise& noise) {
+  check(poses, times, columns, activity, noise);
+  const bool two = (noise.slow.sd.array() > 0).any();
+  return two ? filter<2>(poses, times, columns, activity, noise)
+             : filter<1>(poses, times, columns, activity, noise);
 }
 
 }  // namespace kurumaisu

@@ -6,13 +6,19 @@
 
 namespace kurumaisu {
 
-/// Noise of the reference pose and of the motion itself.
+/// One Ornstein-Uhlenbeck process of the rates.
+struct Colour {
+  Eigen::Vector3d
+      sd;      ///< stationary: v [m/s], lateral [m/s], w [rad/s]; of the second colour, 0 where there is none
+  double tau;  ///< time constant [s]
+};
+
+/// Noise of the reference pose and of the motion itself, whose two colours add up.
 struct MotionNoise {
   double position_sd;  ///< reference pose, each axis of the map frame [m]
   double heading_sd;   ///< reference pose [rad]
-  Eigen::Vector3d
-      process_sd;      ///< stationary sd of the Ornstein-Uhlenbeck rates: v [m/s], lateral [m/s], w [rad/s]
-  double process_tau;  ///< their time constant [s]
+  Colour fast;
+  Colour slow;
 };
 
 /// Whitened columns (rows: 3 per increment) and, per increment, the log determinant of its covariance given the
@@ -27,8 +33,9 @@ struct Whitened {
 /// poses: (n + 1, 3) reference x, y, theta; times: n + 1, increasing [s]; columns: (3 n, m), row 3k..3k+2 being
 /// dx, dy [m] and dtheta [rad] of increment k in the body frame at pose k. The error of pose k is shared by the
 /// increments k - 1 and k; it lives in the map frame, so its share rotates with the robot. Cost O(n m).
+/// activity: (n,) factors on the noise of the rates during each increment, 0 for a robot that is held at rest.
 /// Throws std::invalid_argument for shapes that do not fit, times that do not increase, or noise that is not positive.
 Whitened whiten(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
-                const MotionNoise& noise);
+                const Eigen::VectorXd& activity, const MotionNoise& noise);
 
 }  // namespace kurumaisu

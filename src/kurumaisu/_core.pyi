@@ -66,11 +66,12 @@ def whiten(
     poses: FloatArray,
     times: FloatArray,
     columns: FloatArray,
+    activity: FloatArray,
     *,
     position_sd: float,
     heading_sd: float,
-    process_sd: Sequence[float],
-    process_tau: float,
+    process_sd: Sequence[Sequence[float]],
+    process_tau: Sequence[float],
 ) -> tuple[FloatArray, FloatArray]: ...
 
 class Scene:

@@ -17,7 +17,8 @@ from kurumaisu.types import FloatArray
 Key = tuple[str, str]  # id and parameter
 _SHOWS = 3.0  # whitened norm from which a parameter can be seen at all
 _TYPICAL = 8.0  # whitened norm of the step by which a parameter is judged
-_HALVINGS = 6  # of the log of a step between one that shows too little and one that shows too much
+_NEAR = 0.4  # of the log of the norm
+_TRIALS = 12
 _FARTHEST = 2.0**7  # scales
 
 
@@ -114,22 +115,30 @@ def _showing(own: Sequence[Term], norm: Norm) -> Iterator[Term]:
 
 
 def _typical_step(term: Term, norm: Callable[[float], float]) -> float | None:
-    """Return the step whose change has about the norm _TYPICAL; the largest one that shows, or None."""
+    """Return the step whose change has about the norm _TYPICAL; the largest one that shows, or None.
+
+    A change that is in proportion to the step takes two trials; one with a threshold is bracketed.
+    """
     p = term.parameter
     room = (p.upper - term.null) / p.scale
     sign = 1.0 if room > 0 else -1.0
     largest = min(abs(room if room > 0 else (p.lower - term.null) / p.scale), _FARTHEST)
-    high = min(0.25, largest)
-    low = 0.0
-    while norm(sign * high) < _TYPICAL:
-        if high >= largest:
-            return sign * high if norm(sign * high) >= _SHOWS else None
-        low, high = high, min(2 * high, largest)
-    low = low or high / 2**12
-    for _ in range(_HALVINGS):
-        middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if norm(sign * middle) >= _TYPICAL else (middle, high)
-    return sign * high
+    low, high, step = 0.0, np.inf, min(0.25, largest)
+    for _ in range(_TRIALS):
+        shown = norm(sign * step)
+        if abs(np.log(max(shown, 1e-9) / _TYPICAL)) < _NEAR:
+            return sign * step
+        if shown < _TYPICAL:
+            if step >= largest:
+                return sign * step if shown >= _SHOWS else None
+            low = step
+        else:
+            high = step
+        guess = step * float(np.clip(_TYPICAL / max(shown, 1e-9), 1e-2, 8.0))
+        if not low < guess < high:
+            guess = float(np.sqrt(max(low, high / 100) * high))
+        step = min(guess, largest)
+    return sign * min(high, largest)
 
 
 def candidates(terms: Sequence[Term], model: Model) -> tuple[Candidate, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +21,9 @@ GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate
 # [s] least time between reference poses. Closer ones add cost, hardly information; and odometry is itself measured:
 # over short intervals its noise, in the input and in the residual alike, would pass for a gain below 1 (errors in
 # variables), while over long ones it averages out.
+_ROLLS = 0.2  # [s] for which a chair may move on after it was asked to rest
+_STILL = 0.1  # share of the noise of a moving chair that one at rest may have
+_USUAL_V, _USUAL_W = 0.8, 0.8  # [m/s], [rad/s]
 POSE_INTERVAL = {"voltage": 0.1, "command": 0.1, "odom": 2.0}
 
 
@@ -45,6 +49,28 @@ class Drive:
     def measured(self) -> FloatArray:
         """Body increments of the reference, (m, 3)."""
         return geometry.between(self.poses[:-1], self.poses[1:])
+
+    @cached_property
+    def activity(self) -> FloatArray:
+        """Share of each increment's noise that acts, (m,): floor and casters shake a chair that moves.
+
+        A chair asked to rest may roll on for a while, and is never quite still.
+        """
+        moving = self._means(((self.v != 0) | (self.w != 0)).astype(float), _ROLLS)
+        return np.asarray(np.maximum(np.sqrt(moving), _STILL))
+
+    @cached_property
+    def pace(self) -> FloatArray:
+        """Rates asked for during each increment, in units of what is usual, (m,)."""
+        return self._means(np.abs(self.v) / _USUAL_V + np.abs(self.w) / _USUAL_W, 0.0)
+
+    def _means(self, values: FloatArray, before: float) -> FloatArray:
+        """Return means (m,) of values (n,) on the grid, over the increments and the time [s] before each."""
+        sums = np.concatenate([[0.0], np.cumsum(values)]) * GRID
+        edges = self.start + GRID * np.arange(len(sums))
+        since, until = self.times[:-1] - before, self.times[1:]
+        held = np.interp(until, edges, sums) - np.interp(since, edges, sums)
+        return np.asarray(np.clip(held, 0.0, None) / (until - since))
 
 
 def prepare(run: Run, model: Model, interval: float | None = None) -> Drive:

@@ -52,14 +52,20 @@ class Fit:
 class Problem:
     """Drives, model and noise: everything but the choice of effects."""
 
-    def __init__(self, drives: Sequence[Drive], model: Model, noise: Noise) -> None:
+    def __init__(
+        self, drives: Sequence[Drive], model: Model, noise: Noise, terms: tuple[Term, ...] | None = None
+    ) -> None:
+        """Take terms: those that such drives can show, where somebody has found them out already."""
         self.drives = drives
         self.model = model
         self.noise = noise
+        self._terms = terms
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
         """Return the terms that these drives can show."""
+        if self._terms is not None:
+            return self._terms
         here = self.residual((), np.empty(0))
 
         def norm(settings: tuple[EffectSetting, ...]) -> float:

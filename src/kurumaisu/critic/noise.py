@@ -7,9 +7,10 @@ Taking it from a table, or treating increments as independent, makes a critic na
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import qr
 from scipy.optimize import minimize
 
 from kurumaisu._core import whiten
@@ -22,7 +23,8 @@ class Noise:
     """Of the reference pose and of the rates.
 
     position_sd [m], heading_sd [rad]: white; sd_v [m/s], sd_lateral [m/s], sd_w [rad/s]: stationary sd of
-    Ornstein-Uhlenbeck processes of time constant tau [s].
+    Ornstein-Uhlenbeck processes of time constant tau [s]; slow_...: the same of a second, slower one, 0: none;
+    growth: by how much they grow with the rates, as a share per Drive.pace.
     """
 
     position_sd: float
@@ -31,13 +33,23 @@ class Noise:
     sd_lateral: float
     sd_w: float
     tau: float
+    slow_v: float = 0.0
+    slow_lateral: float = 0.0
+    slow_w: float = 0.0
+    slow_tau: float = 3.0
+    growth: float = 0.0
 
 
 # Where the search for the noise starts, and how far from there a value remains plausible (natural log, 1 sd).
 START = Noise(position_sd=0.01, heading_sd=0.005, sd_v=0.02, sd_lateral=0.005, sd_w=0.03, tau=0.3)
-_SPREAD = np.array([2.0, 2.0, 2.0, 2.0, 2.0, 1.0])
-_FLOOR = np.array([1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 0.02])
-_CEILING = np.array([1.0, 1.0, 3.0, 3.0, 10.0, 20.0])
+_SLOW = replace(START, slow_v=0.005, slow_lateral=0.001, slow_w=0.01, growth=0.3)
+_SPREAD = dict.fromkeys(vars(START), 2.0) | {"tau": 1.0, "slow_tau": 0.7, "growth": 1.0}
+_FLOOR = dict.fromkeys(vars(START), 1e-5) | {"tau": 0.02, "slow_tau": 0.5, "growth": 1e-4}
+_CEILING = dict.fromkeys(vars(START), 3.0) | {"sd_w": 10.0, "tau": 20.0, "slow_tau": 20.0, "growth": 30.0}
+ONE_COLOUR = ("position_sd", "heading_sd", "sd_v", "sd_lateral", "sd_w", "tau")
+_SECOND = ("slow_v", "slow_lateral", "slow_w", "slow_tau")
+_WORTH = 4.0  # [nat] from which a second colour is believed: it has four parameters
+_SAME = 1e-3  # share of a column beyond those before it that makes it one of its own
 
 
 def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
@@ -46,52 +58,95 @@ def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArra
         drive.poses,
         drive.times,
         columns,
+        drive.activity * (1 + noise.growth * drive.pace),
         position_sd=noise.position_sd,
         heading_sd=noise.heading_sd,
-        process_sd=[noise.sd_v, noise.sd_lateral, noise.sd_w],
-        process_tau=noise.tau,
+        process_sd=[
+            [noise.sd_v, noise.sd_lateral, noise.sd_w],
+            [noise.slow_v, noise.slow_lateral, noise.slow_w],
+        ],
+        process_tau=[noise.tau, noise.slow_tau],
     )
 
 
-def estimate(
-    drives: Sequence[Drive],
-    residuals: Sequence[FloatArray],
-    columns: Sequence[FloatArray],
-    truth: tuple[float, float] | None,
-) -> Noise:
-    """Return the noise by restricted maximum likelihood.
+@dataclass(frozen=True)
+class Estimate:
+    """The noise found, and minus its restricted log posterior up to a constant."""
 
-    residuals: (m, 3) per drive, measured minus simulated; columns: (3 m, k) per drive, effects to project out, so
-    that a real effect does not pass for noise; truth: known sd of the reference, else it is estimated too.
-    """
-    start = np.array(list(vars(START).values()))
-    if truth is not None:
-        start[:2] = np.maximum(truth, _FLOOR[:2])
-    free = np.arange(0 if truth is None else 2, 6)
-    stacked = [np.column_stack([r.ravel(), c]) for r, c in zip(residuals, columns, strict=True)]
-
-    def noise_at(log_values: FloatArray) -> Noise:
-        values = start.copy()
-        values[free] = np.clip(np.exp(log_values), _FLOOR[free], _CEILING[free])
-        return Noise(*(float(value) for value in values))
-
-    def cost(log_values: FloatArray) -> float:
-        distance = (log_values - np.log(start[free])) / _SPREAD[free]
-        noise = noise_at(log_values)
-        return _restricted_cost(drives, stacked, noise) + 0.5 * float(distance @ distance)
-
-    at = np.log(start[free])
-    for _ in range(2):  # a second start from the end of the first: Nelder-Mead may stop early on a ridge
-        at = minimize(cost, at, method="Nelder-Mead", options={"xatol": 0.01, "fatol": 0.02, "maxfev": 600}).x
-    return noise_at(at)
+    noise: Noise
+    cost: float
 
 
-def _restricted_cost(drives: Sequence[Drive], stacked: Sequence[FloatArray], noise: Noise) -> float:
-    """Return minus the restricted log likelihood, up to a constant."""
-    parts = [whitened(drive, columns, noise) for drive, columns in zip(drives, stacked, strict=True)]
-    log_determinant = sum(float(part[1].sum()) for part in parts)
-    y = np.concatenate([part[0][:, 0] for part in parts])
-    x = np.concatenate([part[0][:, 1:] for part in parts])
-    gram = x.T @ x + 1e-6 * np.eye(x.shape[1])
-    rest = float(y @ y - (x.T @ y) @ np.linalg.solve(gram, x.T @ y))
-    return 0.5 * (log_determinant + rest + float(np.linalg.slogdet(gram)[1]))
+class Scatter:
+    """What the noise is estimated from: residuals about a model, with what might be the model's fault left out."""
+
+    def __init__(
+        self,
+        drives: Sequence[Drive],
+        residuals: Sequence[FloatArray],
+        columns: Sequence[FloatArray],
+        truth: tuple[float, float] | None,
+    ) -> None:
+        """Take residuals (m, 3) per drive, measured minus simulated; columns (3 m, k) per drive, effects to project out.
+
+        truth: known sd of the reference's position and heading, else they are estimated too.
+        """
+        self._drives = drives
+        kept = _independent(np.concatenate(columns))
+        self._stacked = [np.column_stack([r.ravel(), c[:, kept]]) for r, c in zip(residuals, columns, strict=True)]
+        self._truth = truth
+
+    def estimate(self, start: Noise = START) -> Estimate:
+        """Return the noise of one colour, or of two where they explain more."""
+        one = self._best(replace(start, slow_v=0.0, slow_lateral=0.0, slow_w=0.0), ONE_COLOUR)
+        second = start if start.slow_v else _SLOW
+        slow = {name: getattr(second, name) for name in _SECOND}
+        two = self._best(replace(one.noise, **slow), (*ONE_COLOUR, *_SECOND))
+        return two if two.cost < one.cost - _WORTH else one
+
+    def growing(self, about: Noise) -> Estimate:
+        """Return the noise that grows with the rates, from what it is if it does not."""
+        names = (*ONE_COLOUR, *(_SECOND if about.slow_v else ()), "growth")
+        return self._best(replace(about, growth=_SLOW.growth), names)
+
+    def _best(self, start: Noise, names: Sequence[str]) -> Estimate:
+        if self._truth is not None:
+            known = np.maximum(self._truth, _FLOOR["position_sd"])
+            start = replace(start, position_sd=float(known[0]), heading_sd=float(known[1]))
+            names = [name for name in names if name not in ("position_sd", "heading_sd")]
+        centre = np.log([getattr(_SLOW, name) for name in names])
+        spread = np.array([_SPREAD[name] for name in names])
+        bounds = [(np.log(_FLOOR[name]), np.log(_CEILING[name])) for name in names]
+
+        def noise_at(log_values: FloatArray) -> Noise:
+            return replace(start, **dict(zip(names, np.exp(log_values).tolist(), strict=True)))
+
+        def cost(log_values: FloatArray) -> float:
+            distance = (log_values - centre) / spread
+            return self._cost(noise_at(log_values)) + 0.5 * float(distance @ distance)
+
+        begin = np.clip(np.log([getattr(start, name) for name in names]), *np.array(bounds).T)
+        options = {"eps": 0.01, "ftol": 3e-6, "maxiter": 60}
+        found = minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options=options)
+        return Estimate(noise_at(found.x), float(found.fun))
+
+    def _cost(self, noise: Noise) -> float:
+        """Return minus the restricted log likelihood, up to a constant."""
+        log_determinant, gram = 0.0, np.zeros(2 * self._stacked[0].shape[1:])
+        for drive, columns in zip(self._drives, self._stacked, strict=True):
+            white, parts = whitened(drive, columns, noise)
+            log_determinant += float(parts.sum())
+            gram += white.T @ white
+        square, b, inner = gram[0, 0], gram[1:, 0], gram[1:, 1:] + 1e-6 * np.eye(len(gram) - 1)
+        rest = square - b @ np.linalg.solve(inner, b)
+        return 0.5 * float(log_determinant + rest + np.linalg.slogdet(inner)[1])
+
+
+def _independent(columns: FloatArray) -> FloatArray:
+    """Return which columns (rows, k) are not nearly made of others."""
+    norms = np.linalg.norm(columns, axis=0)
+    loud = np.flatnonzero(norms > 0)
+    if not len(loud):
+        return np.array([], dtype=int)
+    _, triangle, order = qr(columns[:, loud] / norms[loud], mode="economic", pivoting=True)
+    return np.asarray(np.sort(loud[order[np.abs(np.diag(triangle)) > _SAME ** 0.5]]))

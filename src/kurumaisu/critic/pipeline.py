@@ -41,16 +41,17 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
         return explain.invalid(recording, model, wrong)
 
     progress("estimating the noise")
-    empty = Problem(train, model, noise.START).fit((), {})
-    first = _noise(train, model, empty, recording.truth, project=True)
-    found = naming.search(Problem(train, model, first), progress)
+    rough = Problem(train, model, noise.START)
+    empty = rough.fit((), {})
+    first = Problem(train, model, _scatter(rough, empty, recording.truth, project=True).estimate().noise)
+    found = naming.search(first, progress)
     progress("estimating the noise again, beside what was found")
-    final = _noise(train, model, found.best, recording.truth, project=True)
-    problem = Problem(train, model, final)
+    final = _scatter(first, found.best, recording.truth, project=True).estimate(first.noise).noise
+    problem = Problem(train, model, final, first.terms)
     found = naming.search(problem, progress)
 
     progress("measuring the gain on drives held out")
-    baseline = _noise(train, model, empty, recording.truth, project=False)
+    baseline = _scatter(rough, empty, recording.truth, project=False).estimate(final).noise
     splits = gain.folds(train, test)
     worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
     return explain.criticism(recording, problem, found, worth, train + test)
@@ -67,14 +68,11 @@ def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
     write_extended(folder / "extended.yaml", model_file, criticism.model, criticism.settings, criticism.story.recording)
 
 
-def _noise(
-    drives: list[Drive], model: Model, fit: Fit, truth: tuple[float, float] | None, *, project: bool
-) -> noise.Noise:
-    """Return the noise about a fit, with all effects of the catalogue projected out or none."""
-    problem = Problem(drives, model, noise.START)
-    residuals = [drive.measured - problem.simulated(drive, fit.settings) for drive in drives]
+def _scatter(problem: Problem, fit: Fit, truth: tuple[float, float] | None, *, project: bool) -> noise.Scatter:
+    """Return what is left about a fit, with all effects of the catalogue projected out or none."""
+    residuals = [drive.measured - problem.simulated(drive, fit.settings) for drive in problem.drives]
     columns = [
         problem.simulated_columns(drive, fit) if project else np.empty((residual.size, 0))
-        for drive, residual in zip(drives, residuals, strict=True)
+        for drive, residual in zip(problem.drives, residuals, strict=True)
     ]
-    return noise.estimate(drives, residuals, columns, truth)
+    return noise.Scatter(problem.drives, residuals, columns, truth)
