@@ -16,6 +16,7 @@ from kurumaisu.critic.extended import process_noise
 from kurumaisu.critic.material import MATERIAL, moved_share
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.recording import Recording, Run
+from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
 from kurumaisu.critic.verdict import Cause, Gain, Kind, Verdict
 from kurumaisu.params import EffectSetting, Model
@@ -75,10 +76,7 @@ def criticism(
         details=words.details(problem, found, drives, shares, matters),
         pose_source=_pose_source(recording),
         provenance=_provenance(),
-        overlays=tuple(
-            _overlay(run, problem.model, settings or None, held_out=run.name in recording.test)
-            for run in recording.runs
-        ),
+        overlays=overlays(recording, problem.model, settings or None),
         misfits=_misfits(problem, found),
         rivals=words.rivals(found),
         noise=_noise(problem),
@@ -127,8 +125,13 @@ def _misfits(problem: Problem, found: Naming) -> tuple[Misfit, ...]:
     return misfit.figures(problem, fit.settings, sorted(fit.ids))
 
 
+def overlays(recording: Recording, model: Model, settings: Sequence[EffectSetting] | None) -> tuple[Overlay, ...]:
+    """Return the runs from above, as measured, simulated, and simulated with settings if there are some."""
+    return tuple(_overlay(run, model, settings, held_out=run.name in recording.test) for run in recording.runs)
+
+
 def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *, held_out: bool) -> Overlay:
-    drive = prepare(run, model, _PICTURE)
+    drive = informed(prepare(run, model, _PICTURE), run)
 
     def seen(extra: Sequence[EffectSetting]) -> FloatArray:
         return replay.path(drive, model, extra)[:, :2]

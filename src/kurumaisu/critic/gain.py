@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,6 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.critic import replay
 from kurumaisu.critic.drive import Drive, split
-from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import spans
 from kurumaisu.critic.noise import Noise, whitened
 from kurumaisu.critic.verdict import Gain, LogDensityGain, RmseGain
@@ -32,6 +31,9 @@ class Fold:
     test: tuple[Drive, ...]
 
 
+Refit = Callable[[Sequence[Drive]], Sequence[EffectSetting]]
+
+
 def folds(train: Sequence[Drive], test: Sequence[Drive]) -> list[Fold]:
     """Return train against test; without test runs, each run left out in turn; of a single run, each quarter.
 
@@ -45,8 +47,8 @@ def folds(train: Sequence[Drive], test: Sequence[Drive]) -> list[Fold]:
     return [Fold(tuple(parts[:i] + parts[i + 1 :]), (parts[i],)) for i in range(len(parts))]
 
 
-def measure(model: Model, splits: Sequence[Fold], fit: Fit, baseline: Noise, extended: Noise) -> Gain:
-    """Return the gain of a set of effects, whose parameters are refitted on each fold's training drives.
+def measure(model: Model, splits: Sequence[Fold], refit: Refit, baseline: Noise, extended: Noise) -> Gain:
+    """Return the gain of what extends a model; refit: returns it as fitted to each fold's training drives.
 
     baseline, extended: the noise that either model needs to explain the training data; a model that is wrong pays
     for it with wide predictions or with surprises.
@@ -54,9 +56,9 @@ def measure(model: Model, splits: Sequence[Fold], fit: Fit, baseline: Noise, ext
     density: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     errors: dict[float, tuple[list[FloatArray], list[FloatArray]]] = {horizon: ([], []) for horizon in HORIZONS}
     for fold in splits:
-        refit = Problem(fold.train, model, extended).fit_candidates(fit.candidates, fit.start)
+        extension = refit(fold.train)
         for drive in fold.test:
-            for side, (settings, noise) in enumerate((((), baseline), (refit.settings, extended))):
+            for side, (settings, noise) in enumerate((((), baseline), (extension, extended))):
                 density[side].extend(_blocks(drive, _log_density(drive, model, settings, noise)))
                 for horizon in HORIZONS:
                     errors[horizon][side].extend(_open_loop(drive, model, settings, horizon))

@@ -149,4 +149,4 @@ def _independent(columns: FloatArray) -> FloatArray:
     if not len(loud):
         return np.array([], dtype=int)
     _, triangle, order = qr(columns[:, loud] / norms[loud], mode="economic", pivoting=True)
-    return np.asarray(np.sort(loud[order[np.abs(np.diag(triangle)) > _SAME ** 0.5]]))
+    return np.asarray(np.sort(loud[order[np.abs(np.diag(triangle)) > _SAME**0.5]]))

@@ -3,21 +3,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic import explain, gain, naming, noise, sanity
+from kurumaisu.critic import explain, gain, naming, noise, sanity, smooth_explain, smooth_fit, smooth_judge
 from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.report import write_report
+from kurumaisu.critic.smooth_fit import Extension
+from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.verdict import write_verdict
 from kurumaisu.errors import Error
-from kurumaisu.params import Model, follow_commands, load_model
+from kurumaisu.params import EffectSetting, follow_commands, load_model
+from kurumaisu.types import FloatArray
 
 Progress = Callable[[str], None]
 
@@ -32,7 +36,7 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
     model = load_model(model_file)
     if not assume_law and recording.model is None and all(run.voltage is None for run in recording.runs):
         model = follow_commands(model)
-    drives = {run.name: prepare(run, model) for run in recording.runs}
+    drives = {run.name: informed(prepare(run, model), run) for run in recording.runs}
     train = [drives[name] for name in recording.train]
     test = [drives[name] for name in recording.test]
 
@@ -45,16 +49,50 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
     empty = rough.fit((), {})
     first = Problem(train, model, _scatter(rough, empty, recording.truth, project=True).estimate().noise)
     found = naming.search(first, progress)
-    progress("estimating the noise again, beside what was found")
-    final = _scatter(first, found.best, recording.truth, project=True).estimate(first.noise).noise
-    problem = Problem(train, model, final, first.terms)
-    found = naming.search(problem, progress)
+    problem, found, beyond = _decide(first, found, recording.truth, progress)
+    final = problem.noise
+    found = replace(found, p=beyond.rivalry.p_effects)
 
     progress("measuring the gain on drives held out")
     baseline = _scatter(rough, empty, recording.truth, project=False).estimate(final).noise
     splits = gain.folds(train, test)
-    worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
+    anything = splits and (found.best.ids or beyond.extension)
+    worth = gain.measure(model, splits, _refit(problem, found, beyond), baseline, final) if anything else None
+    if beyond.extension is not None:
+        return smooth_explain.criticism(recording, problem, found, beyond, worth)
     return explain.criticism(recording, problem, found, worth, train + test)
+
+
+def _decide(
+    first: Problem, found: naming.Naming, truth: tuple[float, float] | None, progress: Progress
+) -> tuple[Problem, naming.Naming, smooth_judge.Beyond]:
+    """Return what acts, by the noise about it.
+
+    Noise that was estimated without a curve has taken it up. So if one may act, the noise is estimated about it; and
+    if it then does not win, as if there had never been one.
+    """
+    hint = smooth_judge.hinted(first, found)
+    for beside in (hint, None) if hint is not None else (None,):
+        progress("estimating the noise again, beside what was found")
+        about = _scatter(first, found.best, truth, project=True, beside=beside).estimate(first.noise).noise
+        problem = Problem(first.drives, first.model, about, first.terms)
+        again = naming.search(problem, progress)
+        beyond = smooth_judge.judge(problem, again, progress)
+        if beyond.extension is not None:
+            break
+    return problem, again, beyond
+
+
+def _refit(problem: Problem, found: naming.Naming, beyond: smooth_judge.Beyond) -> gain.Refit:
+    """Return what fits the extension to other drives."""
+    best, extension = found.best, beyond.extension
+
+    def refit(drives: Sequence[Drive]) -> Sequence[EffectSetting]:
+        if extension is not None:
+            return smooth_fit.again(extension, drives, problem).settings
+        return Problem(drives, problem.model, problem.noise).fit_candidates(best.candidates, best.start).settings
+
+    return refit
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
@@ -68,11 +106,19 @@ def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
     write_extended(folder / "extended.yaml", model_file, criticism.model, criticism.settings, criticism.story.recording)
 
 
-def _scatter(problem: Problem, fit: Fit, truth: tuple[float, float] | None, *, project: bool) -> noise.Scatter:
-    """Return what is left about a fit, with all effects of the catalogue projected out or none."""
-    residuals = [drive.measured - problem.simulated(drive, fit.settings) for drive in problem.drives]
-    columns = [
-        problem.simulated_columns(drive, fit) if project else np.empty((residual.size, 0))
-        for drive, residual in zip(problem.drives, residuals, strict=True)
-    ]
-    return noise.Scatter(problem.drives, residuals, columns, truth)
+def _scatter(
+    problem: Problem, fit: Fit, truth: tuple[float, float] | None, *, project: bool, beside: Extension | None = None
+) -> noise.Scatter:
+    """Return what is left about a fit, or an extension, with all that may act projected out or nothing."""
+    settings = fit.settings if beside is None else beside.settings
+    residuals = [drive.measured - problem.simulated(drive, settings) for drive in problem.drives]
+
+    def columns(drive: Drive, rows: int) -> FloatArray:
+        if not project:
+            return np.empty((rows, 0))
+        if beside is None:
+            return problem.simulated_columns(drive, fit)
+        return smooth_fit.simulated_columns(problem, drive, beside)
+
+    projected = [columns(drive, left.size) for drive, left in zip(problem.drives, residuals, strict=True)]
+    return noise.Scatter(problem.drives, residuals, projected, truth)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rivals of the catalogue: would a curve over something the chair drives by explain these drives better?
+"""Rivals of the catalogue: curves over something that is known of the drive, in case they explain it better.
 
 A curve's coefficients are normal before the data, so its evidence is that of a linear model; its size and roughness
 are weighed over a small grid. Occam decides: what a catalogue effect explains with one parameter, a curve explains
@@ -8,7 +8,7 @@ with eight.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +16,8 @@ from scipy.special import logsumexp
 
 from kurumaisu import effects
 from kurumaisu.critic import replay
-from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.drive import Drive
+from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.noise import whitened
 from kurumaisu.critic.prior import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.critic.smooth_basis import Basis, bases
@@ -97,22 +97,41 @@ def beside(problem: Problem, fit: Fit, of: FloatArray) -> tuple[FloatArray, Floa
 def belief(gram: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> Belief:
     """Return how much a curve explains: b = X'y, gram = X'X of its whitened columns; any of the priors may hold."""
     found = []
-    for prior in priors:
-        scaled = prior / max(float(np.sum(gram * prior)), 1e-12)
-        values, vectors = np.linalg.eigh(scaled)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        sizes, turns = np.linalg.eigh(root.T @ gram @ root)
-        c = turns.T @ (root.T @ b)
-        for nats, size in zip(_nats(np.maximum(sizes, 0.0), c), _SIZES, strict=True):
-            found.append((float(nats), size**2 * scaled))
+    for scaled, axes, sizes in _axes(gram, priors):
+        found += [(float(nats), size**2 * scaled) for nats, size in zip(_nats(sizes, axes.T @ b), _SIZES, strict=True)]
     weighed = [nats + weight for (nats, _), weight in zip(found, np.tile(_LOG_WEIGHTS, len(priors)), strict=True)]
     best = int(np.argmax(weighed))
     return Belief(float(logsumexp(weighed) - np.log(len(priors))), found[best][1])
 
 
+def null_evidence(design: Design, columns: FloatArray, draws: int) -> FloatArray:
+    """Return the evidence of the best curve in draws of b ~ N(0, G), noise on this very design, (draws,) [nat]."""
+    values, vectors = np.linalg.eigh(columns.T @ columns)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    b = np.random.default_rng(0).standard_normal((draws, len(root))) @ root.T
+    best = np.full(draws, -np.inf)
+    for curve in design.curves:
+        own = columns[:, curve.columns]
+        parts = [
+            logsumexp(_nats(sizes, b[:, curve.columns] @ axes) + _LOG_WEIGHTS, axis=-1)
+            for _, axes, sizes in _axes(own.T @ own, curve.basis.priors)
+        ]
+        best = np.maximum(best, logsumexp(parts, axis=0) - np.log(len(parts)))
+    return best
+
+
+def _axes(gram: FloatArray, priors: Sequence[FloatArray]) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Yield, for each prior: it, scaled to a signal of norm 1; its own axes in b, (k, k); the gram along them, (k,)."""
+    for prior in priors:
+        scaled = prior / max(float(np.sum(gram * prior)), 1e-12)
+        values, vectors = np.linalg.eigh(scaled)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        sizes, turns = np.linalg.eigh(root.T @ gram @ root)
+        yield scaled, root @ turns, np.maximum(sizes, 0.0)
+
+
 def _nats(sizes: FloatArray, c: FloatArray) -> FloatArray:
-    """Return the log evidence for each of _SIZES; sizes, c (..., k): of the gram and of b in the prior's own axes."""
-    grown = _SIZES**2
-    spread = 1 + np.multiply.outer(grown, sizes)
-    gained = grown[:, None] * c**2 / spread
+    """Return the log evidence for each of _SIZES, (..., sizes); sizes (k,), c (..., k): gram and b along own axes."""
+    spread = 1 + np.multiply.outer(_SIZES**2, sizes)
+    gained = (c**2)[..., None, :] * (_SIZES[:, None] ** 2 / spread)
     return np.asarray(0.5 * (gained - np.log(spread)).sum(axis=-1))

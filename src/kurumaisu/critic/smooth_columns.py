@@ -49,7 +49,7 @@ class Sensitivity:
     def _in_body(self, x: FloatArray, y: FloatArray, turn: FloatArray) -> FloatArray:
         cos, sin = np.cos(self._headings[:-1, None]), np.sin(self._headings[:-1, None])
         stacked = np.stack([cos * x + sin * y, -sin * x + cos * y, turn], axis=1)
-        return stacked.reshape(-1, x.shape[1])
+        return np.asarray(stacked.reshape(-1, x.shape[1]))
 
     def _at(self, values: FloatArray) -> FloatArray:
         low, high = values[self._below], values[self._below + 1]

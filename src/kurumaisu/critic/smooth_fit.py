@@ -12,9 +12,8 @@ from kurumaisu.critic import replay
 from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
-from kurumaisu.critic.noise import Noise
 from kurumaisu.critic.smooth import Curve, columns, raw_columns
-from kurumaisu.params import EffectSetting, Model
+from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 _ROUNDS = 3  # from columns linearised anew; the curve itself is linear in all but the path it leads to
@@ -55,11 +54,11 @@ def extend(problem: Problem, fit: Fit, curve: Curve, prior: FloatArray) -> Exten
     return extension
 
 
-def again(extension: Extension, drives: Sequence[Drive], model: Model, noise: Noise) -> Extension:
+def again(extension: Extension, drives: Sequence[Drive], problem: Problem) -> Extension:
     """Return the extension fitted to other drives."""
-    problem = Problem(drives, model, noise)
-    fit = problem.fit_candidates(extension.fit.candidates, extension.fit.start)
-    return extend(problem, fit, extension.curve, extension.prior)
+    other = Problem(drives, problem.model, problem.noise, problem.terms)
+    fit = other.fit_candidates(extension.fit.candidates, extension.fit.start)
+    return extend(other, fit, extension.curve, extension.prior)
 
 
 def simulated_columns(problem: Problem, drive: Drive, extension: Extension) -> FloatArray:
@@ -78,22 +77,23 @@ def _step(problem: Problem, extension: Extension, root: FloatArray) -> Extension
     design = np.hstack([slopes, own])
     target = y + columns(problem, fit.settings, [extension.curve]) @ extension.coefficients
     precision = design.T @ design + np.diag(np.append(np.full(k, 1e-6), np.ones(own.shape[1])))
-    covariance = np.linalg.inv(precision)
-    solved = covariance @ (design.T @ target)
+    covariance: FloatArray = np.linalg.inv(precision)
+    solved = np.asarray(covariance @ (design.T @ target))
     return replace(
         extension,
-        fit=_moved(problem, fit, solved[:k], np.sqrt(np.diag(covariance)[:k])),
+        fit=_moved(problem, fit, solved[:k], covariance),
         coefficients=root @ solved[k:],
         covariance=root @ covariance[k:, k:] @ root.T,
     )
 
 
-def _moved(problem: Problem, fit: Fit, steps: FloatArray, sds: FloatArray) -> Fit:
-    """Return the fit with its values moved, within their bounds; steps, sds per step of a term."""
+def _moved(problem: Problem, fit: Fit, steps: FloatArray, covariance: FloatArray) -> Fit:
+    """Return the fit with its values moved, within their bounds; steps (k,) and covariance per step of a term."""
     if not fit.terms:
         return fit
     unit = np.array([term.step * term.parameter.scale for term in fit.terms])
-    lower, upper = (np.array([getattr(term.parameter, side) for term in fit.terms]) for side in ("lower", "upper"))
+    lower = np.array([term.parameter.lower for term in fit.terms])
+    upper = np.array([term.parameter.upper for term in fit.terms])
     values = np.clip(fit.values + steps * unit, lower, upper)
     settings = replay.completed(problem.model, settings_of(fit.terms, values))
-    return replace(fit, values=values, sds=sds * unit, settings=settings)
+    return replace(fit, values=values, sds=np.sqrt(np.diag(covariance)[: len(unit)]) * unit, settings=settings)

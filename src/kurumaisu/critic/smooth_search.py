@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
+from kurumaisu.critic.catalogue import Candidate
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.prior import log_prior
@@ -49,12 +50,12 @@ class Rivalry:
         return self.rivals[0] if self.rivals and self.lead > BEYOND else None
 
 
-def compare(problem: Problem, found: Naming) -> Rivalry:
-    """Try every curve beside the best sets of the catalogue, and beside none."""
+def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozenset()) -> Rivalry:
+    """Try every curve beside the best sets of the catalogue, beside none, and beside one more."""
     count = len({candidate.id for candidate in problem.candidates})
     design = Design(problem, found.best.settings)
     bare = [(fit, fit.score + log_prior(len(fit.candidates), count)) for fit in found.fits]
-    rivals = sorted(_rivals(problem, design, _tried(bare)), key=lambda rival: -rival.worth)
+    rivals = sorted(_rivals(problem, design, _tried(bare, also)), key=lambda rival: -rival.worth)
     if not rivals:
         return Rivalry((), -np.inf, {}, dict(found.p))
     plain = np.array([worth + np.log1p(-_ODDS) for _, worth in bare])
@@ -73,10 +74,11 @@ def compare(problem: Problem, found: Naming) -> Rivalry:
     return Rivalry(tuple(rivals), float(curved[0] - plain.max()), p, p_effects)
 
 
-def _tried(bare: Sequence[tuple[Fit, float]]) -> list[tuple[Fit, float]]:
-    """Return the best sets, and the empty one."""
+def _tried(bare: Sequence[tuple[Fit, float]], also: frozenset[Candidate]) -> list[tuple[Fit, float]]:
+    """Return the best sets, the empty one, and one more."""
     ranked = sorted(bare, key=lambda pair: -pair[1])
-    return ranked[:_FITS] + [pair for pair in ranked[_FITS:] if not pair[0].candidates]
+    wanted: set[frozenset[Candidate]] = {frozenset(), also}
+    return ranked[:_FITS] + [pair for pair in ranked[_FITS:] if pair[0].candidates in wanted]
 
 
 def _rivals(problem: Problem, design: Design, fits: Sequence[tuple[Fit, float]]) -> Iterator[Rival]:

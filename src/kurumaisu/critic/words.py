@@ -9,8 +9,8 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic import naming
-from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.catalogue import Term
+from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import HORIZON, MATERIAL
 from kurumaisu.critic.naming import Naming
