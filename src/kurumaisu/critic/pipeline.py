@@ -20,7 +20,7 @@ from kurumaisu.critic.smooth_fit import Extension
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.verdict import write_verdict
 from kurumaisu.errors import Error
-from kurumaisu.params import EffectSetting, follow_commands, load_model
+from kurumaisu.params import follow_commands, load_model
 from kurumaisu.types import FloatArray
 
 Progress = Callable[[str], None]
@@ -87,10 +87,12 @@ def _refit(problem: Problem, found: naming.Naming, beyond: smooth_judge.Beyond) 
     """Return what fits the extension to other drives."""
     best, extension = found.best, beyond.extension
 
-    def refit(drives: Sequence[Drive]) -> Sequence[EffectSetting]:
+    def refit(drives: Sequence[Drive]) -> gain.Fitted:
         if extension is not None:
-            return smooth_fit.again(extension, drives, problem).settings
-        return Problem(drives, problem.model, problem.noise).fit_candidates(best.candidates, best.start).settings
+            other = smooth_fit.again(extension, drives, problem)
+            return gain.Fitted(other.settings, lambda drive: smooth_fit.doubt(problem, drive, other))
+        fit = Problem(drives, problem.model, problem.noise, problem.terms).fit_candidates(best.candidates, best.start)
+        return gain.Fitted(fit.settings)
 
     return refit
 

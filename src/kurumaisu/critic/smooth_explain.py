@@ -98,9 +98,10 @@ def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[Floa
 def _told(extension: Extension, beyond: Beyond, share: float) -> str:
     curve = extension.curve
     where = f"{smooth_words.channel(curve)} over {smooth_words.covariate(curve)[0]}"
+    better = f"explains {beyond.rivalry.lead:.1f} nats more than the best set of the catalogue"
     return (
-        f"Outside the catalogue: {where} ({smooth_words.shape(extension)}) explains {beyond.rivalry.lead:.1f} nats more "
-        f"than the best set of the catalogue; within {HORIZON:g} s it moves the chair by {share:.1%} of its way or turn."
+        f"Outside the catalogue: {where} ({smooth_words.shape(extension)}) {better}; "
+        f"within {HORIZON:g} s it moves the chair by {share:.1%} of its way or turn."
     )
 
 

@@ -68,6 +68,13 @@ def simulated_columns(problem: Problem, drive: Drive, extension: Extension) -> F
     return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [extension.curve])])
 
 
+def doubt(problem: Problem, drive: Drive, extension: Extension) -> FloatArray:
+    """Return how a drive's increments change by errors of the curve, normal with sd 1 each, (3 m, k)."""
+    values, vectors = np.linalg.eigh(extension.covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    return np.asarray(raw_columns(drive, problem.model, extension.fit.settings, [extension.curve]) @ root)
+
+
 def _step(problem: Problem, extension: Extension, root: FloatArray) -> Extension:
     fit = extension.fit
     beside = Problem(problem.drives, replay.extend(problem.model, [extension.unknown]), problem.noise, problem.terms)

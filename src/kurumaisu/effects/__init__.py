@@ -51,7 +51,7 @@ from kurumaisu.effects.saturation import Saturation
 from kurumaisu.effects.sign import Sign
 from kurumaisu.effects.slope import Slope
 from kurumaisu.effects.smooth import CHANNELS, constant_of, curve, smooth_id, smooth_of
-from kurumaisu.effects.smooth_covariates import CONSTANTS, COVARIATES, PERIODIC, Follower
+from kurumaisu.effects.smooth_covariates import CONSTANTS, COVARIATES, MEANINGS, PERIODIC, Follower
 from kurumaisu.effects.steering_law import SteeringLaw
 from kurumaisu.effects.understeer import Understeer
 from kurumaisu.effects.veer import Veer
@@ -181,6 +181,7 @@ __all__ = [
     "COVARIATES",
     "CRITICISED",
     "LASER",
+    "MEANINGS",
     "PERIODIC",
     "WORLD",
     "BaseEffect",

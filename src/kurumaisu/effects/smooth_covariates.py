@@ -18,6 +18,23 @@ CONSTANTS: Mapping[str, tuple[str, str]] = {
     "wheel_right": ("track", "m"),
     **{name: ("period", "rad" if name == "heading" else "V") for name in PERIODIC},
 }
+MEANINGS: Mapping[str, str] = {
+    "v": "forward speed that the effects before have left [m/s]",
+    "abs_v": "its size [m/s]",
+    "w": "yaw rate likewise [rad/s]",
+    "abs_w": "its size [rad/s]",
+    "v_times_w": "their product [m/s²]",
+    "wheel_left": "speed of the left wheel, v − w · track / 2 [m/s]",
+    "wheel_right": "speed of the right wheel, v + w · track / 2 [m/s]",
+    "time": "time since the start [s]",
+    "since_command": "time since the rates asked for changed [s]",
+    "since_reversal": "distance since the driving direction changed [m]",
+    "heading": "heading in the map [rad]; periodic",
+    "x": "place in the map [m]",
+    "y": "place in the map [m]",
+    "v_f": "translation voltage [V]; periodic, for steps of the D/A converter",
+    "v_s": "steering voltage [V]; periodic likewise",
+}
 _CHANGED = 1e-6  # [m/s, rad/s] more than rounding: the command is another one
 
 
