@@ -4,10 +4,12 @@
 Euler's rule at 5 ms, first-order noise by hand; commands are the rates themselves (a robot without voltages).
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.noise import Noise, whitened
@@ -49,17 +51,17 @@ class Kind:
 
 
 def bump(x: float) -> float:
-    return float(np.exp(-0.5 * x * x))
+    return math.exp(-0.5 * x * x)
 
 
 KINDS = {
-    "corrugated floor": Kind(0, "heading", lambda s, a, b: np.sin(3 * s.heading + 6 * a)),
-    "side wind": Kind(1, "heading", lambda s, a, b: np.sin(s.heading + 6 * a)),
-    "carpet edge": Kind(2, "x", lambda s, a, b: np.tanh((s.x - 2 * a + 1) / 0.4)),
+    "corrugated floor": Kind(0, "heading", lambda s, a, b: math.sin(3 * s.heading + 6 * a)),
+    "side wind": Kind(1, "heading", lambda s, a, b: math.sin(s.heading + 6 * a)),
+    "carpet edge": Kind(2, "x", lambda s, a, b: math.tanh((s.x - 2 * a + 1) / 0.4)),
     "gully": Kind(2, "y", lambda s, a, b: bump((s.y - 2 * a + 1) / (0.4 + 0.4 * b))),
-    "overshoot": Kind(0, "since_command", lambda s, a, b: np.exp(-s.age / (0.3 + 0.5 * a))),
+    "overshoot": Kind(0, "since_command", lambda s, a, b: math.exp(-s.age / (0.3 + 0.5 * a))),
     "wobble after reversing": Kind(2, "since_reversal", lambda s, a, b: bump((s.way - 0.8 - 0.5 * a) / 0.3)),
-    "warm grease": Kind(0, "temperature", lambda s, a, b: np.tanh((s.warmth - 24 - 4 * a) / 2)),
+    "warm grease": Kind(0, "temperature", lambda s, a, b: math.tanh((s.warmth - 24 - 4 * a) / 2)),
     "tyre lets go": Kind(2, "time", lambda s, a, b: float(s.time > 20 + 20 * a)),
     "turning costs speed": Kind(0, "abs_w", lambda s, a, b: -max(abs(s.w) - 0.2 - 0.2 * a, 0.0)),
     "flutter at one speed": Kind(2, "abs_v", lambda s, a, b: bump((abs(s.v) - 0.3 - 0.2 * a) / 0.08)),
@@ -125,41 +127,40 @@ def plan(seconds: float, rng: np.random.Generator) -> np.ndarray:
 def drive(commands, extra, channel, gain_w, noise, rng) -> Run:
     """Return the run of these commands; extra(state) is added to a channel while the robot moves."""
     steps = round(commands[-1, 0] / STEP)
-    asked = commands[np.searchsorted(commands[:, 0], np.arange(steps) * STEP + 1e-9, side="right") - 1, 1:]
-    changed = np.append(True, (np.diff(asked, axis=0) != 0).any(axis=1))
-    shaken = disturbances(steps, noise, rng)
+    index = np.searchsorted(commands[:, 0], np.arange(steps) * STEP + 1e-9, side="right") - 1
+    asked, changed = commands[index, 1:].tolist(), np.diff(index, prepend=-1) != 0
+    shaken = disturbances(steps, noise, rng).tolist()
+    errors = rng.standard_normal((steps // 20 + 1, 3))
+    errors *= 0 if noise is None else [noise.position_sd, noise.position_sd, noise.heading_sd]
     drift = rng.uniform(3, 8) / commands[-1, 0]
     s, last, poses, warmth = State(), 0.0, [], []
     for k in range(steps):
-        s.v, s.w, s.time = asked[k, 0], asked[k, 1] * (1 + gain_w), k * STEP
+        s.v, s.w, s.time = asked[k][0], asked[k][1] * (1 + gain_w), k * STEP
         s.age = 0.0 if changed[k] else s.age + STEP
-        if s.v and last and np.sign(s.v) != last:
+        if s.v * last < 0:
             s.way = 0.0
-        last = np.sign(s.v) or last
-        s.warmth = 21 + drift * s.time + 2 * np.sin(s.time / 9.0)
+        last = s.v or last
+        s.warmth = 21 + drift * s.time + 2 * math.sin(s.time / 9.0)
         if k % 20 == 0:
-            error = _error(noise, rng)
-            poses.append([s.time, s.x + error[0], s.y + error[1], s.heading + error[2]])
-            warmth.append([s.time, s.warmth])
-        rates = np.array([s.v, 0.0, s.w])
+            poses.append((s.time, s.x, s.y, s.heading))
+            warmth.append((s.time, s.warmth))
+        rates = [s.v, 0.0, s.w]
         if s.v or s.w:
+            rates = [rate + shake for rate, shake in zip(rates, shaken[k], strict=True)]
             rates[channel] += extra(s)
-            rates += shaken[k]
-        s.x += STEP * (rates[0] * np.cos(s.heading) - rates[1] * np.sin(s.heading))
-        s.y += STEP * (rates[0] * np.sin(s.heading) + rates[1] * np.cos(s.heading))
+        cos, sin = math.cos(s.heading), math.sin(s.heading)
+        s.x += STEP * (rates[0] * cos - rates[1] * sin)
+        s.y += STEP * (rates[0] * sin + rates[1] * cos)
         s.heading += STEP * rates[2]
         s.way += STEP * abs(rates[0])
+    table = np.array(poses)
+    table[:, 1:] += errors[: len(table)]
     return Run(
         f"run_{rng.integers(10**9)}",
         command=Series.of_table(commands, "v", "w"),
-        pose=Series.of_table(np.array(poses), "x", "y", "theta"),
+        pose=Series.of_table(table, "x", "y", "theta"),
         covariates={"temperature": Series.of_table(np.array(warmth), "temperature")},
     )
-
-
-def _error(noise, rng) -> np.ndarray:
-    draws = rng.standard_normal(3)
-    return draws * 0 if noise is None else draws * [noise.position_sd, noise.position_sd, noise.heading_sd]
 
 
 def disturbances(steps: int, noise: Noise | None, rng: np.random.Generator) -> np.ndarray:
@@ -168,9 +169,5 @@ def disturbances(steps: int, noise: Noise | None, rng: np.random.Generator) -> n
     if noise is None:
         return draws * 0
     keep = np.exp(-STEP / noise.tau)
-    out = np.empty((steps, 3))
-    level = draws[0]
-    for k in range(steps):
-        level = keep * level + np.sqrt(1 - keep**2) * draws[k]
-        out[k] = level
-    return out * [noise.sd_v, noise.sd_lateral, noise.sd_w]
+    draws[1:] *= np.sqrt(1 - keep**2)
+    return lfilter([1.0], [1.0, -keep], draws, axis=0) * [noise.sd_v, noise.sd_lateral, noise.sd_w]
