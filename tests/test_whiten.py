@@ -8,7 +8,12 @@ from scipy.integrate import dblquad
 from kurumaisu import geometry
 from kurumaisu._core import whiten
 
-NOISE = {"position_sd": 0.01, "heading_sd": 0.004, "process_sd": [0.03, 0.008, 0.05], "process_tau": 0.4}
+NOISE = {
+    "position_sd": 0.01,
+    "heading_sd": 0.004,
+    "process_sd": [[0.03, 0.008, 0.05], [0.0, 0.0, 0.0]],
+    "process_tau": [0.4, 3.0],
+}
 
 
 def run(n: int, seed: int):
@@ -24,10 +29,10 @@ def integral_covariance(a, b, c, d, tau):
     return inner[0]
 
 
-def joint_covariance(times, poses):
-    """Of all increments' residuals, by numerical derivatives of the increments and quadrature of the OU process."""
+def joint_covariance(times, poses, noise, activity):
+    """Of all increments' residuals, by numerical derivatives of the increments and quadrature of the OU processes."""
     n = len(times) - 1
-    sds = [NOISE["position_sd"], NOISE["position_sd"], NOISE["heading_sd"]]
+    sds = [noise["position_sd"], noise["position_sd"], noise["heading_sd"]]
     by_pose = np.zeros((3 * n, 3 * (n + 1)))
     step = 1e-6
     for j in range(3 * (n + 1)):
@@ -42,20 +47,23 @@ def joint_covariance(times, poses):
     for k in range(n):
         dx, dy, turn = geometry.between(poses[k], poses[k + 1])
         c, s = np.cos(turn / 2), np.sin(turn / 2)
-        motions.append(np.array([[c, -s, -dy / 2], [s, c, dx / 2], [0, 0, 1]]))
-    rates = np.diag(np.square(NOISE["process_sd"]))
+        motions.append(activity[k] * np.array([[c, -s, -dy / 2], [s, c, dx / 2], [0, 0, 1]]))
     for j in range(n):
         for k in range(n):
-            shared = integral_covariance(*times[j : j + 2], *times[k : k + 2], NOISE["process_tau"])
-            cov[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] += motions[j] @ (shared * rates) @ motions[k].T
+            for sd, tau in zip(noise["process_sd"], noise["process_tau"], strict=True):
+                rates = integral_covariance(*times[j : j + 2], *times[k : k + 2], tau) * np.diag(np.square(sd))
+                cov[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] += motions[j] @ rates @ motions[k].T
     return cov
 
 
-def test_against_the_joint_covariance():
+@pytest.mark.parametrize("slow", [[0.0, 0.0, 0.0], [0.02, 0.0, 0.03]], ids=["one colour", "two colours"])
+@pytest.mark.parametrize("activity", [[1, 1, 1, 1, 1, 1], [1.5, 0.0, 0.1, 1.0, 2.0, 0.3]], ids=["steady", "gated"])
+def test_against_the_joint_covariance(slow, activity):
     times, poses = run(6, 1)
     columns = np.random.default_rng(2).normal(size=(18, 3))
-    white, log_determinants = whiten(poses, times, columns, **NOISE)
-    cov = joint_covariance(times, poses)
+    noise = {**NOISE, "process_sd": [NOISE["process_sd"][0], slow]}
+    white, log_determinants = whiten(poses, times, columns, np.array(activity, dtype=float), **noise)
+    cov = joint_covariance(times, poses, noise, activity)
     np.testing.assert_allclose(white.T @ white, columns.T @ np.linalg.solve(cov, columns), rtol=1e-5)
     assert log_determinants.sum() == pytest.approx(np.linalg.slogdet(cov)[1], abs=1e-4)
 
@@ -63,7 +71,7 @@ def test_against_the_joint_covariance():
 def test_short_steps_do_not_cancel():
     times = np.arange(50) * 1e-4
     poses = np.zeros((50, 3))
-    white, log_determinants = whiten(poses, times, np.ones((147, 1)), **NOISE)
+    white, log_determinants = whiten(poses, times, np.ones((147, 1)), np.ones(49), **NOISE)
     assert np.isfinite(white).all()
     assert np.isfinite(log_determinants).all()
 
@@ -75,12 +83,23 @@ def test_short_steps_do_not_cancel():
         ({"times": np.arange(6.0)}, "same length"),
         ({"columns": np.zeros((17, 1))}, "three rows per increment"),
         ({"poses": np.zeros((7, 2))}, "shape"),
-        ({"process_tau": 0.0}, "positive"),
-        ({"process_sd": [0.1, -0.1, 0.1]}, "positive"),
+        ({"activity": np.ones(5)}, "one factor per increment"),
+        ({"activity": -np.ones(6)}, "none negative"),
+        ({"process_tau": [0.0, 1.0]}, "positive"),
+        ({"process_tau": [1.0, 0.0]}, "positive"),
+        ({"process_sd": [[0.1, -0.1, 0.1], [0.0, 0.0, 0.0]]}, "positive"),
+        ({"process_sd": [[0.1, 0.1, 0.1], [0.0, -0.1, 0.0]]}, "positive"),
     ],
 )
 def test_bad_input_is_refused(change, message):
     times, poses = run(6, 1)
-    arguments = {"poses": poses, "times": times, "columns": np.zeros((18, 1)), **NOISE, **change}
+    arguments = {
+        "poses": poses,
+        "times": times,
+        "columns": np.zeros((18, 1)),
+        "activity": np.ones(6),
+        **NOISE,
+        **change,
+    }
     with pytest.raises(ValueError, match=message):
         whiten(**arguments)

@@ -13,8 +13,9 @@ from kurumaisu.critic import misfit, naming, replay, words
 from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import MATERIAL, moved_share
+from kurumaisu.critic.material import FELT, MATERIAL, felt_share, moved_share
 from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.noise import Growth
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
@@ -52,15 +53,26 @@ def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Crit
 
 
 def criticism(
-    recording: Recording, problem: Problem, found: Naming, worth: Gain | None, drives: Sequence[Drive]
+    recording: Recording,
+    problem: Problem,
+    found: Naming,
+    growth: Growth,
+    worth: Gain | None,
+    drives: Sequence[Drive],
 ) -> Criticism:
-    """Return the criticism after a search; worth: the gain on held-out drives, None when nothing was found."""
+    """Return the criticism after a search.
+
+    growth: whether the noise grows with the rates; worth: the gain on held-out drives, None when nothing was found.
+    """
     best = found.best
     shares = {name: moved_share(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
     gains = worth is not None and worth.log_density_per_sample.lo90 > 0
-    matters = {name for name, share in shares.items() if gains and share >= MATERIAL}
+    felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
+    matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     kind = _kind(found, matters)
     causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
+    if growth.p >= naming.NAMED:
+        kind, causes = "named", (*causes, Cause(process_noise(problem).id, growth.p, {}, growth.gain_nats))
     settings = best.settings if kind in ("named", "confounded") else ()
     verdict = Verdict(
         kind,
@@ -82,7 +94,7 @@ def criticism(
         noise=_noise(problem),
         unexplained=(*words.suspects(found), *misfit.remaining(problem, best)),
     )
-    return Criticism(verdict, story, problem.model, (*settings, process_noise(problem.noise)))
+    return Criticism(verdict, story, problem.model, (*settings, process_noise(problem)))
 
 
 def _without(fit: Fit, name: str) -> tuple[EffectSetting, ...]:

@@ -6,18 +6,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 from kurumaisu import effects
-from kurumaisu.critic.noise import Noise
+from kurumaisu.critic.evidence import Problem
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model, load_model
 
 
-def process_noise(noise: Noise) -> EffectSetting:
-    """Return the estimated noise of the rates as the effect that the simulator draws it from."""
-    (random,) = (effect.id for effect in effects.BASE if effect.random)
-    return EffectSetting(random, {"sd_v": noise.sd_v, "sd_w": noise.sd_w, "tau": noise.tau})
+def process_noise(problem: Problem) -> EffectSetting:
+    """Return the estimated noise of the rates as the effect that the simulator draws it from.
+
+    That effect has one colour and does not grow with the rates: both are taken into its size, as they were on average.
+    """
+    (random,) = (effect for effect in effects.BASE if effect.random)
+    noise = problem.noise
+    pace = np.concatenate([drive.pace[drive.pace > 0] for drive in problem.drives])
+    grown = float(np.sqrt(np.mean((1 + noise.growth * pace) ** 2))) if len(pace) else 1.0
+    sd_v, sd_w = np.hypot([noise.sd_v, noise.sd_w], [noise.slow_v, noise.slow_w]) * grown
+    share = noise.slow_w**2 / (noise.slow_w**2 + noise.sd_w**2)  # of the variance of the yaw rate
+    tau = (1 - share) * noise.tau + share * noise.slow_tau  # keeps how far the heading wanders
+    values = {"sd_v": float(sd_v), "sd_w": float(sd_w), "tau": tau}
+    return EffectSetting(random.id, {p.name: min(values[p.name], p.upper) for p in random.parameters})
 
 
 def write_extended(path: Path, original: Path, model: Model, settings: Sequence[EffectSetting], recording: str) -> None:

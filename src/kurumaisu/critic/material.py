@@ -11,10 +11,12 @@ from kurumaisu import geometry
 from kurumaisu.critic import replay
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Problem
+from kurumaisu.critic.noise import whitened
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray, IntArray
 
 MATERIAL = 0.005  # share of the way (or of the turn) from which an effect matters to a driver
+FELT = 0.1  # share of what is uncertain anyway, per increment, from which an effect matters to a prediction
 _SAME = 1e-6  # [s] less than any clock resolves: stamps of equal spacing differ by rounding
 HORIZON = 2.0  # [s] over which ways and turns are compared
 
@@ -32,6 +34,16 @@ def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Se
         moved += _squares(one - other)
         made += _squares(other)
     return float(np.sqrt((moved / np.maximum(made, 1e-12)).max()))
+
+
+def felt_share(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
+    """Return what `settings` have and `without` lack, in standard deviations of an increment's noise (rms)."""
+    total, count = 0.0, 0
+    for drive in problem.drives:
+        moved = problem.simulated(drive, settings) - problem.simulated(drive, without)
+        white = whitened(drive, moved.reshape(-1, 1), problem.noise)[0]
+        total, count = total + float(np.sum(white**2)), count + len(moved)
+    return float(np.sqrt(total / count))
 
 
 def spans(drive: Drive, horizon: float) -> tuple[IntArray, IntArray]:

@@ -51,8 +51,11 @@ class Naming:
 Chosen = frozenset[Candidate]
 
 
-def search(problem: Problem, progress: Callable[[str], None]) -> Naming:
-    """Scan sets of effects linearly, refit the promising ones, and go on from the best until it stays the best."""
+def search(problem: Problem, progress: Callable[[str], None], first: Fit | None = None) -> Naming:
+    """Scan sets of effects linearly, refit the promising ones, and go on from the best until it stays the best.
+
+    first: a set to begin with, such as an earlier search under another noise has found.
+    """
     count = len({candidate.id for candidate in problem.candidates})
     empty = problem.fit_candidates((), {})
     fits: dict[Chosen, Fit] = {empty.candidates: empty}
@@ -67,8 +70,11 @@ def search(problem: Problem, progress: Callable[[str], None]) -> Naming:
                 fits[chosen] = problem.fit_candidates(chosen, start)
         return max(fits.values(), key=worth)
 
+    nothing = screen = Screen(problem, empty)
     centre = empty
-    first = screen = Screen(problem, centre)
+    if first is not None and first.candidates:
+        centre = try_sets([(first.candidates, first.start)])
+        screen = Screen(problem, centre) if centre is not empty else nothing
     for _ in range(_ROUNDS):
         guesses = screen.guesses()
         near = [guess for guess in guesses[:_REFITS] if guess.score > guesses[0].score - _CLOSE]
@@ -88,7 +94,7 @@ def search(problem: Problem, progress: Callable[[str], None]) -> Naming:
         return float(sum(w for w, fit in zip(weights, ranked, strict=True) if fit.ids & wanted))
 
     p = {name: p_any([name]) for name in sorted({candidate.id for candidate in problem.candidates})}
-    return Naming(tuple(ranked), p, _confounded(ranked, weights, p, p_any), _false_alarm(problem, first))
+    return Naming(tuple(ranked), p, _confounded(ranked, weights, p, p_any), _false_alarm(nothing))
 
 
 def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
@@ -126,7 +132,7 @@ def _confounded(
     return tuple(tuple(sorted(group)) for group in merged if len(group) > 1 and p_any(group) >= NAMED)
 
 
-def _false_alarm(problem: Problem, screen: Screen) -> float:
+def _false_alarm(screen: Screen) -> float:
     """Return how often noise alone, b ~ N(0, G), gives a single effect the evidence that the data give the best one."""
     loud = [i for i, term in enumerate(screen.terms) if not term.shape]
     if not loud:

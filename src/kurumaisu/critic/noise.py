@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import qr
 from scipy.optimize import minimize
+from scipy.special import expit
 
 from kurumaisu._core import whiten
 from kurumaisu.critic.drive import Drive
+from kurumaisu.critic.prior import occam
 from kurumaisu.types import FloatArray
 
 
@@ -77,6 +79,15 @@ class Estimate:
     cost: float
 
 
+@dataclass(frozen=True)
+class Growth:
+    """Does the noise grow with the rates? p: that it does; gain_nats: log evidence; noise: that which grows."""
+
+    p: float
+    gain_nats: float
+    noise: Noise
+
+
 class Scatter:
     """What the noise is estimated from: residuals about a model, with what might be the model's fault left out."""
 
@@ -87,7 +98,7 @@ class Scatter:
         columns: Sequence[FloatArray],
         truth: tuple[float, float] | None,
     ) -> None:
-        """Take residuals (m, 3) per drive, measured minus simulated; columns (3 m, k) per drive, effects to project out.
+        """Take residuals (m, 3) and columns (3 m, k) per drive: measured minus simulated, and effects to project out.
 
         truth: known sd of the reference's position and heading, else they are estimated too.
         """
@@ -104,10 +115,14 @@ class Scatter:
         two = self._best(replace(one.noise, **slow), (*ONE_COLOUR, *_SECOND))
         return two if two.cost < one.cost - _WORTH else one
 
-    def growing(self, about: Noise) -> Estimate:
-        """Return the noise that grows with the rates, from what it is if it does not."""
-        names = (*ONE_COLOUR, *(_SECOND if about.slow_v else ()), "growth")
-        return self._best(replace(about, growth=_SLOW.growth), names)
+    def growth(self, about: Noise, prior_odds: float) -> Growth:
+        """Return how likely it is that the noise grows with the rates, about noise that does not."""
+        names = (*ONE_COLOUR, *(_SECOND if about.slow_v else ()))
+        steady = self._best(replace(about, growth=0.0), names)
+        growing = self._best(replace(steady.noise, growth=_SLOW.growth), (*names, "growth"))
+        better = max(steady.cost - growing.cost, 0.0)
+        nats = better - float(occam(np.sqrt(2 * better), sides=1))
+        return Growth(float(expit(nats + np.log(prior_odds))), nats, growing.noise)
 
     def _best(self, start: Noise, names: Sequence[str]) -> Estimate:
         if self._truth is not None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
+from kurumaisu.critic.prior import odds
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.smooth_fit import Extension
@@ -49,9 +50,9 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
     empty = rough.fit((), {})
     first = Problem(train, model, _scatter(rough, empty, recording.truth, project=True).estimate().noise)
     found = naming.search(first, progress)
-    problem, found, beyond = _decide(first, found, recording.truth, progress)
+    made = _decide(first, found, recording.truth, progress)
+    problem, found, beyond = made.problem, made.found, made.beyond
     final = problem.noise
-    found = replace(found, p=beyond.rivalry.p_effects)
 
     progress("measuring the gain on drives held out")
     baseline = _scatter(rough, empty, recording.truth, project=False).estimate(final).noise
@@ -59,28 +60,50 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
     anything = splits and (found.best.ids or beyond.extension)
     worth = gain.measure(model, splits, _refit(problem, found, beyond), baseline, final) if anything else None
     if beyond.extension is not None:
-        return smooth_explain.criticism(recording, problem, found, beyond, worth)
-    return explain.criticism(recording, problem, found, worth, train + test)
+        return smooth_explain.criticism(recording, problem, smooth_explain.Outside(found, made.growth, beyond), worth)
+    return explain.criticism(recording, problem, found, made.growth, worth, train + test)
 
 
-def _decide(
-    first: Problem, found: naming.Naming, truth: tuple[float, float] | None, progress: Progress
-) -> tuple[Problem, naming.Naming, smooth_judge.Beyond]:
+@dataclass(frozen=True)
+class _Decision:
+    """What acts, in a problem whose noise is that about it."""
+
+    problem: Problem
+    found: naming.Naming
+    growth: noise.Growth
+    beyond: smooth_judge.Beyond
+
+
+def _decide(first: Problem, found: naming.Naming, truth: tuple[float, float] | None, progress: Progress) -> _Decision:
     """Return what acts, by the noise about it.
 
     Noise that was estimated without a curve has taken it up. So if one may act, the noise is estimated about it; and
     if it then does not win, as if there had never been one.
     """
     hint = smooth_judge.hinted(first, found)
-    for beside in (hint, None) if hint is not None else (None,):
-        progress("estimating the noise again, beside what was found")
-        about = _scatter(first, found.best, truth, project=True, beside=beside).estimate(first.noise).noise
-        problem = Problem(first.drives, first.model, about, first.terms)
-        again = naming.search(problem, progress)
-        beyond = smooth_judge.judge(problem, again, progress)
-        if beyond.extension is not None:
-            break
-    return problem, again, beyond
+    if hint is not None:
+        made = _judged(first, found, hint, truth, progress)
+        if made.beyond.extension is not None:
+            return made
+    return _judged(first, found, None, truth, progress)
+
+
+def _judged(
+    first: Problem,
+    found: naming.Naming,
+    beside: Extension | None,
+    truth: tuple[float, float] | None,
+    progress: Progress,
+) -> _Decision:
+    progress("estimating the noise again, beside what was found")
+    scatter = _scatter(first, found.best, truth, project=True, beside=beside)
+    final = scatter.estimate(first.noise).noise
+    growth = scatter.growth(final, odds(len(found.p)))
+    final = growth.noise if growth.p > 1 / 2 else final
+    problem = Problem(first.drives, first.model, final, first.terms)
+    again = naming.search(problem, progress, found.best)
+    beyond = smooth_judge.judge(problem, again, progress)
+    return _Decision(problem, replace(again, p=beyond.rivalry.p_effects), growth, beyond)
 
 
 def _refit(problem: Problem, found: naming.Naming, beyond: smooth_judge.Beyond) -> gain.Refit:

@@ -20,11 +20,16 @@ _MORE = 0.7
 
 def log_prior(size: int, of: int) -> float:
     """Return the log prior of a set of so many effects out of so many that could show."""
-    each = _MORE / max(of, 1)
+    each = odds(of)
     return float(size * np.log(each) + (of - size) * np.log1p(-each))
 
 
-def occam(z: FloatArray, sides: int = 2) -> FloatArray:
+def odds(of: int) -> float:
+    """Return the prior odds of one effect out of so many that could show."""
+    return _MORE / max(of, 1)
+
+
+def occam(z: FloatArray | float, sides: int = 2) -> FloatArray:
     """Return what an amplitude that shows with |z| standard deviations costs, in nats, elementwise.
 
     z^2 / 2 less the log of the Bayes factor that the prior gives; sides: 1 where only one sign is possible.
@@ -41,11 +46,11 @@ def occam_plane(z: FloatArray) -> FloatArray:
 
 @cache
 def _table(dimensions: int) -> tuple[FloatArray, FloatArray]:
-    log_x = np.linspace(np.log(Z_LOW), np.log(Z_HIGH), 40001)
+    log_x = np.linspace(np.log(Z_LOW), np.log(Z_HIGH), 8001)
     x = np.exp(log_x)
     usual = np.where(x < Z_USUAL, _USUAL / np.log(Z_USUAL / Z_LOW), (1 - _USUAL) / np.log(Z_HIGH / Z_USUAL))
     log_weight = np.log(log_x[1] - log_x[0]) + np.log(usual)
-    grid = np.concatenate([np.linspace(0, 20, 201), np.geomspace(21, 0.99 * Z_HIGH, 150)])
+    grid = np.concatenate([np.linspace(0, 20, 101), np.geomspace(21, 0.99 * Z_HIGH, 60)])
     costs = np.array([-logsumexp(_log_mean_density(z, x, dimensions) + log_weight) for z in grid])
     return grid, costs
 

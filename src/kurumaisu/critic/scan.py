@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Linear screening: how good would sets of effects be, from columns linearised at a fit?"""
+"""Linear screening: how good sets of effects would be, from columns linearised at a fit."""
 
 from __future__ import annotations
 

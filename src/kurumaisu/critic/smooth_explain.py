@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +14,10 @@ from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import HORIZON, MATERIAL, moved_share
+from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, felt_share, moved_share
 from kurumaisu.critic.misfit import bins
 from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.noise import Growth
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.smooth_fit import Extension, extend
 from kurumaisu.critic.smooth_judge import Beyond
@@ -29,24 +30,35 @@ _LISTED = 3  # curves that may act, at most
 _PLAUSIBLE = 0.02  # posterior from which another curve is listed
 
 
-def criticism(recording: Recording, problem: Problem, found: Naming, beyond: Beyond, worth: Gain | None) -> Criticism:
+@dataclass(frozen=True)
+class Outside:
+    """What was found in the catalogue, whether the noise grows with the rates, and what was found outside."""
+
+    found: Naming
+    growth: Growth
+    beyond: Beyond
+
+
+def criticism(recording: Recording, problem: Problem, outside: Outside, worth: Gain | None) -> Criticism:
     """Return the criticism of drives in which a curve explains more than the catalogue."""
+    found, beyond = outside.found, outside.beyond
     extension = beyond.extension
     assert extension is not None
     # What acts beside the curve is judged with the curve in the model.
     curved = Problem(problem.drives, replay.extend(problem.model, [extension.unknown]), problem.noise, problem.terms)
     fit = curved.fit_candidates(extension.fit.candidates, extension.fit.start)
     inner = replace(found, fits=(fit, *found.fits), confounded=(), false_alarm=beyond.false_alarm)
-    beside = explain.criticism(recording, curved, inner, worth, problem.drives)
+    beside = explain.criticism(recording, curved, inner, outside.growth, worth, problem.drives)
     share = moved_share(problem, extension.settings, extension.fit.settings)
+    felt = felt_share(problem, extension.settings, extension.fit.settings)
     gains = worth is not None and worth.log_density_per_sample.lo90 > 0
     told = _told(extension, beyond, share)
-    if not gains or share < MATERIAL:
+    if not gains or (share < MATERIAL and felt < FELT):
         small = f"{told} It is too small to matter, or was not confirmed on data held out."
         story = replace(beside.story, unexplained=(small, *beside.story.unexplained))
         return replace(beside, story=story, model=problem.model)
     verdict = replace(beside.verdict, verdict="unknown", unknown=tuple(_unknowns(problem, beyond)))
-    settings = (*extension.settings, process_noise(problem.noise))
+    settings = (*extension.settings, process_noise(problem))
     story = replace(
         beside.story,
         headline=smooth_words.headline(extension),

@@ -61,7 +61,8 @@ def details(
             f"{term.id}: {term.parameter.name} {e.estimate:.3g}{unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
             f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."
         )
-    wander = np.degrees(problem.noise.sd_w * np.sqrt(2 * problem.noise.tau * _MINUTE))
+    n = problem.noise
+    wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
     said.append(f"The yaw rate fluctuates at random: the heading wanders by {wander:.1f} deg (sd) in a minute.")
     alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
     said.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")

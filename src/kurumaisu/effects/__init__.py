@@ -94,9 +94,6 @@ BASE: tuple[type[BaseEffect], ...] = (
     ClockScale,
 )
 
-# What the critic looks for, too; kept as a name of its own for what is not yet criticised.
-CRITICISED: tuple[type[BaseEffect], ...] = BASE
-
 WORLD: tuple[type[WorldEffect], ...] = (MapError,)
 
 # What the simulator can run.
@@ -179,7 +176,6 @@ __all__ = [
     "CHANNELS",
     "CONSTANTS",
     "COVARIATES",
-    "CRITICISED",
     "LASER",
     "MEANINGS",
     "PERIODIC",

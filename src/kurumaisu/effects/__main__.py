@@ -37,7 +37,7 @@ _BASE = """
 
 Voltages pass the stages CONVERTER and CONTROLLER; the rates that they stand for pass TRANSPORT, THRESHOLD, GAIN,
 RESPONSE and FLOOR; effects of the stage REFERENCE change what `ground_truth` says and not the motion. The critic looks
-for those marked with *.
+for all of them.
 """
 _LASER = """
 ## The laser
@@ -105,9 +105,8 @@ def _table(family: Sequence[type[Mechanism]]) -> str:
     ]
     for effect in ordered:
         stage = effect.stage.name if hasattr(effect, "stage") else "-"
-        name = f"`{effect.id}`{'*' if effect in effects.CRITICISED else ''}"
         sizes = "; ".join(_size(parameter) for parameter in effect.parameters)
-        cells = (name, stage, effect.sentence, effect.formula, sizes, effect.source)
+        cells = (f"`{effect.id}`", stage, effect.sentence, effect.formula, sizes, effect.source)
         rows.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join(rows) + "\n"
 
