@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -32,7 +33,8 @@ class Drive:
     """Inputs and reference of one run.
 
     source: the channel that drives the replay; start [s] of the grid; v, w (n,) rates asked for on the grid;
-    times (m + 1,) and poses (m + 1, 3) of the reference.
+    times (m + 1,) and poses (m + 1, 3) of the reference; known: what unknown effects may follow, (n,) each on the
+    grid, by the names that effects.Motion has.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Drive:
     w: FloatArray
     times: FloatArray
     poses: FloatArray
+    known: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def measured(self) -> FloatArray:

@@ -67,6 +67,12 @@ class Problem:
         self._terms = terms
         self.ids = ids
 
+    def changed(
+        self, *, drives: Sequence[Drive] | None = None, model: Model | None = None, noise: Noise | None = None
+    ) -> Problem:
+        """Return the problem, with the same terms, of other drives, another model or another noise."""
+        return Problem(drives or self.drives, model or self.model, noise or self.noise, self.terms, self.ids)
+
     @cached_property
     def terms(self) -> tuple[Term, ...]:
         """Return the terms that these drives can show."""

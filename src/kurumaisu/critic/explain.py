@@ -3,21 +3,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from kurumaisu.critic import misfit, naming, replay, words
+from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.extended import process_noise
 from kurumaisu.critic.material import FELT, MATERIAL, felt_share, moved_share
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
-from kurumaisu.critic.noise import Growth
 from kurumaisu.critic.recording import Recording, Run
+from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
 from kurumaisu.critic.verdict import Cause, Gain, Kind, Verdict
 from kurumaisu.errors import Error
@@ -48,24 +50,20 @@ def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Crit
         details=tuple(problems),
         pose_source=_pose_source(recording),
         provenance=_provenance(),
-        overlays=tuple(_overlays(recording, model)),
+        overlays=overlays(recording, model),
     )
     return Criticism(verdict, story, model, ())
 
 
 def criticism(
     recording: Recording,
-    problem: Problem,
-    found: Naming,
-    growth: Growth,
+    made: Decision,
     worth: Gain | None,
     drives: Sequence[Drive],
     proposal: Proposal,
 ) -> Criticism:
-    """Return the criticism after a search.
-
-    growth: whether the noise grows with the rates; worth: the gain on held-out drives, None when nothing was found.
-    """
+    """Return the criticism after a search; worth: the gain on held-out drives, None when nothing was found."""
+    problem, found, growth = made.problem, made.found, made.growth
     best = found.best
     shares = {name: moved_share(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
     gains = worth is not None and worth.log_density_per_sample.lo90 > 0
@@ -93,10 +91,7 @@ def criticism(
         details=words.details(problem, found, drives, shares, matters),
         pose_source=_pose_source(recording),
         provenance=_provenance(),
-        overlays=tuple(
-            _overlay(run, problem.model, settings or None, held_out=run.name in recording.test)
-            for run in recording.runs
-        ),
+        overlays=overlays(recording, problem.model, settings or None),
         misfits=_misfits(problem, found),
         rivals=words.rivals(found),
         noise=_noise(problem),
@@ -146,17 +141,19 @@ def _misfits(problem: Problem, found: Naming) -> tuple[Misfit, ...]:
     return misfit.figures(problem, fit.settings, sorted(fit.ids))
 
 
-def _overlays(recording: Recording, model: Model) -> Iterator[Overlay]:
-    """Yield a picture of every run that is whole enough for one."""
+def overlays(
+    recording: Recording, model: Model, settings: Sequence[EffectSetting] | None = None
+) -> tuple[Overlay, ...]:
+    """Return a picture of every run that is whole enough for one; settings: what extends the model, if anything."""
+    drawn = []
     for run in recording.runs:
-        try:
-            yield _overlay(run, model, None, held_out=False)
-        except Error:
-            continue
+        with suppress(Error):
+            drawn.append(_overlay(run, model, settings, held_out=run.name in recording.test))
+    return tuple(drawn)
 
 
 def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *, held_out: bool) -> Overlay:
-    drive = prepare(run, model, _PICTURE)
+    drive = informed(prepare(run, model, _PICTURE), run)
 
     def seen(extra: Sequence[EffectSetting]) -> FloatArray:
         return replay.path(drive, model, extra)[:, :2]

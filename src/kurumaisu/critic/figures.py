@@ -82,6 +82,8 @@ def misfit_svg(misfit: Misfit, shown: Shown, name: str) -> str:
         points = misfit.covariate[shown.index], misfit.residual[shown.index]
         axes.plot(*points, ".", color=INK, alpha=0.3, markersize=4.5, markeredgewidth=0, label="samples")
         axes.axhline(0.0, color=INK, linewidth=0.8)
+        if misfit.band is not None:
+            axes.fill_between(*misfit.band.T, color=EXTENDED, alpha=0.25, linewidth=0, label="90 % band")
         if misfit.curve is not None:
             axes.plot(*misfit.curve.T, color=EXTENDED, linewidth=2.0, label="extension")
         bins = misfit.bins
@@ -104,6 +106,7 @@ def shown_points(misfit: Misfit) -> Shown:
     low, high = np.quantile(drawn[0], _SHOWN_QUANTILES) if finite.any() else (0.0, 0.0)
     ends = [low, high, 0.0, *misfit.bins.lo90, *misfit.bins.hi90]
     ends += [] if misfit.curve is None else list(misfit.curve[:, 1])
+    ends += [] if misfit.band is None else list(misfit.band[:, 1:].ravel())
     bounds = np.array(ends)[np.isfinite(ends)]
     margin = 0.05 * (np.ptp(bounds) or 1.0)
     low, high = float(bounds.min() - margin), float(bounds.max() + margin)

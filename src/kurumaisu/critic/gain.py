@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,6 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.critic import replay
 from kurumaisu.critic.drive import Drive, split
-from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import spans
 from kurumaisu.critic.noise import Noise, whitened
 from kurumaisu.critic.verdict import Gain, LogDensityGain, RmseGain
@@ -32,6 +31,21 @@ class Fold:
     test: tuple[Drive, ...]
 
 
+@dataclass(frozen=True)
+class Fitted:
+    """What extends a model, as fitted to some drives.
+
+    doubt: how the increments of a drive change, (3 m, k), by errors of the fit that are independent and normal with
+    sd 1; None where they are too small to matter.
+    """
+
+    settings: Sequence[EffectSetting]
+    doubt: Callable[[Drive], FloatArray] | None = None
+
+
+Refit = Callable[[Sequence[Drive]], Fitted]
+
+
 def folds(train: Sequence[Drive], test: Sequence[Drive]) -> list[Fold]:
     """Return train against test; without test runs, each run left out in turn; of a single run, each quarter.
 
@@ -45,8 +59,8 @@ def folds(train: Sequence[Drive], test: Sequence[Drive]) -> list[Fold]:
     return [Fold(tuple(parts[:i] + parts[i + 1 :]), (parts[i],)) for i in range(len(parts))]
 
 
-def measure(model: Model, splits: Sequence[Fold], fit: Fit, baseline: Noise, extended: Noise) -> Gain:
-    """Return the gain of a set of effects, whose parameters are refitted on each fold's training drives.
+def measure(model: Model, splits: Sequence[Fold], refit: Refit, baseline: Noise, extended: Noise) -> Gain:
+    """Return the gain of what extends a model; refit: returns it as fitted to each fold's training drives.
 
     baseline, extended: the noise that either model needs to explain the training data; a model that is wrong pays
     for it with wide predictions or with surprises.
@@ -54,24 +68,46 @@ def measure(model: Model, splits: Sequence[Fold], fit: Fit, baseline: Noise, ext
     density: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     errors: dict[float, tuple[list[FloatArray], list[FloatArray]]] = {horizon: ([], []) for horizon in HORIZONS}
     for fold in splits:
-        refit = Problem(fold.train, model, extended).fit_candidates(fit.candidates, fit.start)
+        extension = refit(fold.train)
         for drive in fold.test:
-            for side, (settings, noise) in enumerate((((), baseline), (refit.settings, extended))):
-                density[side].extend(_blocks(drive, _log_density(drive, model, settings, noise)))
+            for side, (fitted, noise) in enumerate(((Fitted(()), baseline), (extension, extended))):
+                density[side].extend(_blocks(drive, _log_density(drive, model, fitted, noise)))
                 for horizon in HORIZONS:
-                    errors[horizon][side].extend(_open_loop(drive, model, settings, horizon))
+                    errors[horizon][side].extend(_open_loop(drive, model, fitted.settings, horizon))
     return Gain(
         _log_density_gain(*density),
         {f"position after {horizon:g} s": _rmse(*errors[horizon]) for horizon in HORIZONS if errors[horizon][0]},
     )
 
 
-def _log_density(drive: Drive, model: Model, settings: Sequence[EffectSetting], noise: Noise) -> FloatArray:
+def _log_density(drive: Drive, model: Model, fitted: Fitted, noise: Noise) -> FloatArray:
     """Return the predictive log density of each increment given those before it, (m,) [nats]."""
-    residual = drive.measured - replay.increments(drive, model, settings)
-    white, log_determinants = whitened(drive, residual.reshape(-1, 1), noise)
-    squares = (white.reshape(-1, 3) ** 2).sum(axis=1)
-    return np.asarray(-0.5 * (squares + log_determinants + 3 * np.log(2 * np.pi)))
+    residual = drive.measured - replay.increments(drive, model, fitted.settings)
+    columns = residual.reshape(-1, 1)
+    if fitted.doubt is not None:
+        columns = np.hstack([columns, fitted.doubt(drive)])
+    white, log_determinants = whitened(drive, columns, noise)
+    parts = white.reshape(-1, 3, white.shape[1])
+    return np.asarray(_surprise(parts[:, :, 0], parts[:, :, 1:]) - 0.5 * (log_determinants + 3 * np.log(2 * np.pi)))
+
+
+def _surprise(innovations: FloatArray, columns: FloatArray) -> FloatArray:
+    """Return the log density of whitened innovations (m, 3), up to a constant, with doubt along columns (m, 3, k).
+
+    What an increment tells about the doubt is used for those after it.
+    """
+    if not columns.shape[2]:
+        return np.asarray(-0.5 * (innovations**2).sum(axis=1))
+    mean, spread = np.zeros(columns.shape[2]), np.eye(columns.shape[2])
+    out = np.empty(len(innovations))
+    for i, (seen, by) in enumerate(zip(innovations, columns, strict=True)):
+        reach = by @ spread
+        total = np.eye(3) + reach @ by.T
+        left = seen - by @ mean
+        weighed = np.linalg.solve(total, np.column_stack([left, reach]))
+        out[i] = -0.5 * float(left @ weighed[:, 0] + np.linalg.slogdet(total)[1])
+        mean, spread = mean + reach.T @ weighed[:, 0], spread - reach.T @ weighed[:, 1:]
+    return out
 
 
 def _blocks(drive: Drive, values: FloatArray) -> list[FloatArray]:

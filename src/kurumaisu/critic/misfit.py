@@ -73,8 +73,8 @@ def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[ef
             strict=True,
         )
     )
-    bins = _bins(x, residual, _FEWEST)
-    curve = _bins(x, added, 1)
+    shown = bins(x, residual)
+    curve = bins(x, added, 1)
     return Misfit(
         channel=effect.shows_in.value,
         unit=_UNITS[effect.shows_in],
@@ -82,7 +82,7 @@ def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[ef
         covariate_unit=_UNITS[effect.follows],
         covariate=x,
         residual=residual,
-        bins=bins,
+        bins=shown,
         explained_by=effect.id,
         curve=np.column_stack([curve.centre, curve.mean]),
     )
@@ -103,7 +103,7 @@ def _samples(
     return covariate(drive, follows), residual, added
 
 
-def _bins(x: FloatArray, y: FloatArray, fewest: int) -> Bins:
+def bins(x: FloatArray, y: FloatArray, fewest: int = _FEWEST) -> Bins:
     """Return means of y in bins of x of equal width; bins with fewer points are left out."""
     count = int(np.clip(len(x) // (2 * _FEWEST), 3, _BINS))
     low, high = np.quantile(x, [0.005, 0.995])

@@ -3,24 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
-from kurumaisu.critic import explain, gain, naming, next_experiment, noise, sanity
+from kurumaisu.critic import explain, gain, next_experiment, noise, sanity, smooth_explain
+from kurumaisu.critic.decide import Progress, decide, scatter
 from kurumaisu.critic.drive import prepare
-from kurumaisu.critic.evidence import Fit, Problem
+from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
-from kurumaisu.critic.prior import odds
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.report import write_report
+from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.verdict import write_verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import follow_commands, load_model
-
-Progress = Callable[[str], None]
 
 
 def criticise(
@@ -43,30 +39,24 @@ def criticise(
     wrong = [*recording.invalid, *sanity.examine(recording, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
-    drives = {run.name: prepare(run, model) for run in recording.runs}
+    drives = {run.name: informed(prepare(run, model), run) for run in recording.runs}
     train = [drives[name] for name in recording.train]
     test = [drives[name] for name in recording.test]
 
     progress("estimating the noise")
     rough = Problem(train, model, noise.START, ids=ids)
     empty = rough.fit((), {})
-    first = Problem(train, model, _scatter(rough, empty, recording.truth, project=True).estimate().noise, ids=ids)
-    found = naming.search(first, progress)
-    progress("estimating the noise again, beside what was found")
-    scatter = _scatter(first, found.best, recording.truth, project=True)
-    final = scatter.estimate(first.noise).noise
-    growth = scatter.growth(final, odds(len(found.p)))
-    final = growth.noise if growth.p > 1 / 2 else final
-    problem = Problem(train, model, final, first.terms, ids)
-    found = naming.search(problem, progress, found.best)
+    first = rough.changed(noise=scatter(rough, empty, recording.truth, project=True).estimate().noise)
+    made = decide(first, recording.truth, progress)
 
     progress("measuring the gain on drives held out")
-    baseline = _scatter(rough, empty, recording.truth, project=False).estimate(final).noise
+    baseline = scatter(rough, empty, recording.truth, project=False).estimate(made.problem.noise).noise
     splits = gain.folds(train, test)
-    worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
+    worth = gain.measure(model, splits, made.refit, baseline, made.problem.noise) if splits and made.something else None
     progress("planning the next drive")
-    proposal = next_experiment.propose(problem, found, next_experiment.drives())
-    return explain.criticism(recording, problem, found, growth, worth, train + test, proposal)
+    proposal = next_experiment.propose(made.problem, made.found, next_experiment.drives())
+    judge = explain.criticism if made.beyond.extension is None else smooth_explain.criticism
+    return judge(recording, made, worth, train + test, proposal)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
@@ -78,13 +68,3 @@ def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
     write_verdict(folder / "verdict.json", criticism.verdict)
     write_report(folder / "report.html", criticism.verdict, criticism.story)
     write_extended(folder / "extended.yaml", model_file, criticism.model, criticism.settings, criticism.story.recording)
-
-
-def _scatter(problem: Problem, fit: Fit, truth: tuple[float, float] | None, *, project: bool) -> noise.Scatter:
-    """Return what is left about a fit, with all effects of the catalogue projected out or none."""
-    residuals = [drive.measured - problem.simulated(drive, fit.settings) for drive in problem.drives]
-    columns = [
-        problem.simulated_columns(drive, fit) if project and problem.terms else np.empty((residual.size, 0))
-        for drive, residual in zip(problem.drives, residuals, strict=True)
-    ]
-    return noise.Scatter(problem.drives, residuals, columns, truth)

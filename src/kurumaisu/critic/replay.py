@@ -33,6 +33,11 @@ def completed(model: Model, settings: Sequence[EffectSetting]) -> tuple[EffectSe
     return tuple(whole)
 
 
+def motion(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> effects.Motion:
+    """Return the motion of the simulated chair on the drive's grid, without random effects."""
+    return _driven(drive, model, settings)[1]
+
+
 def path(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return the simulated reference at its times, (m + 1, 3), starting at the first measured pose."""
     at = _seen(drive, model, settings)
@@ -47,17 +52,21 @@ def increments(drive: Drive, model: Model, settings: Sequence[EffectSetting]) ->
 
 def _seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return what the reference measures of the simulated chair at its times, (m + 1, 3), in a frame of its own."""
-    extended = extend(model, settings)
-    mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in _random()))
-    chair = plant.Plant(mean, GRID, np.random.default_rng(0))
-    heading = float(drive.poses[0, 2])  # the grid begins at the first pose, or a little before it
-    motion = chair.from_rates(drive.v, drive.w, heading)
+    chair, motion = _driven(drive, model, settings)
     poses = plant.path(motion, np.zeros(3))
     times = GRID * np.arange(len(poses))  # since the start: a clock that runs fast is right at the start
     if not chair.effects.reference:
         return geometry.interpolate(drive.start + times, poses, drive.times)
     seen = chair.seen(effects.Reference(times, poses, np.zeros_like(poses)))
     return geometry.interpolate(drive.start + seen.times, seen.poses, drive.times)
+
+
+def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:
+    extended = extend(model, settings)
+    mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in _random()))
+    chair = plant.Plant(mean, GRID, np.random.default_rng(0))
+    heading = float(drive.poses[0, 2])  # the grid begins at the first pose, or a little before it
+    return chair, chair.from_rates(drive.v, drive.w, heading, drive.known)
 
 
 @cache

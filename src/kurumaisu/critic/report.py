@@ -127,6 +127,8 @@ def _misfit(misfit: Misfit, name: str) -> Picture:
     rows += [("mean, lower end", x, y) for x, y in _rows(misfit.bins.centre, misfit.bins.lo90)]
     rows += [("mean, upper end", x, y) for x, y in _rows(misfit.bins.centre, misfit.bins.hi90)]
     rows += [] if misfit.curve is None else [("extension", x, y) for x, y in misfit.curve]
+    for i, end in enumerate(("lower", "upper"), 1):
+        rows += [] if misfit.band is None else [(f"extension, {end} end", row[0], row[i]) for row in misfit.band]
     return Picture(
         title=f"{misfit.explained_by}: {misfit.channel} over {misfit.covariate_name}",
         svg=Markup(figures.misfit_svg(misfit, shown, name)),

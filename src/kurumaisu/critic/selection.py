@@ -16,13 +16,15 @@ _NEAR = 0.6  # share of letters in common from which a name is suggested
 def effect_ids(only: Sequence[str], without: Sequence[str]) -> frozenset[str] | None:
     """Return the ids of the effects that may be named, by ids or patterns like base.lag_*; None for all.
 
+    The word smooth stands for what is not in the catalogue.
+
     Raise Error for a pattern that is none of the catalogue, naming near ones, for one of which the critic looks for
     nothing, and when nothing is left.
     """
     if not only and not without:
         return None
-    catalogue = tuple(effect.id for effect in effects.ALL)
-    sought = tuple(effect.id for effect in effects.BASE if not effect.random)
+    catalogue = (*(effect.id for effect in effects.ALL), effects.SMOOTH)
+    sought = (*(effect.id for effect in effects.BASE), effects.SMOOTH)
     wanted: set[str] = set() if only else set(sought)
     for pattern in only:
         found = set(matching("--only", pattern, catalogue, "effect")) & set(sought)

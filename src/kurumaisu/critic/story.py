@@ -34,7 +34,8 @@ class Misfit:
     """Measured minus simulated, over the covariate that explains it.
 
     covariate, residual: (n,) points; channel and covariate_name as a reader says them, with their units;
-    explained_by: the id or shape that is blamed; curve: (m, 2) covariate and what the extension adds, if any.
+    explained_by: the id or shape that is blamed; curve: (m, 2) covariate and what the extension adds, if any;
+    band: (m, 3) covariate and the ends of the curve's 90 % interval, if known.
     """
 
     channel: str
@@ -46,6 +47,7 @@ class Misfit:
     bins: Bins
     explained_by: str
     curve: FloatArray | None = None
+    band: FloatArray | None = None
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,8 @@ from kurumaisu.effects.reverse_gain import ReverseGain
 from kurumaisu.effects.saturation import Saturation
 from kurumaisu.effects.sign import Sign
 from kurumaisu.effects.slope import Slope
+from kurumaisu.effects.smooth import CHANNELS, SMOOTH, constant_of, curve, smooth_id, smooth_of
+from kurumaisu.effects.smooth_covariates import CONSTANTS, COVARIATES, MEANINGS, PERIODIC, Follower
 from kurumaisu.effects.steering_law import SteeringLaw
 from kurumaisu.effects.understeer import Understeer
 from kurumaisu.effects.veer import Veer
@@ -108,10 +110,13 @@ class Chain:
 
 
 def by_id(name: str) -> type[Mechanism]:
-    """Return the effect of an id. Raise Error when it is not in the catalogue."""
+    """Return the effect of an id, be it a smooth one. Raise Error when it is neither that nor in the catalogue."""
     for effect in ALL:
         if effect.id == name:
             return effect
+    smooth = smooth_of(name)
+    if smooth is not None:
+        return smooth
     raise Error(f"effects: {name!r} is not in the catalogue: {', '.join(effect.id for effect in ALL)}")
 
 
@@ -162,13 +167,19 @@ def _chosen(settings: tuple[EffectSetting, ...]) -> list[tuple[type[Mechanism], 
     if twice:
         raise Error(f"effects: {twice[0]!r} is given twice")
     found = [(by_id(setting.id), setting.parameters) for setting in settings]
-    return sorted(found, key=lambda pair: ALL.index(pair[0]))
+    return sorted(found, key=lambda pair: (ALL.index(pair[0]), "") if pair[0] in ALL else (len(ALL), pair[0].id))
 
 
 __all__ = [
     "ALL",
     "BASE",
+    "CHANNELS",
+    "CONSTANTS",
+    "COVARIATES",
     "LASER",
+    "MEANINGS",
+    "PERIODIC",
+    "SMOOTH",
     "WORLD",
     "BaseEffect",
     "BeamEffect",
@@ -177,6 +188,7 @@ __all__ = [
     "Context",
     "Echoes",
     "Effect",
+    "Follower",
     "Follows",
     "LaserChain",
     "LaserEffect",
@@ -196,7 +208,10 @@ __all__ = [
     "build_world",
     "by_id",
     "check",
+    "constant_of",
+    "curve",
     "fluctuation",
     "incidence",
     "slanted",
+    "smooth_id",
 ]

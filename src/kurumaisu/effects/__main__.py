@@ -52,6 +52,25 @@ _WORLD = """
 
 The walls are moved when the simulator is reset, for the laser and for contacts alike; the world file is the map.
 """
+_SMOOTH = """
+## What is not in the catalogue
+
+Where something acts that is none of these, the critic extends the model by a curve, which the simulator runs as it
+runs all others: `smooth.CHANNEL.COVARIATE` adds a rate that follows another quantity, while the chair moves, after
+everything else of the stage FLOOR.
+
+```yaml
+effects:
+  - {id: smooth.w.x, parameters: {knot_0: -1.0, knot_1: 0.0, knot_2: 2.0, value_0: 0.0, value_1: 0.02, value_2: 0.02}}
+  - {id: smooth.v.heading, parameters: {period: 6.283185, level: 0.0, cos_1: 0.01, sin_1: 0.0}}
+```
+
+Between knots, which must increase, the curve is straight; beyond the outer ones it is constant. There may be 1 to 64 of
+them, counted from 0. Over a periodic covariate the curve is level + Σ cos_k · cos(2πk · c / period) + sin_k · sin(...),
+counted from 1. Every covariate in the table needs the parameter that stands beside it, too. Any other name is that of
+a quantity that a recording has measured (a column of `covariate.csv`); the simulator does not know it and holds it at
+the parameter `now`, for which the critic writes its mean.
+"""
 
 
 def main() -> None:
@@ -65,7 +84,17 @@ def text() -> str:
     for head, family in ((_BASE, effects.BASE), (_LASER, effects.LASER), (_WORLD, effects.WORLD)):
         parts.append(head)
         parts.append(_table(family))
-    return "\n".join(parts)
+    return "\n".join([*parts, _SMOOTH, _smooth_table()])
+
+
+def _smooth_table() -> str:
+    """Return channels and covariates of smooth effects."""
+    rows = [f"Channels: {', '.join(f'`{name}` [{unit}]' for name, unit in effects.CHANNELS.items())}.", ""]
+    rows += ["| covariate | what it is | parameter besides |", "|---|---|---|"]
+    for name, meaning in effects.MEANINGS.items():
+        constant = effects.CONSTANTS.get(name)
+        rows.append(f"| `{name}` | {meaning} | {f'`{constant[0]}` [{constant[1]}]' if constant else ''} |")
+    return "\n".join(rows) + "\n"
 
 
 def _table(family: Sequence[type[Mechanism]]) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from typing import ClassVar
 
@@ -65,6 +65,8 @@ class Motion:
 
     u: None where the chair does not slip, which is 0 throughout. heading [rad] in the map at the first sample; None
     where nobody knows it: an effect that needs it then goes on from where its own sum of the turns has come.
+    known: what else somebody knows of each step, (n,) each: v_asked, w_asked before all effects, x, y [m], heading
+    [rad], v_f, v_s [V], and quantities of a recording by their names.
     """
 
     dt: float
@@ -72,6 +74,7 @@ class Motion:
     w: FloatArray
     u: FloatArray | None = None
     heading: float | None = None
+    known: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,8 @@ class ChairSimulator:
     def step(self, command: Command) -> Observation:
         """Advance by one physics step with the command held."""
         around = self._world
-        motion = self._plant.from_voltages(_volts(command), float(around.pose[2]))
+        x, y, heading = around.pose[0:1], around.pose[1:2], float(around.pose[2])
+        motion = self._plant.from_voltages(_volts(command), heading, {"x": x, "y": y})
         u = 0.0 if motion.u is None else float(motion.u[0])
         rates, contact = around.drive(float(motion.v[0]), float(motion.w[0]), u)
         self._steps += 1

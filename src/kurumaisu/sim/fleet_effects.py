@@ -55,7 +55,7 @@ class FleetEffects:
         self._plants = {
             row: Plant(_Follower(chosen, law, law), self._step, self._stream(row, 0))
             for row, chosen in enumerate(self._chosen)
-            if _any_of(effects.BASE, chosen)
+            if _any_of(effects.BaseEffect, chosen)
         }
         self.referred = any(plant.effects.reference for plant in self._plants.values())
 
@@ -63,7 +63,7 @@ class FleetEffects:
         """Start the fans' effects anew and return them; keys (models,): what the models are known by for life."""
         self._fans, self._fan_keys = {}, {}
         for place, fan in enumerate(fans):
-            if fan.robot < 0 or not _any_of(effects.LASER, self._chosen[fan.robot]):
+            if fan.robot < 0 or not _any_of(effects.LaserEffect, self._chosen[fan.robot]):
                 continue
             key = int(keys[fan.model.index])
             rng = self._stream(fan.robot, 1 + key, fan.number)
@@ -77,15 +77,16 @@ class FleetEffects:
         """Whether some robot does not move as it is commanded."""
         return bool(self._plants)
 
-    def driven(self, velocities: FloatArray, headings: FloatArray) -> FloatArray:
-        """Return how robots with headings (n,) [rad] move when commanded velocities (n, 3).
+    def driven(self, velocities: FloatArray, poses: FloatArray) -> FloatArray:
+        """Return how robots at poses (n, 4) in the map move when commanded velocities (n, 3).
 
         A leftward speed that is commanded stays as it is.
         """
         driven = velocities.copy()
         for row, plant in self._plants.items():
             v, u, w = velocities[row]
-            motion = plant.from_rates(np.array([v]), np.array([w]), float(headings[row]))
+            x, y, _, heading = poses[row]
+            motion = plant.from_rates(np.array([v]), np.array([w]), float(heading), {"x": x, "y": y})
             slip = 0.0 if motion.u is None else float(motion.u[0])
             driven[row] = motion.v[0], u + slip, motion.w[0]
         return driven
@@ -132,6 +133,5 @@ def _of(robot: Model, entries: Sequence[RobotEffects]) -> tuple[EffectSetting, .
     return tuple(effect for entry in entries if entry.robot in (ALL_ROBOTS, robot.name) for effect in entry.effects)
 
 
-def _any_of(kinds: Sequence[type[Any]], chosen: Sequence[EffectSetting]) -> bool:
-    ids = {kind.id for kind in kinds}
-    return any(effect.id in ids for effect in chosen)
+def _any_of(kind: type[Any], chosen: Sequence[EffectSetting]) -> bool:
+    return any(issubclass(effects.by_id(effect.id), kind) for effect in chosen)

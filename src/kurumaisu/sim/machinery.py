@@ -190,7 +190,7 @@ class Machinery:
         """Return what effects and the floor there make of the drives' velocities (n, 3)."""
         wanted = self.drive.velocities
         if self.effects.moves:
-            wanted = self.effects.driven(wanted, self.frames[self.robot_rows, 3])
+            wanted = self.effects.driven(wanted, self.frames[self.robot_rows])
         if not len(self._slopes):
             return wanted
         return self._slopes.slowed(wanted, self.frames[self.robot_rows], self._sideways, self.interval)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
@@ -51,21 +52,29 @@ class Plant:
         """Samples so far whose voltages stood for two rates."""
         return int(self._translation.ambiguous_samples + self._steering.ambiguous_samples)
 
-    def from_voltages(self, volts: effects.Volts, heading: float | None = None) -> effects.Motion:
-        """Return the motion for voltages; heading [rad] of the chair before them, if somebody knows it."""
+    def from_voltages(
+        self, volts: effects.Volts, heading: float | None = None, known: Mapping[str, FloatArray] | None = None
+    ) -> effects.Motion:
+        """Return the motion for voltages; heading [rad] of the chair before them, if somebody knows it.
+
+        known: what else is known of each step, as Motion has it.
+        """
+        known = {"v_f": volts.v_f, "v_s": volts.v_s, **(known or {})}
         for effect in self.effects.volts:
             volts = effect.apply(volts)
         v = self._translation.rates(volts.v_f, volts.sign_v)
         w = self._steering.rates(volts.v_s, volts.sign_w)
-        return self._respond(v, w, heading)
+        return self._respond(v, w, heading, known)
 
-    def from_rates(self, v: FloatArray, w: FloatArray, heading: float | None = None) -> effects.Motion:
-        """Return the motion for commanded rates, both (n,)."""
+    def from_rates(
+        self, v: FloatArray, w: FloatArray, heading: float | None = None, known: Mapping[str, FloatArray] | None = None
+    ) -> effects.Motion:
+        """Return the motion for commanded rates, both (n,); known: as from_voltages has it."""
         if not self.effects.volts:
-            return self._respond(v, w, heading)
+            return self._respond(v, w, heading, known or {})
         model = self._model
         volts = effects.Volts(model.translation.volts(v), model.steering.volts(w), np.sign(v), np.sign(w))
-        return self.from_voltages(volts, heading)
+        return self.from_voltages(volts, heading, known)
 
     def seen(self, reference: effects.Reference) -> effects.Reference:
         """Return what a reference measures where the truth is as given."""
@@ -73,8 +82,10 @@ class Plant:
             reference = effect.apply(reference)
         return reference
 
-    def _respond(self, v: FloatArray, w: FloatArray, heading: float | None) -> effects.Motion:
-        motion = effects.Motion(self.dt, v, w, heading=heading)
+    def _respond(
+        self, v: FloatArray, w: FloatArray, heading: float | None, known: Mapping[str, FloatArray]
+    ) -> effects.Motion:
+        motion = effects.Motion(self.dt, v, w, heading=heading, known={"v_asked": v, "w_asked": w, **known})
         for effect in self.effects.rates:
             motion = effect.apply(motion)
         return motion

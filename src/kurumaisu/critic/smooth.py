@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rivals of the catalogue: curves over something that is known of the drive, in case they explain it better.
+
+A curve's coefficients are normal before the data, so its evidence is that of a linear model; its size and roughness
+are weighed over a small grid. Occam decides: what a catalogue effect explains with one parameter, a curve explains
+with eight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from kurumaisu import effects
+from kurumaisu.critic import replay
+from kurumaisu.critic.drive import Drive
+from kurumaisu.critic.evidence import Fit, Problem
+from kurumaisu.critic.noise import whitened
+from kurumaisu.critic.prior import Z_HIGH, Z_LOW, Z_USUAL
+from kurumaisu.critic.smooth_basis import Basis, bases
+from kurumaisu.critic.smooth_columns import Sensitivity
+from kurumaisu.params import EffectSetting, Model
+from kurumaisu.types import FloatArray
+
+# Sizes of a curve, whitened: with the catalogue's prior of the size of an effect, nine tenths up to Z_USUAL.
+_SIZES = np.concatenate([np.geomspace(Z_LOW, Z_USUAL, 8), np.geomspace(Z_USUAL, Z_HIGH, 5)[1:]])
+_LOG_WEIGHTS = np.log(np.concatenate([np.full(8, 0.9 / 8), np.full(4, 0.1 / 4)]))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve over a covariate in one channel; columns: where it stands among a design's."""
+
+    channel: str
+    basis: Basis
+    columns: slice
+
+    @property
+    def id(self) -> str:
+        """Return the id of the effect that it is."""
+        return effects.smooth_id(self.channel, self.basis.covariate)
+
+
+@dataclass(frozen=True)
+class Belief:
+    """Log evidence of a curve over its absence [nat]; prior (k, k): of its coefficients, at the best size."""
+
+    nats: float
+    prior: FloatArray
+
+
+class Design:
+    """The whitened columns of all curves about simulated drives."""
+
+    def __init__(self, problem: Problem, settings: Sequence[EffectSetting]) -> None:
+        taken = {setting.id for setting in problem.model.effects}
+        self.curves: list[Curve] = []
+        at = 0
+        for basis in bases(problem.drives, problem.model, settings):
+            for channel in effects.CHANNELS:
+                if effects.smooth_id(channel, basis.covariate) not in taken:
+                    self.curves.append(Curve(channel, basis, slice(at, at + basis.size)))
+                    at += basis.size
+        self.columns = columns(problem, settings, self.curves)
+
+
+def columns(problem: Problem, settings: Sequence[EffectSetting], curves: Sequence[Curve]) -> FloatArray:
+    """Return the whitened columns of curves about drives simulated with some effects, (rows, k)."""
+    parts = []
+    for drive in problem.drives:
+        own = raw_columns(drive, problem.model, settings, curves)
+        parts.append(whitened(drive, own, problem.noise)[0])
+    return np.concatenate(parts)
+
+
+def raw_columns(drive: Drive, model: Model, settings: Sequence[EffectSetting], curves: Sequence[Curve]) -> FloatArray:
+    """Return the derivative of a drive's increments by the coefficients of curves, (3 m, k)."""
+    motion = replay.motion(drive, model, settings)
+    sensitivity = Sensitivity(drive, motion)
+    matrices = {basis.covariate: basis.matrix(basis.samples(motion)) for basis in (curve.basis for curve in curves)}
+    return np.column_stack([sensitivity.increments(curve.channel, matrices[curve.basis.covariate]) for curve in curves])
+
+
+def beside(problem: Problem, fit: Fit, of: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the residual at a fit and columns `of`, both without what the fit's own parameters could take up."""
+    y, slopes = problem.linearised(fit.terms, fit.values, fit.terms)
+    if not slopes.shape[1]:
+        return y, of
+    left, sizes, _ = np.linalg.svd(slopes, full_matrices=False)
+    own = left[:, sizes > 1e-6 * max(sizes[0], 1e-12)]
+    return y - own @ (own.T @ y), of - own @ (own.T @ of)
+
+
+def belief(gram: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> Belief:
+    """Return how much a curve explains: b = X'y, gram = X'X of its whitened columns; any of the priors may hold."""
+    found = []
+    for scaled, axes, sizes in _axes(gram, priors):
+        found += [(float(nats), size**2 * scaled) for nats, size in zip(_nats(sizes, axes.T @ b), _SIZES, strict=True)]
+    weighed = [nats + weight for (nats, _), weight in zip(found, np.tile(_LOG_WEIGHTS, len(priors)), strict=True)]
+    best = int(np.argmax(weighed))
+    return Belief(float(logsumexp(weighed) - np.log(len(priors))), found[best][1])
+
+
+def null_evidence(design: Design, columns: FloatArray, draws: int) -> FloatArray:
+    """Return the evidence of the best curve in draws of b ~ N(0, G), noise on this very design, (draws,) [nat]."""
+    values, vectors = np.linalg.eigh(columns.T @ columns)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    b = np.random.default_rng(0).standard_normal((draws, len(root))) @ root.T
+    best = np.full(draws, -np.inf)
+    for curve in design.curves:
+        own = columns[:, curve.columns]
+        parts = [
+            logsumexp(_nats(sizes, b[:, curve.columns] @ axes) + _LOG_WEIGHTS, axis=-1)
+            for _, axes, sizes in _axes(own.T @ own, curve.basis.priors)
+        ]
+        best = np.maximum(best, logsumexp(parts, axis=0) - np.log(len(parts)))
+    return best
+
+
+def _axes(gram: FloatArray, priors: Sequence[FloatArray]) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Yield, for each prior: it, scaled to a signal of norm 1; its own axes in b, (k, k); the gram along them, (k,)."""
+    for prior in priors:
+        scaled = prior / max(float(np.sum(gram * prior)), 1e-12)
+        values, vectors = np.linalg.eigh(scaled)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        sizes, turns = np.linalg.eigh(root.T @ gram @ root)
+        yield scaled, root @ turns, np.maximum(sizes, 0.0)
+
+
+def _nats(sizes: FloatArray, c: FloatArray) -> FloatArray:
+    """Return the log evidence for each of _SIZES, (..., sizes); sizes (k,), c (..., k): gram and b along own axes."""
+    spread = 1 + np.multiply.outer(_SIZES**2, sizes)
+    gained = (c**2)[..., None, :] * (_SIZES[:, None] ** 2 / spread)
+    return np.asarray(0.5 * (gained - np.log(spread)).sum(axis=-1))

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Verdict, words and figure for what is outside the catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic import explain, replay, smooth_shapes, smooth_words
+from kurumaisu.critic.decide import Decision
+from kurumaisu.critic.drive import GRID, Drive
+from kurumaisu.critic.evidence import Problem
+from kurumaisu.critic.explain import Criticism
+from kurumaisu.critic.extended import process_noise
+from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, felt_share, moved_share
+from kurumaisu.critic.misfit import bins
+from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.next_experiment import Proposal
+from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.smooth_fit import Extension, extend
+from kurumaisu.critic.smooth_judge import Beyond
+from kurumaisu.critic.story import Misfit, Rival
+from kurumaisu.critic.verdict import Gain, Unknown
+from kurumaisu.critic.words import NORMAL90
+from kurumaisu.types import FloatArray
+
+_LISTED = 3  # curves that may act, at most
+_PLAUSIBLE = 0.02  # posterior from which another curve is listed
+
+
+def criticism(
+    recording: Recording, made: Decision, worth: Gain | None, drives: Sequence[Drive], proposal: Proposal
+) -> Criticism:
+    """Return the criticism of drives in which a curve explains more than the catalogue."""
+    problem, found, beyond = made.problem, made.found, made.beyond
+    extension = beyond.extension
+    assert extension is not None
+    # What acts beside the curve is judged with the curve in the model.
+    curved = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
+    fit = curved.fit_candidates(extension.fit.candidates, extension.fit.start)
+    inner = replace(found, fits=(fit, *found.fits), confounded=(), false_alarm=beyond.false_alarm)
+    beside = explain.criticism(recording, replace(made, problem=curved, found=inner), worth, drives, proposal)
+    share = moved_share(problem, extension.settings, extension.fit.settings)
+    felt = felt_share(problem, extension.settings, extension.fit.settings)
+    gains = worth is not None and worth.log_density_per_sample.lo90 > 0
+    told = _told(extension, beyond, share)
+    if not gains or (share < MATERIAL and felt < FELT):
+        small = f"{told} It is too small to matter, or was not confirmed on data held out."
+        story = replace(beside.story, unexplained=(small, *beside.story.unexplained))
+        return replace(beside, story=story, model=problem.model)
+    verdict = replace(beside.verdict, verdict="unknown", unknown=tuple(_unknowns(problem, beyond)))
+    settings = (*extension.settings, process_noise(problem))
+    story = replace(
+        beside.story,
+        headline=smooth_words.headline(extension),
+        details=(told, *beside.story.details),
+        overlays=explain.overlays(recording, problem.model, extension.settings),
+        misfits=(figure(problem, extension), *(beside.story.misfits if fit.ids else ())),
+        rivals=tuple(_rivals(found, beyond)),
+    )
+    return Criticism(verdict, story, problem.model, settings)
+
+
+def figure(problem: Problem, extension: Extension) -> Misfit:
+    """Return the residual without the curve over the covariate, and the curve with its band."""
+    name, covariate, unit = smooth_words.covariate(extension.curve)
+    x, residual = (
+        np.concatenate(parts)
+        for parts in zip(*(_samples(problem, drive, extension) for drive in problem.drives), strict=True)
+    )
+    at = smooth_shapes.grid(extension)
+    mean, sd = smooth_shapes.band(extension, at)
+    return Misfit(
+        channel=smooth_words.CHANNELS[extension.curve.channel],
+        unit=effects.CHANNELS[extension.curve.channel],
+        covariate_name=covariate,
+        covariate_unit=unit,
+        covariate=x,
+        residual=residual,
+        bins=bins(x, residual),
+        explained_by=f"not in the catalogue, over {name}",
+        curve=np.column_stack([at, mean]),
+        band=np.column_stack([at, mean - NORMAL90 * sd, mean + NORMAL90 * sd]),
+    )
+
+
+def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[FloatArray, FloatArray]:
+    """Return covariate and residual rate per increment in which the chair moves throughout."""
+    channel = list(effects.CHANNELS).index(extension.curve.channel)
+    motion = replay.motion(drive, problem.model, extension.fit.settings)
+    values = extension.curve.basis.samples(motion)
+    middle = np.clip(((drive.times[1:] + drive.times[:-1]) / 2 - drive.start) / GRID, 0, len(values) - 1).astype(int)
+    left = drive.measured - problem.simulated(drive, extension.fit.settings)
+    x = values[middle]
+    if "period" in extension.curve.basis.constants:
+        x = np.mod(x, extension.curve.basis.constants["period"])
+    use = np.isfinite(x) & ((motion.v != 0) | (motion.w != 0))[middle]
+    return x[use], (left[:, channel] / np.diff(drive.times))[use]
+
+
+def _told(extension: Extension, beyond: Beyond, share: float) -> str:
+    curve = extension.curve
+    where = f"{smooth_words.channel(curve)} over {smooth_words.covariate(curve)[0]}"
+    better = f"explains {beyond.rivalry.lead:.1f} nats more than the best set of the catalogue"
+    return (
+        f"Outside the catalogue: {where} ({smooth_words.shape(extension)}) {better}; "
+        f"within {HORIZON:g} s it moves the chair by {share:.1%} of its way or turn."
+    )
+
+
+def _unknowns(problem: Problem, beyond: Beyond) -> Iterator[Unknown]:
+    """Yield the curve, and those that could stand in for it."""
+    p = beyond.rivalry.p
+    seen: set[str] = set()
+    for rival in beyond.rivalry.rivals:
+        if rival.curve.id in seen or len(seen) == _LISTED or (seen and p[rival.curve.id] < _PLAUSIBLE):
+            continue
+        seen.add(rival.curve.id)
+        own = extend(problem, rival.fit, rival.curve, rival.belief.prior)
+        name = smooth_words.covariate(rival.curve)[0]
+        yield Unknown(smooth_words.channel(rival.curve), name, smooth_words.shape(own), min(p[rival.curve.id], 1.0))
+
+
+def _rivals(found: Naming, beyond: Beyond) -> Iterator[Rival]:
+    """Yield the best set of the catalogue, and the best other curves."""
+    best = beyond.rivalry.rivals[0]
+    yield Rival(" + ".join(sorted(found.best.ids)) or "no effect", -beyond.rivalry.lead, "the best of the catalogue")
+    seen = {best.curve.id}
+    for rival in beyond.rivalry.rivals:
+        if rival.curve.id not in seen and len(seen) <= _LISTED:
+            seen.add(rival.curve.id)
+            beside = "".join(f" + {name}" for name in sorted(rival.fit.ids))
+            name = f"{smooth_words.channel(rival.curve)} over {smooth_words.covariate(rival.curve)[0]}{beside}"
+            yield Rival(name, rival.worth - best.worth, "a curve over something else explains less")

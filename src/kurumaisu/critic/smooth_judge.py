@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Is it outside the catalogue? Curves weighed twice, the second time beside a catalogue searched with one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic import naming, replay
+from kurumaisu.critic.evidence import Problem
+from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.smooth import Design, beside, null_evidence
+from kurumaisu.critic.smooth_fit import Extension, extend
+from kurumaisu.critic.smooth_search import Rivalry, compare
+
+_ALARM = 0.01  # share of null draws with as much evidence above which a curve is not believed
+_HINT = 0.0  # [nat] of lead, where slow noise is not believed, from which the noise is estimated about a curve
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """What was found outside the catalogue.
+
+    rivalry: all curves; extension: the best one with the effects beside it, None where the catalogue suffices;
+    false_alarm: share of null draws on this very design in which some curve has as much evidence.
+    """
+
+    rivalry: Rivalry
+    extension: Extension | None
+    false_alarm: float
+
+
+def hinted(problem: Problem, found: Naming) -> Extension | None:
+    """Return the best set with a curve if one may well act, for an estimate of the noise about it."""
+    if not _asked(problem):
+        return None
+    quick = replace(problem.noise, slow_v=0.0, slow_lateral=0.0, slow_w=0.0)
+    easy = problem.changed(noise=quick)
+    rivalry = compare(easy, found)
+    return _extension(easy, rivalry) if rivalry.lead > _HINT else None
+
+
+def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> Beyond:
+    """Return whether a curve beats the catalogue, and the best one with the effects that act beside it."""
+    if not _asked(problem):
+        return Beyond(Rivalry((), -np.inf, {}, dict(found.p)), None, 1.0)
+    progress("trying what is not in the catalogue")
+    rivalry = compare(problem, found)
+    if rivalry.winner is None:
+        return Beyond(rivalry, None, 1.0)
+    curved = replay.extend(problem.model, [_extension(problem, rivalry).unknown])
+    # With the curve in, sets may be best that nobody would have tried without it.
+    other = naming.search(problem.changed(model=curved), progress).best
+    if other.candidates not in {fit.candidates for fit in found.fits}:
+        more = problem.fit_candidates(other.candidates, other.start)
+        found = replace(found, fits=(*found.fits, more))
+    rivalry = compare(problem, found, also=other.candidates)
+    if rivalry.winner is None:
+        return Beyond(rivalry, None, 1.0)
+    alarm = false_alarm(problem, rivalry)
+    return Beyond(rivalry, _extension(problem, rivalry) if alarm <= _ALARM else None, alarm)
+
+
+def false_alarm(problem: Problem, rivalry: Rivalry) -> float:
+    """Return how often noise alone gives some curve, beside the same effects, the evidence of the best one."""
+    best = rivalry.rivals[0]
+    design = Design(problem, best.fit.settings)
+    drawn = null_evidence(design, beside(problem, best.fit, design.columns)[1], naming.NULLS)
+    return float(np.mean(drawn >= best.belief.nats))
+
+
+def _asked(problem: Problem) -> bool:
+    return problem.ids is None or effects.SMOOTH in problem.ids
+
+
+def _extension(problem: Problem, rivalry: Rivalry) -> Extension:
+    best = rivalry.rivals[0]
+    return extend(problem, best.fit, best.curve, best.belief.prior)

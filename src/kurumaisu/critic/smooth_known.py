@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a recording knows beside the rates, on a drive's grid: where the chair was, the voltages, further columns."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu.critic.drive import GRID, Drive
+from kurumaisu.critic.recording import Run, Series
+from kurumaisu.types import FloatArray
+
+
+def informed(drive: Drive, run: Run) -> Drive:
+    """Return the drive with what its run knows on the grid.
+
+    Poses are the reference's, not the simulated ones: those drift away from where the chair was. Voltages are held,
+    further quantities are taken to change evenly between their samples.
+    """
+    middle = drive.start + GRID * (np.arange(len(drive.v)) + 0.5)
+    known: dict[str, FloatArray] = {}
+    for name, series in run.covariates.items():
+        known[name] = np.interp(middle, series.t, series.values[:, 0])
+    for i, name in enumerate(("x", "y", "heading")):
+        known[name] = np.interp(middle, drive.times, drive.poses[:, i])
+    if run.voltage is not None:
+        for name in ("v_f", "v_s"):
+            known[name] = _held(run.voltage, name, middle)
+    return replace(drive, known=known)
+
+
+def _held(series: Series, column: str, at: FloatArray) -> FloatArray:
+    index = np.searchsorted(series.t, at, side="right") - 1
+    return np.asarray(series.column(column)[np.maximum(index, 0)])

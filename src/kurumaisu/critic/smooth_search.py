@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Curves against the catalogue on the same data: the posterior over sets of effects with and without a curve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from kurumaisu.critic.catalogue import Candidate
+from kurumaisu.critic.evidence import Fit, Problem
+from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.prior import log_prior
+from kurumaisu.critic.smooth import Belief, Curve, Design, belief, beside
+from kurumaisu.types import FloatArray
+
+BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
+_ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
+_FITS = 10  # sets of the catalogue beside which curves are tried
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A set of effects with a curve beside it: log posterior, not normalised."""
+
+    fit: Fit
+    curve: Curve
+    belief: Belief
+    worth: float
+
+
+@dataclass(frozen=True)
+class Rivalry:
+    """Result of the comparison.
+
+    rivals: best first; lead: of the best one over the best set without a curve [nat]; p: posterior of each curve by
+    the id of its effect; p_effects: of each effect of the catalogue, with curves in the running.
+    """
+
+    rivals: tuple[Rival, ...]
+    lead: float
+    p: dict[str, float]
+    p_effects: dict[str, float]
+
+    @property
+    def winner(self) -> Rival | None:
+        """Return the best set with a curve, if it beats the catalogue."""
+        return self.rivals[0] if self.rivals and self.lead > BEYOND else None
+
+
+def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozenset()) -> Rivalry:
+    """Try every curve beside the best sets of the catalogue, beside none, and beside one more."""
+    count = len({candidate.id for candidate in problem.candidates})
+    design = Design(problem, found.best.settings)
+    bare = [(fit, fit.score + log_prior(len(fit.candidates), count)) for fit in found.fits]
+    rivals = sorted(_rivals(problem, design, _tried(bare, also)), key=lambda rival: -rival.worth)
+    if not rivals:
+        return Rivalry((), -np.inf, {}, dict(found.p))
+    plain = np.array([worth + np.log1p(-_ODDS) for _, worth in bare])
+    curved = np.array([rival.worth for rival in rivals])
+    total = logsumexp(np.concatenate([plain, curved]))
+    p: dict[str, float] = {}
+    for rival in rivals:
+        p[rival.curve.id] = p.get(rival.curve.id, 0.0) + float(np.exp(rival.worth - total))
+    p_effects = {
+        name: float(
+            sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if name in fit.ids)
+            + sum(np.exp(rival.worth - total) for rival in rivals if name in rival.fit.ids)
+        )
+        for name in found.p
+    }
+    return Rivalry(tuple(rivals), float(curved[0] - plain.max()), p, p_effects)
+
+
+def _tried(bare: Sequence[tuple[Fit, float]], also: frozenset[Candidate]) -> list[tuple[Fit, float]]:
+    """Return the best sets, the empty one, and one more."""
+    ranked = sorted(bare, key=lambda pair: -pair[1])
+    wanted: set[frozenset[Candidate]] = {frozenset(), also}
+    return ranked[:_FITS] + [pair for pair in ranked[_FITS:] if pair[0].candidates in wanted]
+
+
+def _rivals(problem: Problem, design: Design, fits: Sequence[tuple[Fit, float]]) -> Iterator[Rival]:
+    share = float(np.log(_ODDS / max(len(design.curves), 1)))
+    for fit, worth in fits:
+        y, columns = beside(problem, fit, design.columns)
+        for curve, gram, b in _parts(design, y, columns):
+            found = belief(gram, b, curve.basis.priors)
+            yield Rival(fit, curve, found, worth + found.nats + share)
+
+
+def _parts(design: Design, y: FloatArray, columns: FloatArray) -> Iterator[tuple[Curve, FloatArray, FloatArray]]:
+    for curve in design.curves:
+        own = columns[:, curve.columns]
+        yield curve, own.T @ own, own.T @ y

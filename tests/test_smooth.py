@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Curves against the catalogue: derivatives, evidence and words by themselves, then whole criticisms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import unknown_effects as hidden
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal
+
+from kurumaisu.critic import pipeline, replay, smooth, smooth_shapes, smooth_words
+from kurumaisu.critic.drive import prepare
+from kurumaisu.critic.evidence import Problem
+from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.prior import Z_HIGH, Z_LOW, Z_USUAL
+from kurumaisu.critic.smooth_basis import Basis
+from kurumaisu.critic.smooth_fit import Extension, extend
+from kurumaisu.critic.smooth_judge import false_alarm
+from kurumaisu.critic.smooth_known import informed
+from kurumaisu.critic.smooth_search import compare
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+MD100 = shipped("launch/md100.yaml")
+
+
+def drives_of(recording):
+    return [informed(prepare(run, hidden.MODEL), run) for run in recording.runs]
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """Return a problem with the noise known, and nothing hidden."""
+    case = hidden.make(hidden.KINDS["carpet edge"], 10.0, 3, seconds=30.0, runs=2)
+    return Problem(drives_of(case.null), hidden.MODEL, hidden.USUAL)
+
+
+@pytest.mark.parametrize("beside", [(), (EffectSetting("base.lag_v", {"tau": 0.2}),)], ids=["alone", "with a lag"])
+def test_columns_are_the_derivative_of_the_replay(problem, beside):
+    drive = problem.drives[0]
+    design = smooth.Design(problem, beside)
+    assert {curve.basis.covariate for curve in design.curves} >= {"v", "w", "time", "heading", "x", "y", "temperature"}
+    for curve in design.curves:
+        wanted = smooth.raw_columns(drive, problem.model, beside, [curve])
+        coefficients = np.random.default_rng(1).standard_normal(curve.basis.size) * 1e-4
+
+        def moved(sign, curve=curve, coefficients=coefficients):
+            setting = EffectSetting(curve.id, curve.basis.parameters(sign * coefficients))
+            return replay.increments(drive, problem.model, (*beside, setting)).ravel()
+
+        np.testing.assert_allclose((moved(1) - moved(-1)) / 2, wanted @ coefficients, atol=2e-9, err_msg=curve.id)
+
+
+def test_evidence_is_that_of_a_normal_distribution():
+    """Integrated by hand: y ~ N(0, I + X K X') over the sizes that the prior allows, each K as likely."""
+    rng = np.random.default_rng(2)
+    x, y = rng.standard_normal((40, 3)), rng.standard_normal(40) * 2
+    priors = [np.diag([1.0, 2.0, 3.0]), np.array([[2.0, 1, 0], [1, 2.0, 0], [0, 0, 1.0]])]
+    nulls = multivariate_normal(np.zeros(40)).logpdf(y)
+    sizes = np.geomspace(Z_LOW, Z_HIGH, 4000)
+    density = np.where(sizes < Z_USUAL, 0.9 / np.log(Z_USUAL / Z_LOW), 0.1 / np.log(Z_HIGH / Z_USUAL))
+    weights = density / density.sum()
+    total = []
+    for prior in priors:
+        scaled = x @ prior @ x.T / np.trace(x @ prior @ x.T)
+        values, vectors = np.linalg.eigh(scaled)
+        c = vectors.T @ y
+        spread = 1 + np.multiply.outer(sizes**2, np.maximum(values, 0))
+        total.append(logsumexp(-0.5 * (c**2 / spread + np.log(spread)).sum(axis=1) + 0.5 * c @ c, b=weights))
+    one = 9.0 * priors[0] / np.trace(x @ priors[0] @ x.T)
+    by_hand = multivariate_normal(np.zeros(40), np.eye(40) + x @ one @ x.T).logpdf(y) - nulls
+    own = smooth.belief(x.T @ x, x.T @ y, [priors[0]])
+    assert own.nats == pytest.approx(total[0], abs=0.2)  # a coarse grid stands for the integral
+    assert own.nats > by_hand + np.log(0.9 / 8) - 1e-9
+    both = smooth.belief(x.T @ x, x.T @ y, priors).nats
+    assert both == pytest.approx(logsumexp(total) - np.log(2), abs=0.2)
+
+
+def test_null_draws_have_the_evidence_of_noise(problem):
+    """The quick null by b ~ N(0, G) against whole draws of the whitened residual."""
+    design = smooth.Design(problem, ())
+    quick = smooth.null_evidence(design, design.columns, 400)
+    rng = np.random.default_rng(5)
+    slow = []
+    for _ in range(40):
+        b = design.columns.T @ rng.standard_normal(len(design.columns))
+        parts = [(design.columns[:, c.columns], b[c.columns], c.basis.priors) for c in design.curves]
+        slow.append(max(smooth.belief(own.T @ own, of, priors).nats for own, of, priors in parts))
+    assert np.median(slow) == pytest.approx(np.median(quick), abs=0.6)
+    assert np.quantile(quick, 0.99) < 7.0
+
+
+@pytest.mark.parametrize("name", hidden.KINDS)
+def test_each_unknown_kind_is_found_where_it_is(name):
+    """With the noise known: channel and covariate first, and far above whatever the catalogue could say."""
+    kind = hidden.KINDS[name]
+    case = hidden.make(kind, 20.0, 1001, seconds=40.0, runs=2)
+    problem = Problem(drives_of(case.recording), hidden.MODEL, hidden.USUAL)
+    rivalry = compare(problem, Naming((problem.fit_candidates((), {}),), {}, (), 1.0))
+    assert rivalry.rivals[0].curve.id == f"smooth.{kind.name}.{kind.covariate}"
+    assert rivalry.lead > 20
+
+
+def test_their_null_is_left_alone():
+    """The kinds above share drives and noise, so they have one null."""
+    case = hidden.make(hidden.KINDS["gully"], 20.0, 1001, seconds=40.0, runs=2)
+    problem = Problem(drives_of(case.null), hidden.MODEL, hidden.USUAL)
+    assert compare(problem, Naming((problem.fit_candidates((), {}),), {}, (), 1.0)).winner is None
+
+
+def test_what_the_catalogue_explains_is_left_to_it():
+    case = hidden.make(hidden.KINDS["gully"], 10.0, 1002, seconds=40.0, runs=2, gain_w=0.06)
+    problem = Problem(drives_of(case.null), hidden.MODEL, hidden.USUAL)
+    empty, right = problem.fit_candidates((), {}), problem.fit(["base.gain_w"], {})
+    rivalry = compare(problem, Naming((right, empty), {"base.gain_w": 1.0}, (), 0.0))
+    assert rivalry.winner is None
+    assert rivalry.p_effects["base.gain_w"] > 0.95
+    # Without the right effect the same drives look as if something unknown followed the yaw rate.
+    blind = compare(problem, Naming((empty,), {}, (), 1.0))
+    assert blind.winner.curve.id in ("smooth.w.w", "smooth.w.abs_w")
+    assert false_alarm(problem, blind) == 0.0
+
+
+def test_a_curve_and_an_effect_of_the_catalogue_are_fitted_together():
+    case = hidden.make(hidden.KINDS["corrugated floor"], 30.0, 1003, seconds=40.0, runs=2, gain_w=0.06)
+    problem = Problem(drives_of(case.recording), hidden.MODEL, hidden.USUAL)
+    right = problem.fit(["base.gain_w"], {})
+    best = compare(problem, Naming((right,), {"base.gain_w": 1.0}, (), 0.0)).rivals[0]
+    extension = extend(problem, best.fit, best.curve, best.belief.prior)
+    assert extension.fit.values[0] == pytest.approx(0.06, abs=4 * extension.fit.sds[0])
+    assert smooth_words.shape(extension).startswith("periodic, period 2 pi/3, amplitude")
+    size = smooth_shapes.shape_of(extension).size
+    assert size[1] < abs(case.size) * 1.05
+    assert size[2] > abs(case.size) * 0.95
+    left = [d.measured - problem.simulated(d, extension.settings) for d in problem.drives]
+    white = np.concatenate(
+        [smooth.whitened(d, r.reshape(-1, 1), problem.noise)[0] for d, r in zip(problem.drives, left, strict=True)]
+    )
+    assert float(np.mean(white**2)) == pytest.approx(1.07, abs=0.07)
+
+
+def drawn(law, sd):
+    """Return an extension whose curve is a law of the covariate, known to sd."""
+    knots = np.linspace(0.0, 4.0, 8)
+    basis = Basis("time", knots, {}, (), 0.0, 4.0)
+    curve = smooth.Curve("v", basis, slice(0, 8))
+    return Extension(None, curve, np.eye(8), np.array([law(k) for k in knots]), sd**2 * np.eye(8))
+
+
+@pytest.mark.parametrize(
+    ("law", "kind", "place", "size"),
+    [
+        (lambda t: 0.01 * t, "line", 2.0, 0.04),
+        (lambda t: 0.02 * (t > 2.2), "step", 2.3, 0.02),
+        (lambda t: -0.02 * max(t - 2.0, 0), "threshold", 2.0, -0.04),
+        (lambda t: 0.03 * np.exp(-(((t - 1.5) / 0.6) ** 2)), "bump", 1.5, 0.03),
+    ],
+)
+def test_shapes_are_told_with_place_and_size(law, kind, place, size):
+    found = smooth_shapes.shape_of(drawn(law, 0.001))
+    assert found.kind == kind
+    assert found.place[0] == pytest.approx(place, abs=0.35)
+    assert found.size[0] == pytest.approx(size, rel=0.15)
+    assert found.size[1] < found.size[0] < found.size[2]
+
+
+def criticise(recording):
+    return pipeline.criticise(recording, MD100, lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def carpet():
+    case = hidden.make(hidden.KINDS["turning costs speed"], 25.0, 1004, seconds=40.0, runs=2)
+    return case, criticise(case.recording)
+
+
+def test_an_unknown_effect_is_said_to_be_one(carpet, tmp_path):
+    criticism = carpet[1]
+    verdict = criticism.verdict
+    assert verdict.verdict == "unknown"
+    assert not [cause for cause in verdict.causes if cause.p >= 0.9]
+    assert (verdict.unknown[0].channel, verdict.unknown[0].covariate) == ("base.v", "|w|")
+    assert verdict.unknown[0].shape.startswith(("threshold at", "monotone"))
+    assert verdict.gain.log_density_per_sample.lo90 > 0
+    pipeline.write(criticism, MD100, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Outside the catalogue" in page
+    assert "extension, upper end" not in page  # the data are in the link
+    (setting, _) = load_model(tmp_path / "extended.yaml").effects
+    assert setting.id == "smooth.v.abs_w"
+
+
+def test_the_extended_model_leaves_nothing_to_find(carpet):
+    """The same drives judged against the extended model, with the noise known: neither curve nor gain is left."""
+    case, criticism = carpet
+    settings = tuple(setting for setting in criticism.settings if setting.id.startswith("smooth."))
+    problem = Problem(drives_of(case.recording), replay.extend(hidden.MODEL, settings), hidden.USUAL)
+    assert compare(problem, Naming((problem.fit_candidates((), {}),), {}, (), 1.0)).lead < 0
+
+
+def test_columns_of_words_are_no_covariates_and_constant_ones_neither():
+    case = hidden.make(hidden.KINDS["gully"], 10.0, 1005, seconds=30.0, runs=2)
+    constant = {"temperature": lambda s: replace(s, values=np.full_like(s.values, 20.0))}
+    runs = tuple(
+        replace(run, covariates={name: constant[name](series) for name, series in run.covariates.items()})
+        for run in case.null.runs
+    )
+    problem = Problem(drives_of(replace(case.null, runs=runs)), hidden.MODEL, hidden.USUAL)
+    assert "temperature" not in {curve.basis.covariate for curve in smooth.Design(problem, ()).curves}
