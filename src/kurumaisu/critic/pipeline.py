@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.critic import explain, gain, naming, noise, sanity
-from kurumaisu.critic.drive import Drive, prepare
+from kurumaisu.critic.drive import Drive, driven, prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
+from kurumaisu.critic.laser.merge import with_laser
+from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.verdict import write_verdict
@@ -32,6 +34,8 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
     model = load_model(model_file)
     if not assume_law and recording.model is None and all(run.voltage is None for run in recording.runs):
         model = follow_commands(model)
+    if not any(driven(run) for run in recording.runs):
+        return with_laser(explain.undriven(recording, model), criticise_laser(recording, model, progress))
     drives = {run.name: prepare(run, model) for run in recording.runs}
     train = [drives[name] for name in recording.train]
     test = [drives[name] for name in recording.test]
@@ -53,7 +57,8 @@ def criticise(recording: Recording, model_file: Path, progress: Progress, *, ass
     baseline = _noise(train, model, empty, recording.truth, project=False)
     splits = gain.folds(train, test)
     worth = gain.measure(model, splits, found.best, baseline, final) if splits and found.best.ids else None
-    return explain.criticism(recording, problem, found, worth, train + test)
+    base = explain.criticism(recording, problem, found, worth, train + test)
+    return with_laser(base, criticise_laser(recording, model, progress))
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
