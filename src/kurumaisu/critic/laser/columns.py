@@ -162,7 +162,7 @@ class Marks:
         pairs: list[dict[str, float]] = [{}]
         grids: dict[str, list[float]] = {}
         for parameter in shaping:
-            grid = _grid(parameter)
+            grid = _grid(parameter, float(np.ptp(self._shots.stamps)) or 1.0)
             units = np.array([_unit(self._slope(effect, acting[0], {parameter.name: value})) for value in grid])
             sizes = np.linalg.svd(units, compute_uv=False)
             rank = int(np.sum(sizes > _RANK * sizes[0]))
@@ -174,13 +174,15 @@ class Marks:
         return pairs, grids
 
 
-def _grid(parameter: Parameter) -> list[float]:
-    """Return values of a parameter that only shapes an effect."""
-    if parameter.lower > 0:
+def _grid(parameter: Parameter, span: float) -> list[float]:
+    """Return values of a parameter that only shapes an effect; span [s]: of the scans, for a parameter in seconds."""
+    if parameter.unit == "s":
+        values = span * 2.0 ** np.arange(-4, 2.1, 0.5)
+    elif parameter.lower > 0:
         values = parameter.null * 2.0 ** np.arange(-3, 1.6, 0.25)
     else:
         values = parameter.null + parameter.scale * np.arange(0, 3.1, 0.5)
-    return [float(value) for value in values if parameter.lower <= value <= parameter.upper]
+    return [float(value) for value in values if parameter.lower <= value <= parameter.upper] or [parameter.null]
 
 
 def _unit(column: FloatArray) -> FloatArray:

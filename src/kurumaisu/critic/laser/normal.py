@@ -10,8 +10,9 @@ import numpy as np
 
 from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
-from kurumaisu.critic.laser.shots import Shots, look, predict
-from kurumaisu.critic.laser.trust import hats, trusted
+from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict
+from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
+from kurumaisu.geometry import compose
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
@@ -56,6 +57,7 @@ class Assembly:
         for _ in range(_SHIFTS):
             self._linearise(self._moved())
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
+        self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base)
         self.forms, self.columns = self.marks.forms()
 
     def _linearise(self, shots: Shots) -> None:
@@ -182,6 +184,18 @@ class Assembly:
             return np.empty((len(one), 0)), np.hstack([one, poses]), last
         own = (self.hats[k].weights[:, :, np.newaxis] * poses[:, np.newaxis, :]).reshape(len(one), -1)
         return own, one, last
+
+    def random_columns(self, k: int) -> FloatArray:
+        """Return (b, q) what the readings of a scan do by its common mode and by errors of its reference poses."""
+        own, shared, _ = self._rows(k, None)
+        return np.hstack([shared[:, :1], own, shared[:, 1:]])
+
+    def origins(self) -> tuple[FloatArray, FloatArray]:
+        """Return poses (k, b, 3) of the laser and bearings (k, b) [rad] at which beams leave it, by the model."""
+        beams = self.marks.seen.beams
+        poses = poses_at(self.shots, np.array([each.times for each in beams]))
+        mounts = np.array([each.mount for each in beams])[:, np.newaxis, :]
+        return compose(poses, mounts), np.array([each.bearings for each in beams])
 
     def _by_pose(self) -> FloatArray:
         """Return the change (k, b, 3) of the mean readings per metre and radian of the pose."""

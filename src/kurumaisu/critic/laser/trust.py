@@ -31,12 +31,15 @@ def edges(seen: Look, increment: float) -> BoolArray:
     return wide
 
 
+def trusted_place(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
+    """Return (k, b) which beams meet a wall where a reading may speak about the mean, whatever they read."""
+    inside = (base > shots.laser.range_min + _GATE) & (base < shots.laser.range_max - _GATE)
+    return np.asarray(inside & ~edges(seen, shots.laser.angle_increment) & (seen.incidence < _STEEPEST))
+
+
 def trusted(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
     """Return (k, b) which readings may speak about the mean, outliers aside."""
-    inside = (base > shots.laser.range_min + _GATE) & (base < shots.laser.range_max - _GATE)
-    return np.asarray(
-        inside & np.isfinite(shots.measured) & ~edges(seen, shots.laser.angle_increment) & (seen.incidence < _STEEPEST)
-    )
+    return np.asarray(trusted_place(shots, seen, base) & np.isfinite(shots.measured))
 
 
 @dataclass(frozen=True)
