@@ -7,6 +7,7 @@ No effect is named: how a parameter acts (at once, as a square, only beside anot
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import product
 
@@ -17,7 +18,7 @@ from kurumaisu import effects
 from kurumaisu.critic.laser.shots import Look, Shots, look, predict, shapes, thin
 from kurumaisu.effects import Mechanism, Parameter
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import FloatArray
+from kurumaisu.types import FloatArray, IntArray
 
 _STEP = 0.2  # of a finite difference, in units of a parameter's scale
 _NOTHING = 1e-9  # [m] a change that is none
@@ -66,6 +67,19 @@ class Marks:
     def seen(self) -> Look:
         """What the beams meet by the model."""
         return self._seen
+
+    def thinned(self, rows: IntArray) -> Marks:
+        """Return some of the scans alone."""
+        out, seen = copy(self), self._seen
+        out._seen = Look(
+            seen.ranges[rows],
+            seen.level[rows],
+            seen.incidence[rows],
+            seen.returns[rows],
+            tuple(seen.beams[row] for row in rows.tolist()),
+        )
+        out.base = self.base[rows]
+        return out
 
     def change(self, effect: type[Mechanism], values: Mapping[str, float], seed: int = 0) -> FloatArray:
         """Return the change (k, b) [m] of the mean by an effect with values in place of the model's."""

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
-from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict
+from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict, thin
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
 from kurumaisu.geometry import compose
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -114,6 +115,18 @@ class Assembly:
             beam = replace(self.first, valid=self.first.valid & (z < _OUTLIER * _MAD * np.nanmedian(z)))
         return out
 
+    def thinned(self, most: int) -> Assembly:
+        """Return at most so many of the scans, evenly taken, without columns."""
+        rows = np.unique(np.linspace(0, len(self.hats) - 1, most).astype(int))
+        out = copy(self)
+        out.shots, out.marks = thin(self.shots, most), self.marks.thinned(rows)
+        out.columns = np.empty((*out.shots.measured.shape, 0), dtype=np.float32)
+        out.hats = [self.hats[row] for row in rows]
+        out.layout = Layout(*(part[rows] for part in (self.layout.times, self.layout.run, self.layout.stand)))
+        out.residual, out.poses, out.geometry = self.residual[rows], self.poses[rows], self.geometry[rows]
+        out.first = BeamNoise(self.first.sd[rows], self.first.rho, self.first.valid[rows])
+        return out
+
     def settle(self, truth: tuple[float, float] | None, fitted: Sequence[Form] = ()) -> Normal:
         """Return the normal equations with the noise estimated from these very data; fitted: forms to project out."""
         project = np.concatenate([np.arange(len(self.columns))[form.span] for form in self._plain(fitted)])
@@ -138,7 +151,7 @@ class Assembly:
         grams = self.grams(beam, columns)
         total = marginal(grams, self.layout, _BROAD)[0]
         beta = _solve(total[:-1, :-1], total[:-1, -1])
-        out = np.empty_like(self.residual)
+        out: FloatArray = np.empty_like(self.residual)
         for k, gram in enumerate(grams):
             own, shared, common = self._rows(k, columns)
             lead = gram.own + gram.shared
@@ -206,7 +219,7 @@ class Assembly:
                 seen = look(self.shots, (), 0, shift=sign * np.eye(3)[axis] * _MOVE, like=self.marks.seen)
                 moved.append(predict(self.shots, (), seen, 0))
             out.append((moved[1] - moved[0]) / (2 * _MOVE[axis]))
-        return np.nan_to_num(np.stack(out, axis=-1))
+        return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
 
 
 def _stands(shots: Shots) -> IntArray:

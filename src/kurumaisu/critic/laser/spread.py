@@ -6,7 +6,7 @@ Which numbers an effect changes is found by simulating it. No effect is named.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,9 +26,12 @@ from kurumaisu.types import FloatArray
 _NULLS = 60  # simulations of the model as it is, for the covariance of the statistics
 _MODEL = 0.5  # what the simulation of the statistics itself is off by, in their sds
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
+_COUNTS = 1.0  # no statistic but a root of a count is that large
 _SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # in units of a parameter's scale, tried first
 _LARGEST = 3  # effects in a set
-_TRIES = 40  # simulations of a refit per parameter
+_TRIES = 15  # simulations of a refit per parameter
+_REFITS = 5  # effects that are refitted
+_FREE = 2.0  # nats that a further parameter must bring
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,17 @@ class Scatter:
     p: float
     nats: float
     sds: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class _Rough:
+    low: float
+    effect: type[Mechanism]
+    values: Mapping[str, float]
+
+
+def _low(rough: _Rough) -> float:
+    return rough.low
 
 
 class Simulator:
@@ -68,7 +82,8 @@ class ScatterSearch:
         """Take the measured statistics; means: parameters, as id.name, that act on the mean and are not for here."""
         nulls = np.array([simulate((), 1000 + i) for i in range(_NULLS)])
         self._simulate, self._measured, self._means = simulate, measured, set(means)
-        sd = np.maximum(nulls.std(axis=0), 1e-3 * np.maximum(np.abs(nulls.mean(axis=0)), 1e-2))
+        # A count that is always 0 in simulations may well be 1 in truth; roots of counts have an sd of 1.
+        sd = np.maximum(nulls.std(axis=0), np.where(np.abs(nulls.mean(axis=0)) >= _COUNTS, 0.7, 0.003))
         unit = (nulls - nulls.mean(axis=0)) / sd
         half = 0.5 * (unit.T @ unit / _NULLS + np.eye(len(sd)))  # of 60 draws, correlations of 40 are uncertain
         self._sd = sd
@@ -80,17 +95,22 @@ class ScatterSearch:
         if np.abs((self._measured - self._offset) / self._sd).max() < _QUIET:
             return []
         chosen: list[tuple[type[Mechanism], EffectSetting]] = []
-        here = self._misfit(())
+        here = self._misfit((), (1, 2))
         out: list[Scatter] = []
         count = len(effects.LASER)
         while len(chosen) < _LARGEST:
+            beside = [setting for _, setting in chosen]
+            rough = sorted(
+                (self._rough(effect, beside) for effect in self._candidates([e for e, _ in chosen])), key=_low
+            )
             tried = []
-            for effect in self._candidates([effect for effect, _ in chosen]):
-                setting, misfit = self._fit(effect, [setting for _, setting in chosen])
+            for start in [each for each in rough[:_REFITS] if each.low < here]:
+                setting, misfit = self._refit(start, beside)
                 z = np.sqrt(max(2 * (here - misfit), 0.0))
-                free = len(self._parameters(effect))
-                gain = here - misfit - float(occam(np.array(z))) - 2.0 * (free - 1)
-                tried.append((gain + log_prior(1, count) - log_prior(0, count), misfit, effect, setting))
+                gain = here - misfit - float(occam(np.array(z))) - 2.0 * (len(start.values) - 1)
+                tried.append((gain + log_prior(1, count) - log_prior(0, count), misfit, start.effect, setting))
+            if not tried:
+                break
             tried.sort(key=lambda item: -item[0])
             best, misfit, effect, setting = tried[0]
             p = float(np.exp(best - logsumexp([0.0, *(item[0] for item in tried)])))
@@ -109,49 +129,40 @@ class ScatterSearch:
     def _parameters(self, effect: type[Mechanism]) -> list[Parameter]:
         return [p for p in effect.parameters if f"{effect.id}.{p.name}" not in self._means]
 
-    def _misfit(self, settings: Sequence[EffectSetting]) -> float:
-        off = (np.mean([self._simulate(settings, seed) for seed in (1, 2)], axis=0) - self._measured) / self._sd
-        white = self._whiten @ off
-        return 0.5 * float(np.sum(np.minimum(white**2, 1e4)))
+    def _misfit(self, settings: Sequence[EffectSetting], seeds: Sequence[int] = (1,)) -> float:
+        simulated = np.mean([self._simulate(settings, seed) for seed in seeds], axis=0)
+        white = self._whiten @ ((simulated - self._measured) / self._sd)
+        return 0.5 * float(white @ white)
 
-    def _fit(self, effect: type[Mechanism], beside: Sequence[EffectSetting]) -> tuple[EffectSetting, float]:
-        """Return an effect's best setting and its misfit: sizes one by one, then all parameters together."""
+    def _rough(self, effect: type[Mechanism], beside: Sequence[EffectSetting]) -> _Rough:
+        """Return the best of some sizes of an effect's parameters, one after the other."""
         null = {p.name: p.null for p in effect.parameters}
-        free = self._parameters(effect)
-
-        def misfit(values: Mapping[str, float]) -> float:
-            return self._misfit((*beside, EffectSetting(effect.id, {**null, **values})))
-
-        best: dict[str, float] = {}
-        low = misfit({})
-        for p in free:
-            at = dict(best)
+        low, best = np.inf, dict[str, float]()
+        for p in self._parameters(effect):
             for value in _sizes(p):
-                found = misfit({**at, p.name: value})
-                if found < low:
-                    low, best = found, {**at, p.name: value}
-        if not best:
-            return EffectSetting(effect.id, null), low
-        return self._refit(effect.id, null, free, best, misfit)
+                values = {**best, p.name: value}
+                misfit = self._misfit((*beside, EffectSetting(effect.id, {**null, **values})))
+                if misfit < low - _FREE:
+                    low, best = misfit, values
+        return _Rough(low, effect, best)
 
-    def _refit(
-        self,
-        name: str,
-        null: Mapping[str, float],
-        free: Sequence[Parameter],
-        best: Mapping[str, float],
-        misfit: Callable[[Mapping[str, float]], float],
-    ) -> tuple[EffectSetting, float]:
-        start = np.array([{**null, **best}[p.name] for p in free])
-        step = np.array([0.3 * abs(x - p.null) or 0.1 * p.scale for x, p in zip(start, free, strict=True)])
+    def _refit(self, start: _Rough, beside: Sequence[EffectSetting]) -> tuple[EffectSetting, float]:
+        """Return an effect's best setting and its misfit, from a rough one: those parameters that helped, together."""
+        effect = start.effect
+        null = {p.name: p.null for p in effect.parameters}
+        free = [p for p in effect.parameters if p.name in start.values]
+        centre = np.array([start.values[p.name] for p in free])
+        step = np.array([0.3 * abs(x - p.null) or 0.1 * p.scale for x, p in zip(centre, free, strict=True)])
 
-        def at(x: FloatArray) -> dict[str, float]:
-            return {p.name: float(np.clip(v, p.lower, p.upper)) for p, v in zip(free, start + step * x, strict=True)}
+        def at(x: FloatArray) -> EffectSetting:
+            values = {p.name: float(np.clip(v, p.lower, p.upper)) for p, v in zip(free, centre + step * x, strict=True)}
+            return EffectSetting(effect.id, {**null, **values})
 
         simplex = np.vstack([np.zeros(len(free)), np.eye(len(free))])
-        options = {"maxfev": _TRIES, "xatol": 0.02, "fatol": 0.1, "initial_simplex": simplex}
-        result = minimize(lambda x: misfit(at(x)), np.zeros(len(free)), method="Nelder-Mead", options=options)
-        return EffectSetting(name, {**null, **at(result.x)}), float(result.fun)
+        options = {"maxfev": _TRIES * len(free), "xatol": 0.02, "fatol": 0.1, "initial_simplex": simplex}
+        cost = lambda x: self._misfit((*beside, at(x)), (1, 2))  # noqa: E731
+        result = minimize(cost, np.zeros(len(free)), method="Nelder-Mead", options=options)
+        return at(result.x), float(result.fun)
 
     def _errors(
         self, effect: type[Mechanism], setting: EffectSetting, beside: Sequence[EffectSetting]
@@ -162,8 +173,13 @@ class ScatterSearch:
             step = 0.1 * abs(setting.parameters[p.name] - p.null) or 0.05 * p.scale
             ends = np.clip(setting.parameters[p.name] + np.array([-step, step]), p.lower, p.upper)
             moved = [
-                np.mean([self._simulate((*beside, EffectSetting(effect.id, {**setting.parameters, p.name: float(e)})), s)
-                         for s in (1, 2)], axis=0)
+                np.mean(
+                    [
+                        self._simulate((*beside, EffectSetting(effect.id, {**setting.parameters, p.name: float(e)})), s)
+                        for s in (1, 2)
+                    ],
+                    axis=0,
+                )
                 for e in ends
             ]
             slopes.append(self._whiten @ ((moved[1] - moved[0]) / self._sd) / (ends[1] - ends[0]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How readings scatter, in some forty numbers that know nothing of any effect; alike for measured and simulated ones."""
+"""How readings scatter, in some forty numbers that know nothing of any effect, alike for measured and simulated."""
 
 from __future__ import annotations
 
@@ -35,16 +35,15 @@ class Statistics:
         shots, seen = assembly.shots, assembly.marks.seen
         self._base = assembly.marks.base
         self._sd = assembly.first.sd
-        gate = (self._base > shots.laser.range_min + 0.1) & (self._base < shots.laser.range_max - 0.1)
-        self._expected: BoolArray = np.asarray(gate & np.isfinite(self._base))
         self._trust = assembly.geometry
-        self._groups = _groups(self._expected, seen.ranges, seen.incidence, seen.returns)
+        met = np.asarray(np.isfinite(self._base) & (self._base < shots.laser.range_max - 0.1))
+        self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
-        self._sides = _sides(seen.ranges, self._expected)
+        self._sides = _sides(seen.ranges, met)
         self._basis, self._size = _basis(assembly, noise)
-        weighed = self._basis * (self._trust / self._sd)[:, :, np.newaxis]
-        inner = weighed.transpose(0, 2, 1) @ weighed
-        inner[:, range(inner.shape[1]), range(inner.shape[1])] += self._size**-2
+        weighed = np.asarray(self._basis * (self._trust / self._sd)[:, :, np.newaxis])
+        inner = np.asarray(weighed.transpose(0, 2, 1) @ weighed, dtype=np.float64)
+        inner = inner + np.eye(inner.shape[1]) * (self._size**-2)[:, np.newaxis, :]
         self._solve = np.linalg.inv(inner) @ weighed.transpose(0, 2, 1)
 
     def pose_errors(self, rng: np.random.Generator) -> FloatArray:
@@ -70,9 +69,9 @@ class Statistics:
         out += [_log(float(np.mean(common**2))), float(common[1:] @ common[:-1]) / float(common @ common)]
         out += [_between(z, inside, np.broadcast_to(np.arange(z.shape[1]), z.shape)), _between(z, inside, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
-        out.append(_share(np.isinf(readings[self._expected])))
+        out.append(_share(np.isinf(readings[self._trust])))
         out.append(self._mixed(readings))
-        return np.array([*out, *_values(readings, self._base)])
+        return np.array([*out, *_values(readings[self._trust])])
 
     def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what poses and common mode leave of the errors (k, b), in deviations, and the common modes (k,) [m].
@@ -158,13 +157,12 @@ def _between(z: FloatArray, inside: BoolArray, group: IntArray) -> float:
     return _log(float(np.mean(sums[many] ** 2 / count[many])))
 
 
-def _values(readings: FloatArray, base: FloatArray) -> list[float]:
+def _values(readings: FloatArray) -> list[float]:
     """Return how many different values there are, and how many readings have the least and the greatest of them."""
     steps = np.rint(readings[np.isfinite(readings)] / _GRID)
     if not len(steps):
         return [0.0, 0.0, 0.0]
-    del base
-    return [_log(len(np.unique(steps))) * 10, _share(steps <= steps.min()), _share(steps >= steps.max())]
+    return [_log(len(np.unique(steps))), _share(steps <= steps.min()), _share(steps >= steps.max())]
 
 
 def _share(hits: BoolArray) -> float:

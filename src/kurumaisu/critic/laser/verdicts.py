@@ -12,11 +12,15 @@ from kurumaisu import effects
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
+from kurumaisu.critic.laser.spread import Scatter, ScatterSearch, Simulator
+from kurumaisu.critic.laser.statistics import Statistics
+from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.verdict import Cause, Estimate
 from kurumaisu.params import EffectSetting, Model
 
 MATERIAL = 3e-4  # [m] rms change of the readings below which an effect of the laser does not matter
+_SCATTERED = 60  # scans whose scatter is looked at: each simulation of them takes a hundredth of a second
 _NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
 Progress = Callable[[str], None]
 
@@ -50,10 +54,26 @@ def criticise(recording: Recording, model: Model, progress: Progress) -> LaserFi
     if found.best.forms:
         normal = assembly.settle(recording.truth, found.best.forms)
         found = Search(assembly.forms, normal.gram).run()
-    return _finding(assembly, normal, found)
+    progress("laser: weighing effects on the scatter")
+    scatter = _scatter(assembly, normal, found)
+    return _finding(assembly, normal, found, scatter)
 
 
-def _finding(assembly: Assembly, normal: Normal, found: Found) -> LaserFinding:
+def _scatter(assembly: Assembly, normal: Normal, found: Found) -> list[Scatter]:
+    """Return the effects on how readings scatter about the best fit of their mean."""
+    use = np.concatenate([np.arange(0), *(np.arange(form.span.start, form.span.stop) for form in found.best.forms)])
+    error = assembly.residual - assembly.columns[:, :, use.astype(int)] @ found.best.coefficients
+    few = assembly.thinned(_SCATTERED)
+    rows = np.unique(np.linspace(0, len(error) - 1, _SCATTERED).astype(int))
+    statistics = Statistics(few, normal.scan_noise)
+    means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
+    means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
+    measured = few.shots.measured
+    seen = statistics.of(measured, np.where(np.isfinite(measured), error[rows], np.nan))
+    return ScatterSearch(Simulator(few, statistics), seen, sorted(means)).run()
+
+
+def _finding(assembly: Assembly, normal: Normal, found: Found, scatter: list[Scatter]) -> LaserFinding:
     sizes = {form.id: _rms(assembly, normal, found.best, form.id) for form in found.best.forms}
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = tuple(setting for setting in _settings(found.best) if setting.id in matters)
@@ -71,7 +91,31 @@ def _finding(assembly: Assembly, normal: Normal, found: Found) -> LaserFinding:
         f"the reference {1e3 * noise.position_sd:.2g} mm and {1e3 * noise.heading_sd:.2g} mrad.",
         *(f"{name}: changes the readings by {1e3 * size:.2g} mm (rms)." for name, size in sorted(sizes.items())),
     )
-    return LaserFinding(causes, confounded, settings, details)
+    known = {cause.id: cause for cause in causes}
+    for each in scatter:
+        if each.p >= NAMED:
+            known[each.setting.id] = _joined(known.get(each.setting.id), each)
+    joined = {setting.id: setting for setting in settings}
+    for each in scatter:
+        mean = joined.get(each.setting.id)
+        at = {**each.setting.parameters, **(_off_null(mean) if mean else {})}
+        joined[each.setting.id] = EffectSetting(each.setting.id, at)
+    return LaserFinding(tuple(known.values()), confounded, tuple(joined.values()), details)
+
+
+def _off_null(setting: EffectSetting) -> dict[str, float]:
+    nulls = {p.name: p.null for p in effects.by_id(setting.id).parameters}
+    return {name: value for name, value in setting.parameters.items() if value != nulls[name]}
+
+
+def _joined(cause: Cause | None, scatter: Scatter) -> Cause:
+    parameters = {p.name: p for p in effects.by_id(scatter.setting.id).parameters}
+    estimates = dict(cause.parameters) if cause is not None else {}
+    for name, sd in scatter.sds.items():
+        p, value, half = parameters[name], scatter.setting.parameters[name], _NORMAL90 * sd
+        estimates[name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
+    nats = scatter.nats + (cause.gain_nats if cause is not None else 0.0)
+    return Cause(scatter.setting.id, max(min(scatter.p, 1.0), cause.p if cause is not None else 0.0), estimates, nats)
 
 
 def _rms(assembly: Assembly, normal: Normal, fit: Fitted, name: str) -> float:
