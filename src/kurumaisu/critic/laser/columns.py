@@ -24,6 +24,8 @@ _STEP = 0.2  # of a finite difference, in units of a parameter's scale
 _NOTHING = 1e-9  # [m] a change that is none
 _SAME = 0.98  # correlation from which two forms of an effect are one
 _PROBE = 12  # scans on which it is tried how a parameter acts
+_FINER = tuple(2.0 ** np.arange(-0.375, 0.4, 0.0625))  # about a value of the grid
+_AROUND = 127  # shapes that are tried to say a sum of two as one
 _RANK = 1e-3  # singular values below this share of the largest do not count
 
 
@@ -33,6 +35,7 @@ class Column:
 
     parameter: Parameter
     squared: bool
+    beside: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,40 @@ class Marks:
                 columns += [value.astype(np.float32) for value in values]
         return forms, np.stack(columns, axis=-1)
 
+    def finer(self, form: Form) -> Iterator[tuple[dict[str, float], FloatArray]]:
+        """Yield shapes between those of the grid, about a form's, and its columns (k, b, m) there."""
+        effect = effects.by_id(form.id)
+        grids = {p.name for p in effect.parameters if p.name in form.at and _geometric(p)}
+        for factors in product(*(_FINER for _ in grids)):
+            at = {**form.at, **{name: form.at[name] * f for name, f in zip(sorted(grids), factors, strict=True)}}
+            if grids and all(p.lower <= at.get(p.name, p.lower) <= p.upper for p in effect.parameters):
+                slopes = [self._slope(effect, column.parameter, {**at, **column.beside}) for column in form.columns]
+                yield at, np.stack(slopes, axis=-1)
+
+    def joined(self, form: Form, coefficients: FloatArray) -> dict[str, float]:
+        """Return the parameters whose one column is a sum of those of a form that spans them by several."""
+        effect, lead = effects.by_id(form.id), form.columns[0].parameter
+        probe = self._probe
+        target = sum(
+            c * probe._slope(effect, lead, {**form.at, **column.beside})
+            for c, column in zip(coefficients.tolist(), form.columns, strict=True)
+        )
+        flat = np.nan_to_num(np.asarray(target)).ravel()
+        (name,) = form.columns[0].beside
+        shape = next(p for p in effect.parameters if p.name == name)
+        tried = []
+        for value in np.linspace(max(shape.lower, -np.pi), min(shape.upper, np.pi), _AROUND).tolist():
+            column = np.nan_to_num(probe._slope(effect, lead, {**form.at, name: value})).ravel()
+            size = float(flat @ column) / max(float(column @ column), 1e-300)
+            # Of a shape and its opposite, the one whose size is positive.
+            tried.append((float(np.sum((flat - size * column) ** 2)) * (1 if size > 0 else 2), value, size))
+        _, value, size = min(tried)
+        return {
+            **form.at,
+            name: value,
+            lead.name: float(np.clip(lead.null + size * lead.scale, lead.lower, lead.upper)),
+        }
+
     def _of(self, effect: type[Mechanism]) -> Iterator[tuple[dict[str, float], list[Column], list[FloatArray]]]:
         acting, squares, shaping = self._probe.sort(effect)
         if squares:
@@ -118,7 +155,7 @@ class Marks:
             marks, values = [], []
             for parameter in acting:
                 for beside in pairs:
-                    marks.append(Column(parameter, squared=False))
+                    marks.append(Column(parameter, squared=False, beside=beside))
                     values.append(self._slope(effect, parameter, {**at, **beside}))
             unit = _unit(values[0])
             if all(abs(float(unit @ other)) < _SAME for other in known):
@@ -167,7 +204,7 @@ class Marks:
                 sizes = {p.name: sign for p, sign in zip(squares, signs, strict=True)}
                 values = {p.name: self.null(effect)[p.name] + sizes[p.name] * p.scale for p in squares}
                 lead = next(p for p, sign in zip(squares, signs, strict=True) if sign)
-                yield sizes, [Column(lead, squared=True)], [self.change(effect, values)]
+                yield sizes, [Column(lead, squared=True, beside={})], [self.change(effect, values)]
 
     def spanned(
         self, effect: type[Mechanism], acting: Sequence[Parameter], shaping: Sequence[Parameter]
@@ -197,6 +234,11 @@ def _grid(parameter: Parameter, span: float) -> list[float]:
     else:
         values = parameter.null + parameter.scale * np.arange(0, 3.1, 0.5)
     return [float(value) for value in values if parameter.lower <= value <= parameter.upper] or [parameter.null]
+
+
+def _geometric(parameter: Parameter) -> bool:
+    """Return whether a parameter's grid is of factors."""
+    return parameter.unit == "s" or parameter.lower > 0
 
 
 def _unit(column: FloatArray) -> FloatArray:

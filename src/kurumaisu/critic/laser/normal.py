@@ -115,6 +115,21 @@ class Assembly:
             beam = replace(self.first, valid=self.first.valid & (z < _OUTLIER * _MAD * np.nanmedian(z)))
         return out
 
+    def refine(self, fitted: Sequence[Form], beam: BeamNoise, scan: ScanNoise) -> None:
+        """Put in place of each fitted form's shape the one between those of the grid that explains most."""
+        for form in fitted:
+            best, at, columns = -np.inf, form.at, None
+            for shape, some in self.marks.finer(form):
+                self.columns[:, :, form.span] = some
+                use = np.concatenate([np.arange(other.span.start, other.span.stop) for other in fitted])
+                gram = marginal(self.grams(beam, use), self.layout, scan)[0]
+                gain = float(gram[:-1, -1] @ _solve(gram[:-1, :-1], gram[:-1, -1]))
+                if gain > best:
+                    best, at, columns = gain, shape, some
+            if columns is not None:
+                self.columns[:, :, form.span] = columns
+                self.forms[self.forms.index(form)] = replace(form, at=at)
+
     def thinned(self, most: int) -> Assembly:
         """Return at most so many of the scans, evenly taken, without columns."""
         rows = np.unique(np.linspace(0, len(self.hats) - 1, most).astype(int))

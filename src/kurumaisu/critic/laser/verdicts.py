@@ -52,7 +52,9 @@ def criticise(recording: Recording, model: Model, progress: Progress) -> LaserFi
     progress("laser: weighing effects")
     found = Search(assembly.forms, normal.gram).run()
     if found.best.forms:
-        normal = assembly.settle(recording.truth, found.best.forms)
+        assembly.refine(found.best.forms, normal.beam_noise, normal.scan_noise)
+        shaped = [form for form in assembly.forms if form.start in {each.start for each in found.best.forms}]
+        normal = assembly.settle(recording.truth, shaped)
         found = Search(assembly.forms, normal.gram).run()
     progress("laser: weighing effects on the scatter")
     scatter = _scatter(assembly, normal, found)
@@ -76,7 +78,7 @@ def _scatter(assembly: Assembly, normal: Normal, found: Found) -> list[Scatter]:
 def _finding(assembly: Assembly, normal: Normal, found: Found, scatter: list[Scatter]) -> LaserFinding:
     sizes = {form.id: _rms(assembly, normal, found.best, form.id) for form in found.best.forms}
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
-    settings = tuple(setting for setting in _settings(found.best) if setting.id in matters)
+    settings = tuple(setting for setting in _settings(assembly, found.best) if setting.id in matters)
     by_id = {setting.id: setting for setting in settings}
     causes = tuple(
         Cause(name, min(found.p[name], 1.0), _estimates(found.best, by_id[name]), _gain(found, name))
@@ -129,13 +131,17 @@ def _rms(assembly: Assembly, normal: Normal, fit: Fitted, name: str) -> float:
     return float(np.sqrt(np.mean(change**2)))
 
 
-def _settings(fit: Fitted) -> list[EffectSetting]:
+def _settings(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
     """Return the fitted effects as a model file has them."""
     out, start = [], 0
     for form in fit.forms:
         at = fit.coefficients[start : start + len(form.columns)]
         start += len(form.columns)
         effect = effects.by_id(form.id)
+        if len(form.columns) > 1 and form.columns[0].beside:
+            nulls = {p.name: p.null for p in effect.parameters}
+            out.append(EffectSetting(form.id, {**nulls, **assembly.marks.joined(form, at)}))
+            continue
         values = {p.name: p.null for p in effect.parameters}
         for column, coefficient in zip(form.columns, at.tolist(), strict=True):
             p = column.parameter
