@@ -31,9 +31,9 @@ class Repeatability:
     missing: float
 
     def sd_between(self, low: float, high: float) -> float:
-        """Return the root mean square sd [m] of beams whose range is from low to high [m]."""
+        """Return the median sd [m] of beams whose range is from low to high [m]: a few always sit on some edge."""
         inside = (self.ranges >= low) & (self.ranges < high)
-        return float(np.sqrt(np.mean(self.sds[inside] ** 2)))
+        return float(np.median(self.sds[inside]))
 
 
 def repeatability(readings: FloatArray) -> Repeatability:
@@ -51,11 +51,12 @@ def repeatability(readings: FloatArray) -> Repeatability:
     use = spread < _STABLE
     if not use.any():
         raise Error("repeatability: no beam is valid in all scans and sees one still surface")
-    left = np.where(use, readings - middle, np.nan)
-    left[np.abs(left) > _OUTLIER * np.maximum(spread, 1e-3)] = np.nan
+    left = readings[:, use] - middle[use]
+    left[np.abs(left) > _OUTLIER * np.maximum(spread[use], 1e-3)] = np.nan
+    left = left - np.nanmean(left, axis=0)
+    sds = np.nanstd(left, axis=0) * np.sqrt(len(readings) / (len(readings) - 1))
     common = np.nanmean(left, axis=1)
-    left = left - np.nanmean(left, axis=0, keepdims=True)
-    sds = np.nanstd(left[:, use], axis=0) * np.sqrt(len(readings) / (len(readings) - 1))
-    unit = left / np.where(use, np.nanstd(left, axis=0), np.nan)
+    unit = np.full(readings.shape, np.nan)
+    unit[:, use] = (left - common[:, np.newaxis]) / np.nanstd(left - common[:, np.newaxis], axis=0)
     correlation = {lag: float(np.nanmean(unit[:, lag:] * unit[:, :-lag])) for lag in _LAGS}
     return Repeatability(middle[use], sds, correlation, float(np.std(common)), float(np.mean(~np.isfinite(readings))))
