@@ -28,6 +28,7 @@ _MODEL = 0.5  # what the simulation of the statistics itself is off by, in their
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
 _COUNTS = 1.0  # no statistic but a root of a count is that large
 _SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # in units of a parameter's scale, tried first
+_ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
 _LARGEST = 3  # effects in a set
 _TRIES = 15  # simulations of a refit per parameter
 _REFITS = 5  # effects that are refitted
@@ -114,7 +115,7 @@ class ScatterSearch:
             tried.sort(key=lambda item: -item[0])
             best, misfit, effect, setting = tried[0]
             p = float(np.exp(best - logsumexp([0.0, *(item[0] for item in tried)])))
-            if best < 0 or p < 0.5:
+            if best < _ENOUGH or p < 0.5:
                 break
             chosen.append((effect, setting))
             out.append(Scatter(setting, p, best, self._errors(effect, setting, [s for _, s in chosen[:-1]])))
