@@ -118,6 +118,11 @@ def split(drive: Drive, parts: int) -> list[Drive]:
     ]
 
 
+def driven(run: Run) -> bool:
+    """Return whether a run says what drove the robot."""
+    return run.voltage is not None or run.command is not None or run.odom is not None
+
+
 def _inputs(run: Run, model: Model) -> tuple[str, FloatArray, FloatArray, FloatArray]:
     """Return the source and its samples t, v, w, each held until the next: voltages, else commands, else odometry."""
     if run.voltage is not None:

@@ -55,6 +55,19 @@ def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Crit
     return Criticism(verdict, story, model, ())
 
 
+def undriven(recording: Recording, model: Model) -> Criticism:
+    """Return the criticism of drives of which nobody knows what drove them: nothing is said of the base."""
+    story = Story(
+        recording=recording.name,
+        model=model.name,
+        headline="Nothing is missing in the model that these scans could show.",
+        details=("base not criticised: there are neither voltages nor commands nor odometry.",),
+        pose_source=_pose_source(recording),
+        provenance=_provenance(),
+    )
+    return Criticism(Verdict("none", problems=recording.problems), story, model, ())
+
+
 def criticism(
     recording: Recording,
     made: Decision,

@@ -7,16 +7,18 @@ from pathlib import Path
 
 from kurumaisu.critic import explain, gain, next_experiment, noise, sanity, smooth_explain
 from kurumaisu.critic.decide import Progress, decide, scatter
-from kurumaisu.critic.drive import prepare
+from kurumaisu.critic.drive import driven, prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
+from kurumaisu.critic.laser.merge import with_laser
+from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.verdict import write_verdict
 from kurumaisu.errors import Error
-from kurumaisu.params import follow_commands, load_model
+from kurumaisu.params import Model, follow_commands, load_model
 
 
 def criticise(
@@ -39,6 +41,14 @@ def criticise(
     wrong = [*recording.invalid, *sanity.examine(recording, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
+    if any(driven(run) for run in recording.runs):
+        base = _criticise_base(recording, model, progress, ids)
+    else:
+        base = explain.undriven(recording, model)
+    return with_laser(base, criticise_laser(recording, model, progress, ids))
+
+
+def _criticise_base(recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None) -> Criticism:
     drives = {run.name: informed(prepare(run, model), run) for run in recording.runs}
     train = [drives[name] for name in recording.train]
     test = [drives[name] for name in recording.test]

@@ -18,19 +18,14 @@ def effect_ids(only: Sequence[str], without: Sequence[str]) -> frozenset[str] | 
 
     The word smooth stands for what is not in the catalogue.
 
-    Raise Error for a pattern that is none of the catalogue, naming near ones, for one of which the critic looks for
-    nothing, and when nothing is left.
+    Raise Error for a pattern that is none of the catalogue, naming near ones, and when nothing is left.
     """
     if not only and not without:
         return None
     catalogue = (*(effect.id for effect in effects.ALL), effects.SMOOTH)
-    sought = (*(effect.id for effect in effects.BASE), effects.SMOOTH)
-    wanted: set[str] = set() if only else set(sought)
+    wanted: set[str] = set() if only else set(catalogue)
     for pattern in only:
-        found = set(matching("--only", pattern, catalogue, "effect")) & set(sought)
-        if not found:
-            raise Error(f"--only: the critic does not look for {pattern}; it looks for: {', '.join(sought)}")
-        wanted |= found
+        wanted |= set(matching("--only", pattern, catalogue, "effect"))
     for pattern in without:
         wanted -= set(matching("--without", pattern, catalogue, "effect"))
     if not wanted:

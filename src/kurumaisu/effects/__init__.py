@@ -37,7 +37,7 @@ from kurumaisu.effects.dead_zone import DeadZoneV, DeadZoneW
 from kurumaisu.effects.delay import Delay
 from kurumaisu.effects.gain import GainV, GainW
 from kurumaisu.effects.lag import LagV, LagW
-from kurumaisu.effects.laser import LASER, BeamEffect, Beams, Echoes, LaserEffect, ReadingEffect
+from kurumaisu.effects.laser import LASER, BeamEffect, Beams, Echoes, LaserEffect, LaserStage, ReadingEffect
 from kurumaisu.effects.laser.chain import LaserChain, incidence, slanted
 from kurumaisu.effects.lateral_slip import LateralSlip
 from kurumaisu.effects.left_right_gain import LeftRightGain
@@ -192,6 +192,7 @@ __all__ = [
     "Follows",
     "LaserChain",
     "LaserEffect",
+    "LaserStage",
     "Mechanism",
     "Motion",
     "Parameter",

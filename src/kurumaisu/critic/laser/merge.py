@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One verdict of what the drives and what the scans say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from kurumaisu import effects
+from kurumaisu.critic.explain import Criticism
+from kurumaisu.critic.laser.verdicts import LaserFinding
+from kurumaisu.critic.verdict import Kind
+
+_NOTHING_SAID = "none"
+
+
+def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
+    """Return a criticism of the base with what the scans say besides."""
+    verdict, story = criticism.verdict, criticism.story
+    if finding.refused is not None:
+        return replace(criticism, story=replace(story, details=(*story.details, _refusal(finding.refused))))
+    kind: Kind = verdict.verdict
+    if finding.causes:
+        kind = "named"
+    elif finding.confounded and kind == _NOTHING_SAID:
+        kind = "confounded"
+    joined = replace(
+        verdict,
+        verdict=kind,
+        causes=(*verdict.causes, *finding.causes),
+        confounded=(*verdict.confounded, *finding.confounded),
+    )
+    words = headline(finding)
+    if words and verdict.verdict in ("named", "confounded"):
+        words = f"{story.headline} {words}"
+    told = replace(story, headline=words or story.headline, details=(*story.details, *finding.details))
+    return replace(criticism, verdict=joined, story=told, settings=(*criticism.settings, *finding.settings))
+
+
+def headline(finding: LaserFinding) -> str:
+    """Return what the scans say in a sentence; empty when they say nothing."""
+    if finding.causes:
+        text = "; ".join(effects.by_id(cause.id).sentence for cause in finding.causes)
+        return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in finding.causes)})."
+    if finding.confounded:
+        return f"The scans miss something, but cannot tell which: {' or '.join(finding.confounded[0])}."
+    return ""
+
+
+def _refusal(why: str) -> str:
+    return f"laser not criticised: {why}."

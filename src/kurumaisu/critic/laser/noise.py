@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How laser readings err at random, estimated on every data set: beams, neighbours, scans, poses.
+
+Readings of one scan share its pose and its common mode, neighbours share light and wall. Counting 170 000 readings as
+so many independent ones makes a critic certain of effects that are not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import minimize
+
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+_FLOOR = 1e-6  # [m, rad] below which no sd counts
+
+
+@dataclass(frozen=True)
+class ScanNoise:
+    """Errors that the readings of a scan share.
+
+    position_sd [m], heading_sd [rad]: of a reference pose; common_sd [m]: of the offset of a scan, whose correlation
+    with the next one falls off with a time constant common_tau [s].
+    """
+
+    position_sd: float
+    heading_sd: float
+    common_sd: float
+    common_tau: float
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How scans hang together: times (k,) [s]; run (k,); stand (k,): scans of one and the same pose row, or -1."""
+
+    times: FloatArray
+    run: IntArray
+    stand: IntArray
+
+
+@dataclass(frozen=True)
+class Gram:
+    """Normal equations of one scan, whitened within the scan.
+
+    own: number of leading columns, for the errors of its own reference poses, x, y, yaw in turn; shared: of those that
+    follow, one for its common mode and, where it belongs to a stand, three for the error of that pose; the rest are
+    common to all scans.
+    """
+
+    matrix: FloatArray
+    own: int
+    shared: int
+
+
+def whitened(columns: FloatArray, valid: BoolArray, sd: FloatArray, rho: float) -> FloatArray:
+    """Return L^-1 X, (valid readings of the scan, m), for columns X (b, m), deviations sd (b,) [m] and neighbours' rho.
+
+    Neighbours with gaps between them correlate by rho to the power of their distance.
+    """
+    at = np.flatnonzero(valid)
+    z = columns[at] / sd[at, np.newaxis]
+    shared = rho ** np.diff(at)[:, np.newaxis]
+    out = z.copy()
+    out[1:] = (z[1:] - shared * z[:-1]) / np.sqrt(1 - shared**2)
+    return np.asarray(out)
+
+
+def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[FloatArray, float]:
+    """Return the normal equations of the columns common to all, scans' errors integrated out, and a log determinant.
+
+    The latter is that of the covariance, relative to independent readings.
+    """
+    size = np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], _FLOOR)
+    scans, stands = len(grams), int(layout.stand.max(initial=-1)) + 1
+    common = len(grams[0].matrix) - grams[0].own - grams[0].shared
+    inner = np.zeros((scans + 3 * stands, scans + 3 * stands))
+    cross = np.zeros((len(inner), common))
+    total = np.zeros((common, common))
+    log_det = 0.0
+    for rows in _alike(grams):
+        rest, more = _without_own(np.array([grams[k].matrix for k in rows]), grams[rows[0]].own, size)
+        log_det += more
+        lead = grams[rows[0]].shared
+        total += rest[:, lead:, lead:].sum(axis=0)
+        for k, part in zip(rows, rest, strict=True):
+            index = [k, *(scans + 3 * layout.stand[k] + i for i in range(lead - 1))]
+            inner[np.ix_(index, index)] += part[:lead, :lead]
+            cross[index] += part[:lead, lead:]
+    prior, prior_log_det = _precision(layout, noise, np.tile(size**-2, stands))
+    factor = cho_factor(inner + prior)
+    log_det += 2 * float(np.log(np.diag(factor[0])).sum()) - prior_log_det
+    return total - cross.T @ cho_solve(factor, cross), log_det
+
+
+def _alike(grams: Sequence[Gram]) -> list[list[int]]:
+    """Return the scans whose grams have the same parts, together."""
+    groups: dict[tuple[int, int], list[int]] = {}
+    for k, gram in enumerate(grams):
+        groups.setdefault((gram.own, gram.shared), []).append(k)
+    return list(groups.values())
+
+
+def _without_own(matrices: FloatArray, own: int, size: FloatArray) -> tuple[FloatArray, float]:
+    """Return the rest (n, m, m) of grams when errors of their own poses are integrated out, and a log determinant."""
+    if own == 0:
+        return matrices, 0.0
+    scale = np.tile(size, own // 3)
+    inner = matrices[:, :own, :own] * np.outer(scale, scale) + np.eye(own)
+    cross = matrices[:, :own, own:] * scale[:, np.newaxis]
+    rest = matrices[:, own:, own:] - cross.transpose(0, 2, 1) @ np.linalg.solve(inner, cross)
+    return rest, float(np.linalg.slogdet(inner)[1].sum())
+
+
+def _precision(layout: Layout, noise: ScanNoise, stands: FloatArray) -> tuple[FloatArray, float]:
+    """Return the precision of common modes, autoregressive within a run, and stands; and its log determinant."""
+    n = len(layout.times)
+    sd = max(noise.common_sd, _FLOOR)
+    out = np.zeros((n + len(stands), n + len(stands)))
+    out[range(n, len(out)), range(n, len(out))] = stands
+    gap = np.diff(layout.times)
+    rho = np.where(np.diff(layout.run) == 0, np.exp(-np.abs(gap) / noise.common_tau), 0.0)
+    innovation = np.concatenate([[1.0], 1 - rho**2])  # variances, in sd^2
+    innovation = np.maximum(innovation, 1e-9)
+    diagonal = 1 / innovation
+    diagonal[:-1] += rho**2 / innovation[1:]
+    out[range(n), range(n)] = diagonal / sd**2
+    out[range(n - 1), range(1, n)] = out[range(1, n), range(n - 1)] = -rho / innovation[1:] / sd**2
+    log_det = -float(np.log(innovation).sum()) - 2 * n * np.log(sd) + float(np.log(stands).sum())
+    return out, log_det
+
+
+def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] | None, project: IntArray) -> ScanNoise:
+    """Return the scans' noise by restricted maximum likelihood; project: common columns to project out.
+
+    The last common column is the residual. truth: known sd of the reference, else it is estimated too.
+    """
+    start = np.log([0.005, 0.005, 2e-4, 1.0])
+    low, high = np.log([1e-5, 1e-5, 1e-6, 0.01]), np.log([0.3, 0.3, 0.1, 1e3])
+    if truth is not None:
+        start[:2] = np.log(np.maximum(truth, 1e-5))
+    free = np.arange(0 if truth is None else 2, 4)
+    spread = np.array([2.0, 2.0, 1.0, 1.0])
+
+    def noise_at(values: FloatArray) -> ScanNoise:
+        every = start.copy()
+        every[free] = np.clip(values, low[free], high[free])
+        return ScanNoise(*(float(value) for value in np.exp(every)))
+
+    small = [_only(gram, project) for gram in grams]
+
+    def cost(values: FloatArray) -> float:
+        s, log_det = marginal(small, layout, noise_at(values))
+        x, b, yy = s[:-1, :-1], s[:-1, -1], float(s[-1, -1])
+        norms = np.sqrt(np.maximum(np.diag(x), 1e-300))
+        x = x / np.outer(norms, norms) + 1e-9 * np.eye(len(x))
+        b = b / norms
+        fitted = float(b @ np.linalg.solve(x, b)) if len(b) else 0.0
+        distance = (values - start[free]) / spread[free]
+        kept = float(np.linalg.slogdet(x)[1]) + 2 * float(np.log(norms).sum())
+        return 0.5 * (log_det + yy - fitted + kept) + 0.5 * float(distance @ distance)
+
+    at = start[free]
+    for step in (1.0, 0.3):  # a second start from the end of the first: it may stop early on a ridge
+        simplex = np.vstack([at, at + step * np.eye(len(at))])
+        options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 100, "initial_simplex": simplex}
+        at = minimize(cost, at, method="Nelder-Mead", options=options).x
+    return noise_at(at)
+
+
+def _only(gram: Gram, project: IntArray) -> Gram:
+    """Return a gram with some of the common columns, and the last, which is the residual."""
+    lead = gram.own + gram.shared
+    keep = np.concatenate([np.arange(lead), lead + project, [len(gram.matrix) - 1]])
+    return Gram(gram.matrix[np.ix_(keep, keep)], gram.own, gram.shared)

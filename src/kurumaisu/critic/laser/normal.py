@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From readings to normal equations: residuals and columns, whitened, the errors that scans share integrated out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kurumaisu.critic.laser.columns import Form, Marks
+from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
+from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict, thin
+from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
+from kurumaisu.geometry import compose
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+_MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
+_OUTLIER = 4.5  # deviations from which a reading does not count
+_BINS = 6  # of the range, in which the deviation is estimated
+_ROUNDS = 3
+_SHIFTS = 2  # times that poses are sought by the scans
+_LEAST = 1e-4  # [m] deviation of a reading
+_BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau=1.0)  # before any is known
+_MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
+
+
+@dataclass(frozen=True)
+class BeamNoise:
+    """Deviations (k, b) [m] of readings, how neighbours correlate, and which readings count."""
+
+    sd: FloatArray
+    rho: float
+    valid: BoolArray
+
+
+@dataclass(frozen=True)
+class Normal:
+    """gram (p + 1, p + 1): normal equations of all columns and, last, the residual; noise that made them so."""
+
+    gram: FloatArray
+    scan_noise: ScanNoise
+    beam_noise: BeamNoise
+    readings: int
+
+
+class Assembly:
+    """Residuals, columns and what scans share, of some shots."""
+
+    def __init__(self, shots: Shots, ids: frozenset[str] | None = None) -> None:
+        """Take the shots, and the effects to look for; None for all."""
+        self.hats = [hats(shots, row) for row in range(len(shots.stamps))]
+        self.layout = Layout(shots.stamps, shots.run, _stands(shots))
+        self.tracks = shots.tracks
+        self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
+        self._linearise(shots)
+        self.first = self._trust()
+        for _ in range(_SHIFTS):
+            self._linearise(self._moved())
+        self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
+        self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base)
+        self.forms, self.columns = self.marks.forms(ids)
+
+    def _linearise(self, shots: Shots) -> None:
+        """Predict at the shots' shifted poses; the residual is as of the reference's own."""
+        self.shots = shots
+        self.marks = Marks(shots)
+        self.poses = self._by_pose()
+        self.residual = shots.measured - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
+
+    def _trust(self) -> BeamNoise:
+        sd = np.maximum(predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base, _LEAST)
+        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base))
+
+    def _moved(self) -> Shots:
+        """Return the shots on tracks that are moved to where the scans put them, each scan alone."""
+        tracks = [replace(track, poses=track.poses.copy()) for track in self.shots.tracks]
+        sums = [np.zeros((*track.poses.shape[:1], 4)) for track in tracks]
+        for k, errors in enumerate(self._errors()):
+            rows = self._alike_rows(k)
+            sums[self.shots.run[k]][rows, :3] += errors
+            sums[self.shots.run[k]][rows, 3] += 1
+        mean = [some[:, :3] / np.maximum(some[:, 3:], 1) for some in sums]
+        # Errors are as of the first tracks, which `shift` has moved already.
+        for track, first, error in zip(tracks, self.tracks, mean, strict=True):
+            track.poses[:] = first.poses + error
+        shift = [hat.weights @ mean[self.shots.run[k]][hat.rows] for k, hat in enumerate(self.hats)]
+        return replace(self.shots, tracks=tuple(tracks), shift=np.array(shift))
+
+    def _alike_rows(self, k: int) -> IntArray:
+        """Return the rows of the track that share the errors of a scan: its own, or all of its stand."""
+        rows = np.arange(len(self.shots.tracks[self.shots.run[k]].times))[self.hats[k].rows]
+        if self.layout.stand[k] < 0:
+            return rows
+        poses = self.tracks[self.shots.run[k]].poses
+        return np.flatnonzero((poses == poses[rows[0]]).all(axis=1))
+
+    def _errors(self) -> list[FloatArray]:
+        """Return the errors of the poses (q, 3) under each scan, by that scan alone, within what is plausible."""
+        size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
+        beam = self.first
+        out: list[FloatArray] = []
+        for _ in range(2):  # without outliers in the second round
+            left, out = np.full_like(self.residual, np.nan), []
+            for k, gram in enumerate(self.grams(beam)):
+                own, shared, _ = self._rows(k, None)
+                sizes = np.concatenate([np.tile(size, own.shape[1] // 3), [_BROAD.common_sd], size])[
+                    : gram.own + gram.shared
+                ]
+                lead = len(sizes)
+                errors = np.linalg.solve(gram.matrix[:lead, :lead] + np.diag(sizes**-2), gram.matrix[:lead, -1])
+                left[k] = self.residual[k] - np.hstack([own, shared]) @ errors
+                out.append(errors[: gram.own].reshape(-1, 3) if gram.own else errors[np.newaxis, 1:4])
+            z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
+            beam = replace(self.first, valid=self.first.valid & (z < _OUTLIER * _MAD * np.nanmedian(z)))
+        return out
+
+    def refine(self, fitted: Sequence[Form], beam: BeamNoise, scan: ScanNoise) -> None:
+        """Put in place of each fitted form's shape the one between those of the grid that explains most."""
+        for form in fitted:
+            best, at, columns = -np.inf, form.at, None
+            for shape, some in self.marks.finer(form):
+                self.columns[:, :, form.span] = some
+                use = np.concatenate([np.arange(other.span.start, other.span.stop) for other in fitted])
+                gram = marginal(self.grams(beam, use), self.layout, scan)[0]
+                gain = float(gram[:-1, -1] @ _solve(gram[:-1, :-1], gram[:-1, -1]))
+                if gain > best:
+                    best, at, columns = gain, shape, some
+            if columns is not None:
+                self.columns[:, :, form.span] = columns
+                self.forms[self.forms.index(form)] = replace(form, at=at)
+
+    def thinned(self, most: int) -> Assembly:
+        """Return at most so many of the scans, evenly taken, without columns."""
+        rows = np.unique(np.linspace(0, len(self.hats) - 1, most).astype(int))
+        out = copy(self)
+        out.shots, out.marks = thin(self.shots, most), self.marks.thinned(rows)
+        out.columns = np.empty((*out.shots.measured.shape, 0), dtype=np.float32)
+        out.hats = [self.hats[row] for row in rows]
+        out.layout = Layout(*(part[rows] for part in (self.layout.times, self.layout.run, self.layout.stand)))
+        out.residual, out.poses, out.geometry = self.residual[rows], self.poses[rows], self.geometry[rows]
+        out.first = BeamNoise(self.first.sd[rows], self.first.rho, self.first.valid[rows])
+        return out
+
+    def settle(self, truth: tuple[float, float] | None, fitted: Sequence[Form] = ()) -> Normal:
+        """Return the normal equations with the noise estimated from these very data; fitted: forms to project out."""
+        project = np.concatenate([np.arange(len(self.columns))[form.span] for form in self._plain(fitted)])
+        beam = self.first
+        for _ in range(_ROUNDS):
+            beam = self._refined(beam, project)
+        grams = self.grams(beam)
+        scan = estimate(grams, self.layout, truth, project)
+        return Normal(marginal(grams, self.layout, scan)[0], scan, beam, int(beam.valid.sum()))
+
+    def grams(self, beam: BeamNoise, columns: IntArray | None = None) -> list[Gram]:
+        """Return the normal equations of each scan; columns: which of all, None for all."""
+        out = []
+        for k in range(len(self.residual)):
+            own, shared, common = self._rows(k, columns)
+            rows = whitened(np.hstack([own, shared, common]), beam.valid[k], beam.sd[k], beam.rho)
+            out.append(Gram(rows.T @ rows, own.shape[1], shared.shape[1]))
+        return out
+
+    def leftover(self, beam: BeamNoise, columns: IntArray) -> FloatArray:
+        """Return what some columns, the poses and the common modes leave of the residual (k, b) [m]."""
+        grams = self.grams(beam, columns)
+        total = marginal(grams, self.layout, _BROAD)[0]
+        beta = _solve(total[:-1, :-1], total[:-1, -1])
+        out: FloatArray = np.empty_like(self.residual)
+        for k, gram in enumerate(grams):
+            own, shared, common = self._rows(k, columns)
+            lead = gram.own + gram.shared
+            target = gram.matrix[:lead, -1] - gram.matrix[:lead, lead:-1] @ beta
+            random = _solve(gram.matrix[:lead, :lead], target)
+            out[k] = common[:, -1] - common[:, :-1] @ beta - np.hstack([own, shared]) @ random
+        return out
+
+    def _plain(self, fitted: Sequence[Form]) -> list[Form]:
+        """Return a form per effect: the fitted one, else the one in the middle of its grid."""
+        chosen = {form.id: form for form in fitted}
+        by_id: dict[str, list[Form]] = {}
+        for form in self.forms:
+            by_id.setdefault(form.id, []).append(form)
+        return [chosen.get(name, forms[len(forms) // 2]) for name, forms in by_id.items()]
+
+    def _refined(self, beam: BeamNoise, project: IntArray) -> BeamNoise:
+        left = np.where(beam.valid, self.leftover(beam, project), np.nan)
+        edges = np.nanquantile(np.where(beam.valid, self.marks.seen.ranges, np.nan), np.linspace(0, 1, _BINS + 1)[1:-1])
+        bins = np.digitize(self.marks.seen.ranges, edges)
+        sd = self.first.sd.copy()
+        for i in range(_BINS):
+            inside = (bins == i) & beam.valid
+            if inside.any():
+                sd[bins == i] *= max(_MAD * float(np.median(np.abs(left[inside] / self.first.sd[inside]))), 0.05)
+        z = left / sd
+        valid = self.first.valid & (np.abs(np.nan_to_num(self.leftover_all(left, beam, project) / sd)) < _OUTLIER)
+        both = beam.valid[:, 1:] & beam.valid[:, :-1] & (np.abs(z[:, 1:]) < _OUTLIER) & (np.abs(z[:, :-1]) < _OUTLIER)
+        a, b = z[:, 1:][both], z[:, :-1][both]
+        rho = float(np.clip(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9), 0.0, 0.95))
+        return replace(beam, sd=sd, rho=rho, valid=valid)
+
+    def leftover_all(self, left: FloatArray, beam: BeamNoise, project: IntArray) -> FloatArray:
+        """Return the leftover of every reading that may ever count, outliers of the last round too."""
+        return self.leftover(beam, project) if not np.array_equal(beam.valid, self.first.valid) else left
+
+    def _rows(self, k: int, columns: IntArray | None) -> tuple[FloatArray, FloatArray, FloatArray]:
+        poses = self.poses[k]
+        one = np.ones((poses.shape[0], 1))
+        common = self.columns[k] if columns is None else self.columns[k][:, columns]
+        last = np.column_stack([common, self.residual[k]])
+        if self.layout.stand[k] >= 0:
+            return np.empty((len(one), 0)), np.hstack([one, poses]), last
+        own = (self.hats[k].weights[:, :, np.newaxis] * poses[:, np.newaxis, :]).reshape(len(one), -1)
+        return own, one, last
+
+    def random_columns(self, k: int) -> FloatArray:
+        """Return (b, q) what the readings of a scan do by its common mode and by errors of its reference poses."""
+        own, shared, _ = self._rows(k, None)
+        return np.hstack([shared[:, :1], own, shared[:, 1:]])
+
+    def origins(self) -> tuple[FloatArray, FloatArray]:
+        """Return poses (k, b, 3) of the laser and bearings (k, b) [rad] at which beams leave it, by the model."""
+        beams = self.marks.seen.beams
+        poses = poses_at(self.shots, np.array([each.times for each in beams]))
+        mounts = np.array([each.mount for each in beams])[:, np.newaxis, :]
+        return compose(poses, mounts), np.array([each.bearings for each in beams])
+
+    def _by_pose(self) -> FloatArray:
+        """Return the change (k, b, 3) of the mean readings per metre and radian of the pose."""
+        out = []
+        for axis in range(3):
+            moved = []
+            for sign in (-1.0, 1.0):
+                seen = look(self.shots, (), 0, shift=sign * np.eye(3)[axis] * _MOVE, like=self.marks.seen)
+                moved.append(predict(self.shots, (), seen, 0))
+            out.append((moved[1] - moved[0]) / (2 * _MOVE[axis]))
+        return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
+
+
+def _stands(shots: Shots) -> IntArray:
+    """Return which scans were taken from one and the same row of reference poses, numbered, else -1."""
+    out = np.full(len(shots.stamps), -1)
+    known: dict[tuple[int, bytes], int] = {}
+    for k in range(len(out)):
+        track = shots.tracks[shots.run[k]]
+        times = shots.stamps[k] + shots.said[[0, -1]]
+        low = max(int(np.searchsorted(track.times, times[0], side="right")) - 1, 0)
+        high = min(int(np.searchsorted(track.times, times[1])), len(track.times) - 1)
+        rows = track.poses[low : high + 1]
+        if (rows == rows[0]).all():
+            out[k] = known.setdefault((int(shots.run[k]), rows[0].tobytes()), len(known))
+    return out
+
+
+def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:
+    norms = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    inside = gram / np.outer(norms, norms) + 1e-9 * np.eye(len(gram))
+    return np.asarray(np.linalg.solve(inside, target / norms) / norms)

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects that change how readings scatter, not their mean: likelihood of statistics, simulated with the very effects.
+
+Which numbers an effect changes is found by simulating it. No effect is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import logsumexp
+
+from kurumaisu import effects
+from kurumaisu.critic.laser.normal import Assembly
+from kurumaisu.critic.laser.shots import own_with, read
+from kurumaisu.critic.laser.statistics import Statistics
+from kurumaisu.critic.prior import log_prior, occam
+from kurumaisu.effects import LaserStage, Mechanism, Parameter
+from kurumaisu.params import EffectSetting
+from kurumaisu.types import FloatArray
+
+_NULLS = 60  # simulations of the model as it is, for the covariance of the statistics
+_MODEL = 0.5  # what the simulation of the statistics itself is off by, in their sds
+_QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
+_COUNTS = 1.0  # no statistic but a root of a count is that large
+_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # in units of a parameter's scale, tried first
+_ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
+_LARGEST = 3  # effects in a set
+_TRIES = 15  # simulations of a refit per parameter
+_REFITS = 5  # effects that are refitted
+_FREE = 2.0  # nats that a further parameter must bring
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Effects on the scatter: a setting each, with the posterior, the log evidence, and sds of the parameters."""
+
+    setting: EffectSetting
+    p: float
+    nats: float
+    sds: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class _Rough:
+    low: float
+    effect: type[Mechanism]
+    values: Mapping[str, float]
+
+
+def _low(rough: _Rough) -> float:
+    return rough.low
+
+
+class Simulator:
+    """Statistics of the shots with effects on how readings scatter."""
+
+    def __init__(self, assembly: Assembly, statistics: Statistics) -> None:
+        self._assembly = assembly
+        self._statistics = statistics
+
+    def __call__(self, settings: Sequence[EffectSetting], seed: int) -> FloatArray:
+        """Return the statistics of a simulation."""
+        shots, seen, base = self._assembly.shots, self._assembly.marks.seen, self._assembly.marks.base
+        rng = np.random.default_rng([seed, 7])
+        chain = effects.build_laser(own_with(shots, settings), np.random.default_rng(seed))
+        raw = read(shots, seen, chain, rng.standard_normal(base.shape))
+        error = shots.laser.error
+        raw = raw + self._statistics.pose_errors(rng)
+        readings = error.reading(error.range(raw), np.zeros_like(raw))
+        with np.errstate(invalid="ignore"):
+            return self._statistics.of(readings, np.where(np.isfinite(readings), readings - base, np.nan))
+
+
+class ScatterSearch:
+    """Finds the effects that the statistics call for."""
+
+    def __init__(
+        self, simulate: Simulator, measured: FloatArray, means: Sequence[str], ids: frozenset[str] | None = None
+    ) -> None:
+        """Take the measured statistics; means: parameters, as id.name, that act on the mean and are not for here.
+
+        ids: the effects to look for; None for all.
+        """
+        self._ids = ids
+        nulls = np.array([simulate((), 1000 + i) for i in range(_NULLS)])
+        self._simulate, self._measured, self._means = simulate, measured, set(means)
+        # A count that is always 0 in simulations may well be 1 in truth; roots of counts have an sd of 1.
+        sd = np.maximum(nulls.std(axis=0), np.where(np.abs(nulls.mean(axis=0)) >= _COUNTS, 0.7, 0.003))
+        unit = (nulls - nulls.mean(axis=0)) / sd
+        half = 0.5 * (unit.T @ unit / _NULLS + np.eye(len(sd)))  # of 60 draws, correlations of 40 are uncertain
+        self._sd = sd
+        self._whiten = np.linalg.inv(np.linalg.cholesky(half + _MODEL**2 * np.eye(len(sd))))
+        self._offset = nulls.mean(axis=0)
+
+    def run(self) -> list[Scatter]:
+        """Return the effects, greedily added while the evidence grows."""
+        if np.abs((self._measured - self._offset) / self._sd).max() < _QUIET:
+            return []
+        chosen: list[tuple[type[Mechanism], EffectSetting]] = []
+        here = self._misfit((), (1, 2))
+        out: list[Scatter] = []
+        count = len(effects.LASER)
+        while len(chosen) < _LARGEST:
+            beside = [setting for _, setting in chosen]
+            rough = sorted(
+                (self._rough(effect, beside) for effect in self._candidates([e for e, _ in chosen])), key=_low
+            )
+            tried = []
+            for start in [each for each in rough[:_REFITS] if each.low < here]:
+                setting, misfit = self._refit(start, beside)
+                z = np.sqrt(max(2 * (here - misfit), 0.0))
+                gain = here - misfit - float(occam(np.array(z))) - 2.0 * (len(start.values) - 1)
+                tried.append((gain + log_prior(1, count) - log_prior(0, count), misfit, start.effect, setting))
+            if not tried:
+                break
+            tried.sort(key=lambda item: -item[0])
+            best, misfit, effect, setting = tried[0]
+            p = float(np.exp(best - logsumexp([0.0, *(item[0] for item in tried)])))
+            if best < _ENOUGH or p < 0.5:
+                break
+            chosen.append((effect, setting))
+            out.append(Scatter(setting, p, best, self._errors(effect, setting, [s for _, s in chosen[:-1]])))
+            here = misfit
+        return out
+
+    def _candidates(self, without: Sequence[type[Mechanism]]) -> Iterator[type[Mechanism]]:
+        for effect in effects.LASER:
+            asked = self._ids is None or effect.id in self._ids
+            if asked and effect not in without and effect.stage > LaserStage.GEOMETRY and self._parameters(effect):
+                yield effect
+
+    def _parameters(self, effect: type[Mechanism]) -> list[Parameter]:
+        return [p for p in effect.parameters if f"{effect.id}.{p.name}" not in self._means]
+
+    def _misfit(self, settings: Sequence[EffectSetting], seeds: Sequence[int] = (1,)) -> float:
+        simulated = np.mean([self._simulate(settings, seed) for seed in seeds], axis=0)
+        white = self._whiten @ ((simulated - self._measured) / self._sd)
+        return 0.5 * float(white @ white)
+
+    def _rough(self, effect: type[Mechanism], beside: Sequence[EffectSetting]) -> _Rough:
+        """Return the best of some sizes of an effect's parameters, one after the other."""
+        null = {p.name: p.null for p in effect.parameters}
+        low, best = np.inf, dict[str, float]()
+        for p in self._parameters(effect):
+            for value in _sizes(p):
+                values = {**best, p.name: value}
+                misfit = self._misfit((*beside, EffectSetting(effect.id, {**null, **values})))
+                if misfit < low - _FREE:
+                    low, best = misfit, values
+        return _Rough(low, effect, best)
+
+    def _refit(self, start: _Rough, beside: Sequence[EffectSetting]) -> tuple[EffectSetting, float]:
+        """Return an effect's best setting and its misfit, from a rough one: those parameters that helped, together."""
+        effect = start.effect
+        null = {p.name: p.null for p in effect.parameters}
+        free = [p for p in effect.parameters if p.name in start.values]
+        centre = np.array([start.values[p.name] for p in free])
+        step = np.array([0.3 * abs(x - p.null) or 0.1 * p.scale for x, p in zip(centre, free, strict=True)])
+
+        def at(x: FloatArray) -> EffectSetting:
+            values = {p.name: float(np.clip(v, p.lower, p.upper)) for p, v in zip(free, centre + step * x, strict=True)}
+            return EffectSetting(effect.id, {**null, **values})
+
+        simplex = np.vstack([np.zeros(len(free)), np.eye(len(free))])
+        options = {"maxfev": _TRIES * len(free), "xatol": 0.02, "fatol": 0.1, "initial_simplex": simplex}
+        cost = lambda x: self._misfit((*beside, at(x)), (1, 2))  # noqa: E731
+        result = minimize(cost, np.zeros(len(free)), method="Nelder-Mead", options=options)
+        return at(result.x), float(result.fun)
+
+    def _errors(
+        self, effect: type[Mechanism], setting: EffectSetting, beside: Sequence[EffectSetting]
+    ) -> dict[str, float]:
+        """Return sds of the parameters from how the statistics follow each."""
+        slopes = []
+        for p in self._parameters(effect):
+            step = 0.1 * abs(setting.parameters[p.name] - p.null) or 0.05 * p.scale
+            ends = np.clip(setting.parameters[p.name] + np.array([-step, step]), p.lower, p.upper)
+            moved = [
+                np.mean(
+                    [
+                        self._simulate((*beside, EffectSetting(effect.id, {**setting.parameters, p.name: float(e)})), s)
+                        for s in (1, 2)
+                    ],
+                    axis=0,
+                )
+                for e in ends
+            ]
+            slopes.append(self._whiten @ ((moved[1] - moved[0]) / self._sd) / (ends[1] - ends[0]))
+        j = np.array(slopes).T
+        scale = np.array([p.scale for p in self._parameters(effect)])
+        inverse = np.linalg.inv((j * scale).T @ (j * scale) + 1e-4 * np.eye(len(scale)))
+        sds = np.sqrt(np.diag(inverse)) * scale
+        return {p.name: float(sd) for p, sd in zip(self._parameters(effect), sds, strict=True)}
+
+
+def _sizes(p: Parameter) -> list[float]:
+    """Return values to try for a parameter, off its null."""
+    values = [p.null + sign * size * p.scale for size in _SIZES for sign in (1.0, -1.0)]
+    return [value for value in values if p.lower <= value <= p.upper]

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How readings scatter, in some forty numbers that know nothing of any effect, alike for measured and simulated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kurumaisu.critic.laser.noise import ScanNoise
+from kurumaisu.critic.laser.normal import Assembly
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+_CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
+_FAR = 6.0  # deviations of an outlier
+_COMMON = 0.005  # [m] plausible common mode of a scan, when it is read off one scan alone
+_CELL = 0.5  # [m] of the map in which errors are averaged
+_GRID = 1e-3  # [m] to which readings are rounded before their values are counted
+_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Masks (k, b) by what is known of a beam beforehand, each a part of the readings that are to be expected."""
+
+    names: tuple[str, ...]
+    masks: tuple[BoolArray, ...]
+
+
+class Statistics:
+    """The numbers of one set of shots."""
+
+    def __init__(self, assembly: Assembly, noise: ScanNoise) -> None:
+        """Take the geometry; noise: of the reference, which each scan's poses are sought within."""
+        shots, seen = assembly.shots, assembly.marks.seen
+        self._base = assembly.marks.base
+        self._sd = assembly.first.sd
+        self._trust = assembly.geometry
+        met = np.asarray(np.isfinite(self._base) & (self._base < shots.laser.range_max - 0.1))
+        self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
+        self._cells = _cells(assembly)
+        self._sides = _sides(seen.ranges, met)
+        self._basis, self._size = _basis(assembly, noise)
+        weighed = np.asarray(self._basis * (self._trust / self._sd)[:, :, np.newaxis])
+        inner = np.asarray(weighed.transpose(0, 2, 1) @ weighed, dtype=np.float64)
+        inner = inner + np.eye(inner.shape[1]) * (self._size**-2)[:, np.newaxis, :]
+        self._solve = np.linalg.inv(inner) @ weighed.transpose(0, 2, 1)
+
+    def pose_errors(self, rng: np.random.Generator) -> FloatArray:
+        """Return errors of readings (k, b) [m] by errors of the reference, drawn."""
+        draws = rng.standard_normal(self._size.shape) * self._size
+        draws[:, 0] = 0.0
+        return np.asarray((self._basis @ draws[:, :, np.newaxis])[:, :, 0])
+
+    def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
+        """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
+        left, common = self._leftover(error)
+        inside = self._trust & np.isfinite(left)
+        z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
+        out = [_log(float(np.mean(z[group & inside] ** 2))) for group in self._groups.masks if (group & inside).any()]
+        power = float(np.mean(z[inside] ** 2))
+        for lag in (1, 2, 4):
+            both = inside[:, lag:] & inside[:, :-lag]
+            out.append(float(np.mean(z[:, lag:][both] * z[:, :-lag][both])) / power)
+        size = np.abs(left[inside])
+        out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR)]
+        far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
+        out.append(_share((far[:, 1:] & far[:, :-1])[inside[:, 1:]]))
+        out += [_log(float(np.mean(common**2))), float(common[1:] @ common[:-1]) / float(common @ common)]
+        out += [_between(z, inside, np.broadcast_to(np.arange(z.shape[1]), z.shape)), _between(z, inside, self._cells)]
+        out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
+        out.append(_share(np.isinf(readings[self._trust])))
+        out.append(self._mixed(readings))
+        return np.array([*out, *_values(readings[self._trust])])
+
+    def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what poses and common mode leave of the errors (k, b), in deviations, and the common modes (k,) [m].
+
+        Missing readings and outliers take the value that the others give them.
+        """
+        z = error / self._sd
+        known = self._trust & np.isfinite(z)
+        fitted = np.zeros_like(z)
+        inside = known
+        coefficients = np.zeros(self._size.shape)
+        for _ in range(_ROUNDS):
+            filled = np.where(inside, np.nan_to_num(z), fitted)
+            coefficients = (self._solve @ filled[:, :, np.newaxis])[:, :, 0]
+            fitted = (self._basis @ coefficients[:, :, np.newaxis])[:, :, 0] / self._sd
+            width = 1.4826 * float(np.median(np.abs((z - fitted)[inside])))
+            inside = known & (np.abs(np.nan_to_num(z - fitted)) < 4.5 * max(width, 0.1))
+        return np.where(known, z - fitted, np.nan), coefficients[:, 0]
+
+    def _mixed(self, readings: FloatArray) -> float:
+        """Return how many readings beside a jump lie well between its sides."""
+        near, far, at = self._sides
+        if not at.any():
+            return 0.0
+        with np.errstate(invalid="ignore"):
+            share = (readings[at] - near[at]) / (far[at] - near[at])
+        return _share((share > 0.15) & (share < 0.85))
+
+
+def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, returns: FloatArray) -> Groups:
+    names, masks = [], []
+    for name, values, count in (("range", ranges, 4), ("incidence", incidence, 4)):
+        cuts = np.quantile(values[expected], np.linspace(0, 1, count + 1)[1:-1])
+        bins = np.digitize(values, cuts)
+        for i in range(count):
+            names.append(f"{name} {i}")
+            masks.append(expected & (bins == i))
+    for value in np.unique(returns[expected])[:4]:
+        names.append(f"return {value:g}")
+        masks.append(expected & (returns == value))
+    return Groups(tuple(names), tuple(mask for mask in masks if mask.any()))
+
+
+def _cells(assembly: Assembly) -> IntArray:
+    """Return the cell of the map (k, b) in which each beam ends, numbered."""
+    origins, bearings = assembly.origins()
+    angle = origins[:, :, 2] + bearings
+    ranges = np.nan_to_num(assembly.marks.seen.level, posinf=0.0)
+    ends = origins[:, :, :2] + ranges[:, :, np.newaxis] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    _, index = np.unique(np.floor(ends / _CELL).reshape(-1, 2), axis=0, return_inverse=True)
+    return np.asarray(index.reshape(ranges.shape))
+
+
+def _sides(ranges: FloatArray, expected: BoolArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return nearer and farther side (k, b) of the jump beside a beam, and where there is one."""
+    jump = np.diff(np.where(expected, ranges, np.nan), axis=1)
+    at = np.abs(np.nan_to_num(jump)) > 0.15
+    near, far = np.full(ranges.shape, np.nan), np.full(ranges.shape, np.nan)
+    low, high = np.minimum(ranges[:, 1:], ranges[:, :-1]), np.maximum(ranges[:, 1:], ranges[:, :-1])
+    for side in (slice(None, -1), slice(1, None)):
+        near[:, side][at], far[:, side][at] = low[at], high[at]
+    return near, far, np.isfinite(near)
+
+
+def _basis(assembly: Assembly, noise: ScanNoise) -> tuple[FloatArray, FloatArray]:
+    """Return (k, b, q) what readings do by a common mode and by errors of the poses, and their sds (k, q)."""
+    parts = [assembly.random_columns(k) for k in range(len(assembly.residual))]
+    widest = max(part.shape[1] for part in parts)
+    basis = np.zeros((len(parts), parts[0].shape[0], widest))
+    size = np.full((len(parts), widest), 1e-6)
+    pose = np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], 1e-6)
+    for k, part in enumerate(parts):
+        basis[k, :, : part.shape[1]] = part
+        size[k, : part.shape[1]] = np.concatenate([[_COMMON], np.tile(pose, part.shape[1] // 3)])
+    return basis, size
+
+
+def _between(z: FloatArray, inside: BoolArray, group: IntArray) -> float:
+    """Return the log of the mean squared group mean, each in deviations of what chance gives it."""
+    count = np.bincount(group[inside])
+    sums = np.bincount(group[inside], z[inside])
+    many = count > 5
+    return _log(float(np.mean(sums[many] ** 2 / count[many])))
+
+
+def _values(readings: FloatArray) -> list[float]:
+    """Return how many different values there are, and how many readings have the least and the greatest of them."""
+    steps = np.rint(readings[np.isfinite(readings)] / _GRID)
+    if not len(steps):
+        return [0.0, 0.0, 0.0]
+    return [_log(len(np.unique(steps))), _share(steps <= steps.min()), _share(steps >= steps.max())]
+
+
+def _share(hits: BoolArray) -> float:
+    """Return the square root of a count: its variance does not depend on how many are to be expected."""
+    return 2 * float(np.sqrt(np.sum(hits) + 0.375))
+
+
+def _log(value: float) -> float:
+    return float(np.log(max(value, 1e-12)))

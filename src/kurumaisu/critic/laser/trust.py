@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which readings may speak about the mean: those that meet a wall well inside, within the gate, and are no outliers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kurumaisu.critic.laser.shots import Look, Shots
+from kurumaisu.types import BoolArray, FloatArray
+
+_KINK = 1e-4  # departure from a straight wall, where 1/r(i+1) + 1/r(i-1) = 2 cos(increment) / r(i), relative to 1/r
+_BESIDE = 4  # beams on each side of a corner or jump: an error of the pose or the mounting moves it so far
+_STEEPEST = np.radians(80.0)  # [rad] oblique beyond this, a beam slides along the wall with every error of the pose
+_GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
+
+
+def edges(seen: Look, increment: float) -> BoolArray:
+    """Return (k, b) which beams have a corner or a jump of the range beside them; increment [rad] between beams."""
+    with np.errstate(divide="ignore"):
+        near = 1 / seen.level
+    middle = near[:, 1:-1]
+    jump = ~(near > 0)
+    jump[:, [0, -1]] = True  # nobody sees what lies beyond
+    jump[:, 1:-1] |= np.abs(near[:, 2:] + near[:, :-2] - 2 * np.cos(increment) * middle) > _KINK * middle
+    wide = jump.copy()
+    for shift in range(-_BESIDE, _BESIDE + 1):
+        moved = jump[:, max(0, -shift) : jump.shape[1] - max(0, shift)]
+        wide[:, max(0, shift) : jump.shape[1] - max(0, -shift)] |= moved
+    return wide
+
+
+def trusted_place(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
+    """Return (k, b) which beams meet a wall where a reading may speak about the mean, whatever they read."""
+    inside = (base > shots.laser.range_min + _GATE) & (base < shots.laser.range_max - _GATE)
+    return np.asarray(inside & ~edges(seen, shots.laser.angle_increment) & (seen.incidence < _STEEPEST))
+
+
+def trusted(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
+    """Return (k, b) which readings may speak about the mean, outliers aside."""
+    return np.asarray(trusted_place(shots, seen, base) & np.isfinite(shots.measured))
+
+
+@dataclass(frozen=True)
+class Hats:
+    """The q reference poses around a scan: rows of its track, and (b, q) the weight of each in each beam's pose."""
+
+    rows: slice
+    weights: FloatArray
+
+
+def hats(shots: Shots, scan: int) -> Hats:
+    """Return on which reference poses a scan rests."""
+    track = shots.tracks[shots.run[scan]]
+    times = shots.stamps[scan] + shots.said
+    first = max(int(np.searchsorted(track.times, times[0], side="right")) - 1, 0)
+    rows = slice(first, min(int(np.searchsorted(track.times, times[-1])), len(track.times) - 1) + 1)
+    knots = track.times[rows]
+    return Hats(rows, np.stack([np.interp(times, knots, unit) for unit in np.eye(len(knots))], axis=-1))

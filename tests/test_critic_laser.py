@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The laser's criticism on scans that share no code with the effects, on nulls, and on a real sensor."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laser_scene import neighbours, recording
+
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, marginal, whitened
+from kurumaisu.critic.laser.normal import Assembly
+from kurumaisu.critic.laser.search import Search
+from kurumaisu.critic.laser.shots import gather
+from kurumaisu.critic.laser.still import repeatability
+from kurumaisu.critic.laser.verdicts import criticise
+from kurumaisu.errors import Error
+from kurumaisu.params import load_model, shipped
+
+MD100 = shipped("launch/md100.yaml")
+MODEL = load_model(MD100)
+REAL = Path(__file__).resolve().parents[2] / "shared/data/player_urg04lx/hokuyo_aist.logr"
+
+
+def say(_):
+    """Progress that nobody reads."""
+
+
+def test_what_is_missing_is_said(tmp_path):
+    good = recording(tmp_path, None, 0.0, 1, scans=6)
+    assert "map" in criticise(replace(good, world=None), MODEL, say).refused
+    blind = replace(good, runs=(replace(good.runs[0], pose=None),))
+    assert "reference pose" in criticise(blind, MODEL, say).refused
+    none = replace(good, runs=(replace(good.runs[0], scan=None),))
+    assert "scans" in criticise(none, MODEL, say).refused
+    late = replace(good.runs[0].scan, t=good.runs[0].scan.t + 1000)
+    assert "within the time" in criticise(replace(good, runs=(replace(good.runs[0], scan=late),)), MODEL, say).refused
+
+
+def test_without_an_effect_the_verdict_is_none(tmp_path):
+    finding = criticise(recording(tmp_path, None, 0.0, 2, scans=30), MODEL, say)
+    assert finding.causes == ()
+    assert finding.confounded == ()
+
+
+@pytest.mark.parametrize("seed", [3])
+def test_dependent_noise_does_not_pass_for_an_effect_on_the_mean(tmp_path, seed):
+    """The i.i.d. likelihood of the same data, beside it, is certain of effects that are not there."""
+    shots = gather(
+        recording(tmp_path, None, 0.0, seed, scans=30, rho=0.5, common=0.001, truth=0.005, told=False), MODEL
+    )
+    assembly = Assembly(shots)
+    normal = assembly.settle(None)
+    found = Search(assembly.forms, normal.gram).run()
+    assert found.named == ()
+    assert normal.beam_noise.rho == pytest.approx(0.5, abs=0.05)
+    assert normal.scan_noise.position_sd == pytest.approx(0.005, rel=0.4)
+    assert normal.scan_noise.heading_sd == pytest.approx(0.005, rel=0.4)
+    naive = [gram.matrix[gram.own + gram.shared :, gram.own + gram.shared :] for gram in assembly.grams(assembly.first)]
+    assert Search(assembly.forms, np.sum(naive, axis=0)).run().named
+
+
+@pytest.mark.parametrize(
+    ("effect", "size", "parameter"), [("laser.scale", 0.006, "scale"), ("laser.mount_yaw", -0.02, "yaw")]
+)
+def test_a_hidden_effect_is_named_and_measured(tmp_path, effect, size, parameter):
+    finding = criticise(recording(tmp_path, effect, size, 5, scans=30), MODEL, say)
+    assert [cause.id for cause in finding.causes] == [effect]
+    estimate = finding.causes[0].parameters[parameter]
+    error = (estimate.hi90 - estimate.lo90) / (2 * 1.645)
+    assert abs(estimate.estimate - size) < 4 * error
+    assert error < 0.1 * abs(size)
+
+
+def test_an_effect_on_the_scatter_is_named_and_measured(tmp_path):
+    finding = criticise(recording(tmp_path, "laser.dropout", 0.04, 6, scans=20), MODEL, say)
+    assert [cause.id for cause in finding.causes] == ["laser.dropout"]
+    assert finding.causes[0].parameters["probability"].estimate == pytest.approx(0.04, rel=0.25)
+
+
+def test_the_pipeline_tells_of_scans_without_commands(tmp_path):
+    data = recording(tmp_path, "laser.quadratic", 0.003, 7, scans=30)
+    criticism = pipeline.criticise(data, MD100, say)
+    pipeline.write(criticism, MD100, tmp_path / "out")
+    verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert [cause["id"] for cause in verdict["causes"]] == ["laser.quadratic"]
+    extended = load_model(tmp_path / "out" / "extended.yaml")
+    assert [setting.id for setting in extended.effects] == ["laser.quadratic"]
+    refused = pipeline.criticise(replace(data, world=None), MD100, say)
+    assert any("laser not criticised" in line for line in refused.story.details)
+
+
+def test_normal_equations_are_those_of_the_dense_covariance():
+    """Errors of poses, an autoregressive common mode and neighbours' correlation, all at once, by brute force."""
+    rng = np.random.default_rng(8)
+    scans, beams, own, common = 4, 9, 6, 3
+    noise = ScanNoise(0.01, 0.02, 0.005, 1.5)
+    times, run = np.array([0.0, 0.5, 1.5, 1.7]), np.array([0, 0, 0, 1])
+    sd, rho = 0.003 * np.ones(beams), 0.4
+    valid = np.ones(beams, dtype=bool)
+    valid[3] = False
+    at = np.flatnonzero(valid)
+    poses = rng.standard_normal((scans, beams, own))
+    columns = rng.standard_normal((scans, beams, common))
+    grams = []
+    for k in range(scans):
+        rows = whitened(np.hstack([poses[k], np.ones((beams, 1)), columns[k]]), valid, sd, rho)
+        grams.append(Gram(rows.T @ rows, own, 1))
+    layout = Layout(times, run, np.full(scans, -1))
+    gram, log_det = marginal(grams, layout, noise)
+    same = run[:, None] == run[None, :]
+    modes = noise.common_sd**2 * np.exp(-np.abs(times[:, None] - times) / noise.common_tau) * same
+    n = len(at)
+    dense = np.kron(modes, np.ones((n, n)))
+    beam = 0.003**2 * rho ** np.abs(at[:, None] - at)
+    for k in range(scans):
+        size = np.tile([0.01, 0.01, 0.02], 2) ** 2
+        dense[k * n : k * n + n, k * n : k * n + n] += beam + (poses[k][at] * size) @ poses[k][at].T
+    x = columns[:, at].reshape(-1, common)
+    np.testing.assert_allclose(gram, x.T @ np.linalg.solve(dense, x), rtol=1e-6)
+    expected = np.linalg.slogdet(dense)[1] - scans * np.linalg.slogdet(beam)[1]
+    assert log_det == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_still_laser_gives_its_noise_away():
+    rng = np.random.default_rng(9)
+    ranges = np.linspace(0.5, 3.0, 682)
+    sd = 0.002 + 0.0005 * ranges
+    readings = np.round(ranges + sd * neighbours(rng, 0.5, 60), 3)
+    readings[rng.random(readings.shape) < 0.0005] = np.nan
+    found = repeatability(readings)
+    assert found.sd_between(0.5, 1.0) == pytest.approx(np.sqrt(0.00238**2 + 1e-6 / 12), rel=0.03)
+    assert found.correlation[1] == pytest.approx(0.5 / (1 + 1e-6 / 12 / 0.0028**2), abs=0.03)
+    with pytest.raises(Error, match="at least 10 scans"):
+        repeatability(readings[:9])
+
+
+@pytest.mark.skipif(not REAL.exists(), reason="the real sensor's log is not there")
+def test_the_real_sensor_has_the_noise_that_careful_people_measured():
+    readings = real_scans()[:34] / 1000.0
+    found = repeatability(np.where(readings < 0.02, np.nan, readings))
+    assert 1e3 * found.sd_between(0.02, 0.75) == pytest.approx(2.3, abs=0.3)
+    assert 1e3 * found.sd_between(2.0, 2.5) == pytest.approx(3.6, abs=0.3)
+    # Theirs lie between ours with the scans' common mode (0.57, 0.36, 0.22) and without it.
+    assert [found.correlation[lag] for lag in (1, 2, 3)] == pytest.approx([0.52, 0.31, 0.18], abs=0.05)
+
+
+def real_scans():
+    """The distances [mm] of the log's scans: SCIP 2.0, three characters each, 64 to a line and a sum."""
+    data, stream, at = REAL.read_bytes(), b"", 0
+    while at < len(data):
+        size = int.from_bytes(data[at + 8 : at + 12], "big")
+        stream, at = stream + data[at + 12 : at + 12 + size], at + 12 + size
+    out = []
+    for part in stream.split(b"GD0046072201\n")[1:]:
+        lines = part.split(b"\n\n")[0].split(b"\n")[2:]
+        codes = np.frombuffer(b"".join(line[:-1] for line in lines), dtype=np.uint8).astype(int) - 0x30
+        if len(codes) == 3 * 677:
+            out.append(codes.reshape(-1, 3) @ [4096, 64, 1])
+    return np.array(out, dtype=float)
