@@ -72,8 +72,10 @@ def sift(request: Mapping[str, Any]) -> Asked:
     """Return the changes that a request asks for: out of bounds becomes the bound, what is no number is left out."""
     asked = Asked()
     for name, value in request.items():
-        if name == "groups" or name in _ENABLERS:
+        if name == "groups":
             asked.changes[name] = value
+        elif name in _ENABLERS:
+            asked.changes[name] = bool(value)
         elif name not in _NUMBERS:
             asked.complaints.append(f"{name}: is no parameter of an effect")
         else:
