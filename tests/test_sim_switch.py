@@ -107,6 +107,18 @@ def test_a_lag_that_is_changed_goes_on_from_its_level(world):
     np.testing.assert_allclose(np.concatenate([falling, slower]), expected, rtol=1e-9)
 
 
+def test_switches_between_two_steps_add_up(world):
+    once, bit_by_bit = start(world), start(world)
+    names = ["base.lag_v", "base.gain_v", "base.delay", "base.lag_w", "base.accel_limit", "laser.offset"]
+    for it in (once, bit_by_bit):
+        drive(it, BEND, 30)
+    for count in range(1, len(names) + 1):
+        bit_by_bit.switch(tuple(TYPICAL[name] for name in names[:count]))
+    once.switch(tuple(TYPICAL[name] for name in names))
+    same(drive(bit_by_bit, BACK, 30), drive(once, BACK, 30))
+    assert bit_by_bit.state_hash() == once.state_hash()
+
+
 def test_a_delay_that_is_lengthened_and_shortened(world):
     it = start(world)
     drive(it, AHEAD, 20)

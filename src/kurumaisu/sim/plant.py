@@ -100,6 +100,7 @@ class Plant:
             if rate.id in before:
                 v, w = self._passed[rate.id]
             else:
+                self._passed[rate.id] = v, w
                 rate.settle(effects.Motion(self.dt, np.array([v]), np.array([w]), known=asked))
 
     def seen(self, reference: effects.Reference) -> effects.Reference:
