@@ -14,7 +14,7 @@ from kurumaisu.params import load_model, shipped
 DT = 0.02
 STEPS = 160
 MODEL = load_model(shipped("launch/md100.yaml"))
-DRAWS = range(3)
+DRAWS = range(5)  # the last two of parameters anywhere within their bounds
 TESTED = [*oracle_base.RATES, *oracle_base.VOLTS, "base.process_noise"]
 TESTED += ["base.marker_x", "base.marker_y", "base.clock_scale"]
 
@@ -24,12 +24,15 @@ def make(name, values, seed=0):
     return effects.by_id(name)(values, context)
 
 
-def drawn(name, rng):
-    """Parameters within their bounds, each up to three times the typical size from where it does nothing."""
-    return {
-        p.name: float(np.clip(p.null + p.scale * rng.uniform(-3, 3), p.lower, p.upper))
-        for p in effects.by_id(name).parameters
-    }
+def drawn(name, rng, anywhere=False):
+    """Parameters up to three times the typical size from where they do nothing, or anywhere within their bounds."""
+
+    def draw(p):
+        if anywhere:
+            return float(rng.uniform(p.lower, p.upper))
+        return float(np.clip(p.null + p.scale * rng.uniform(-3, 3), p.lower, p.upper))
+
+    return {p.name: draw(p) for p in effects.by_id(name).parameters}
 
 
 def drive(rng):
@@ -47,7 +50,7 @@ def drive(rng):
 def test_rates(name):
     for seed in DRAWS:
         rng = np.random.default_rng([seed, 1])
-        values, run = drawn(name, rng), drive(rng)
+        values, run = drawn(name, rng, seed > 2), drive(rng)
         motion = effects.Motion(DT, np.array(run.v), np.array(run.w), heading=run.heading)
         out = make(name, values).apply(motion)
         u = np.zeros(STEPS) if out.u is None else out.u
@@ -72,7 +75,7 @@ def test_the_oracle_is_no_identity(name):
 def test_volts(name):
     for seed in DRAWS:
         rng = np.random.default_rng([seed, 2])
-        values, run = drawn(name, rng), drive(rng)
+        values, run = drawn(name, rng, seed > 2), drive(rng)
         if name == "base.steering_law":
             values = {"flip": float(rng.choice([0.0, 0.3, 1.0]))}
         v_f = [oracle_base.volts("translation", v) for v in run.v]
