@@ -75,6 +75,21 @@ def test_switched_on_in_a_drive_leaves_the_chair_where_it_is_and_off_again_nothi
     np.testing.assert_allclose(rates, [0.4, 0.0, 0.3], atol=1e-9)
 
 
+@pytest.mark.parametrize("name", TYPICAL)
+def test_at_its_bounds_the_simulation_goes_on(world, name):
+    it = start(world)
+    drive(it, BEND, 30)
+    for bound in ("lower", "upper"):
+        values = {p.name: getattr(p, bound) for p in effects.by_id(name).parameters}
+        it.switch((EffectSetting(name, values),))
+        rows, scans = drive(it, BEND, 45)
+        assert np.isfinite(rows).all()
+        assert len(scans) >= (3 if name != "laser.latency" else 2)  # the first one waits for beams that come later
+        it.save()
+    it.switch(())
+    assert len(drive(it, BEND, 40)[1]) >= 3
+
+
 def settled(name):
     """Whether an effect that remembers makes nothing of a steady drive."""
     chain = effects.build((TYPICAL[name],), effects.Context(MODEL.translation, MODEL.steering, None)).rates
