@@ -9,7 +9,9 @@ import pytest
 from kurumaisu import effects
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
+from kurumaisu.sim import state
 from kurumaisu.sim.chair import ChairSimulator, Command
+from kurumaisu.sim.sensors.settings import load_sensors
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.world import load_world
 
@@ -28,7 +30,8 @@ def world(tmp_path_factory):
     file = tmp_path_factory.mktemp("world") / "room.world"
     walls = [(6, 0, 1, 12), (-6, 0, 1, 12), (0, 6, 12, 1), (0, -6, 12, 1)]
     text = "".join(f"model ( pose [{x} {y} 0 0] size [{a} {b} 1] )\n" for x, y, a, b in walls)
-    file.write_text(text + "model ( pose [-4 -4 0 0] size [1 1 1] mass 5 )\nposition ( pose [0 -2 0 45] )")
+    text += "model ( pose [-4 -4 0 0] size [1 1 1] mass 5 )\n" + 'model ( name "post" pose [-4 4 0 0] size [1 1 1] )\n'
+    file.write_text(text + "position ( pose [0 -2 0 45] )")
     return load_world(file)
 
 
@@ -204,6 +207,27 @@ def test_walls_move_and_the_rest_stays(world):
     np.testing.assert_array_equal(rows[:, :3], 0.0)
     it.switch(())
     assert drive(it, stand, 20)[1][-1][ahead] == pytest.approx(near, abs=1e-9)
+    it.set_pose("post", [4.0, 0.0, 0.0, 0.0])  # a wall that somebody has moved before
+    near = drive(it, stand, 20)[1][-1][ahead]
+    it.switch((EffectSetting("world.map_error", {"scale": 0.1, "sd": 0.0}),))
+    assert drive(it, stand, 20)[1][-1][ahead] == pytest.approx(near + 0.35, abs=1e-3)
+    it.switch(())
+    assert drive(it, stand, 20)[1][-1][ahead] == pytest.approx(near, abs=1e-9)
+
+
+def test_further_sensors_go_on_when_walls_move(world):
+    """Noise, biases and rhythm of an IMU, a battery, sonars, ... are those of a chair whose walls stay."""
+    sensors = load_sensors(shipped("launch/sensors.yaml"))
+    moved, plain = (ChairSimulator(MODEL, world, DYNAMICS, sensors) for _ in range(2))
+    for it in (moved, plain):
+        it.reset(2)
+        drive(it, BEND, 33)
+    moved.switch((EffectSetting("world.map_error", {"scale": 0.05, "sd": 0.0}),))
+    moved.switch(())
+    for _ in range(60):
+        one, other = moved.step(BEND), plain.step(BEND)
+        assert state.digest(repr(one.readings)) == state.digest(repr(other.readings))
+    assert moved.state_hash() == plain.state_hash()
 
 
 def test_walls_in_the_chair_are_refused_and_nothing_has_changed(world):

@@ -103,9 +103,10 @@ class ChairSimulator:
         self._world = self._walls.among(self._world, settings, self._seed)
         self._scanner.sight.enter(self._world)
         if self._sensing is not None:
-            known = self._sensing.state()
+            known, random = self._sensing.state(), remember(self._sensor_rng)
             self._power_up()
             self._sensing.restore(known)
+            recall(self._sensor_rng, random)
 
     def command(self, robot: str, velocity: FloatArray | Sequence[float]) -> None:
         """Let another robot drive on at forward, leftward [m/s], turn [rad/s], as its world file bounds it.
