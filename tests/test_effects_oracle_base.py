@@ -142,7 +142,7 @@ def test_a_fast_clock_sees_slow_rates():
 def test_noise_of_the_rates_is_ornstein_uhlenbeck_while_moving():
     """Of 400 drives the same moment: independent draws, so errors are those of textbooks; seed 11."""
     count, steps, tau = 400, 200, 0.25
-    values = {"sd_v": 0.03, "sd_w": 0.07, "tau": tau}
+    values = {"sd_v": 0.03, "sd_w": 0.07, "tau": tau, "growth": 0.0}
     v, w = np.full(steps, 0.5), np.full(steps, -0.3)
     v[120:130] = w[120:130] = 0.0
     motion = effects.Motion(DT, v, w)
@@ -160,3 +160,17 @@ def test_noise_of_the_rates_is_ornstein_uhlenbeck_while_moving():
         ends = 1 - np.exp(-2 * DT * np.array([1, 6, 21]) / tau)
         np.testing.assert_allclose(grown, ends, atol=0, rtol=4 * math.sqrt(2 / count))
     assert abs(np.corrcoef(n_v[:, 150], n_w[:, 150])[0, 1]) < 4 / math.sqrt(count)
+
+
+def test_noise_that_grows_is_the_same_noise_louder():
+    """At 0.5 m/s and -0.3 rad/s by 1 + growth, at 0.1 m/s by an eighth of it."""
+    v, w = np.repeat([0.5, 0.1], 50), np.repeat([-0.3, 0.0], 50)
+    steady, grown = (
+        make("base.process_noise", {"sd_v": 0.03, "sd_w": 0.07, "tau": 0.25, "growth": growth}, 3).apply(
+            effects.Motion(DT, v, w)
+        )
+        for growth in (0.0, 0.6)
+    )
+    louder = np.repeat([1.6, 1.075], 50)
+    np.testing.assert_allclose(grown.v - v, louder * (steady.v - v), atol=1e-15)
+    np.testing.assert_allclose(grown.w - w, louder * (steady.w - w), atol=1e-15)

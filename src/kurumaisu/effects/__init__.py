@@ -131,8 +131,8 @@ def by_id(name: str) -> type[Mechanism]:
 
 
 def fluctuation(sd_v: float, sd_w: float, tau: float) -> EffectSetting:
-    """Return noise of the rates, sd [m/s], [rad/s] and time constant [s], as a model file has it."""
-    return EffectSetting(ProcessNoise.id, {"sd_v": sd_v, "sd_w": sd_w, "tau": tau})
+    """Return steady noise of the rates, sd [m/s], [rad/s] and time constant [s], as a model file has it."""
+    return EffectSetting(ProcessNoise.id, {"sd_v": sd_v, "sd_w": sd_w, "tau": tau, "growth": 0.0})
 
 
 def check(settings: tuple[EffectSetting, ...]) -> None:
@@ -173,7 +173,7 @@ def build_laser(
     built = [
         _go_on(known[effect.id], values)
         if effect.id in known
-        else effect(values, np.random.default_rng([seed, LASER.index(effect)]))
+        else effect(values, np.random.default_rng([seed, LASER.index(effect) if effect in LASER else len(LASER)]))
         for effect, values in _chosen(settings)
         if issubclass(effect, LaserEffect)
     ]
