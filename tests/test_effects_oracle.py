@@ -105,7 +105,11 @@ def test_curves(channel, covariate):
         rows = watched(v.tolist(), w.tolist(), u.tolist(), 0.7)
         added = np.array([shape(row[covariate]) for row in rows]) * ((v != 0) | (w != 0))
         expected = {"v": v, "w": w, "lateral": u}
-        expected[channel] = expected[channel] + added
+        if channel in expected:
+            expected[channel] = expected[channel] + added
+        else:  # v_gain, w_gain: a share of the rate
+            rate = channel.removesuffix("_gain")
+            expected[rate] = expected[rate] + added * expected[rate]
         np.testing.assert_allclose(out.v, expected["v"], atol=1e-12)
         np.testing.assert_allclose(out.w, expected["w"], atol=1e-12)
         np.testing.assert_allclose(out.u, expected["lateral"], atol=1e-12)

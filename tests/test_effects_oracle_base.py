@@ -39,7 +39,7 @@ def drive(rng):
     """Like a joystick's: both signs, standing, one axis alone, steps of any length, none on the grid of anything."""
     v, w = [], []
     while len(v) < STEPS:
-        rates = rng.uniform(-0.8, 0.8, 2) * (rng.random(2) > 0.3)
+        rates = rng.uniform(-1.2, 1.2, 2) * (rng.random(2) > 0.3)
         count = int(rng.integers(1, 30))
         v += [float(rates[0])] * count
         w += [float(rates[1])] * count

@@ -60,7 +60,7 @@ _SMOOTH = """
 
 Where something acts that is none of these, the critic extends the model by a curve, which the simulator runs as it
 runs all others: `smooth.CHANNEL.COVARIATE` adds a rate that follows another quantity, while the chair moves, after
-everything else of the stage FLOOR.
+everything else of the stage FLOOR; the channels `v_gain` and `w_gain` multiply the rate by 1 + curve.
 
 ```yaml
 effects:
