@@ -186,7 +186,7 @@ def test_tails_are_student_s_of_the_same_size(inverse_nu):
 
 def test_points_hang_between_foreground_and_background():
     """Posts in front of a wall, one beam wide, and steps of 5 cm, which are no jump."""
-    n, probability = 6000, 0.4
+    n, probability = 60_000, 0.4
     ranges = np.full(n, 3.0)
     posts = np.arange(5, n - 5, 12)
     ranges[posts] = 1.0
@@ -200,8 +200,9 @@ def test_points_hang_between_foreground_and_background():
     assert not changed[~beside].any()
     count = int(beside.sum())
     assert changed[beside].mean() == pytest.approx(probability, abs=SIGMAS * np.sqrt(0.24 / count))
-    where = (readings[changed] - 1.0) / 2.0
-    assert stats.kstest(where, "uniform").pvalue > 1e-3
+    for near in (True, False):  # a post's reading goes towards the wall, a wall's towards the post: both uniformly
+        where = (readings[changed & ((ranges == 1.0) == near)] - 1.0) / 2.0
+        assert stats.kstest(where, "uniform").pvalue > 1e-3
     assert (chain("laser.mixed_pixels", 6, probability=1.0, jump=0.2).read(it) != ranges).sum() == count
 
 
@@ -230,13 +231,14 @@ def test_readings_drop_out_as_often_as_asked():
 
 def test_another_laser_s_light_comes_from_a_sector_that_drifts():
     n, values = 30_000, {"probability": 0.25, "width": 0.8, "drift": -0.7, "reach": 5.0}
-    it = chain("laser.crosstalk", 7, **values)
+    it, always = chain("laser.crosstalk", 7, **values), chain("laser.crosstalk", 7, **values | {"probability": 1.0})
     for stamp in (0.0, 3.0, 8.0):
         scan = flat(n, 7, stamp=stamp, noise=np.zeros(n))
         readings = it.read(scan)
         inside = np.array([oracle_laser.lit(values, bearing, stamp) for bearing in scan.bearings.tolist()])
         hit = readings != 2.0
         assert not hit[~inside].any()
+        np.testing.assert_array_equal(always.read(scan) != 2.0, inside)
         if inside.any():
             assert hit[inside].mean() == pytest.approx(0.25, abs=SIGMAS * np.sqrt(0.19 / inside.sum()))
             assert stats.kstest(readings[hit] / 5.0, "uniform").pvalue > 1e-3
