@@ -15,7 +15,7 @@ from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import FELT, MATERIAL, felt_share, moved_share
+from kurumaisu.critic.material import FELT, MATERIAL, confirmed, felt_share, moved_share
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
 from kurumaisu.critic.recording import Recording, Run
@@ -81,7 +81,7 @@ def criticism(
     problem, found, growth = made.problem, made.found, made.growth
     best = found.best
     shares = {name: moved_share(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
-    gains = worth is not None and worth.log_density_per_sample.lo90 > 0
+    gains = confirmed(worth, best.score - found.empty.score)
     felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     kind = _kind(found, matters)

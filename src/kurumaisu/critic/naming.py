@@ -45,6 +45,11 @@ class Naming:
         return self.fits[0]
 
     @property
+    def empty(self) -> Fit:
+        """Return the fit of nothing."""
+        return next(fit for fit in self.fits if not fit.candidates)
+
+    @property
     def named(self) -> tuple[str, ...]:
         """Return the effects of the best set that are certain enough to be named."""
         return tuple(name for name in sorted(self.best.ids) if self.p[name] >= NAMED)

@@ -14,7 +14,7 @@ from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, felt_share, moved_share
+from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, confirmed, felt_share, moved_share
 from kurumaisu.critic.misfit import bins
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
@@ -22,8 +22,7 @@ from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.smooth_fit import Extension, extend
 from kurumaisu.critic.smooth_judge import Beyond
 from kurumaisu.critic.story import Misfit, Rival
-from kurumaisu.critic.verdict import Gain, Unknown
-from kurumaisu.critic.words import NORMAL90
+from kurumaisu.critic.verdict import NORMAL90, Gain, Unknown
 from kurumaisu.types import FloatArray
 
 _LISTED = 3  # curves that may act, at most
@@ -44,7 +43,7 @@ def criticism(
     beside = explain.criticism(recording, replace(made, problem=curved, found=inner), worth, drives, proposal)
     share = moved_share(problem, extension.settings, extension.fit.settings)
     felt = felt_share(problem, extension.settings, extension.fit.settings)
-    gains = worth is not None and worth.log_density_per_sample.lo90 > 0
+    gains = confirmed(worth, beyond.rivalry.lead)
     told = _told(extension, beyond, share)
     if not gains or (share < MATERIAL and felt < FELT):
         small = f"{told} It is too small to matter, or was not confirmed on data held out."
