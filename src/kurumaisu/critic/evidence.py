@@ -19,6 +19,7 @@ from kurumaisu.types import FloatArray
 
 _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
 _STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a refit may start
+_ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
 _ROUGH_STARTS = tuple(float(n) for n in np.geomspace(0.25, 64, 49))  # of a parameter whose derivative says little
 
 
@@ -174,7 +175,7 @@ class Problem:
         """Return what the set costs, in nats: Laplace's approximation about the fit, with the prior of each signal."""
         cost, free = 0.0, []
         for candidate in chosen:
-            cost += float(np.log(candidate.ways))
+            cost += float(np.log(candidate.ways)) + (_ROUGH_WAYS if candidate.rough else 0.0)
             own = [i for i, term in enumerate(terms) if term.id == candidate.id and not term.fixed]
             loud = [i for i in own if not terms[i].shape]
             free += loud

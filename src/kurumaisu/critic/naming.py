@@ -133,7 +133,9 @@ def _confounded(
         without = best.ids - {name}
         group = {name}
         for fit, weight in zip(ranked, weights, strict=True):
-            if name not in fit.ids and weight > RIVAL / 5 and len(fit.ids & without) >= len(without) - 1:
+            stands_in = name not in fit.ids and len(fit.ids & without) >= len(without) - 1
+            # Alone, as `name` does: what needs others beside it is another story.
+            if stands_in and len(fit.ids) <= len(best.ids) and weight > RIVAL / 5:
                 group |= {other for other in fit.ids - best.ids if p[other] >= RIVAL}
         groups.append(group)
     merged: list[set[str]] = []

@@ -30,6 +30,8 @@ from kurumaisu.world import load_world
 
 # A reference may be written twice as often as it measures, but not this often.
 _REPEATS = 3.0
+# Every row twice is such a reference; some rows twice is a buffer that was stuck.
+_SOME_TWICE = (1.04, 1.7)
 
 
 def examine(recording: Recording, model: Model) -> Faults:
@@ -97,7 +99,7 @@ def _against(name: str, part: Series, pose: Series, rates: tuple[Rates, Rates], 
     """Return what is wrong with poses in the light of an input, or with the input itself."""
     words = sanity_volts.words(part, rates[1], model) if name == "voltage" else []
     times = sanity_rows.repeats(pose, rates[1])
-    words += [sanity_rows.held(times)] if times > _REPEATS else []
+    words += [sanity_rows.held(times)] if times > _REPEATS or _SOME_TWICE[0] < times < _SOME_TWICE[1] else []
     for check in (
         sanity_rows.frozen(pose, *rates),
         sanity_rows.coarse(pose, rates[1]),

@@ -21,6 +21,7 @@ _LONGEST = 120.0  # [s] shifts of clocks that are tried
 _SCALES = np.exp(np.linspace(np.log(0.4), np.log(2.5), 185))  # of one clock against the other, in steps of 1 %
 _SCALE = 0.05  # clocks may differ by this share
 _PIECES = 240.0  # [s] of a drive that are compared
+_FEWEST_TURNS = 12  # changes of the input below which nearly any pace of the clocks would do
 _PIECE = 100.0  # [s] of the drive that the scales are tried on
 _WIN = 15.0  # nats by which another reading of the data must win
 _ALIKE = 0.7  # least correlation of a reading that is said
@@ -135,7 +136,8 @@ def _scale_words(asked: Rates, driven: Rates, name: str, base: float) -> list[st
     t, goal = driven.t[:size], driven.values[:size]
     best: tuple[float, float, float] = (base, 1.0, 0.0)
     known = np.isfinite(asked.values).all(axis=1)
-    if known.sum() < 20:
+    turns = int((np.abs(np.diff(asked.values[known], axis=0)) > _LEAST).any(axis=1).sum())
+    if known.sum() < 20 or turns < _FEWEST_TURNS:
         return []
     for scale in _SCALES:
         if abs(scale - 1) < _SCALE:

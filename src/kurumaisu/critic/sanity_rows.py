@@ -61,7 +61,8 @@ def repeats(pose: Series, driven: Rates) -> float:
 
 def held(times: float) -> str:
     """Return the words for poses that repeat so many times."""
-    return f"poses repeat under new times, each {times:.2g} times on the mean, while the robot moves: keep the first"
+    how = f"each {times:.2g} times on the mean" if times >= 2 else f"{1 - 1 / times:.0%} of them"
+    return f"duplicate rows: poses repeat under new times, {how}, while the robot moves: keep the first"
 
 
 def _exact(pose: Series) -> bool:
