@@ -12,6 +12,7 @@ import numpy as np
 from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict, thin
+from kurumaisu.critic.laser.standing import smoothed
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
 from kurumaisu.geometry import compose
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -19,7 +20,10 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
 _OUTLIER = 4.5  # deviations from which a reading does not count
 _BINS = 6  # of the range, in which the deviation is estimated
+_JOLT = 4.0  # sds among scans from which one of them does not count
+_TOLERATED = 0.1  # share by which a scan may always be noisier than the middle one
 _ROUNDS = 3
+_UNSEEN = 0.2  # weight of a pose that no scan has moved, among others
 _SHIFTS = 2  # times that poses are sought by the scans
 _LEAST = 1e-4  # [m] deviation of a reading
 _BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau=1.0)  # before any is known
@@ -81,10 +85,12 @@ class Assembly:
             rows = self._alike_rows(k)
             sums[self.shots.run[k]][rows, :3] += errors
             sums[self.shots.run[k]][rows, 3] += 1
-        mean = [some[:, :3] / np.maximum(some[:, 3:], 1) for some in sums]
+        mean = []
         # Errors are as of the first tracks, which `shift` has moved already.
-        for track, first, error in zip(tracks, self.tracks, mean, strict=True):
-            track.poses[:] = first.poses + error
+        for track, first, some in zip(tracks, self.tracks, sums, strict=True):
+            moved = first.poses + some[:, :3] / np.maximum(some[:, 3:], 1)
+            track.poses[:] = smoothed(track.times, moved, np.where(some[:, 3] > 0, 1.0, _UNSEEN))
+            mean.append(track.poses - first.poses)
         shift = [hat.weights @ mean[self.shots.run[k]][hat.rows] for k, hat in enumerate(self.hats)]
         return replace(self.shots, tracks=tuple(tracks), shift=np.array(shift))
 
@@ -194,11 +200,23 @@ class Assembly:
             if inside.any():
                 sd[bins == i] *= max(_MAD * float(np.median(np.abs(left[inside] / self.first.sd[inside]))), 0.05)
         z = left / sd
-        valid = self.first.valid & (np.abs(np.nan_to_num(self.leftover_all(left, beam, project) / sd)) < _OUTLIER)
+        every = self.leftover_all(left, beam, project) / sd
+        valid = self.first.valid & (np.abs(np.nan_to_num(every)) < _OUTLIER) & ~self._jolted(every)[:, np.newaxis]
         both = beam.valid[:, 1:] & beam.valid[:, :-1] & (np.abs(z[:, 1:]) < _OUTLIER) & (np.abs(z[:, :-1]) < _OUTLIER)
         a, b = z[:, 1:][both], z[:, :-1][both]
         rho = float(np.clip(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9), 0.0, 0.95))
         return replace(beam, sd=sd, rho=rho, valid=valid)
+
+    def _jolted(self, z: FloatArray) -> BoolArray:
+        """Return (k,) which scans nothing fits as well as the others: the speed jumped between two poses."""
+        with np.errstate(invalid="ignore"):
+            seen = np.where(self.first.valid, np.minimum(np.abs(z), _OUTLIER), np.nan)
+        some = self.first.valid.any(axis=1)
+        size = np.ones(len(z))
+        size[some] = np.sqrt(np.nanmean(seen[some] ** 2, axis=1))
+        middle = float(np.median(size[some]))
+        width = _MAD * float(np.median(np.abs(size[some] - middle)))
+        return np.asarray((size > middle + max(_JOLT * width, _TOLERATED * middle)) & (self.layout.stand < 0))
 
     def leftover_all(self, left: FloatArray, beam: BeamNoise, project: IntArray) -> FloatArray:
         """Return the leftover of every reading that may ever count, outliers of the last round too."""
