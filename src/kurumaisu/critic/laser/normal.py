@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict, thin
@@ -25,6 +26,7 @@ _TOLERATED = 0.1  # share by which a scan may always be noisier than the middle 
 _ROUNDS = 3
 _UNSEEN = 0.2  # weight of a pose that no scan has moved, among others
 _SHIFTS = 2  # times that poses are sought by the scans
+_MANY = 10  # readings of a beam, and beams, from which their offsets are estimated
 _LEAST = 1e-4  # [m] deviation of a reading
 _BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau=1.0)  # before any is known
 _MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
@@ -32,11 +34,12 @@ _MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
 
 @dataclass(frozen=True)
 class BeamNoise:
-    """Deviations (k, b) [m] of readings, how neighbours correlate, and which readings count."""
+    """Deviations (k, b) [m] of readings, how neighbours correlate, which readings count, and beams' own offsets [m]."""
 
     sd: FloatArray
     rho: float
     valid: BoolArray
+    own_sd: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -155,9 +158,25 @@ class Assembly:
         beam = self.first
         for _ in range(_ROUNDS):
             beam = self._refined(beam, project)
-        grams = self.grams(beam)
+        grams, cross = self._crossed(beam)
         scan = estimate(grams, self.layout, truth, project)
-        return Normal(marginal(grams, self.layout, scan)[0], scan, beam, int(beam.valid.sum()))
+        gram = without_beams(grams, cross, self.layout, scan, beam.own_sd)
+        return Normal(gram, scan, beam, int(beam.valid.sum()))
+
+    def _crossed(self, beam: BeamNoise) -> tuple[list[Gram], Crossed]:
+        """Return the normal equations of each scan, and what single beams' offsets have in common with them."""
+        beams = self.residual.shape[1]
+        inner, common = np.zeros((beams, beams)), np.zeros((beams, self.columns.shape[2] + 1))
+        grams, parts = [], []
+        for k in range(len(self.residual)):
+            own, shared, last = self._rows(k, None)
+            rows = whitened(np.hstack([own, shared, last]), beam.valid[k], beam.sd[k], beam.rho)
+            grams.append(Gram(rows.T @ rows, own.shape[1], shared.shape[1]))
+            products = crossed(rows, beam.valid[k], beam.sd[k], beam.rho, inner)
+            lead = own.shape[1] + shared.shape[1]
+            parts.append(products[:, :lead])
+            common += products[:, lead:]
+        return grams, Crossed(tuple(parts), common, inner)
 
     def grams(self, beam: BeamNoise, columns: IntArray | None = None) -> list[Gram]:
         """Return the normal equations of each scan; columns: which of all, None for all."""
@@ -205,7 +224,8 @@ class Assembly:
         both = beam.valid[:, 1:] & beam.valid[:, :-1] & (np.abs(z[:, 1:]) < _OUTLIER) & (np.abs(z[:, :-1]) < _OUTLIER)
         a, b = z[:, 1:][both], z[:, :-1][both]
         rho = float(np.clip(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9), 0.0, 0.95))
-        return replace(beam, sd=sd, rho=rho, valid=valid)
+        kept = np.where(beam.valid & (np.abs(z) < _OUTLIER), left, np.nan)
+        return replace(beam, sd=sd, rho=rho, valid=valid, own_sd=_own_sd(kept, sd))
 
     def _jolted(self, z: FloatArray) -> BoolArray:
         """Return (k,) which scans nothing fits as well as the others: the speed jumped between two poses."""
@@ -269,6 +289,19 @@ def _stands(shots: Shots) -> IntArray:
         if (rows == rows[0]).all():
             out[k] = known.setdefault((int(shots.run[k]), rows[0].tobytes()), len(known))
     return out
+
+
+def _own_sd(left: FloatArray, sd: FloatArray) -> float:
+    """Return the sd [m] of what beams keep over all scans, beyond what chance leaves of so many readings."""
+    seen = np.isfinite(left)
+    count = seen.sum(axis=0)
+    many = count >= _MANY
+    if many.sum() < _MANY:
+        return 0.0
+    middle = np.nanmean(left[:, many], axis=0)
+    chance = np.nansum(np.where(seen, sd, 0.0)[:, many] ** 2, axis=0) / count[many] ** 2
+    spread = (_MAD * float(np.median(np.abs(middle - np.median(middle))))) ** 2
+    return float(np.sqrt(max(spread - float(np.median(chance)), 0.0)))
 
 
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:
