@@ -80,6 +80,7 @@ class Marks:
             seen.incidence[rows],
             seen.returns[rows],
             tuple(seen.beams[row] for row in rows.tolist()),
+            seen.origins[rows],
         )
         out.base = self.base[rows]
         return out

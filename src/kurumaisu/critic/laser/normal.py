@@ -11,6 +11,7 @@ import numpy as np
 
 from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.columns import Form, Marks
+from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict, thin
 from kurumaisu.critic.laser.standing import smoothed
@@ -67,7 +68,9 @@ class Assembly:
             self._linearise(self._moved())
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base)
-        self.forms, self.columns = self.marks.forms(ids)
+        self.forms, fixed = self.marks.forms(ids)
+        self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
+        self.columns = np.concatenate([fixed, more], axis=2)
 
     def _linearise(self, shots: Shots) -> None:
         """Predict at the shots' shifted poses; the residual is as of the reference's own."""
@@ -154,7 +157,8 @@ class Assembly:
 
     def settle(self, truth: tuple[float, float] | None, fitted: Sequence[Form] = ()) -> Normal:
         """Return the normal equations with the noise estimated from these very data; fitted: forms to project out."""
-        project = np.concatenate([np.arange(len(self.columns))[form.span] for form in self._plain(fitted)])
+        spans = [form.span for form in self._plain(fitted)] + [free.span for free in self.free if free.whole]
+        project = np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
         beam = self.first
         for _ in range(_ROUNDS):
             beam = self._refined(beam, project)

@@ -53,13 +53,17 @@ class Shots:
 
 @dataclass(frozen=True)
 class Look:
-    """What beams meet, (k, b): ranges [m], level ones without tilt, incidence [rad], returns [1]; and the beams."""
+    """What beams meet, (k, b): ranges [m], level ones without tilt, incidence [rad], returns [1]; and the beams.
+
+    origins (k, b, 3): poses of the laser when each is fired.
+    """
 
     ranges: FloatArray
     level: FloatArray
     incidence: FloatArray
     returns: FloatArray
     beams: tuple[Beams, ...]
+    origins: FloatArray
 
 
 def missing(recording: Recording) -> str | None:
@@ -174,14 +178,15 @@ def look(
     poses = poses_at(shots, np.array([each.times for each in beams]))
     if shift is not None:
         poses = poses + shift
-    origins = geometry.compose(poses, np.array([each.mount for each in beams])[:, np.newaxis, :]).reshape(-1, 3)
+    placed = geometry.compose(poses, np.array([each.mount for each in beams])[:, np.newaxis, :])
+    origins = placed.reshape(-1, 3)
     bearings = np.concatenate([each.bearings for each in beams])
     level, returns = rays.cast(origins, bearings)
     shape = shots.measured.shape
     angles = incidence(rays.ranges, origins, bearings, level).reshape(shape) if like is None else like.incidence
     level = level.reshape(shape)
     ranges = np.array([slanted(row, each) for row, each in zip(level, beams, strict=True)])
-    return Look(ranges, level, angles, returns.reshape(shape), tuple(beams))
+    return Look(ranges, level, angles, returns.reshape(shape), tuple(beams), placed)
 
 
 def poses_at(shots: Shots, times: FloatArray) -> FloatArray:
@@ -198,10 +203,10 @@ def read(shots: Shots, seen: Look, chain: LaserChain, noise: FloatArray) -> Floa
     mean, sd = shots.laser.error.mean(seen.ranges), shots.laser.error.deviation(seen.ranges)
     rows = [
         chain.read(
-            Echoes(stamp, shots.laser.bearings, ranges, angles, returns, mean_k, sd_k, noise_k, ranges),
+            Echoes(stamp, shots.laser.bearings, ranges, angles, returns, mean_k, sd_k, noise_k, ranges, origins),
         )
-        for stamp, ranges, angles, returns, mean_k, sd_k, noise_k in zip(
-            shots.stamps.tolist(), seen.ranges, seen.incidence, seen.returns, mean, sd, noise, strict=True
+        for stamp, ranges, angles, returns, mean_k, sd_k, noise_k, origins in zip(
+            shots.stamps.tolist(), seen.ranges, seen.incidence, seen.returns, mean, sd, noise, seen.origins, strict=True
         )
     ]
     return np.array(rows)

@@ -22,15 +22,15 @@ from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
-_NULLS = 60  # simulations of the model as it is, for the covariance of the statistics
+_NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
 _MODEL = 0.5  # what the simulation of the statistics itself is off by, in their sds
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
 _COUNTS = 1.0  # no statistic but a root of a count is that large
-_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # in units of a parameter's scale, tried first
+_SIZES = (0.05, 0.2, 0.7, 2.5)  # in units of a parameter's scale, tried first
 _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
 _LARGEST = 3  # effects in a set
-_TRIES = 15  # simulations of a refit per parameter
-_REFITS = 5  # effects that are refitted
+_TRIES = 12  # simulations of a refit per parameter
+_REFITS = 3  # effects that are refitted
 _FREE = 2.0  # nats that a further parameter must bring
 
 
@@ -91,7 +91,7 @@ class ScatterSearch:
         # A count that is always 0 in simulations may well be 1 in truth; roots of counts have an sd of 1.
         sd = np.maximum(nulls.std(axis=0), np.where(np.abs(nulls.mean(axis=0)) >= _COUNTS, 0.7, 0.003))
         unit = (nulls - nulls.mean(axis=0)) / sd
-        half = 0.5 * (unit.T @ unit / _NULLS + np.eye(len(sd)))  # of 60 draws, correlations of 40 are uncertain
+        half = 0.5 * (unit.T @ unit / _NULLS + np.eye(len(sd)))  # of 50 draws, correlations of 40 are uncertain
         self._sd = sd
         self._whiten = np.linalg.inv(np.linalg.cholesky(half + _MODEL**2 * np.eye(len(sd))))
         self._offset = nulls.mean(axis=0)

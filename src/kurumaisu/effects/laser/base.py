@@ -53,6 +53,7 @@ class Echoes:
     and where no effect of the chain is oblique; returns [1]: reflectance, 1 being the surface that the laser's law was
     measured on; mean, sd [m] of a reading; noise [1]: standard deviates; readings [m]: made of the three after the
     stage NOISE, until then they mean nothing.
+    origins (n, 3): the laser's pose in the map when each beam is fired, None where nobody knows it.
     A beam that met nothing has a range of +inf in the stages OUTLIER and GRID, and of 0 before them.
     """
 
@@ -65,6 +66,7 @@ class Echoes:
     sd: FloatArray
     noise: FloatArray
     readings: FloatArray
+    origins: FloatArray | None = None
 
 
 class LaserEffect(Mechanism):
