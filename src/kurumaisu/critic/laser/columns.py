@@ -137,7 +137,8 @@ class Marks:
         (name,) = form.columns[0].beside
         shape = next(p for p in effect.parameters if p.name == name)
         tried = []
-        for value in np.linspace(max(shape.lower, -np.pi), min(shape.upper, np.pi), _AROUND).tolist():
+        low, high = (-np.pi, np.pi) if shape.unit == "rad" else (shape.lower, shape.upper)
+        for value in np.linspace(max(shape.lower, low), min(shape.upper, high), _AROUND).tolist():
             column = np.nan_to_num(probe._slope(effect, lead, {**form.at, name: value})).ravel()
             size = float(flat @ column) / max(float(column @ column), 1e-300)
             # Of a shape and its opposite, the one whose size is positive.
