@@ -62,21 +62,24 @@ class Assembly:
         self.layout = Layout(shots.stamps, shots.run, _stands(shots))
         self.tracks = shots.tracks
         self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
-        self._linearise(shots)
+        self._linearise(shots, roughly=True)
         self.first = self._trust()
-        for _ in range(_SHIFTS):
-            self._linearise(self._moved())
+        for i in range(_SHIFTS):
+            self._linearise(self._moved(), roughly=i < _SHIFTS - 1)
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base)
         self.forms, fixed = self.marks.forms(ids)
         self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
         self.columns = np.concatenate([fixed, more], axis=2)
 
-    def _linearise(self, shots: Shots) -> None:
-        """Predict at the shots' shifted poses; the residual is as of the reference's own."""
+    def _linearise(self, shots: Shots, *, roughly: bool) -> None:
+        """Predict at the shots' shifted poses; the residual is as of the reference's own.
+
+        roughly: where poses are only sought, one side of a difference will do.
+        """
         self.shots = shots
         self.marks = Marks(shots)
-        self.poses = self._by_pose()
+        self.poses = self._by_pose((1.0,) if roughly else (-1.0, 1.0))
         self.residual = shots.measured - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
 
     def _trust(self) -> BeamNoise:
@@ -268,15 +271,15 @@ class Assembly:
         mounts = np.array([each.mount for each in beams])[:, np.newaxis, :]
         return compose(poses, mounts), np.array([each.bearings for each in beams])
 
-    def _by_pose(self) -> FloatArray:
+    def _by_pose(self, signs: Sequence[float]) -> FloatArray:
         """Return the change (k, b, 3) of the mean readings per metre and radian of the pose."""
         out = []
         for axis in range(3):
-            moved = []
-            for sign in (-1.0, 1.0):
+            moved = [self.marks.base] if len(signs) == 1 else []
+            for sign in signs:
                 seen = look(self.shots, (), 0, shift=sign * np.eye(3)[axis] * _MOVE, like=self.marks.seen)
                 moved.append(predict(self.shots, (), seen, 0))
-            out.append((moved[1] - moved[0]) / (2 * _MOVE[axis]))
+            out.append((moved[1] - moved[0]) / (len(signs) * _MOVE[axis]))
         return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
 
 
