@@ -28,6 +28,7 @@ _STOPS = 20  # stops of which each may have a knot of its own
 _DRAWS = 150  # coefficients of an effect that are still told one by one; of more, so many draws stand for all
 _STEP = 0.2  # of a finite difference, in units of a parameter's scale
 _ROUNDING = 1e-6
+_SAMPLES = 20000  # readings that say how often a covariate has which value
 
 
 @dataclass(frozen=True)
@@ -63,11 +64,14 @@ class _Spike(np.random.Generator):
 
 
 def blocks(shots: Shots, marks: Marks, start: int, ids: frozenset[str] | None) -> tuple[list[Free], FloatArray]:
-    """Return all blocks, and their columns (k, b, m); start: index of the first one in the whole matrix."""
+    """Return all blocks, those first that change whole scans, and their columns (k, b, m).
+
+    start: index of the first one in the whole matrix.
+    """
     found: list[Free] = []
     columns: list[NDArray[np.float32]] = []
     parts = [*_drawn(shots, marks, ids), *(_curves(shots, marks) if ids is None or effects.SMOOTH in ids else ())]
-    for free, part in parts:
+    for free, part in sorted(parts, key=lambda each: not each[0].whole):
         found.append(replace(free, span=slice(start, start + part.shape[2])))
         columns.append(part.astype(np.float32))
         start += part.shape[2]
@@ -129,11 +133,12 @@ def _curves(shots: Shots, marks: Marks) -> Iterator[tuple[Free, FloatArray]]:
         if np.ptp(values) <= _ROUNDING * max(1.0, float(np.abs(values).max())):
             continue
         whole = bool((np.ptp(at, axis=1) <= _ROUNDING).mean() > 0.5) or name == "heading"
-        knots = _knots(at[:, 0] if whole else values)
+        knots = _knots(at[:, 0] if whole else values[:: max(len(values) // _SAMPLES, 1)])
         if len(knots) < 3:
             continue
-        matrix = np.column_stack([np.interp(values, knots, row) for row in np.eye(len(knots))])
-        low, high = np.quantile(values, [0.025, 0.975])
+        few = values[:: max(len(values) // _SAMPLES, 1)]
+        matrix = np.column_stack([np.interp(few, knots, row) for row in np.eye(len(knots))])
+        low, high = np.quantile(few, [0.025, 0.975])
         priors = tuple(priors_of(knots, matrix))
         basis = Basis(name, knots, {}, priors, float(low), float(high))
         columns = basis.matrix(at.ravel()).reshape(*at.shape, len(knots))

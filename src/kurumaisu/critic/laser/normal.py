@@ -71,6 +71,7 @@ class Assembly:
         self.forms, fixed = self.marks.forms(ids)
         self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
         self.columns = np.concatenate([fixed, more], axis=2)
+        self._fixed = fixed.shape[2]
 
     def _linearise(self, shots: Shots, *, roughly: bool) -> None:
         """Predict at the shots' shifted poses; the residual is as of the reference's own.
@@ -159,24 +160,35 @@ class Assembly:
         return out
 
     def settle(self, truth: tuple[float, float] | None, fitted: Sequence[Form] = ()) -> Normal:
-        """Return the normal equations with the noise estimated from these very data; fitted: forms to project out."""
-        spans = [form.span for form in self._plain(fitted)] + [free.span for free in self.free if free.whole]
+        """Return the normal equations with the noise estimated from these very data; fitted: forms to project out.
+
+        Without the blocks of many columns, but for those that change whole scans.
+        """
+        whole = [free.span for free in self.free if free.whole]
+        spans = [form.span for form in self._plain(fitted)] + whole
         project = np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
         beam = self.first
         for _ in range(_ROUNDS):
             beam = self._refined(beam, project)
-        grams, cross = self._crossed(beam)
+        narrow = max((span.stop for span in whole), default=self._fixed)
+        grams, cross = self._crossed(beam, narrow)
         scan = estimate(grams, self.layout, truth, project)
         gram = without_beams(grams, cross, self.layout, scan, beam.own_sd)
         return Normal(gram, scan, beam, int(beam.valid.sum()))
 
-    def _crossed(self, beam: BeamNoise) -> tuple[list[Gram], Crossed]:
-        """Return the normal equations of each scan, and what single beams' offsets have in common with them."""
+    def full(self, normal: Normal) -> Normal:
+        """Return the normal equations of all columns, in the noise that is known."""
+        grams, cross = self._crossed(normal.beam_noise, self.columns.shape[2])
+        gram = without_beams(grams, cross, self.layout, normal.scan_noise, normal.beam_noise.own_sd)
+        return replace(normal, gram=gram)
+
+    def _crossed(self, beam: BeamNoise, count: int) -> tuple[list[Gram], Crossed]:
+        """Return the first columns' normal equations of each scan, and what single beams' offsets share with them."""
         beams = self.residual.shape[1]
-        inner, common = np.zeros((beams, beams)), np.zeros((beams, self.columns.shape[2] + 1))
+        inner, common = np.zeros((beams, beams)), np.zeros((beams, count + 1))
         grams, parts = [], []
         for k in range(len(self.residual)):
-            own, shared, last = self._rows(k, None)
+            own, shared, last = self._rows(k, np.arange(count))
             rows = whitened(np.hstack([own, shared, last]), beam.valid[k], beam.sd[k], beam.rho)
             grams.append(Gram(rows.T @ rows, own.shape[1], shared.shape[1]))
             products = crossed(rows, beam.valid[k], beam.sd[k], beam.rho, inner)

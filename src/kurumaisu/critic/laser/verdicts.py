@@ -66,6 +66,7 @@ def criticise(
         shaped = [form for form in assembly.forms if form.start in {each.start for each in found.best.forms}]
         normal = assembly.settle(recording.truth, shaped)
         found = Search(assembly.forms, normal.gram).run()
+    normal = assembly.full(normal)
     made = _made(assembly, normal, found)
     progress("laser: weighing effects on the scatter")
     scatter = _scatter(assembly, normal, made, ids)
