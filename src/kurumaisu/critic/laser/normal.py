@@ -84,7 +84,8 @@ class Assembly:
         self.residual = shots.measured - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
 
     def _trust(self) -> BeamNoise:
-        sd = np.maximum(predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base, _LEAST)
+        one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
+        sd = np.maximum(np.nan_to_num(one), _LEAST)  # a beam that meets nothing has none
         return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base))
 
     def _moved(self) -> Shots:
