@@ -66,7 +66,7 @@ def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:
     for fit in _tried(found.fits):
         for each in free:
             if each.id not in fit.ids:
-                inner, b = _beside(fit, each, gram)
+                inner, b = beside(fit, each, gram)
                 share = np.log(odds(count)) if each.basis is None else np.log(_ODDS / curves)
                 seen = belief(inner, b, each.priors)
                 rivals.append(Rival(fit, each, seen, fit.score + seen.nats + float(share)))
@@ -105,7 +105,7 @@ def joint(rival: Rival, gram: FloatArray) -> tuple[Fitted, FloatArray, FloatArra
 
 def size(rival: Rival, gram: FloatArray) -> tuple[float, float, float]:
     """Return the sd of a block's coefficients in units of its scale, with its 90 % interval."""
-    inner, b = _beside(rival.fit, rival.free, gram)
+    inner, b = beside(rival.fit, rival.free, gram)
     values, vectors = np.linalg.eigh(inner)
     c, values = vectors.T @ b, np.maximum(values, 0.0)
     square = _SIZES[:, np.newaxis] ** 2
@@ -127,7 +127,7 @@ def _use(fit: Fitted) -> IntArray:
     return np.concatenate([np.arange(0), *(np.arange(form.span.start, form.span.stop) for form in fit.forms)])
 
 
-def _beside(fit: Fitted, free: Free, gram: FloatArray) -> tuple[FloatArray, FloatArray]:
+def beside(fit: Fitted, free: Free, gram: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return gram and target of a block, without what a set's own columns could take up."""
     use, own = _use(fit), np.arange(free.span.start, free.span.stop)
     inner, b = gram[np.ix_(own, own)], gram[own, -1]
