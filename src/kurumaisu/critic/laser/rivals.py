@@ -60,7 +60,8 @@ class Weighed:
 
 def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:
     """Try every block beside the best sets, beside single effects, and beside none."""
-    count = len(found.p)
+    ids = tuple(dict.fromkeys([*found.p, *(each.id for each in free if each.basis is None)]))
+    count = len(ids)
     curves = sum(each.basis is not None for each in free)
     rivals = []
     for fit in _tried(found.fits):
@@ -78,7 +79,7 @@ def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:
     sets = [*plain, *((rival.fit.ids, rival.worth) for rival in curved)]
     weights = [(ids, float(np.exp(worth - total))) for ids, worth in sets]
     best = max(plain, key=lambda each: each[1])
-    p, confounded = confusion(weights, best[0], tuple(found.p))
+    p, confounded = confusion(weights, best[0], ids)
     lead = curved[0].worth - best[1] if curved else -np.inf
     by_curve = {each.id: 0.0 for each in free if each.basis is not None}
     for rival in curved:
