@@ -21,7 +21,7 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
 _OUTLIER = 4.5  # deviations from which a reading does not count
-_BINS = 6  # of the range, in which the deviation is estimated
+_BINS = 6  # of the range, and of the incidence, in which the deviation is estimated
 _JOLT = 4.0  # sds among scans from which one of them does not count
 _TOLERATED = 0.1  # share by which a scan may always be noisier than the middle one
 _ROUNDS = 3
@@ -231,13 +231,9 @@ class Assembly:
 
     def _refined(self, beam: BeamNoise, project: IntArray) -> BeamNoise:
         left = np.where(beam.valid, self.leftover(beam, project), np.nan)
-        edges = np.nanquantile(np.where(beam.valid, self.marks.seen.ranges, np.nan), np.linspace(0, 1, _BINS + 1)[1:-1])
-        bins = np.digitize(self.marks.seen.ranges, edges)
         sd = self.first.sd.copy()
-        for i in range(_BINS):
-            inside = (bins == i) & beam.valid
-            if inside.any():
-                sd[bins == i] *= max(_MAD * float(np.median(np.abs(left[inside] / self.first.sd[inside]))), 0.05)
+        for covariate in (self.marks.seen.ranges, self.marks.seen.incidence):  # oblique walls may be read more noisily
+            sd *= _factors(left, sd, np.where(beam.valid, covariate, np.nan), covariate)
         z = left / sd
         every = self.leftover_all(left, beam, project) / sd
         valid = self.first.valid & (np.abs(np.nan_to_num(every)) < _OUTLIER) & ~self._jolted(every)[:, np.newaxis]
@@ -308,6 +304,17 @@ def _stands(shots: Shots) -> IntArray:
         rows = track.poses[low : high + 1]
         if (rows == rows[0]).all():
             out[k] = known.setdefault((int(shots.run[k]), rows[0].tobytes()), len(known))
+    return out
+
+
+def _factors(left: FloatArray, sd: FloatArray, known: FloatArray, covariate: FloatArray) -> FloatArray:
+    """Return by how much the deviations (k, b) of what is left differ from sd, in bins of a covariate."""
+    bins = np.digitize(covariate, np.nanquantile(known, np.linspace(0, 1, _BINS + 1)[1:-1]))
+    out = np.ones_like(sd)
+    for i in range(_BINS):
+        inside = (bins == i) & np.isfinite(known)
+        if inside.any():
+            out[bins == i] = max(_MAD * float(np.median(np.abs(left[inside] / sd[inside]))), 0.05)
     return out
 
 
