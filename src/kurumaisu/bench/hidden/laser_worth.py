@@ -20,13 +20,14 @@ from scipy.stats import norm, t
 from kurumaisu.bench.hidden import laws
 from kurumaisu.bench.hidden.backdrop import Backdrop
 from kurumaisu.bench.hidden.laser_catalogue import LASER
-from kurumaisu.bench.hidden.motion import Fault, Sizes
+from kurumaisu.bench.hidden.motion import STEP, Fault, Sizes
 from kurumaisu.bench.hidden.scanning import BEAM_TIME, MOUNT, Scans, expected
 from kurumaisu.bench.hidden.tours import REFERENCE_TIME, Tour
 from kurumaisu.types import BoolArray, FloatArray
 
 _PART = 1e-5
 _OBLIQUE = 0.2  # least cosine of the incidence that counts
+_JUMP = 0.05  # [m/s, rad/s] from one step of the integration to the next, more than the noise of the rates
 _SELDOM = 1e-4  # share of readings that are wild anyway
 EVERY = 5  # of the scans, the first of so many is looked at and stands for all
 
@@ -38,7 +39,7 @@ class LaserScale:
         """Look once without faults."""
         self.tour, self._backdrop = tour, backdrop
         self.nominal = expected(tour, (), EVERY)
-        self._seen = seen(self.nominal)
+        self._seen = seen(self.nominal) & ~jolted(tour, self.nominal)[:, None]
         self.count = sum(len(leg.stamps) for leg in tour.legs) / len(self.nominal.stamps)
 
     def signal(self, fault: Fault) -> FloatArray:
@@ -155,6 +156,18 @@ def _unchained(columns: FloatArray, rho: float) -> FloatArray:
         return columns
     out = columns.copy()
     out[:, 1:] = (columns[:, 1:] - rho * columns[:, :-1]) / np.sqrt(1 - rho**2)
+    return out
+
+
+def jolted(tour: Tour, scans: Scans) -> BoolArray:
+    """Return the scans (s,) of a drive in which, or beside which, a rate jumps: no reference shows when exactly."""
+    out = np.zeros(len(scans.stamps), dtype=bool)
+    for i, leg in enumerate(tour.legs if tour.moving else ()):
+        rates = np.diff(leg.path, axis=0) / STEP
+        kinks = STEP * (1 + np.flatnonzero((np.abs(np.diff(rates, axis=0)) > _JUMP).any(axis=1)))
+        mine = scans.leg == i
+        since = scans.stamps[mine][:, None] - kinks
+        out[mine] = ((since < REFERENCE_TIME) & (since > -3 * REFERENCE_TIME)).any(axis=1)
     return out
 
 

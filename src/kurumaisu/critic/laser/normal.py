@@ -14,7 +14,7 @@ from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict, thin
-from kurumaisu.critic.laser.standing import smoothed
+from kurumaisu.critic.laser.standing import kinks, smoothed
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
 from kurumaisu.geometry import compose
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -22,6 +22,7 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
 _OUTLIER = 4.5  # deviations from which a reading does not count
 _BINS = 6  # of the range, and of the incidence, in which the deviation is estimated
+_SURE = 0.3  # share of the scans that must lie on a smooth path, or else none is preferred
 _JOLT = 4.0  # sds among scans from which one of them does not count
 _TOLERATED = 0.1  # share by which a scan may always be noisier than the middle one
 _ROUNDS = 3
@@ -61,6 +62,7 @@ class Assembly:
         self.hats = [hats(shots, row) for row in range(len(shots.stamps))]
         self.layout = Layout(shots.stamps, shots.run, _stands(shots))
         self.tracks = shots.tracks
+        self.kinked = [np.zeros(len(track.times), dtype=bool) for track in shots.tracks]
         self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
         self._linearise(shots, roughly=True)
         self.first = self._trust()
@@ -86,7 +88,10 @@ class Assembly:
     def _trust(self) -> BeamNoise:
         one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
         sd = np.maximum(np.nan_to_num(one), _LEAST)  # a beam that meets nothing has none
-        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base))
+        sure = np.array([not self.kinked[self.shots.run[k]][hat.rows].any() for k, hat in enumerate(self.hats)])
+        if sure.mean() < _SURE:
+            sure[:] = True
+        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & sure[:, np.newaxis])
 
     def _moved(self) -> Shots:
         """Return the shots on tracks that are moved to where the scans put them, each scan alone."""
@@ -96,12 +101,17 @@ class Assembly:
             rows = self._alike_rows(k)
             sums[self.shots.run[k]][rows, :3] += errors
             sums[self.shots.run[k]][rows, 3] += 1
-        mean = []
+        mean, sought = [], []
         # Errors are as of the first tracks, which `shift` has moved already.
         for track, first, some in zip(tracks, self.tracks, sums, strict=True):
             moved = first.poses + some[:, :3] / np.maximum(some[:, 3:], 1)
+            sought.append(moved)
             track.poses[:] = smoothed(track.times, moved, np.where(some[:, 3] > 0, 1.0, _UNSEEN))
             mean.append(track.poses - first.poses)
+        self.kinked = [
+            kinks(moved_to, track.poses, some[:, 3] > 0)
+            for moved_to, track, some in zip(sought, tracks, sums, strict=True)
+        ]
         shift = [hat.weights @ mean[self.shots.run[k]][hat.rows] for k, hat in enumerate(self.hats)]
         return replace(self.shots, tracks=tuple(tracks), shift=np.array(shift))
 
