@@ -16,6 +16,7 @@ from kurumaisu.critic.smooth import Belief, belief
 from kurumaisu.types import FloatArray, IntArray
 
 BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
+LEFT = 0.05  # share of a curve's evidence that the curve itself may leave to other effects
 _ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
 _FITS = 10  # best sets beside which blocks are tried
 _SINGLES = 12  # best single effects likewise
@@ -55,8 +56,17 @@ class Weighed:
         if best.free.basis is not None and self.lead <= BEYOND:
             best = next((rival for rival in self.rivals if rival.free.basis is None), best)
         if best.free.basis is not None:
-            return best if self.lead > BEYOND else None
+            return self._plainest(best) if self.lead > BEYOND else None
         return best if best.worth > self.found.best.score else None
+
+    def _plainest(self, best: Rival) -> Rival:
+        """Return the curve of the best rival beside as few effects as explain much of what it explains.
+
+        Straight lines between knots miss a step, say, by a little, which then looks like one more effect.
+        """
+        least = LEFT * best.belief.nats
+        same = [rival for rival in self.rivals if rival.free.id == best.free.id and rival.fit.ids <= best.fit.ids]
+        return max(same, key=lambda rival: rival.worth - least * len(rival.fit.ids))
 
 
 def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:

@@ -32,7 +32,8 @@ class Described:
 def unknowns(weighed: Weighed, gram: FloatArray) -> Iterator[Unknown]:
     """Yield the curve that acts, and the next ones that could stand in for it."""
     seen: set[str] = set()
-    for rival in weighed.rivals:
+    first = () if weighed.winner is None else (weighed.winner,)
+    for rival in (*first, *weighed.rivals):
         basis = rival.free.basis
         if basis is None or rival.free.id in seen or len(seen) == _LISTED:
             continue

@@ -10,6 +10,7 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.laser import rivals
+from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.rivals import Rival, Weighed
 from kurumaisu.critic.laser.search import Fitted, Found, Search
@@ -142,20 +143,27 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scat
     )
     curve = made.winner is not None and made.winner.free.basis is not None and made.winner.free.id in matters
     unknown = tuple(unknowns(made.weighed, normal.gram)) if curve else ()
-    confounded = (
-        () if curve else tuple(group for group in _confused(assembly, normal, made, causes) if matters & set(group))
-    )
+    groups = () if curve else _confused(assembly, normal, made, causes)
+    confounded = tuple(group for group in groups if matters & set(group))
     causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
-    details = (_noise_told(assembly, normal), *_told(sizes))
-    known = {cause.id: cause for cause in causes}
+    details = (_noise_told(assembly, normal), *lacking(assembly), *_told(sizes))
+    if made.winner is not None and curve:
+        scatter = [each for each in scatter if each.nats > rivals.LEFT * made.winner.belief.nats]
+    causes, added = _with_scatter(causes, settings, scatter)
+    return LaserFinding(causes, confounded, unknown, added, details)
+
+
+def _with_scatter(
+    causes: Sequence[Cause], settings: Mapping[str, EffectSetting], scatter: Sequence[Scatter]
+) -> tuple[tuple[Cause, ...], tuple[EffectSetting, ...]]:
+    """Return causes and settings, also of what acts on the scatter."""
+    known, out = {cause.id: cause for cause in causes}, dict(settings)
     for each in scatter:
+        name, mean = each.setting.id, settings.get(each.setting.id)
         if each.p >= NAMED:
-            known[each.setting.id] = _joined(known.get(each.setting.id), each)
-    for each in scatter:
-        mean = settings.get(each.setting.id)
-        at = {**each.setting.parameters, **(_off_null(mean) if mean else {})}
-        settings[each.setting.id] = EffectSetting(each.setting.id, at)
-    return LaserFinding(tuple(known.values()), confounded, unknown, tuple(settings.values()), details)
+            known[name] = _joined(known.get(name), each)
+        out[name] = EffectSetting(name, {**each.setting.parameters, **(_off_null(mean) if mean else {})})
+    return tuple(known.values()), tuple(out.values())
 
 
 def _confused(assembly: Assembly, normal: Normal, made: _Made, causes: Sequence[Cause]) -> Groups:
