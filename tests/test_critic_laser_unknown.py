@@ -81,6 +81,17 @@ def test_the_temperature_that_was_recorded_is_followed():
     assert chain.read(echoes)[0] - 1 == pytest.approx(0.0025)
 
 
+def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypatch):
+    monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 80)
+    case = make(Ask("single", ("laser.tilt",), 40.0, regime="clean", design="room"), 1002, tmp_path)
+    finding = criticise(case.recording, MODEL, say)
+    assert [cause.id for cause in finding.causes] == ["laser.tilt"]
+    (setting,) = [setting for setting in finding.settings if setting.id == "laser.tilt"]
+    for name, truth in case.truth.parameters["laser.tilt"].items():
+        assert abs(setting.parameters[name]) == pytest.approx(abs(truth), abs=0.004)
+    effects.check(finding.settings)
+
+
 def test_one_wall_does_not_tell_the_mounting_from_the_map(tmp_path, monkeypatch):
     monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 60)
     case = make(Ask("confounded", ("laser.mount_x",), 16.0, regime="clean"), 301, tmp_path)

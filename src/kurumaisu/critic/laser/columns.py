@@ -25,6 +25,8 @@ _NOTHING = 1e-9  # [m] a change that is none
 _SAME = 0.98  # correlation from which two forms of an effect are one
 _PROBE = 12  # scans on which it is tried how a parameter acts
 _FINER = tuple(2.0 ** np.arange(-0.375, 0.4, 0.0625))  # about a value of the grid
+_HALF_TURN = 8  # directions in half a turn of two parameters that act by their squares
+_BETWEEN = np.pi / 16 * np.linspace(-1, 1, 9)  # [rad] about such a direction
 _AROUND = 127  # shapes that are tried to say a sum of two as one
 _RANK = 1e-3  # singular values below this share of the largest do not count
 
@@ -119,6 +121,13 @@ class Marks:
     def finer(self, form: Form) -> Iterator[tuple[dict[str, float], FloatArray]]:
         """Yield shapes between those of the grid, about a form's, and its columns (k, b, m) there."""
         effect = effects.by_id(form.id)
+        if form.columns[0].squared and len(form.at) == 2:
+            first, second = form.at
+            middle = np.arctan2(form.at[second], form.at[first])
+            for angle in middle + _BETWEEN:
+                at = {first: float(np.cos(angle)), second: float(np.sin(angle))}
+                yield at, self._along(effect, at)[:, :, np.newaxis]
+            return
         grids = {p.name for p in effect.parameters if p.name in form.at and _geometric(p)}
         for factors in product(*(_FINER for _ in grids)):
             at = {**form.at, **{name: form.at[name] * f for name, f in zip(sorted(grids), factors, strict=True)}}
@@ -219,13 +228,15 @@ class Marks:
         self, effect: type[Mechanism], squares: Sequence[Parameter]
     ) -> Iterator[tuple[dict[str, float], list[Column], list[FloatArray]]]:
         """Yield a form per direction in which parameters that act by their square may go together."""
-        for signs in product((-1.0, 0.0, 1.0), repeat=len(squares)):
-            first = next((sign for sign in signs if sign), 0.0)
-            if first > 0:
-                sizes = {p.name: sign for p, sign in zip(squares, signs, strict=True)}
-                values = {p.name: self.null(effect)[p.name] + sizes[p.name] * p.scale for p in squares}
-                lead = next(p for p, sign in zip(squares, signs, strict=True) if sign)
-                yield sizes, [Column(lead, squared=True, beside={})], [self.change(effect, values)]
+        for signs in _directions(len(squares)):
+            sizes = {p.name: sign for p, sign in zip(squares, signs, strict=True)}
+            lead = next(p for p in squares if sizes[p.name])
+            yield sizes, [Column(lead, squared=True, beside={})], [self._along(effect, sizes)]
+
+    def _along(self, effect: type[Mechanism], sizes: Mapping[str, float]) -> FloatArray:
+        """Return the change by parameters together, of these sizes in units of their scales."""
+        null, scales = self.null(effect), {p.name: p.scale for p in effect.parameters}
+        return self.change(effect, {name: null[name] + size * scales[name] for name, size in sizes.items()})
 
     def spanned(
         self, effect: type[Mechanism], acting: Sequence[Parameter], shaping: Sequence[Parameter]
@@ -244,6 +255,17 @@ class Marks:
                 other = int(np.argmin(np.abs(units @ units[0])))
                 pairs = [{**pair, parameter.name: grid[i]} for pair in pairs for i in (0, other)]
         return pairs, grids
+
+
+def _directions(count: int) -> list[tuple[float, ...]]:
+    """Return sizes of parameters that act by their squares; of two, directions over half a turn."""
+    if count == 2:
+        return [
+            (round(float(np.cos(a)), 12), round(float(np.sin(a)), 12))
+            for a in np.pi / _HALF_TURN * np.arange(_HALF_TURN)
+        ]
+    every = product((-1.0, 0.0, 1.0), repeat=count)
+    return [signs for signs in every if next((sign for sign in signs if sign), 0.0) > 0]
 
 
 def _grid(parameter: Parameter, span: float) -> list[float]:

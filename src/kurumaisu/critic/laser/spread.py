@@ -28,6 +28,7 @@ _QUIET = 3.5  # sds that some statistic must be off by before any effect is trie
 _COUNTS = 1.0  # no statistic but a root of a count is that large
 _SIZES = (0.05, 0.2, 0.7, 2.5)  # in units of a parameter's scale, tried first
 _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
+_LEFT = 1e-3  # share of an effect's evidence that its own form may leave to others
 _LARGEST = 3  # effects in a set
 _TRIES = 12  # simulations of a refit per parameter
 _REFITS = 4  # effects that are refitted
@@ -117,7 +118,8 @@ class ScatterSearch:
         out: list[Scatter] = []
         while len(chosen) < _LARGEST:
             step = self._step(pushes, chosen, settings)
-            if step is None:
+            least = max([_ENOUGH, *(_LEFT * each.nats for each in out)])
+            if step is None or step[3] < least:
                 break
             effect, setting, p, gain = step
             out.append(Scatter(setting, p, gain, self._errors(effect, setting, settings)))
@@ -147,7 +149,7 @@ class ScatterSearch:
             return None
         best, effect, setting = max(tried, key=lambda item: item[0])
         p = float(np.exp(best - logsumexp([0.0, *(item[0] for item in tried)])))
-        return None if best < _ENOUGH or p < 0.5 else (effect, setting, p, best)
+        return None if p < 0.5 else (effect, setting, p, best)
 
     def _pushes(self) -> Iterator[_Push]:
         """Yield what each parameter alone does to the statistics, at some values."""

@@ -22,6 +22,7 @@ from kurumaisu.critic.laser.unknowns import unknowns
 from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.verdict import Cause, Estimate, Unknown
+from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray, IntArray
 
@@ -236,20 +237,40 @@ def _settings(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
             continue
         values = {p.name: p.null for p in effect.parameters}
         for column, coefficient in zip(form.columns, at.tolist(), strict=True):
-            p = column.parameter
-            values[p.name] = p.null + p.scale * (np.sqrt(coefficient) if column.squared else coefficient)
-        out.append(EffectSetting(form.id, {**values, **form.at}))
+            if column.squared:
+                values |= _squared(effect, form.at, coefficient)
+            else:
+                values[column.parameter.name] = column.parameter.null + column.parameter.scale * coefficient
+        shape = {} if form.columns[0].squared else form.at
+        out.append(EffectSetting(form.id, {**values, **shape}))
     return out
+
+
+def _squared(effect: type[Mechanism], signs: Mapping[str, float], coefficient: float) -> dict[str, float]:
+    """Return the parameters that act by their squares together, for their common square in units of their scales."""
+    size = float(np.sqrt(max(coefficient, 0.0)))
+    return {
+        p.name: float(np.clip(p.null + signs[p.name] * size * p.scale, p.lower, p.upper))
+        for p in effect.parameters
+        if p.name in signs
+    }
 
 
 def _estimates(fit: Fitted, setting: EffectSetting) -> dict[str, Estimate]:
     out, start = {}, 0
+    parameters = {p.name: p for p in effects.by_id(setting.id).parameters}
     for form in fit.forms:
         for i, column in enumerate(form.columns):
-            if form.id == setting.id:
-                p = column.parameter
-                value, half = setting.parameters[p.name], _NORMAL90 * p.scale * float(fit.sds[start + i])
-                out[p.name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
+            if form.id != setting.id:
+                continue
+            sd = float(fit.sds[start + i])
+            names = [column.parameter.name]
+            if column.squared:
+                names = [name for name, size in form.at.items() if size]
+                sd /= 2 * float(np.sqrt(max(fit.coefficients[start + i], sd)))
+            for name in names:
+                p, value, half = parameters[name], setting.parameters[name], _NORMAL90 * parameters[name].scale * sd
+                out[name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
         start += len(form.columns)
     return out
 
