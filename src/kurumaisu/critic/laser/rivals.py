@@ -48,15 +48,22 @@ class Weighed:
     p: dict[str, float]
 
     @property
+    def least(self) -> float:
+        """Lead that a curve needs [nat]: an effect of the catalogue of a slightly other form leaves some, too."""
+        nothing = max((fit.score for fit in self.found.fits if not fit.forms), default=0.0)
+        curve = next((rival.worth for rival in self.rivals if rival.free.basis is not None), nothing)
+        return max(BEYOND, LEFT * (curve - nothing))
+
+    @property
     def winner(self) -> Rival | None:
         """The block that acts, if any: a curve only if it is far better than the catalogue."""
         if not self.rivals:
             return None
         best = self.rivals[0]
-        if best.free.basis is not None and self.lead <= BEYOND:
+        if best.free.basis is not None and self.lead <= self.least:
             best = next((rival for rival in self.rivals if rival.free.basis is None), best)
         if best.free.basis is not None:
-            return self._plainest(best) if self.lead > BEYOND else None
+            return self._plainest(best) if self.lead > self.least else None
         return best if best.worth > self.found.best.score else None
 
     def _plainest(self, best: Rival) -> Rival:
