@@ -53,6 +53,7 @@ from kurumaisu.effects.sign import Sign
 from kurumaisu.effects.slope import Slope
 from kurumaisu.effects.smooth import CHANNELS, SMOOTH, constant_of, curve, smooth_id, smooth_of
 from kurumaisu.effects.smooth_covariates import CONSTANTS, COVARIATES, MEANINGS, PERIODIC, Follower
+from kurumaisu.effects.smooth_laser import RANGE_COVARIATES, smooth_range_id, smooth_range_of
 from kurumaisu.effects.steering_law import SteeringLaw
 from kurumaisu.effects.understeer import Understeer
 from kurumaisu.effects.veer import Veer
@@ -127,6 +128,9 @@ def by_id(name: str) -> type[Mechanism]:
     smooth = smooth_of(name)
     if smooth is not None:
         return smooth
+    ranged = smooth_range_of(name)
+    if ranged is not None:
+        return ranged
     raise Error(f"effects: {name!r} is not in the catalogue: {', '.join(effect.id for effect in ALL)}")
 
 
@@ -215,6 +219,7 @@ __all__ = [
     "LASER",
     "MEANINGS",
     "PERIODIC",
+    "RANGE_COVARIATES",
     "SMOOTH",
     "WORLD",
     "BaseEffect",
@@ -252,4 +257,5 @@ __all__ = [
     "of_world",
     "slanted",
     "smooth_id",
+    "smooth_range_id",
 ]

@@ -73,6 +73,15 @@ them, counted from 0. Over a periodic covariate the curve is level + Σ cos_k ·
 counted from 1. Every covariate in the table needs the parameter that stands beside it, too. Any other name is that of
 a quantity that a recording has measured (a column of `covariate.csv`); the simulator does not know it and holds it at
 the parameter `now`, for which the critic writes its mean.
+
+`smooth.range.COVARIATE` adds such a curve, in metres, to the laser's readings, with the stage BIAS; all of them have
+knots. They follow `range` [m], `incidence`, `bearing`, `heading`, `world_bearing` [rad, within half a turn], `time` [s]
+since the laser was switched on, or `hit_x`, `hit_y` [m] in the map.
+
+```yaml
+effects:
+  - {id: smooth.range.range, parameters: {knot_0: 1.9, knot_1: 2.1, value_0: 0.0, value_1: 0.01}}
+```
 """
 
 

@@ -25,6 +25,8 @@ _NOTHING = 1e-9  # [m] a change that is none
 _SAME = 0.98  # correlation from which two forms of an effect are one
 _PROBE = 12  # scans on which it is tried how a parameter acts
 _FINER = tuple(2.0 ** np.arange(-0.375, 0.4, 0.0625))  # about a value of the grid
+_HALF_TURN = 8  # directions in half a turn of two parameters that act by their squares
+_BETWEEN = np.pi / 16 * np.linspace(-1, 1, 9)  # [rad] about such a direction
 _AROUND = 127  # shapes that are tried to say a sum of two as one
 _RANK = 1e-3  # singular values below this share of the largest do not count
 
@@ -64,6 +66,7 @@ class Marks:
         self._seen = look(shots, (), 0)
         self._own = {setting.id: setting.parameters for setting in shots.own}
         self.base = predict(shots, (), self._seen, 0)
+        self._halves: dict[tuple[str, str], bool] = {}
         self._probe = Marks(thin(shots, _PROBE)) if len(shots.stamps) > _PROBE else self
 
     @property
@@ -80,6 +83,7 @@ class Marks:
             seen.incidence[rows],
             seen.returns[rows],
             tuple(seen.beams[row] for row in rows.tolist()),
+            seen.origins[rows],
         )
         out.base = self.base[rows]
         return out
@@ -117,6 +121,13 @@ class Marks:
     def finer(self, form: Form) -> Iterator[tuple[dict[str, float], FloatArray]]:
         """Yield shapes between those of the grid, about a form's, and its columns (k, b, m) there."""
         effect = effects.by_id(form.id)
+        if form.columns[0].squared and len(form.at) == 2:
+            first, second = form.at
+            middle = np.arctan2(form.at[second], form.at[first])
+            for angle in middle + _BETWEEN:
+                at = {first: float(np.cos(angle)), second: float(np.sin(angle))}
+                yield at, self._along(effect, at)[:, :, np.newaxis]
+            return
         grids = {p.name for p in effect.parameters if p.name in form.at and _geometric(p)}
         for factors in product(*(_FINER for _ in grids)):
             at = {**form.at, **{name: form.at[name] * f for name, f in zip(sorted(grids), factors, strict=True)}}
@@ -136,7 +147,8 @@ class Marks:
         (name,) = form.columns[0].beside
         shape = next(p for p in effect.parameters if p.name == name)
         tried = []
-        for value in np.linspace(max(shape.lower, -np.pi), min(shape.upper, np.pi), _AROUND).tolist():
+        low, high = (-np.pi, np.pi) if shape.unit == "rad" else (shape.lower, shape.upper)
+        for value in np.linspace(max(shape.lower, low), min(shape.upper, high), _AROUND).tolist():
             column = np.nan_to_num(probe._slope(effect, lead, {**form.at, name: value})).ravel()
             size = float(flat @ column) / max(float(column @ column), 1e-300)
             # Of a shape and its opposite, the one whose size is positive.
@@ -191,6 +203,10 @@ class Marks:
     def _slope(self, effect: type[Mechanism], parameter: Parameter, beside: Mapping[str, float]) -> FloatArray:
         """Return the change per scale, from both sides where bounds allow: one side sees half the curvature."""
         null = self.null(effect)[parameter.name]
+        if issubclass(effect, effects.ReadingEffect) and effect.id not in self._own and self._linear(effect, parameter):
+            step = _STEP * parameter.scale if parameter.upper > null else -_STEP * parameter.scale
+            moved = self.change(effect, {**beside, parameter.name: null + step})
+            return np.asarray(moved * (parameter.scale / step))
         ends = np.clip(
             [null - _STEP * parameter.scale, null + _STEP * parameter.scale], parameter.lower, parameter.upper
         )
@@ -200,17 +216,27 @@ class Marks:
         )
         return np.asarray((high - low) * (parameter.scale / (ends[1] - ends[0])))
 
+    def _linear(self, effect: type[Mechanism], parameter: Parameter) -> bool:
+        """Return whether half of a parameter does half of what the whole does; a few scans show it."""
+        known = self._probe._halves
+        if (effect.id, parameter.name) not in known:
+            whole, half = (self._probe._moved(effect, parameter, steps, 0) for steps in (1.0, 0.5))
+            known[effect.id, parameter.name] = bool(np.nanmax(np.abs(whole - 2 * half)) < _NOTHING)
+        return known[effect.id, parameter.name]
+
     def _squares(
         self, effect: type[Mechanism], squares: Sequence[Parameter]
     ) -> Iterator[tuple[dict[str, float], list[Column], list[FloatArray]]]:
         """Yield a form per direction in which parameters that act by their square may go together."""
-        for signs in product((-1.0, 0.0, 1.0), repeat=len(squares)):
-            first = next((sign for sign in signs if sign), 0.0)
-            if first > 0:
-                sizes = {p.name: sign for p, sign in zip(squares, signs, strict=True)}
-                values = {p.name: self.null(effect)[p.name] + sizes[p.name] * p.scale for p in squares}
-                lead = next(p for p, sign in zip(squares, signs, strict=True) if sign)
-                yield sizes, [Column(lead, squared=True, beside={})], [self.change(effect, values)]
+        for signs in _directions(len(squares)):
+            sizes = {p.name: sign for p, sign in zip(squares, signs, strict=True)}
+            lead = next(p for p in squares if sizes[p.name])
+            yield sizes, [Column(lead, squared=True, beside={})], [self._along(effect, sizes)]
+
+    def _along(self, effect: type[Mechanism], sizes: Mapping[str, float]) -> FloatArray:
+        """Return the change by parameters together, of these sizes in units of their scales."""
+        null, scales = self.null(effect), {p.name: p.scale for p in effect.parameters}
+        return self.change(effect, {name: null[name] + size * scales[name] for name, size in sizes.items()})
 
     def spanned(
         self, effect: type[Mechanism], acting: Sequence[Parameter], shaping: Sequence[Parameter]
@@ -223,12 +249,23 @@ class Marks:
             units = np.array([_unit(self._slope(effect, acting[0], {parameter.name: value})) for value in grid])
             sizes = np.linalg.svd(units, compute_uv=False)
             rank = int(np.sum(sizes > _RANK * sizes[0]))
-            if rank > 2:
+            if rank > 2 or (rank == 2 and _geometric(parameter)):  # within bounds, which a sum of two would ignore
                 grids[parameter.name] = grid
             elif rank == 2:
                 other = int(np.argmin(np.abs(units @ units[0])))
                 pairs = [{**pair, parameter.name: grid[i]} for pair in pairs for i in (0, other)]
         return pairs, grids
+
+
+def _directions(count: int) -> list[tuple[float, ...]]:
+    """Return sizes of parameters that act by their squares; of two, directions over half a turn."""
+    if count == 2:
+        return [
+            (round(float(np.cos(a)), 12), round(float(np.sin(a)), 12))
+            for a in np.pi / _HALF_TURN * np.arange(_HALF_TURN)
+        ]
+    every = product((-1.0, 0.0, 1.0), repeat=count)
+    return [signs for signs in every if next((sign for sign in signs if sign), 0.0) > 0]
 
 
 def _grid(parameter: Parameter, span: float) -> list[float]:

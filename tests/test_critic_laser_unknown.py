@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Curves outside the catalogue, walls that are off, stands, and sets of effects that one wall cannot tell apart."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from laser_scene import recording
+
+from kurumaisu import effects
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.critic import pipeline, sanity_jumps
+from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
+from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, whitened
+from kurumaisu.critic.laser.standing import kinks, smoothed, steadied
+from kurumaisu.critic.laser.verdicts import criticise
+from kurumaisu.critic.recording import Series
+from kurumaisu.effects import Echoes
+from kurumaisu.errors import Error
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+MD100 = shipped("launch/md100.yaml")
+MODEL = load_model(MD100)
+
+
+def say(_):
+    """Progress that nobody reads."""
+
+
+@pytest.mark.parametrize("size", [0.0, 0.004])
+def test_a_step_of_the_range_is_outside_the_catalogue(tmp_path, size):
+    data = recording(tmp_path, None, 0.0, 11, scans=30)
+    run = data.runs[0]
+    far = np.where(run.scan.values > 2.2, size, 0.0)
+    data = replace(data, runs=(replace(run, scan=replace(run.scan, values=run.scan.values + far)),))
+    criticism = pipeline.criticise(data, MD100, say)
+    verdict = criticism.verdict
+    if size == 0:
+        assert verdict.verdict == "none"
+        assert verdict.unknown == ()
+        return
+    assert verdict.verdict == "unknown"
+    assert (verdict.unknown[0].channel, verdict.unknown[0].covariate) == ("laser.bias", "range")
+    assert not any(cause.id.startswith("laser") for cause in verdict.causes)
+    pipeline.write(criticism, MD100, tmp_path / "out")
+    assert json.loads((tmp_path / "out" / "verdict.json").read_text())["verdict"] == "unknown"
+    extended = load_model(tmp_path / "out" / "extended.yaml")
+    (curve,) = [own for own in extended.effects if own.id == "smooth.range.range"]
+    near, beyond = (added(curve, ranges) for ranges in (1.5, 2.8))
+    assert beyond - near == pytest.approx(size, rel=0.4)
+
+
+def added(setting, ranges):
+    """What an effect adds to the mean of one reading [m]."""
+    chain = effects.build_laser((setting,), np.random.default_rng(0))
+    one = np.ones(1)
+    return chain.read(Echoes(0.0, 0 * one, ranges * one, 0 * one, one, ranges * one, 0 * one, 0 * one, one))[0] - ranges
+
+
+def test_a_curve_over_where_beams_hit_needs_the_pose():
+    values = {"knot_0": 0.0, "knot_1": 2.0, "value_0": 0.0, "value_1": 0.01}
+    setting = EffectSetting("smooth.range.hit_x", values)
+    assert added(setting, 1.5) == 0
+    chain = effects.build_laser((setting,), np.random.default_rng(0))
+    one = np.ones(1)
+    echoes = Echoes(0.0, 0 * one, one, 0 * one, one, one, 0 * one, 0 * one, one, np.array([[0.5, 0.0, 0.0]]))
+    assert chain.read(echoes)[0] - 1 == pytest.approx(0.0075)
+    with pytest.raises(Error, match="knots must increase"):
+        effects.check((EffectSetting("smooth.range.range", {**values, "knot_1": -1.0}),))
+    with pytest.raises(Error, match="not in the catalogue"):
+        effects.by_id("smooth.range.moon")
+
+
+def test_the_temperature_that_was_recorded_is_followed():
+    one = np.ones(1)
+    values = {"coefficient": 5e-4, "swing": 5.0, "period": 600.0, "reference": 21.0}
+    chain = effects.build_laser((EffectSetting("laser.temperature", values),), np.random.default_rng(0))
+    echoes = Echoes(150.0, 0 * one, one, 0 * one, one, one, 0 * one, 0 * one, one)
+    assert chain.read(replace(echoes, known={"temperature": 25.0}))[0] - 1 == pytest.approx(0.002)
+    assert chain.read(echoes)[0] - 1 == pytest.approx(0.0025)
+
+
+def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypatch):
+    monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 80)
+    case = make(Ask("single", ("laser.tilt",), 40.0, regime="clean", design="room"), 1002, tmp_path)
+    finding = criticise(case.recording, MODEL, say)
+    assert [cause.id for cause in finding.causes] == ["laser.tilt"]
+    (setting,) = [setting for setting in finding.settings if setting.id == "laser.tilt"]
+    for name, truth in case.truth.parameters["laser.tilt"].items():
+        assert abs(setting.parameters[name]) == pytest.approx(abs(truth), abs=0.004)
+    effects.check(finding.settings)
+
+
+def test_one_wall_does_not_tell_the_mounting_from_the_map(tmp_path, monkeypatch):
+    monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 60)
+    case = make(Ask("confounded", ("laser.mount_x",), 16.0, regime="clean"), 301, tmp_path)
+    finding = criticise(case.recording, MODEL, say)
+    assert finding.confounded == (("laser.mount_x", "world.map_error"),)
+    assert finding.causes == ()
+    assert any("only one wall" in line and "room_poses" in line for line in finding.details)
+    null = criticise(case.null, MODEL, say)
+    assert (null.confounded, null.causes, null.unknown) == ((), (), ())
+
+
+def test_beams_that_keep_an_offset_are_integrated_out():
+    rng = np.random.default_rng(8)
+    scans, beams, own, common, sd_own = 4, 9, 6, 3, 0.002
+    noise = ScanNoise(0.01, 0.02, 0.005, 1.5)
+    times, run = np.array([0.0, 0.5, 1.5, 1.7]), np.array([0, 0, 0, 1])
+    sd, rho = 0.003 * rng.uniform(0.5, 1.5, beams), 0.4
+    valid = np.ones(beams, dtype=bool)
+    valid[3] = False
+    at = np.flatnonzero(valid)
+    n = len(at)
+    poses, columns = rng.standard_normal((scans, beams, own)), rng.standard_normal((scans, beams, common))
+    inner, total, grams, parts = np.zeros((beams, beams)), np.zeros((beams, common)), [], []
+    for k in range(scans):
+        rows = whitened(np.hstack([poses[k], np.ones((beams, 1)), columns[k]]), valid, sd, rho)
+        grams.append(Gram(rows.T @ rows, own, 1))
+        products = crossed(rows, valid, sd, rho, inner)
+        parts.append(products[:, : own + 1])
+        total += products[:, own + 1 :]
+    layout = Layout(times, run, np.full(scans, -1))
+    gram = without_beams(grams, Crossed(tuple(parts), total, inner), layout, noise, sd_own)
+    modes = noise.common_sd**2 * np.exp(-np.abs(times[:, None] - times) / noise.common_tau)
+    dense = np.kron(modes * (run[:, None] == run), np.ones((n, n)))
+    dense += np.kron(np.ones((scans, scans)), sd_own**2 * np.eye(n))
+    for k in range(scans):
+        size = np.tile([0.01, 0.01, 0.02], 2) ** 2
+        beam = rho ** np.abs(at[:, None] - at) * np.outer(sd[at], sd[at])
+        dense[k * n : k * n + n, k * n : k * n + n] += beam + (poses[k][at] * size) @ poses[k][at].T
+    x = columns[:, at].reshape(-1, common)
+    np.testing.assert_allclose(gram, x.T @ np.linalg.solve(dense, x), rtol=1e-8)
+
+
+def test_poses_of_a_stand_are_one_and_those_of_a_drive_are_not():
+    rng = np.random.default_rng(3)
+    times = np.concatenate([0.1 * np.arange(30), 100 + 0.1 * np.arange(30)])
+    places = np.repeat([[0.0, 0.0, 0.0], [1.0, 0.5, 2.0]], 30, axis=0)
+    still = steadied(times, places + 0.001 * rng.standard_normal(places.shape))
+    assert len(np.unique(still, axis=0)) == 2
+    np.testing.assert_allclose(still, places, atol=0.001)
+    driven = np.column_stack([0.3 * times, 0.0 * times, 0.0 * times]) + 0.001 * rng.standard_normal(places.shape)
+    np.testing.assert_array_equal(steadied(times, driven), driven)
+
+
+def test_a_smooth_path_has_the_rates_of_the_truth_and_shows_its_kinks():
+    rng = np.random.default_rng(4)
+    times = 0.05 * np.arange(200)
+    yaw = np.where(times < 5, 0.0, 0.5 * (times - 5))
+    poses = np.column_stack([0.2 * times, 0.0 * times, yaw]) + 0.001 * rng.standard_normal((200, 3))
+    smooth = smoothed(times, poses, np.ones(200))
+    rates = np.diff(smooth[:, 0]) / 0.05
+    assert np.std(rates[10:-10]) < 0.2 * np.std(np.diff(poses[:, 0]) / 0.05)
+    assert rates[10:-10].mean() == pytest.approx(0.2, abs=0.005)
+    found = np.flatnonzero(kinks(poses, smooth, np.ones(200, dtype=bool)))
+    assert np.any(np.abs(found - 100) <= 2)
+    assert len(found) < 12
+
+
+@pytest.mark.parametrize(("pause", "jumps"), [(0.0, True), (60.0, False)])
+def test_a_chair_that_was_carried_has_not_jumped(pause, jumps):
+    rng = np.random.default_rng(5)
+    times = 0.1 * np.arange(40)
+    times[20:] += pause
+    places = np.repeat([[0.0, 0.0, 0.0], [1.5, 0.5, 1.0]], 20, axis=0) + 0.0005 * rng.standard_normal((40, 3))
+    assert bool(sanity_jumps.words(Series(times, places, ("x", "y", "theta")))) == jumps
