@@ -18,6 +18,7 @@ from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
 GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
+_CLOCK = 0.02  # share by which the reference's clock may be off, and more
 LONGEST = 100_000.0  # [s] a day: what is longer has its times in another unit, and its grid would fill the memory
 # [s] least time between reference poses. Closer ones add cost, hardly information; and odometry is itself measured:
 # over short intervals its noise, in the input and in the residual alike, would pass for a gain below 1 (errors in
@@ -65,6 +66,10 @@ class Drive:
         """Rates asked for during each increment, in units of what is usual, (m,)."""
         return self._means(np.abs(self.v) / _USUAL_V + np.abs(self.w) / _USUAL_W, 0.0)
 
+    def seen_at(self, times: FloatArray, poses: FloatArray) -> Drive:
+        """Return the drive with other poses (m + 1, 3) at other times (m + 1,)."""
+        return replace(self, times=times, poses=poses)
+
     def _means(self, values: FloatArray, before: float) -> FloatArray:
         """Return means (m,) of values (n,) on the grid, over the increments and the time [s] before each."""
         sums = np.concatenate([[0.0], np.cumsum(values)]) * GRID
@@ -101,6 +106,23 @@ def prepare(run: Run, model: Model, interval: float | None = None) -> Drive:
         times=pose_times,
         poses=poses,
     )
+
+
+def prepare_all(run: Run, model: Model, until: float) -> Drive:
+    """Return the drive of a run with all its poses, be they few or none, and its inputs until a time [s] at least.
+
+    Raise Error when nothing says what drove the robot.
+    """
+    source, times, v, w = _inputs(run, model)
+    pose = run.pose or Series(np.empty(0), np.empty((0, 3)), ("x", "y", "theta"))
+    use = pose.t >= times[0]
+    first, last = min(times[0], *pose.t[use][:1], until), max([until, *pose.t[use][-1:]])
+    if last - first > LONGEST:
+        raise Error(f"{run.name}: lasts {last - first:.6g} s: are its times in seconds?")
+    # A reference whose clock is off sees the path at other times.
+    edges = np.arange(first, last + 2 * GRID + _CLOCK * (last - first), GRID)
+    rates = (_mean_rates(times, rate, edges) for rate in (v, w))
+    return Drive(run.name, source, float(edges[0]), *rates, pose.t[use], pose.values[use, :3])
 
 
 def split(drive: Drive, parts: int) -> list[Drive]:

@@ -3,17 +3,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic import explain, gain, next_experiment, noise, sanity, smooth_explain
+from kurumaisu.critic import explain, gain, next_experiment, noise, predict, sanity, smooth_explain
 from kurumaisu.critic.decide import Progress, decide, scatter
-from kurumaisu.critic.drive import driven, prepare
+from kurumaisu.critic.drive import Drive, driven, prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
 from kurumaisu.critic.laser.merge import with_laser
 from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
-from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.predict_doubt import forecast_of
+from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.verdict import write_verdict
@@ -38,20 +40,45 @@ def criticise(
     model = load_model(model_file)
     if not assume_law and recording.model is None and all(run.voltage is None for run in recording.runs):
         model = follow_commands(model)
-    wrong = [*recording.invalid, *sanity.examine(recording, model).invalid]
+    whole = replace(recording, runs=tuple(run for run in recording.runs if not _withheld(recording, run)))
+    wrong = [*recording.invalid, *sanity.examine(whole, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
-    if any(driven(run) for run in recording.runs):
-        base = _criticise_base(recording, model, progress, ids)
+    forecast = None
+    if any(driven(run) for run in whole.runs):
+        base, forecast = _criticise_base(recording, model, progress, ids)
     else:
         base = explain.undriven(recording, model)
-    return with_laser(base, criticise_laser(recording, model, progress, ids))
+    found = with_laser(base, criticise_laser(recording, model, progress, ids))
+    if not predict.asked(recording):
+        return found
+    progress("predicting what was asked for")
+    return replace(found, predictions=tuple(predict.predictions(recording, model, forecast, found.settings)))
 
 
-def _criticise_base(recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None) -> Criticism:
-    drives = {run.name: informed(prepare(run, model), run) for run in recording.runs}
+def _withheld(recording: Recording, run: Run) -> bool:
+    """Tell whether a run lacks poses because they are to be predicted: gaps in it are no fault."""
+    return run.queries is not None and run.name in recording.test
+
+
+def _drives(recording: Recording, model: Model) -> dict[str, Drive]:
+    """Return the drives, without those of withheld runs that have too few poses left to judge by."""
+    drives = {}
+    for run in recording.runs:
+        try:
+            drives[run.name] = informed(prepare(run, model), run)
+        except Error:
+            if not _withheld(recording, run):
+                raise
+    return drives
+
+
+def _criticise_base(
+    recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None
+) -> tuple[Criticism, predict.Forecast]:
+    drives = _drives(recording, model)
     train = [drives[name] for name in recording.train]
-    test = [drives[name] for name in recording.test]
+    test = [drives[name] for name in recording.test if name in drives]
 
     progress("estimating the noise")
     rough = Problem(train, model, noise.START, ids=ids)
@@ -66,11 +93,15 @@ def _criticise_base(recording: Recording, model: Model, progress: Progress, ids:
     progress("planning the next drive")
     proposal = next_experiment.propose(made.problem, made.found, next_experiment.drives())
     judge = explain.criticism if made.beyond.extension is None else smooth_explain.criticism
-    return judge(recording, made, worth, train + test, proposal)
+    judged = judge(recording, made, worth, train + test, proposal)
+    return judged, forecast_of(made, judged.settings, baseline)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
-    """Write verdict.json, extended.yaml and report.html. Raise Error naming what cannot be written."""
+    """Write verdict.json, extended.yaml, report.html and, if asked for, prediction.csv.
+
+    Raise Error naming what cannot be written.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -78,3 +109,5 @@ def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
     write_verdict(folder / "verdict.json", criticism.verdict)
     write_report(folder / "report.html", criticism.verdict, criticism.story)
     write_extended(folder / "extended.yaml", model_file, criticism.model, criticism.settings, criticism.story.recording)
+    if criticism.predictions:
+        predict.write_predictions(folder / predict.FILE, criticism.predictions)

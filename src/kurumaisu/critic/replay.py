@@ -40,25 +40,25 @@ def motion(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> eff
 
 def path(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return the simulated reference at its times, (m + 1, 3), starting at the first measured pose."""
-    at = _seen(drive, model, settings)
+    at = seen(drive, model, settings)
     return geometry.compose(drive.poses[0], geometry.between(at[0], at))
 
 
 def increments(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return the simulated body increments between the reference's times, (m, 3)."""
-    at = _seen(drive, model, settings)
+    at = seen(drive, model, settings)
     return geometry.between(at[:-1], at[1:])
 
 
-def _seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
+def seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return what the reference measures of the simulated chair at its times, (m + 1, 3), in a frame of its own."""
     chair, motion = _driven(drive, model, settings)
     poses = plant.path(motion, np.zeros(3))
     times = GRID * np.arange(len(poses))  # since the start: a clock that runs fast is right at the start
     if not chair.effects.reference:
         return geometry.interpolate(drive.start + times, poses, drive.times)
-    seen = chair.seen(effects.Reference(times, poses, np.zeros_like(poses)))
-    return geometry.interpolate(drive.start + seen.times, seen.poses, drive.times)
+    measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses)))
+    return geometry.interpolate(drive.start + measured.times, measured.poses, drive.times)
 
 
 def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:
