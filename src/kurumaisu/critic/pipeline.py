@@ -15,6 +15,7 @@ from kurumaisu.critic.extended import write_extended
 from kurumaisu.critic.laser.merge import with_laser
 from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
 from kurumaisu.critic.predict_doubt import forecast_of
+from kurumaisu.critic.predict_motion import Forecast
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.smooth_known import informed
@@ -75,7 +76,7 @@ def _drives(recording: Recording, model: Model) -> dict[str, Drive]:
 
 def _criticise_base(
     recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None
-) -> tuple[Criticism, predict.Forecast]:
+) -> tuple[Criticism, Forecast]:
     drives = _drives(recording, model)
     train = [drives[name] for name in recording.train]
     test = [drives[name] for name in recording.test if name in drives]

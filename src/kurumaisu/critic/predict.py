@@ -11,9 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.critic.drive import driven, prepare_all
-from kurumaisu.critic.noise import Noise
-from kurumaisu.critic.predict_motion import motion_ahead
+from kurumaisu.critic.laser.shots import missing
+from kurumaisu.critic.predict_motion import Forecast, motion_ahead
 from kurumaisu.critic.predict_path import Paths
+from kurumaisu.critic.predict_scan import fit_scatter
+from kurumaisu.critic.predict_track import Places, joined
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.smooth_known import beside
 from kurumaisu.errors import Error
@@ -25,16 +27,6 @@ CHANNELS = ("dx", "dy", "dtheta")
 RANGE = "range"
 FILE = "prediction.csv"
 Settings = tuple[EffectSetting, ...]
-
-
-@dataclass(frozen=True)
-class Forecast:
-    """What is needed to predict motion: the extended model, its noise, and models that it might as well be."""
-
-    model: Model
-    settings: Settings
-    noise: Noise
-    others: tuple[Settings, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -65,20 +57,52 @@ def predictions(
 
     forecast: None where nobody drove; settings: all that extends the model, the laser's, too.
     """
+    scans = list(ranges(recording, model, forecast, settings))
     for run in asked(recording):
         assert run.queries is not None
-        moving = run.queries[:, 1] > run.queries[:, 0]
-        if forecast is not None:
-            yield from motions_of(run, forecast, run.queries[moving])
+        made = _motions(run, forecast) + [one for one in scans if one.run == run.name]
+        known = {(one.t0, one.t1): one for one in made}
+        yield from (known[t0, t1] for t0, t1 in run.queries.tolist())
+
+
+def _motions(run: Run, forecast: Forecast | None) -> list[Prediction]:
+    assert run.queries is not None
+    queries = run.queries[run.queries[:, 1] > run.queries[:, 0]]
+    if forecast is not None and driven(run):
+        return motions_of(run, forecast, queries)
+    nothing = np.full(3, np.nan)
+    return [Prediction(run.name, t0, t1, nothing, nothing) for t0, t1 in queries.tolist()]
+
+
+def ranges(recording: Recording, model: Model, forecast: Forecast | None, settings: Settings) -> Iterator[Prediction]:
+    """Yield the scans asked for; nan throughout where there is no map, no pose, or no scan to learn from."""
+    stamps = {run.name: run.queries[run.queries[:, 1] == run.queries[:, 0], 0] for run in asked(recording)}
+    wanted = [run for run in asked(recording) if len(stamps[run.name])]
+    if not wanted:
+        return
+    able = missing(recording) is None
+    places = Places(recording, model, forecast) if able else None
+    scatter = fit_scatter(joined(places.trained()), settings, recording.truth) if places else None
+    for run in wanted:
+        if places is None or scatter is None or run.pose is None:
+            beams = _beams(recording, model)
+            means = sds = np.full((len(stamps[run.name]), beams), np.nan)
+        else:
+            means, sds = scatter.predict(places.of(run, stamps[run.name]))
+        for t, mean, sd in zip(stamps[run.name].tolist(), means, sds, strict=True):
+            yield Prediction(run.name, t, t, mean, sd)
+
+
+def _beams(recording: Recording, model: Model) -> int:
+    """Return how many ranges a scan has."""
+    seen = [run.scan.values.shape[1] for run in recording.runs if run.scan is not None]
+    return seen[0] if seen else recording.laser.beams if recording.laser is not None else model.laser.beams
 
 
 def motions_of(run: Run, forecast: Forecast, queries: FloatArray) -> list[Prediction]:
-    """Return the motions of a run for queries (q, 2) of t0 < t1 [s]."""
+    """Return the motions of a driven run for queries (q, 2) of t0 < t1 [s]."""
     if not len(queries):
         return []
-    if not driven(run):
-        nothing = np.full(3, np.nan)
-        return [Prediction(run.name, t0, t1, nothing, nothing) for t0, t1 in queries.tolist()]
     drive = beside(prepare_all(run, forecast.model, float(queries.max())), run)
     paths = Paths(drive, forecast.model, forecast.settings, forecast.others)
     out = []

@@ -13,7 +13,7 @@ from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem, covariance
 from kurumaisu.critic.noise import Noise
-from kurumaisu.critic.predict import Forecast
+from kurumaisu.critic.predict_motion import Forecast
 from kurumaisu.critic.smooth_fit import Extension
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray

@@ -17,14 +17,26 @@ from kurumaisu import geometry
 from kurumaisu.critic.drive import POSE_INTERVAL, Drive
 from kurumaisu.critic.noise import Noise, whitened
 from kurumaisu.critic.predict_path import Paths
+from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
+Settings = tuple[EffectSetting, ...]
 _SAME = 1e-6  # [s] within which a stamp is meant
 _MEMORY = 6.0  # time constants of the noise that are looked back on
 _LEAST_MEMORY = 5.0  # [s]
 _MOST_ROWS = 400  # that are looked back on
 _STEP = 0.25  # [s] into which the way ahead is cut: a rate's error acts along its mean heading
 _MOST_STEPS = 40
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What is needed to predict motion: the extended model, its noise, and models that it might as well be."""
+
+    model: Model
+    settings: Settings
+    noise: Noise
+    others: tuple[Settings, ...] = ()
 
 
 @dataclass(frozen=True)

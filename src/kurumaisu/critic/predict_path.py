@@ -40,7 +40,9 @@ class Paths:
             self._base = self._run(seen, settings)
             self._others = [self._run(seen, other) for other in others]
 
-    def at(self, drive: Drive, times: FloatArray, past: Sequence[int], t0: float) -> tuple[FloatArray, list[FloatArray]]:
+    def at(
+        self, drive: Drive, times: FloatArray, past: Sequence[int], t0: float
+    ) -> tuple[FloatArray, list[FloatArray]]:
         """Return poses (n, 3) at times by the model, in a frame of its own, and as many by each other one.
 
         past: rows of the drive's poses, none after t0, that may be used.

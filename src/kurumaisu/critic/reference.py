@@ -28,7 +28,8 @@ def with_reference(recording: Recording, seed: int, progress: Progress) -> Recor
     if all(run.pose is not None or run.queries is not None for run in recording.runs):
         return recording
     runs = tuple(
-        run if run.pose is not None or run.queries is not None else _with_mapped_pose(recording, run, seed, progress) for run in recording.runs
+        run if run.pose is not None or run.queries is not None else _with_mapped_pose(recording, run, seed, progress)
+        for run in recording.runs
     )
     return replace(recording, runs=runs)
 
