@@ -121,8 +121,8 @@ def prepare_all(run: Run, model: Model, until: float) -> Drive:
         raise Error(f"{run.name}: lasts {last - first:.6g} s: are its times in seconds?")
     # A reference whose clock is off sees the path at other times.
     edges = np.arange(first, last + 2 * GRID + _CLOCK * (last - first), GRID)
-    rates = (_mean_rates(times, rate, edges) for rate in (v, w))
-    return Drive(run.name, source, float(edges[0]), *rates, pose.t[use], pose.values[use, :3])
+    v, w = _mean_rates(times, v, edges), _mean_rates(times, w, edges)
+    return Drive(run.name, source, float(edges[0]), v, w, pose.t[use], pose.values[use, :3])
 
 
 def split(drive: Drive, parts: int) -> list[Drive]:

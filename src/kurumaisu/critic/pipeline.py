@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic import explain, gain, next_experiment, noise, predict, sanity, smooth_explain
+from kurumaisu.critic import explain, gain, gain_laser, next_experiment, noise, predict, sanity, smooth_explain
 from kurumaisu.critic.decide import Progress, decide, scatter
 from kurumaisu.critic.drive import Drive, driven, prepare
 from kurumaisu.critic.evidence import Problem
@@ -14,7 +14,7 @@ from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
 from kurumaisu.critic.laser.merge import with_laser
 from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
-from kurumaisu.critic.predict_doubt import forecast_of
+from kurumaisu.critic.predict_extended import forecast_of
 from kurumaisu.critic.predict_motion import Forecast
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.report import write_report
@@ -50,7 +50,8 @@ def criticise(
         base, forecast = _criticise_base(recording, model, progress, ids)
     else:
         base = explain.undriven(recording, model)
-    found = with_laser(base, criticise_laser(recording, model, progress, ids))
+    scans = criticise_laser(recording, model, progress, ids)
+    found = gain_laser.with_worth(with_laser(base, scans), recording, forecast, scans.settings)
     if not predict.asked(recording):
         return found
     progress("predicting what was asked for")

@@ -76,7 +76,7 @@ def _motions(run: Run, forecast: Forecast | None) -> list[Prediction]:
 
 def ranges(recording: Recording, model: Model, forecast: Forecast | None, settings: Settings) -> Iterator[Prediction]:
     """Yield the scans asked for; nan throughout where there is no map, no pose, or no scan to learn from."""
-    stamps = {run.name: run.queries[run.queries[:, 1] == run.queries[:, 0], 0] for run in asked(recording)}
+    stamps = {run.name: _stamps(run) for run in asked(recording)}
     wanted = [run for run in asked(recording) if len(stamps[run.name])]
     if not wanted:
         return
@@ -91,6 +91,11 @@ def ranges(recording: Recording, model: Model, forecast: Forecast | None, settin
             means, sds = scatter.predict(places.of(run, stamps[run.name]))
         for t, mean, sd in zip(stamps[run.name].tolist(), means, sds, strict=True):
             yield Prediction(run.name, t, t, mean, sd)
+
+
+def _stamps(run: Run) -> FloatArray:
+    assert run.queries is not None
+    return np.asarray(run.queries[run.queries[:, 1] == run.queries[:, 0], 0])
 
 
 def _beams(recording: Recording, model: Model) -> int:

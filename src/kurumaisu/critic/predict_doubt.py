@@ -9,31 +9,14 @@ import numpy as np
 
 from kurumaisu.critic import replay
 from kurumaisu.critic.catalogue import settings_of
-from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem, covariance
-from kurumaisu.critic.noise import Noise
-from kurumaisu.critic.predict_motion import Forecast
 from kurumaisu.critic.smooth_fit import Extension
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 Settings = tuple[EffectSetting, ...]
 _SLIGHT = 1e-3  # share of the largest direction's whitened size below which one does not count
-
-
-def forecast_of(made: Decision, settings: Settings, baseline: Noise) -> Forecast:
-    """Return what predicts motion: what extends the model by the verdict; without that the model in its own noise.
-
-    settings: of the criticism; baseline: noise about the model as it was.
-    """
-    problem, best, extension = made.problem, made.found.best, made.beyond.extension
-    given = {setting.id for setting in settings}
-    if extension is not None and extension.curve.id in given:
-        return Forecast(problem.model, extension.settings, problem.noise, about_curve(extension))
-    if best.ids and best.ids <= given:
-        return Forecast(problem.model, best.settings, problem.noise, about_fit(problem, best))
-    return Forecast(problem.model, (), baseline)
 
 
 def about_fit(problem: Problem, fit: Fit) -> tuple[Settings, ...]:

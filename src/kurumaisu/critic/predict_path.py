@@ -36,7 +36,7 @@ class Paths:
         apart = geometry.between(moved[:-1], moved[1:]) - geometry.between(self._path[:-1], self._path[1:])
         self.placed = bool(np.abs(apart).max(initial=0.0) > _NOTHING)  # depends on where the chair is
         if self.placed:  # the doubt is small: it may know poses that the path itself must not know
-            seen = _knowing(drive, _interpolated(drive, np.arange(len(drive.times)), self._times))
+            seen = _knowing(drive, _interpolated(drive, range(len(drive.times)), self._times))
             self._base = self._run(seen, settings)
             self._others = [self._run(seen, other) for other in others]
 

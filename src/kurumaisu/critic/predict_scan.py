@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from kurumaisu.critic.laser.shots import Shots, look, predict
+from kurumaisu import effects
+from kurumaisu.critic.laser.shots import Shots, look, predict, thin
 from kurumaisu.critic.laser.trust import trusted_place
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray
@@ -20,9 +21,9 @@ _SPREAD = (0.4, 1.5, 1.5, 1.5)
 _KNOWN = (0.4, 0.5, 0.5, 1.5)
 _MOVE = np.array([0.006, 0.006, 0.006])  # [m, m, rad] by which poses are moved to see what their errors do
 _OUTLIER = 5.0  # deviations from which a reading does not say how wide the others scatter
+_PROBE = 2  # scans on which it is tried what is drawn
 _CAP = 6.0  # deviations that an outlier counts as
 _FEWEST = 50  # readings
-_INDEPENDENT = 2000.0  # readings that all of them are worth at most
 _LEAST = 1e-4  # [m]
 Settings = Sequence[EffectSetting]
 
@@ -31,11 +32,13 @@ Settings = Sequence[EffectSetting]
 class Expected:
     """Mean (k, b) [m], nan where nothing is to be expected; parts of the variance (4, k, b) [m^2] for unit factors.
 
-    place: (k, b) which beams meet a wall well inside, where errors are small and alike.
+    shared (k, b, 4): what a reading does by errors that its scan shares: of the pose, x, y [m], yaw [rad], and of all
+    readings [m]. place: (k, b) which beams meet a wall well inside, where errors are small and alike.
     """
 
     mean: FloatArray
     parts: FloatArray
+    shared: FloatArray
     place: BoolArray
 
 
@@ -59,19 +62,41 @@ class ScanModel:
 
 def expected(shots: Shots, settings: Settings) -> Expected:
     """Return what shots are to read with these effects, and what makes them scatter."""
+    settings = undrawn(shots, settings)
     seen = look(shots, settings, 0)
     mean = predict(shots, settings, seen, 0)
     mean = np.where((mean <= shots.laser.range_max) & (mean >= shots.laser.range_min), mean, np.nan)
     own = np.square(predict(shots, settings, seen, 0, noise=1.0) - mean)
     moved = np.zeros((3, *mean.shape))
+    shared = np.ones((*mean.shape, 4))
     for i, size in enumerate(_MOVE):
-        for sign in (-1.0, 1.0):
-            there = look(shots, settings, 0, shift=sign * size * np.eye(3)[i], like=seen)
-            # Where a moved beam meets nothing, the move says nothing.
-            off = np.nan_to_num(predict(shots, settings, there, 0) - mean)
-            moved[i] += 0.5 * np.square(off / size)
+        sides = [look(shots, settings, 0, shift=sign * size * np.eye(3)[i], like=seen) for sign in (-1.0, 1.0)]
+        # Where a moved beam meets nothing, the move says nothing.
+        low, high = (np.nan_to_num((predict(shots, settings, side, 0) - mean) / size) for side in sides)
+        moved[i] = 0.5 * (low**2 + high**2)  # at an edge one side jumps
+        shared[:, :, i] = 0.5 * (high - low)
     parts = np.array([own, moved[0] + moved[1], moved[2], np.ones_like(mean)])
-    return Expected(mean, parts, trusted_place(shots, seen, np.nan_to_num(mean)))
+    return Expected(mean, parts, shared, trusted_place(shots, seen, np.nan_to_num(mean)))
+
+
+def undrawn(shots: Shots, settings: Settings) -> Settings:
+    """Return the effects without those of their parameters whose mark on the mean is drawn: nobody can expect it."""
+    few, out = thin(shots, _PROBE), list(settings)
+    for i, setting in enumerate(settings):
+        effect = effects.by_id(setting.id)
+        if not effect.random or _steady(few, out):
+            continue
+        for p in effect.parameters:
+            without = EffectSetting(setting.id, {**out[i].parameters, p.name: p.null})
+            if _steady(few, [without]):
+                out[i] = without
+                break
+    return tuple(out)
+
+
+def _steady(shots: Shots, settings: Settings) -> bool:
+    drawn = [predict(shots, settings, look(shots, settings, seed), seed) for seed in (0, 1)]
+    return np.array_equal(drawn[0], drawn[1], equal_nan=True)
 
 
 def fit_scatter(shots: Shots, settings: Settings, truth: tuple[float, float] | None) -> ScanModel:
@@ -96,22 +121,45 @@ def scattered(
         near = inside & (np.abs(np.nan_to_num(z)) < _OUTLIER * 1.4826 * max(middle, 0.1))
         if near.sum() < _FEWEST:
             break
-        factors = _factors(what.parts[:, near], error[near], start, np.array(_SPREAD if truth is None else _KNOWN))
+        factors = _factors(Joint(what, error, near), start, np.array(_SPREAD if truth is None else _KNOWN))
     z = error / ScanModel(settings, factors, (1.0, 1.0)).of(what)[1]
     return ScanModel(settings, factors, (_tail(z[inside]), _tail(z[~what.place & np.isfinite(z)])))
 
 
-def _factors(parts: FloatArray, error: FloatArray, start: FloatArray, spread: FloatArray) -> FloatArray:
-    """Return the likeliest factors (4,), near their start; readings that share an error count as few."""
-    weight = min(1.0, _INDEPENDENT / len(error))
+class Joint:
+    """Readings of whole scans, whose shared errors make them err together."""
+
+    def __init__(self, what: Expected, error: FloatArray, use: BoolArray) -> None:
+        """Take errors (k, b) [m] and which of them count."""
+        own = np.where(use, what.parts[0], np.inf)
+        left = np.where(use, np.nan_to_num(error), 0.0)
+        weighed = what.shared / own[:, :, np.newaxis]
+        self.count = use.sum(axis=1)
+        self._inner = weighed.transpose(0, 2, 1) @ what.shared
+        self._cross = (weighed.transpose(0, 2, 1) @ left[:, :, np.newaxis])[:, :, 0]
+        self._square = np.sum(left**2 / own, axis=1)
+        self._log = np.sum(np.log(np.where(use, own, 1.0)), axis=1)
+
+    def log_density(self, factors: FloatArray) -> FloatArray:
+        """Return the log density of each scan's readings together, (k,) [nat]; factors (4,) as of ScanModel."""
+        k = factors[0]
+        size = factors[[1, 1, 2, 3]] / k
+        inner = np.eye(4) + self._inner * np.outer(size, size)
+        cross = self._cross * size
+        rest = self._square - np.sum(cross * np.linalg.solve(inner, cross[:, :, np.newaxis])[:, :, 0], axis=1)
+        log_det = self._log + 2 * self.count * np.log(k) + np.linalg.slogdet(inner)[1]
+        return np.asarray(-0.5 * (rest / k**2 + log_det + self.count * np.log(2 * np.pi)))
+
+
+def _factors(joint: Joint, start: FloatArray, spread: FloatArray) -> FloatArray:
+    """Return the likeliest factors (4,), near their start."""
 
     def cost(values: FloatArray) -> float:
-        variance = np.tensordot(np.exp(2 * values), parts, 1)
         away = (values - start) / spread
-        return 0.5 * weight * float(np.sum(np.log(variance) + error**2 / variance)) + 0.5 * float(away @ away)
+        return 0.5 * float(away @ away) - float(joint.log_density(np.exp(values)).sum())
 
     simplex = np.vstack([start, start + 0.5 * np.eye(4)])
-    options = {"xatol": 0.01, "fatol": 0.01, "maxfev": 200, "initial_simplex": simplex}
+    options = {"xatol": 0.01, "fatol": 0.1, "maxfev": 300, "initial_simplex": simplex}
     return np.asarray(np.exp(minimize(cost, start, method="Nelder-Mead", options=options).x))
 
 

@@ -16,10 +16,12 @@ from kurumaisu.critic.predict_path import Paths
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.smooth_known import beside
 from kurumaisu.params import Model
-from kurumaisu.types import FloatArray
+from kurumaisu.types import FloatArray, IntArray
 
 _AROUND = np.array([-0.5, -0.3, -0.2, -0.1, 0.0, 0.05, 0.1, 0.2, 0.3])  # [s] about a stamp: late clocks, slow sweeps
 _AFTER = 1e-3  # [s] so much later a pose is asked for, where the last row is of the very stamp
+_NEAR = 0.3  # [s] from a pose on either side within which a scan's place is known
+_SAME = 1e-3  # [s]
 _RANDOM = 60  # scans that the scatter is estimated from
 
 
@@ -96,3 +98,22 @@ def joined(parts: Sequence[Shots]) -> Shots:
         measured=np.concatenate([part.measured for part in parts]),
         shift=np.concatenate([part.shift for part in parts]),
     )
+
+
+def rows_of(shots: Shots, rows: IntArray) -> Shots:
+    """Return some of the scans."""
+    return replace(
+        shots, stamps=shots.stamps[rows], run=shots.run[rows], measured=shots.measured[rows], shift=shots.shift[rows]
+    )
+
+
+def chosen(run: Run, most: int) -> tuple[FloatArray, FloatArray]:
+    """Return stamps (k,) and readings (k, b) of at most so many scans of a run at which its poses are known."""
+    if run.scan is None or run.pose is None:
+        return np.empty(0), np.empty((0, 0))
+    next_to = np.abs(run.pose.t[np.searchsorted(run.pose.t[:-1], run.scan.t)] - run.scan.t)
+    before = np.abs(run.pose.t[np.maximum(np.searchsorted(run.pose.t, run.scan.t) - 1, 0)] - run.scan.t)
+    known = (np.maximum(next_to, before) < _NEAR) | (np.minimum(next_to, before) < _SAME)
+    rows = np.flatnonzero(known & np.isfinite(run.scan.values).any(axis=1))
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))] if len(rows) else rows
+    return run.scan.t[rows], run.scan.values[rows]
