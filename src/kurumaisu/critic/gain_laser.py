@@ -4,19 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.gain import log_density_gain, rmse_gain
 from kurumaisu.critic.laser.shots import Shots, missing
 from kurumaisu.critic.predict_motion import Forecast
 from kurumaisu.critic.predict_scan import Expected, Joint, ScanModel, expected, scattered
 from kurumaisu.critic.predict_track import Places, chosen, joined, rows_of
 from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.verdict import ChannelGain, Gain
+from kurumaisu.critic.verdict import ChannelGain
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -36,16 +35,6 @@ class Split:
 
     train: Shots
     test: Shots
-
-
-def with_worth(criticism: Criticism, recording: Recording, forecast: Forecast | None, settings: Settings) -> Criticism:
-    """Return a criticism with the gain of what its settings for the laser do."""
-    worth = measure(recording, criticism.model, forecast, settings)
-    if worth is None:
-        return criticism
-    gain = criticism.verdict.gain or Gain(worth.log_density_per_sample)
-    whole = replace(gain, channels={**gain.channels, CHANNEL: worth})
-    return replace(criticism, verdict=replace(criticism.verdict, gain=whole))
 
 
 def measure(recording: Recording, model: Model, forecast: Forecast | None, settings: Settings) -> ChannelGain | None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic import explain, gain, gain_laser, next_experiment, noise, predict, sanity, smooth_explain
+from kurumaisu.critic import explain, gain, next_experiment, noise, predict, sanity, smooth_explain, worth
 from kurumaisu.critic.decide import Progress, decide, scatter
 from kurumaisu.critic.drive import Drive, driven, prepare
 from kurumaisu.critic.evidence import Problem
@@ -15,7 +15,7 @@ from kurumaisu.critic.extended import write_extended
 from kurumaisu.critic.laser.merge import with_laser
 from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
 from kurumaisu.critic.predict_extended import forecast_of
-from kurumaisu.critic.predict_motion import Forecast
+from kurumaisu.critic.predict_motion import Settings
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.smooth_known import informed
@@ -31,11 +31,13 @@ def criticise(
     *,
     assume_law: bool = False,
     ids: frozenset[str] | None = None,
+    slam: bool = False,
 ) -> Criticism:
     """Return the criticism of a model by a recording whose runs have reference poses.
 
     Without voltages the model is "velocity follows command", unless the recording names a model or assume_law says
     that the robot has the model's voltage law. ids: the effects that may be named; None for all that are criticised.
+    slam: whether SLAM is run with both models on a run held out, which takes some seconds.
     Raise Error when a run has no reference, or nothing that drove the robot.
     """
     model = load_model(model_file)
@@ -45,17 +47,21 @@ def criticise(
     wrong = [*recording.invalid, *sanity.examine(whole, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
-    forecast = None
     if any(driven(run) for run in whole.runs):
-        base, forecast = _criticise_base(recording, model, progress, ids)
+        base, extension = _criticise_base(recording, model, progress, ids)
     else:
-        base = explain.undriven(recording, model)
+        base, extension = explain.undriven(recording, model), worth.Extension(None, (), lambda _: ())
     scans = criticise_laser(recording, model, progress, ids)
-    found = gain_laser.with_worth(with_laser(base, scans), recording, forecast, scans.settings)
+    extension = replace(extension, scans=scans.settings)
+    progress("measuring the gain on scans held out")
+    found = worth.with_laser_gain(with_laser(base, scans), recording, extension)
+    if slam:
+        progress("running SLAM with both models")
+        found = worth.with_slam(found, recording, extension)
     if not predict.asked(recording):
         return found
     progress("predicting what was asked for")
-    return replace(found, predictions=tuple(predict.predictions(recording, model, forecast, found.settings)))
+    return replace(found, predictions=tuple(predict.predictions(recording, model, extension.forecast, found.settings)))
 
 
 def _withheld(recording: Recording, run: Run) -> bool:
@@ -77,7 +83,7 @@ def _drives(recording: Recording, model: Model) -> dict[str, Drive]:
 
 def _criticise_base(
     recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None
-) -> tuple[Criticism, Forecast]:
+) -> tuple[Criticism, worth.Extension]:
     drives = _drives(recording, model)
     train = [drives[name] for name in recording.train]
     test = [drives[name] for name in recording.test if name in drives]
@@ -91,12 +97,19 @@ def _criticise_base(
     progress("measuring the gain on drives held out")
     baseline = scatter(rough, empty, recording.truth, project=False).estimate(made.problem.noise).noise
     splits = gain.folds(train, test)
-    worth = gain.measure(model, splits, made.refit, baseline, made.problem.noise) if splits and made.something else None
+    held = gain.measure(model, splits, made.refit, baseline, made.problem.noise) if splits and made.something else None
     progress("planning the next drive")
     proposal = next_experiment.propose(made.problem, made.found, next_experiment.drives())
     judge = explain.criticism if made.beyond.extension is None else smooth_explain.criticism
-    judged = judge(recording, made, worth, train + test, proposal)
-    return judged, forecast_of(made, judged.settings, baseline)
+    judged = judge(recording, made, held, train + test, proposal)
+    forecast = forecast_of(made, judged.settings, baseline)
+
+    def refit(name: str) -> Settings:
+        others = [drive for drive in train if drive.name != name]
+        again = forecast.settings and len(others) in range(1, len(train))
+        return tuple(made.refit(others).settings) if again else forecast.settings
+
+    return judged, worth.Extension(forecast, (), refit)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:

@@ -38,6 +38,12 @@ def motion(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> eff
     return _driven(drive, model, settings)[1]
 
 
+def odometry(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[FloatArray, FloatArray]:
+    """Return times (n,) [s] and poses (n, 3) of the simulated chair itself, whatever a reference would see of it."""
+    poses = plant.path(_driven(drive, model, settings)[1], np.zeros(3))
+    return drive.start + GRID * np.arange(len(poses)), poses
+
+
 def path(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return the simulated reference at its times, (m + 1, 3), starting at the first measured pose."""
     at = seen(drive, model, settings)

@@ -49,6 +49,10 @@ def _gain(gain: Gain) -> list[str]:
             f"  {name}: rms error {error.baseline:.3f} -> {error.extended:.3f} {error.unit}"
             for name, error in gain.rmse.items()
         ),
+        *(
+            f"  {name}: {channel.log_density_per_sample.gain:+.3g} nats per sample"
+            for name, channel in gain.channels.items()
+        ),
     ]
 
 

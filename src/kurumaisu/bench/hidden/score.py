@@ -18,7 +18,8 @@ from kurumaisu.critic.verdict import Verdict
 class Score:
     """One answer: right for its kind, and what else it was; covered: of intervals whose parameter has a truth.
 
-    stated: probability and truth of each cause named; cpu [s]; z, z_rival of the case; words: of the answer, short.
+    stated: probability and truth of each cause named; cpu [s]; z, z_rival of the case; words: of the answer, short;
+    gain_share: of the oracle's gain on data held out, None where there is no oracle.
     """
 
     right: bool
@@ -31,6 +32,7 @@ class Score:
     cpu: float
     truth: Truth
     words: str
+    gain_share: float | None = None
 
 
 def score(truth: Truth, verdict: Verdict, cpu: float) -> Score:
