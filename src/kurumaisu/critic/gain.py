@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic import replay
+from kurumaisu.critic import predict_floor, replay
 from kurumaisu.critic.drive import Drive, split
 from kurumaisu.critic.material import spans
 from kurumaisu.critic.noise import Noise, whitened
@@ -69,15 +69,21 @@ def measure(model: Model, splits: Sequence[Fold], refit: Refit, baseline: Noise,
     """
     density: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     errors: dict[float, tuple[list[FloatArray], list[FloatArray]]] = {horizon: ([], []) for horizon in HORIZONS}
+    floors: dict[float, list[float]] = {horizon: [] for horizon in HORIZONS}
     for fold in splits:
         extension = refit(fold.train)
         for drive in fold.test:
+            for horizon, squares in predict_floor.squares(drive, model, extension.settings, extended, HORIZONS):
+                floors[horizon].append(squares)
             for side, (fitted, noise) in enumerate(((Fitted(()), baseline), (extension, extended))):
                 density[side].extend(_blocks(drive, _log_density(drive, model, fitted, noise)))
                 for horizon in HORIZONS:
                     errors[horizon][side].extend(_open_loop(drive, model, fitted.settings, horizon))
     rmse = {
-        f"position after {horizon:g} s": rmse_gain(*_columns(errors[horizon], slice(0, 2)), "m")
+        f"position after {horizon:g} s": replace(
+            rmse_gain(*_columns(errors[horizon], slice(0, 2)), "m"),
+            achievable=float(np.sqrt(np.mean(floors[horizon]))) if floors[horizon] else None,
+        )
         for horizon in HORIZONS
         if errors[horizon][0]
     }

@@ -71,7 +71,10 @@ class LogDensityGain:
 
 @dataclass(frozen=True)
 class RmseGain:
-    """Held-out root mean square error of both models; gain = baseline - extended with its 90 % interval."""
+    """Held-out root mean square error of both models; gain = baseline - extended with its 90 % interval.
+
+    achievable: what noise alone leaves to a model without fault; None where that is not known.
+    """
 
     baseline: float
     extended: float
@@ -79,6 +82,7 @@ class RmseGain:
     lo90: float
     hi90: float
     unit: str
+    achievable: float | None = None
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from kurumaisu.critic.predict_motion import Forecast, Settings
 from kurumaisu.critic.predict_track import Places, joined
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Overlay
-from kurumaisu.critic.verdict import Gain
+from kurumaisu.critic.verdict import ChannelGain, Gain
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,21 @@ def with_laser_gain(criticism: Criticism, recording: Recording, extension: Exten
         return criticism
     gain = criticism.verdict.gain or Gain(worth.log_density_per_sample)
     whole = replace(gain, channels={**gain.channels, gain_laser.CHANNEL: worth})
-    return replace(criticism, verdict=replace(criticism.verdict, gain=whole))
+    story = replace(criticism.story, details=(*criticism.story.details, _told(worth)))
+    return replace(criticism, verdict=replace(criticism.verdict, gain=whole), story=story)
+
+
+def _told(worth: ChannelGain) -> str:
+    density = worth.log_density_per_sample
+    text = (
+        f"On scans held out, what was found in the laser gains {density.gain:+.3g} nats per reading "
+        f"(90 % {density.lo90:+.3g} to {density.hi90:+.3g})"
+    )
+    if worth.rmse is not None:
+        text += (
+            f"; readings are off by {1e3 * worth.rmse.baseline:.2g} mm before, {1e3 * worth.rmse.extended:.2g} mm after"
+        )
+    return text + ("." if density.lo90 > 0 else ": not confirmed there.")
 
 
 def with_slam(criticism: Criticism, recording: Recording, extension: Extension) -> Criticism:

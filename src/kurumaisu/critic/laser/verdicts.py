@@ -96,7 +96,10 @@ def _finding(assembly: Assembly, normal: Normal, found: Found, scatter: list[Sca
         f"laser: {normal.readings} readings of {len(assembly.shots.stamps)} scans; noise of neighbours correlates by "
         f"{normal.beam_noise.rho:.2f}, of whole scans {1e3 * noise.common_sd:.2g} mm over {noise.common_tau:.2g} s, of "
         f"the reference {1e3 * noise.position_sd:.2g} mm and {1e3 * noise.heading_sd:.2g} mrad.",
-        *(f"{name}: changes the readings by {1e3 * size:.2g} mm (rms)." for name, size in sorted(sizes.items())),
+        *(
+            f"{name}: changes the readings by {1e3 * size:.2g} mm (rms){_weight(size)}."
+            for name, size in sorted(sizes.items())
+        ),
     )
     known = {cause.id: cause for cause in causes}
     for each in scatter:
@@ -108,6 +111,10 @@ def _finding(assembly: Assembly, normal: Normal, found: Found, scatter: list[Sca
         at = {**each.setting.parameters, **(_off_null(mean) if mean else {})}
         joined[each.setting.id] = EffectSetting(each.setting.id, at)
     return LaserFinding(tuple(known.values()), confounded, tuple(joined.values()), details)
+
+
+def _weight(size: float) -> str:
+    return "" if size >= MATERIAL else ": detectable, but it does not matter"
 
 
 def _off_null(setting: EffectSetting) -> dict[str, float]:
