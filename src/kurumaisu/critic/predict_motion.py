@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from kurumaisu import geometry
 from kurumaisu.critic.drive import POSE_INTERVAL, Drive
 from kurumaisu.critic.noise import Noise, whitened
-from kurumaisu.critic.predict_path import Paths
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
@@ -54,7 +54,16 @@ class Ahead:
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
-def motion_ahead(drive: Drive, paths: Paths, noise: Noise, t0: float, t1: float) -> Ahead:
+class Known(Protocol):
+    """What is known of the way: Paths, or what stands in for them."""
+
+    def at(
+        self, drive: Drive, times: FloatArray, past: Sequence[int], t0: float
+    ) -> tuple[FloatArray, list[FloatArray]]:
+        """Return poses (n, 3) at times, and as many by each other model."""
+
+
+def motion_ahead(drive: Drive, paths: Known, noise: Noise, t0: float, t1: float) -> Ahead:
     """Return the motion from t0 to t1; drive: all its poses, of which those after t0 are not used.
 
     paths: what the reference would see of the model, on the drive's inputs up to t1 at least.
