@@ -13,11 +13,14 @@ from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import REGIMES
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic import pipeline, predict
+from kurumaisu.critic.arrays import recording_of
+from kurumaisu.critic.meta import Meta
 from kurumaisu.critic.predict_motion import Forecast
 from kurumaisu.critic.reading import read_recording
 from kurumaisu.critic.recording import Recording, Series
 from kurumaisu.critic.reference import with_reference
 from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MD100 = shipped("launch/md100.yaml")
@@ -183,3 +186,16 @@ def test_a_withheld_run_is_predicted_and_written(tmp_path):
     z = (truth.ravel() - [float(x["mean"]) for x in own]) / [float(x["sd"]) for x in own]
     assert np.sqrt((z**2).mean()) < 1.5
     assert (np.abs(z) < NORMAL90).mean() > 0.75
+
+
+def test_queries_may_be_arrays():
+    run = drives_of("usual", 10)[0]
+    tables = {
+        "voltage": np.column_stack([run.voltage.t, run.voltage.values]),
+        "pose": np.column_stack([run.pose.t, run.pose.values]),
+    }
+    asked = {**tables, "query": [[1.0, 2.0], [3.0, 3.0]]}
+    made = recording_of("arrays", {"drive": tables, "asked": asked}, Meta(test=("asked",)))
+    assert made.runs[1].queries.tolist() == [[1.0, 2.0], [3.0, 3.0]]
+    with pytest.raises(Error, match="asked/query:1: t1 must not be before t0: 3, 2"):
+        recording_of("arrays", {"drive": tables, "asked": {**tables, "query": [[1.0, 2.0], [3.0, 2.0]]}}, Meta())

@@ -37,7 +37,7 @@ def make_base(ask: Ask, seed: int) -> Case:
     null = recording(name, drives, ())
     found = recording(name, drives, faults) if faults else null
     known = None
-    if ids and "base.process_noise" not in ids:
+    if ids and not {"base.process_noise", "base.sign"} & set(ids):  # no mean, or no data that anybody would fit
         known = Known(tuple(drive(replace(s, noise=None), faults)[0] for s in drives.settings), regime)
     return Case(found, null, _truth(ask, scale, sizes), seed, known)
 
