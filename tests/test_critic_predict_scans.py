@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
+from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic import predict
 from kurumaisu.critic.recording import Recording, Series
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -87,3 +88,20 @@ def test_rows_are_in_the_order_of_the_queries(tmp_path):
     assert lines[1].split(",")[:2] == ["test", "range"]
     assert [line.split(",")[4] for line in lines[1:683]] == [str(i) for i in range(682)]
     assert lines[683].split(",")[5] == "nan"  # nothing drove it
+
+
+def test_at_a_stop_the_scans_before_tell_how_far_the_pose_is_off(tmp_path):
+    """Of scans after t0 nothing is used: of a stop's first scan nobody knows more than its pose."""
+    data = make(Ask("null", design="room", family="laser", regime="usual"), 2, tmp_path).null
+    last = data.runs[-1]
+    held = np.arange(0, 80, 10)  # each stop has 20 scans: its first one, and one in the middle
+    rest = np.setdiff1d(np.arange(80), held)
+    scan = Series(last.scan.t[rest], last.scan.values[rest], last.scan.columns)
+    run = replace(last, scan=scan, queries=np.repeat(last.scan.t[held, None], 2, axis=1))
+    asked = replace(data, runs=(*data.runs[:-1], run), train=data.train[:-1], test=(run.name,))
+    means, sds = predicted(asked)
+    z = (last.scan.values[held] - means) / sds
+    first, middle = z[::2][np.isfinite(z[::2])], z[1::2][np.isfinite(z[1::2])]
+    assert np.nanmedian(sds[1::2]) < 0.7 * np.nanmedian(sds[::2])
+    assert (np.abs(middle) < NORMAL90).mean() == pytest.approx(0.9, abs=0.05)
+    assert (np.abs(first) < NORMAL90).mean() > 0.75

@@ -14,8 +14,8 @@ from kurumaisu.critic.drive import driven, prepare_all
 from kurumaisu.critic.laser.shots import missing
 from kurumaisu.critic.predict_motion import Forecast, motion_ahead
 from kurumaisu.critic.predict_path import Paths
-from kurumaisu.critic.predict_scan import fit_scatter
-from kurumaisu.critic.predict_track import Places, joined
+from kurumaisu.critic.predict_refine import trained
+from kurumaisu.critic.predict_track import Places
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.smooth_known import beside
 from kurumaisu.errors import Error
@@ -82,13 +82,13 @@ def ranges(recording: Recording, model: Model, forecast: Forecast | None, settin
         return
     able = missing(recording) is None
     places = Places(recording, model, forecast) if able else None
-    scatter = fit_scatter(joined(places.trained()), settings, recording.truth) if places else None
+    refiner = trained(places, settings, recording.truth) if places else None
     for run in wanted:
-        if places is None or scatter is None or run.pose is None:
+        if places is None or refiner is None or run.pose is None:
             beams = _beams(recording, model)
             means = sds = np.full((len(stamps[run.name]), beams), np.nan)
         else:
-            means, sds = scatter.predict(places.of(run, stamps[run.name]))
+            means, sds = refiner.predict(places, run, stamps[run.name])
         for t, mean, sd in zip(stamps[run.name].tolist(), means, sds, strict=True):
             yield Prediction(run.name, t, t, mean, sd)
 

@@ -34,7 +34,8 @@ class Places:
         self._base = gather(recording, model)
         first = next(run for run in recording.runs if run.name in recording.train and run.scan is not None and run.pose)
         assert first.pose is not None
-        self._zero = float(first.pose.t[0] - self._base.tracks[0].times[0])  # [s] at which the laser's time begins
+        #: [s] at which the laser's time begins.
+        self.zero = float(first.pose.t[0] - self._base.tracks[0].times[0])
 
     def of(self, run: Run, stamps: FloatArray, measured: FloatArray | None = None) -> Shots:
         """Return shots of a run with poses at stamps (k,) [s]; measured (k, b) [m], if known."""
@@ -42,8 +43,8 @@ class Places:
         shape = (len(stamps), self._base.laser.beams)
         return replace(
             self._base,
-            tracks=tuple(Track(track.times - self._zero, track.poses) for track in tracks),
-            stamps=stamps - self._zero,
+            tracks=tuple(Track(track.times - self.zero, track.poses) for track in tracks),
+            stamps=stamps - self.zero,
             run=np.arange(len(stamps)) if len(tracks) > 1 else np.zeros(len(stamps), dtype=int),
             measured=np.full(shape, np.nan) if measured is None else measured,
             shift=np.zeros((*shape, 3)),
@@ -51,6 +52,10 @@ class Places:
 
     def trained(self) -> list[Shots]:
         """Return shots of the runs to fit, few of them, per run."""
+        return [shots for _, shots in self.trained_runs()]
+
+    def trained_runs(self) -> list[tuple[Run, Shots]]:
+        """Return the runs to fit, each with few of its shots."""
         few = thin(self._base, _RANDOM)
         scanned = [
             run
@@ -58,7 +63,7 @@ class Places:
             if run.name in self._recording.train and run.scan is not None and run.pose
         ]
         return [
-            self.of(run, few.stamps[few.run == i] + self._zero, few.measured[few.run == i])
+            (run, self.of(run, few.stamps[few.run == i] + self.zero, few.measured[few.run == i]))
             for i, run in enumerate(scanned)
             if (few.run == i).any()
         ]
