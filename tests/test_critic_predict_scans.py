@@ -38,7 +38,7 @@ def predicted(data, settings=()):
 
 @pytest.mark.parametrize("told", [True, False])
 def test_intervals_cover(tmp_path, told):
-    data, truth = withheld(recording(tmp_path, None, 0.0, 1, scans=40, rho=0.3, common=0.0005, told=told))
+    data, truth = withheld(recording(tmp_path, None, 0.0, 1, scans=28, rho=0.3, common=0.0005, told=told))
     means, sds = predicted(data)
     z = (truth - means) / sds
     seen = np.isfinite(z)
@@ -47,18 +47,18 @@ def test_intervals_cover(tmp_path, told):
 
 
 def test_effects_and_their_scatter_are_in_the_prediction(tmp_path):
-    data, truth = withheld(recording(tmp_path, "laser.scale", 0.02, 2, scans=40))
+    data, truth = withheld(recording(tmp_path, "laser.scale", 0.02, 2, scans=28))
     known, sds = predicted(data, (EffectSetting("laser.scale", {"scale": 0.02}),))
     plain, wide = predicted(data)
     seen = np.isfinite(truth + known + plain)
     assert np.median(np.abs(truth - known)[seen]) < 0.3 * np.median(np.abs(truth - plain)[seen])
     assert np.median(wide[seen]) > 1.5 * np.median(sds[seen])  # a model that is wrong does not know it well
-    loud, _ = withheld(recording(tmp_path, "laser.range_noise", 8.0, 3, scans=40))
+    loud, _ = withheld(recording(tmp_path, "laser.range_noise", 8.0, 3, scans=28))
     assert np.nanmedian(predicted(loud)[1]) > 1.2 * np.nanmedian(sds)
 
 
 def test_where_no_return_is_expected_nothing_is_predicted(tmp_path):
-    data, truth = withheld(recording(tmp_path, None, 0.0, 4, scans=40))
+    data, truth = withheld(recording(tmp_path, None, 0.0, 4, scans=28))
     means, sds = predicted(data)
     np.testing.assert_array_equal(np.isnan(means), np.isnan(sds))
     assert np.isinf(truth).any()

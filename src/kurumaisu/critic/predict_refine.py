@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from kurumaisu.critic.predict_scan import ScanModel, expected, fit_scatter
 from kurumaisu.critic.predict_track import Places, joined, rows_of
 from kurumaisu.critic.recording import Run
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import BoolArray, FloatArray, IntArray
+from kurumaisu.types import FloatArray, IntArray
 
 _REACH = 0.45  # [s] for which an error of the pose lasts
 _WITHIN = 0.5  # [m], [rad] that the chair may have moved meanwhile
@@ -37,9 +38,10 @@ class Refiner:
         means, sds = self.alone.predict(shots)
         if self.after is None:
             return means, sds
-        moved, able = corrected(shots, run, places.zero, self.alone, self.share)
-        if able.any():
-            means[able], sds[able] = self.after.predict(rows_of(moved, np.flatnonzero(able)))
+        errors = off(shots, run, places.zero, self.alone)
+        if errors:
+            able = np.array(sorted(errors))
+            means[able], sds[able] = self.after.predict(moved(shots, errors, self.share))
         return means, sds
 
 
@@ -49,12 +51,10 @@ def trained(places: Places, settings: Settings, truth: tuple[float, float] | Non
     whole = joined([shots for _, shots in runs])
     alone = fit_scatter(whole, settings, truth)
     best, after, share = -np.inf, None, 0.0
-    for tried in _SHARES:
-        parts = [corrected(shots, run, places.zero, alone, tried) for run, shots in runs]
-        able = np.concatenate([one for _, one in parts])
-        if able.sum() < _FEWEST:
-            break
-        some = rows_of(joined([shots for shots, _ in parts]), np.flatnonzero(able))
+    parts = [(shots, off(shots, run, places.zero, alone)) for run, shots in runs]
+    parts = [(shots, errors) for shots, errors in parts if errors]
+    for tried in _SHARES if sum(len(errors) for _, errors in parts) >= _FEWEST else ():
+        some = joined([moved(shots, errors, tried) for shots, errors in parts])
         model = fit_scatter(some, settings, None)
         density = _density(model, some)
         if density > best:
@@ -70,20 +70,27 @@ def _density(model: ScanModel, shots: Shots) -> float:
     return -float(np.mean(0.5 * np.minimum(z[use] ** 2, _OUTLIER**2) + np.log(sds[use])))
 
 
-def corrected(shots: Shots, run: Run, zero: float, model: ScanModel, share: float) -> tuple[Shots, BoolArray]:
-    """Return shots on tracks of their own, moved by a share of what the scans before them say; and which could be."""
-    tracks = [shots.tracks[i] for i in shots.run]
-    able = np.zeros(len(tracks), dtype=bool)
-    if run.scan is not None:
-        before = [_before(shots, k, run.scan.t - zero) for k in range(len(tracks))]
-        owner = np.repeat(np.arange(len(tracks)), [len(rows) for rows in before])
-        if len(owner):
-            rows = np.concatenate(before).astype(int)
-            errors = _errors(_seen(shots, owner, run.scan.t[rows] - zero, run.scan.values[rows]), owner, model)
-            for k, error in errors.items():
-                tracks[k] = Track(tracks[k].times, tracks[k].poses + share * error)
-                able[k] = True
-    return replace(shots, tracks=tuple(tracks), run=np.arange(len(tracks))), able
+def off(shots: Shots, run: Run, zero: float, model: ScanModel) -> dict[int, FloatArray]:
+    """Return the errors (3,) of the poses of shots by the scans before them, by row, for those that have any."""
+    if run.scan is None:
+        return {}
+    before = [_before(shots, k, run.scan.t - zero) for k in range(len(shots.stamps))]
+    owner = np.repeat(np.arange(len(before)), [len(rows) for rows in before])
+    if not len(owner):
+        return {}
+    rows = np.concatenate(before).astype(int)
+    return _errors(_seen(shots, owner, run.scan.t[rows] - zero, run.scan.values[rows]), owner, model)
+
+
+def moved(shots: Shots, errors: Mapping[int, FloatArray], share: float) -> Shots:
+    """Return the shots that have errors, on tracks of their own from which a share of them is taken."""
+    rows = sorted(errors)
+    tracks = [(shots.tracks[shots.run[k]], errors[k]) for k in rows]
+    return replace(
+        rows_of(shots, np.array(rows)),
+        tracks=tuple(Track(track.times, track.poses + share * error) for track, error in tracks),
+        run=np.arange(len(rows)),
+    )
 
 
 def _before(shots: Shots, k: int, stamps: FloatArray) -> IntArray:
