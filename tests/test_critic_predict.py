@@ -96,10 +96,16 @@ def test_what_the_noise_does_at_t0_helps():
     assert (gain > 0.1).all()
 
 
-def test_with_the_hidden_effect_known_the_errors_are_those_of_the_noise():
-    faults = (BASE["base.gain_v"].fault({"size": 0.08}, "plain"),)
-    known = (EffectSetting("base.gain_v", {"gain": 0.08}),)
-    right, _ = scores("usual", range(2), (2.0,), known, faults)
+@pytest.mark.parametrize(
+    ("name", "sizes", "known"),
+    [
+        ("base.gain_v", {"size": 0.08}, {"gain": 0.08}),
+        ("base.slope", {"size": 0.06, "bearing": 0.0}, {"climb_x": 0.06, "climb_y": 0.0}),
+    ],
+)
+def test_with_the_hidden_effect_known_the_errors_are_those_of_the_noise(name, sizes, known):
+    faults = (BASE[name].fault(sizes, "plain"),)
+    right, _ = scores("usual", range(2), (2.0,), (EffectSetting(name, known),), faults)
     wrong, _ = scores("usual", range(2), (2.0,), (), faults)
     assert np.sqrt((right**2).mean(axis=0)) == pytest.approx(1.0, abs=0.2)
     assert np.sqrt((wrong[:, 0] ** 2).mean()) > 2
