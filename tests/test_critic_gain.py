@@ -155,6 +155,11 @@ def test_why_slam_was_not_compared_is_said(tmp_path, change, words):
     assert words in slam_gain.measure(data, MODEL, lambda _: ()).told
 
 
+def test_scans_of_another_laser_are_no_reason_to_fail(tmp_path):
+    data = make(Ask("null", design="drive", family="laser", regime="usual"), 3, tmp_path).null
+    assert "682" in slam_gain.measure(replace(data, laser=replace(data.laser, beams=681)), MODEL, lambda _: ()).told
+
+
 def test_slam_gets_the_ranges_behind_the_readings(tmp_path):
     data = scanned(tmp_path, "laser.scale", 0.02, 4, scans=6)
     run, rows = data.runs[0], list(range(6))

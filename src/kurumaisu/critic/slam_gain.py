@@ -14,10 +14,12 @@ from kurumaisu import geometry, slam_score
 from kurumaisu.critic import replay
 from kurumaisu.critic.drive import Drive, driven, prepare_all
 from kurumaisu.critic.gain import rmse_gain
+from kurumaisu.critic.laser.shots import laser_of
 from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.critic.slam_readings import Corrected, corrected
 from kurumaisu.critic.smooth_known import beside
 from kurumaisu.critic.verdict import SlamGain
+from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model, shipped
 from kurumaisu.types import FloatArray
 
@@ -60,8 +62,18 @@ def measure(recording: Recording, model: Model, refit: Refit) -> Downstream:
     run = _chosen(recording)
     if run is None:
         return Downstream(f"SLAM not compared: {_missing(recording)}.")
+    try:
+        return _compared(recording, run, model, refit)
+    except Error as error:  # a verdict is worth more than what it is worth downstream
+        return Downstream(f"SLAM not compared: {error}.")
+
+
+def _compared(recording: Recording, run: Run, model: Model, refit: Refit) -> Downstream:
     assert run.scan is not None
     assert run.pose is not None
+    beams = laser_of(model.laser, recording.laser, recording.runs).beams
+    if beams != run.scan.values.shape[1]:
+        raise Error(f"{run.name}: scans have {run.scan.values.shape[1]} beams, the model's laser has {beams}")
     rows = _rows(run)
     ours = recording.model is not None or any(one.voltage is not None for one in recording.runs)
     sides = []
