@@ -16,8 +16,8 @@ from kurumaisu.bench.hidden.case import Known
 from kurumaisu.bench.hidden.motion import drive as driven_by
 from kurumaisu.bench.hidden.noise import USUAL
 from kurumaisu.bench.hidden.oracle import gain_share, noise_of
-from kurumaisu.critic import gain, gain_laser, slam_gain
-from kurumaisu.critic.drive import prepare
+from kurumaisu.critic import gain, gain_laser, replay, slam_gain
+from kurumaisu.critic.drive import prepare, split
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.results import summary
 from kurumaisu.critic.slam_readings import corrected
@@ -82,6 +82,30 @@ def test_a_gap_of_a_whole_turn_is_no_surprise():
         runs.append(replace(run, pose=replace(run.pose, t=run.pose.t[keep], values=values)))
     with_gaps = measured(replace(data, runs=tuple(runs)), ()).log_density_per_sample
     assert with_gaps.baseline > measured(data, ()).log_density_per_sample.baseline - 1.0
+
+
+def test_withheld_drives_are_judged_by_beside_the_others_but_not_across_gaps():
+    data = hidden("base.gain_v", 0.08, 3)[1]
+    *train, last = [prepare(run, MODEL) for run in data.runs]
+    keep = np.abs((last.times % 10.0) - 4.0) > 2.0
+    held = replace(last, times=last.times[keep], poses=last.poses[keep])
+    splits = gain.with_withheld(gain.folds(train, []), train, [held])
+    assert [len(split.test) for split in splits] == [1, 1, 4]
+    pieces = splits[-1].test
+    assert max(np.diff(piece.times).max() for piece in pieces) < 0.5
+    assert sum(len(piece.times) for piece in pieces) == keep.sum()
+    settings = (EffectSetting("base.gain_v", {"gain": 0.08}),)
+    worth = gain.measure(MODEL, splits, lambda _: gain.Fitted(settings), NOISE, NOISE)
+    assert worth.log_density_per_sample.lo90 > 0
+    alone = replace(held, times=held.times[:2], poses=held.poses[:2])
+    assert gain.with_withheld([], train, [alone]) == []
+
+
+def test_a_part_of_a_drive_still_knows_the_heading_at_its_start():
+    whole = prepare(hidden(None, 0.0, 4)[1].runs[0], MODEL)
+    climb = (EffectSetting("base.slope", {"climb_x": 0.1, "climb_y": 0.0}),)
+    parts = np.concatenate([replay.increments(part, MODEL, climb) for part in split(whole, 4)])
+    np.testing.assert_allclose(parts, replay.increments(whole, MODEL, climb), atol=1e-12)
 
 
 def test_the_oracle_gains_all_and_nothing_gains_nothing():

@@ -15,7 +15,7 @@ from kurumaisu._core import AxisInverse
 from kurumaisu.critic.recording import Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
-from kurumaisu.types import FloatArray
+from kurumaisu.types import FloatArray, IntArray
 
 GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
 _CLOCK = 0.02  # share by which the reference's clock may be off, and more
@@ -35,7 +35,7 @@ class Drive:
 
     source: the channel that drives the replay; start [s] of the grid; v, w (n,) rates asked for on the grid;
     times (m + 1,) and poses (m + 1, 3) of the reference; known: what unknown effects may follow, (n,) each on the
-    grid, by the names that effects.Motion has.
+    grid, by the names that effects.Motion has; heading [rad] at the start of the grid, None: that of the first pose.
     """
 
     name: str
@@ -46,6 +46,7 @@ class Drive:
     times: FloatArray
     poses: FloatArray
     known: Mapping[str, FloatArray] = field(default_factory=dict)
+    heading: float | None = None
 
     @property
     def measured(self) -> FloatArray:
@@ -127,13 +128,26 @@ def prepare_all(run: Run, model: Model, until: float) -> Drive:
 
 def split(drive: Drive, parts: int) -> list[Drive]:
     """Return the drive cut into parts of equally many increments; each keeps all inputs, so effects keep their past."""
-    bounds = np.linspace(0, len(drive.times) - 1, parts + 1).astype(int)
+    return _cut(drive, np.linspace(0, len(drive.times) - 1, parts + 1).astype(int))
+
+
+def pieces(drive: Drive, gap: float) -> list[Drive]:
+    """Return the drive without the increments that are longer than a gap [s]; each piece keeps all inputs."""
+    long = np.flatnonzero(np.diff(drive.times) > gap)
+    edges = np.concatenate([[-1], long, [len(drive.times) - 1]])
+    return [piece for a, b in pairwise(edges) for piece in _cut(drive, np.array([a + 1, b]))]
+
+
+def _cut(drive: Drive, bounds: IntArray) -> list[Drive]:
+    """Return the parts between rows of poses that have two increments at least."""
+    heading = float(drive.poses[0, 2]) if drive.heading is None else drive.heading
     return [
         replace(
             drive,
-            name=f"{drive.name}[{i + 1}/{parts}]",
+            name=f"{drive.name}[{i + 1}/{len(bounds) - 1}]",
             times=drive.times[a : b + 1],
             poses=drive.poses[a : b + 1],
+            heading=heading,
         )
         for i, (a, b) in enumerate(pairwise(bounds))
         if b - a >= 2

@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu import geometry
 from kurumaisu.critic import predict_floor, replay
-from kurumaisu.critic.drive import Drive, split
+from kurumaisu.critic.drive import Drive, pieces, split
 from kurumaisu.critic.material import spans
 from kurumaisu.critic.noise import Noise, whitened
 from kurumaisu.critic.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
@@ -22,6 +22,7 @@ HORIZONS = (2.0, 5.0, 20.0)  # [s] over which the path is predicted from the inp
 _PARTS = 4  # of a single run, of which each is held out in turn
 _BLOCK = 5.0  # [s] resampled as a whole: at least ten time constants of the usual process noise
 _DRAWS = 2000
+_GAP = 1.0  # [s] between poses, beyond which poses are withheld
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,12 @@ def folds(train: Sequence[Drive], test: Sequence[Drive]) -> list[Fold]:
     if len(parts) < 2:
         return []
     return [Fold(tuple(parts[:i] + parts[i + 1 :]), (parts[i],)) for i in range(len(parts))]
+
+
+def with_withheld(splits: list[Fold], train: Sequence[Drive], withheld: Sequence[Drive]) -> list[Fold]:
+    """Return folds and, as one more, what is known of withheld drives; their gaps are not for judging by."""
+    parts = tuple(part for drive in withheld for part in pieces(drive, _GAP))
+    return [*splits, Fold(tuple(train), parts)] if parts else splits
 
 
 def measure(model: Model, splits: Sequence[Fold], refit: Refit, baseline: Noise, extended: Noise) -> Gain:

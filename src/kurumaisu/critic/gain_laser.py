@@ -31,10 +31,11 @@ Settings = tuple[EffectSetting, ...]
 
 @dataclass(frozen=True)
 class Split:
-    """Scans to fit and scans to judge by."""
+    """Scans to fit and scans to judge by; apart: those to judge by were not among those that found what extends."""
 
     train: Shots
     test: Shots
+    apart: bool
 
 
 def measure(recording: Recording, model: Model, forecast: Forecast | None, settings: Settings) -> ChannelGain | None:
@@ -47,7 +48,7 @@ def measure(recording: Recording, model: Model, forecast: Forecast | None, setti
     sums: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     squares: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     for split in _splits(recording, model, forecast):
-        refitted = settings if recording.test else refit(split.train, settings)
+        refitted = settings if split.apart else refit(split.train, settings)
         sides = [_side(split, some, recording.truth) for some in ((), refitted)]
         use = sides[0].counts & sides[1].counts
         for i, side in enumerate(sides):
@@ -88,20 +89,18 @@ def _side(split: Split, settings: Settings, truth: tuple[float, float] | None) -
 def _splits(recording: Recording, model: Model, forecast: Forecast | None) -> Iterator[Split]:
     places = Places(recording, model, forecast)
     parts = places.trained()
-    if recording.test:
-        seen = [
-            places.of(run, *chosen(run, _SCANS)) for run in recording.runs if run.name in recording.test and run.pose
-        ]
-        held = [shots for shots in seen if len(shots.stamps)]
-        if held:
-            yield Split(joined(parts), joined(held))
+    tests = [run for run in recording.runs if run.name in recording.test and run.pose]
+    picked = [(run, *chosen(run, _SCANS)) for run in tests]
+    held = [places.of(run, stamps, measured) for run, stamps, measured in picked if len(stamps)]
+    if held:
+        yield Split(joined(parts), joined(held), apart=True)
         return
     if len(parts) == 1:
         parts = _cut(parts[0], _PARTS)
     for i, part in enumerate(parts):
         rest = [other for j, other in enumerate(parts) if j != i]
         if rest:
-            yield Split(joined(rest), part)
+            yield Split(joined(rest), part, apart=False)
 
 
 def refit(shots: Shots, settings: Settings) -> Settings:

@@ -96,7 +96,10 @@ def _criticise_base(
 
     progress("measuring the gain on drives held out")
     baseline = scatter(rough, empty, recording.truth, project=False).estimate(made.problem.noise).noise
-    splits = gain.folds(train, test)
+    withheld = [drives[run.name] for run in recording.runs if run.name in drives and _withheld(recording, run)]
+    names = {drive.name for drive in withheld}
+    whole = [drive for drive in test if drive.name not in names]
+    splits = gain.with_withheld(gain.folds(train, whole), train, withheld)
     held = gain.measure(model, splits, made.refit, baseline, made.problem.noise) if splits and made.something else None
     progress("planning the next drive")
     proposal = next_experiment.propose(made.problem, made.found, next_experiment.drives())

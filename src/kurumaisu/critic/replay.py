@@ -71,7 +71,8 @@ def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tu
     extended = extend(model, settings)
     mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in _random()))
     chair = plant.Plant(mean, GRID, np.random.default_rng(0))
-    heading = float(drive.poses[0, 2])  # the grid begins at the first pose, or a little before it
+    # The grid begins at the first pose, or a little before it, unless the drive is a part of a longer one.
+    heading = float(drive.poses[0, 2]) if drive.heading is None else drive.heading
     return chair, chair.from_rates(drive.v, drive.w, heading, drive.known)
 
 
