@@ -23,6 +23,8 @@ from kurumaisu.critic.verdict import write_verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, follow_commands, load_model
 
+_UNDRIVEN = worth.Extension(None, (), lambda _: ())
+
 
 def criticise(
     recording: Recording,
@@ -47,21 +49,29 @@ def criticise(
     wrong = [*recording.invalid, *sanity.examine(whole, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
-    if any(driven(run) for run in whole.runs):
-        base, extension = _criticise_base(recording, model, progress, ids)
-    else:
-        base, extension = explain.undriven(recording, model), worth.Extension(None, (), lambda _: ())
+    moved = any(driven(run) for run in whole.runs)
+    base, extension = _criticise_base(recording, model, progress, ids) if moved else (None, _UNDRIVEN)
     scans = criticise_laser(recording, model, progress, ids)
-    extension = replace(extension, scans=scans.settings)
-    progress("measuring the gain on scans held out")
-    found = worth.with_laser_gain(with_laser(base, scans), recording, extension)
-    if slam:
-        progress("running SLAM with both models")
-        found = worth.with_slam(found, recording, extension)
+    if base is None and scans.refused:
+        nothing = "has neither voltages nor commands nor odometry"
+        raise Error(f"{recording.runs[0].name}: {nothing}; laser: {scans.refused}")
+    found = with_laser(base or explain.undriven(recording, model), scans)
+    found = _with_worth(found, recording, replace(extension, scans=scans.settings), progress, slam=slam)
     if not predict.asked(recording):
         return found
     progress("predicting what was asked for")
     return replace(found, predictions=tuple(predict.predictions(recording, model, extension.forecast, found.settings)))
+
+
+def _with_worth(
+    found: Criticism, recording: Recording, extension: worth.Extension, progress: Progress, *, slam: bool
+) -> Criticism:
+    progress("measuring the gain on scans held out")
+    found = worth.with_laser_gain(found, recording, extension)
+    if slam:
+        progress("running SLAM with both models")
+        found = worth.with_slam(found, recording, extension)
+    return found
 
 
 def _withheld(recording: Recording, run: Run) -> bool:

@@ -15,11 +15,10 @@ from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import HORIZON, MATERIAL
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.story import Rival
-from kurumaisu.critic.verdict import Estimate, Verdict
+from kurumaisu.critic.verdict import NORMAL90, Estimate, Verdict
 from kurumaisu.params import Model
 
 _MINUTE = 60.0  # [s]
-NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
 
