@@ -170,6 +170,7 @@ def test_slam_goes_wrong_with_a_wrong_mounting_and_says_so(tmp_path: Path):
     [
         ({"scan": None}, "no scans"),
         ({"pose": None}, "no reference pose"),
+        ({"pose_source": "particle filter"}, "SLAM's own"),
         ({"command": None, "voltage": None, "odom": None}, "what drove the chair"),
     ],
 )

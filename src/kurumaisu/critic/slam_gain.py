@@ -116,6 +116,8 @@ def _missing(recording: Recording) -> str:
         return "no scans were recorded"
     if all(run.pose is None for run in runs):
         return "there is no reference pose"
+    if all(run.pose_source != "measured" for run in runs):
+        return "the reference pose is SLAM's own"
     if not any(driven(run) for run in runs):
         return "nobody knows what drove the chair"
     return f"no run has {FEWEST} scans between reference poses while it was driven"
