@@ -135,7 +135,7 @@ def test_dead_zone_swallows_volts_of_each_branch():
 def test_process_noise_has_the_stated_size_and_colour():
     n, tau = 400_000, 0.3
     motion = effects.Motion(DT, np.full(n, 0.5), np.full(n, 0.1))
-    noise = effects.by_id("base.process_noise")({"sd_v": 0.01, "sd_w": 0.02, "tau": tau}, context(5))
+    noise = effects.by_id("base.process_noise")({"sd_v": 0.01, "sd_w": 0.02, "tau": tau, "growth": 0.0}, context(5))
     out = noise.apply(motion)
     samples = n * DT / (2 * tau)  # independent ones
     for values, sd in ((out.v - 0.5, 0.01), (out.w - 0.1, 0.02)):

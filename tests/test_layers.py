@@ -16,7 +16,7 @@ from kurumaisu import effects
 
 ROOT = Path(__file__).resolve().parents[1]
 ROS_PYTHON = (
-    r"(rospy|rosbag|roslib|roslaunch|rospkg|rosgraph|rosnode|rosparam|rostopic|rosservice|roscpp|genpy|actionlib"
+    r"(rospy|rosbag|dynamic_reconfigure|roslib|roslaunch|rospkg|rosgraph|rosnode|rosparam|rostopic|rosservice|roscpp|genpy|actionlib"
     r"|tf|tf2\w*|\w+_msgs|std_srvs|kurumaisu\.msg|kurumaisu\.srv)(\.|$)"
 )
 ROS_CPP = r"<(ros\w*|tf2?|tf2_\w+|xmlrpcpp|actionlib|nodelet|diagnostic_updater|\w+_msgs|std_srvs|kurumaisu)/"

@@ -44,6 +44,16 @@ def test_a_curve_is_added_to_its_channel_while_the_chair_moves():
         np.testing.assert_allclose(found, rate + expected, atol=1e-15)
 
 
+def test_a_curve_multiplies_its_rate():
+    v, w = np.array([0.3, 0.0, 0.5, -0.2]), np.array([0.0, 0.25, 0.0, 0.1])
+    over_w = interp1d([-0.3, 0.1, 0.4], [0.05, -0.02, 0.03])(w)
+    over_v = np.interp(v, [-0.3, 0.1, 0.4], [0.05, -0.02, 0.03])
+    moved = apply("smooth.v_gain.w", HATS, Motion(DT, v, w))
+    np.testing.assert_allclose(moved.v, v + v * over_w, atol=1e-15)
+    np.testing.assert_array_equal(moved.w, w)
+    np.testing.assert_allclose(apply("smooth.w_gain.v", HATS, Motion(DT, v, w)).w, w + w * over_v, atol=1e-15)
+
+
 def test_beyond_its_knots_a_curve_is_constant():
     moved = apply("smooth.w.v", HATS, Motion(DT, np.array([-2.0, 2.0]), np.zeros(2)))
     np.testing.assert_allclose(moved.w, [0.05, 0.03])

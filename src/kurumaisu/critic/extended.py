@@ -18,16 +18,14 @@ from kurumaisu.params import EffectSetting, Model, load_model
 def process_noise(problem: Problem) -> EffectSetting:
     """Return the estimated noise of the rates as the effect that the simulator draws it from.
 
-    That effect has one colour and does not grow with the rates: both are taken into its size, as they were on average.
+    That effect has one colour: both are taken into its size, as they were on average.
     """
     (random,) = (effect for effect in effects.BASE if effect.random)
     noise = problem.noise
-    pace = np.concatenate([drive.pace[drive.pace > 0] for drive in problem.drives])
-    grown = float(np.sqrt(np.mean((1 + noise.growth * pace) ** 2))) if len(pace) else 1.0
-    sd_v, sd_w = np.hypot([noise.sd_v, noise.sd_w], [noise.slow_v, noise.slow_w]) * grown
+    sd_v, sd_w = np.hypot([noise.sd_v, noise.sd_w], [noise.slow_v, noise.slow_w])
     share = noise.slow_w**2 / (noise.slow_w**2 + noise.sd_w**2)  # of the variance of the yaw rate
     tau = (1 - share) * noise.tau + share * noise.slow_tau  # keeps how far the heading wanders
-    values = {"sd_v": float(sd_v), "sd_w": float(sd_w), "tau": tau}
+    values = {"sd_v": float(sd_v), "sd_w": float(sd_w), "tau": tau, "growth": noise.growth}
     return EffectSetting(random.id, {p.name: min(values[p.name], p.upper) for p in random.parameters})
 
 

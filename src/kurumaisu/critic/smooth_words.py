@@ -24,7 +24,7 @@ COVARIATES = {
     "abs_v": ("|v|", "speed", "m/s"),
     "w": ("w", "yaw rate", "rad/s"),
     "abs_w": ("|w|", "size of the yaw rate", "rad/s"),
-    "v_times_w": ("v*w", "product of speed and yaw rate", "m/s^2"),
+    "v_times_w": ("vw", "product of speed and yaw rate", "m/s^2"),
     "wheel_left": ("wheel_left", "speed of the left wheel", "m/s"),
     "wheel_right": ("wheel_right", "speed of the right wheel", "m/s"),
     "time": ("time", "time since the start", "s"),

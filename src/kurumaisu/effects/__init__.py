@@ -5,8 +5,9 @@ Effects of one stage act in the order of the list, whatever a file's order.
 """
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -104,9 +105,18 @@ ALL: tuple[type[Mechanism], ...] = (*BASE, *LASER, *WORLD)
 class Chain:
     """The effects on the base, each kind in the order in which they act."""
 
-    volts: tuple[VoltageEffect, ...]
-    rates: tuple[Effect, ...]
-    reference: tuple[ReferenceEffect, ...]
+    volts: tuple[VoltageEffect, ...] = ()
+    rates: tuple[Effect, ...] = ()
+    reference: tuple[ReferenceEffect, ...] = ()
+
+    @property
+    def all(self) -> tuple[BaseEffect, ...]:
+        """Every kind."""
+        return *self.volts, *self.rates, *self.reference
+
+
+_NOTHING = Chain()
+_Acting = TypeVar("_Acting", bound=Mechanism)
 
 
 def by_id(name: str) -> type[Mechanism]:
@@ -121,8 +131,8 @@ def by_id(name: str) -> type[Mechanism]:
 
 
 def fluctuation(sd_v: float, sd_w: float, tau: float) -> EffectSetting:
-    """Return noise of the rates, sd [m/s], [rad/s] and time constant [s], as a model file has it."""
-    return EffectSetting(ProcessNoise.id, {"sd_v": sd_v, "sd_w": sd_w, "tau": tau})
+    """Return steady noise of the rates, sd [m/s], [rad/s] and time constant [s], as a model file has it."""
+    return EffectSetting(ProcessNoise.id, {"sd_v": sd_v, "sd_w": sd_w, "tau": tau, "growth": 0.0})
 
 
 def check(settings: tuple[EffectSetting, ...]) -> None:
@@ -131,12 +141,18 @@ def check(settings: tuple[EffectSetting, ...]) -> None:
         effect.check(values)
 
 
-def build(settings: tuple[EffectSetting, ...], context: Context) -> Chain:
+def build(settings: tuple[EffectSetting, ...], context: Context, acting: Chain = _NOTHING) -> Chain:
     """Return the effects on the base among those of a model file.
 
+    acting: those so far; what is still among the settings goes on from the state that it is in, with other values.
     Raise Error for an unknown id, an id given twice, or parameters that do not fit.
     """
-    built = [effect(values, context) for effect, values in _chosen(settings) if issubclass(effect, BaseEffect)]
+    known = {effect.id: effect for effect in acting.all}
+    built = [
+        _go_on(known[effect.id], values) if effect.id in known else effect(values, context)
+        for effect, values in _chosen(settings)
+        if issubclass(effect, BaseEffect)
+    ]
     built.sort(key=lambda effect: effect.stage)
     return Chain(
         tuple(effect for effect in built if isinstance(effect, VoltageEffect)),
@@ -145,20 +161,40 @@ def build(settings: tuple[EffectSetting, ...], context: Context) -> Chain:
     )
 
 
-def build_laser(settings: tuple[EffectSetting, ...], rng: np.random.Generator) -> LaserChain:
-    """Return the effects on a laser among those of a model file; raises as build does.
+def build_laser(
+    settings: tuple[EffectSetting, ...], rng: np.random.Generator, acting: Sequence[LaserEffect] = ()
+) -> LaserChain:
+    """Return the effects on a laser among those of a model file; acting, and raises, as in build.
 
     Each draws from a generator of its own, so that its noise does not depend on which others there are.
     """
-    chosen = [(effect, values) for effect, values in _chosen(settings) if issubclass(effect, LaserEffect)]
+    known = {effect.id: effect for effect in acting}
     seed = int(rng.integers(2**63))
-    built = [effect(values, np.random.default_rng([seed, LASER.index(effect)])) for effect, values in chosen]
+    built = [
+        _go_on(known[effect.id], values)
+        if effect.id in known
+        else effect(values, np.random.default_rng([seed, LASER.index(effect) if effect in LASER else len(LASER)]))
+        for effect, values in _chosen(settings)
+        if issubclass(effect, LaserEffect)
+    ]
     return LaserChain(sorted(built, key=lambda effect: effect.stage))
 
 
 def build_world(settings: tuple[EffectSetting, ...], rng: np.random.Generator) -> tuple[WorldEffect, ...]:
     """Return the effects on the world's walls among those of a model file; raises as build does."""
     return tuple(effect(values, rng) for effect, values in _chosen(settings) if issubclass(effect, WorldEffect))
+
+
+def of_world(settings: tuple[EffectSetting, ...]) -> list[EffectSetting]:
+    """Return those of a model file that act on the world's walls; raises as build does."""
+    return [EffectSetting(effect.id, dict(v)) for effect, v in _chosen(settings) if issubclass(effect, WorldEffect)]
+
+
+def _go_on(effect: _Acting, values: Mapping[str, float]) -> _Acting:
+    """Return an effect that acts already, with values that may be others."""
+    if values != effect.values:
+        effect.change(values)
+    return effect
 
 
 def _chosen(settings: tuple[EffectSetting, ...]) -> list[tuple[type[Mechanism], Mapping[str, float]]]:
@@ -213,6 +249,7 @@ __all__ = [
     "curve",
     "fluctuation",
     "incidence",
+    "of_world",
     "slanted",
     "smooth_id",
 ]

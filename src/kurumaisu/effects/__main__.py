@@ -22,15 +22,18 @@ effects:
 
     scripts/run roslaunch kurumaisu sim.launch effects:=$PWD/effects.yaml
 
+In a running simulator each can be switched on, changed and off again: docs/sim_node.md, *Effects while it runs*.
+
 Every parameter must be given. The order of the list does not matter: effects act by stage, those of a stage in the
 order of the tables. Each effect on the laser draws from a generator of its own, so that the laser's noise is the same
 with it and without. With a size of 0 an effect is absent; a form's other parameters have a middle instead, as `tau`
 900 ± 600 s. Sizes are what we expect, for a fit to start from, and measured only where a source says so; bounds are
 what the reader of the file accepts.
 
-Symbols: v, u, w forward, leftward speed [m/s] and yaw rate [rad/s]; V_f, V_s voltages [V]; t time since the reset [s];
-r true range [m], φ bearing, a angle of incidence (0: along the wall's normal) [rad]; µ, σ mean and standard deviation
-of a reading [m]; n, z standard normal. Rates are means over the simulator's steps.
+Symbols: v, u, w forward, leftward speed [m/s] and yaw rate [rad/s]; V_f, V_s voltages [V]; t time [s] since the reset,
+or since the effect was switched on later; r true range [m], φ bearing, a angle of incidence (0: along the wall's
+normal) [rad]; µ, σ mean and standard deviation of a reading [m]; n, z standard normal. Rates are means over the
+simulator's steps.
 """
 _BASE = """
 ## The base
@@ -57,7 +60,7 @@ _SMOOTH = """
 
 Where something acts that is none of these, the critic extends the model by a curve, which the simulator runs as it
 runs all others: `smooth.CHANNEL.COVARIATE` adds a rate that follows another quantity, while the chair moves, after
-everything else of the stage FLOOR.
+everything else of the stage FLOOR; the channels `v_gain` and `w_gain` multiply the rate by 1 + curve.
 
 ```yaml
 effects:

@@ -33,3 +33,7 @@ class AccelLimit(Effect):
         v, self._v = _core.ramp(motion.v, self.values["slowness_v"], motion.dt, self._v)
         w, self._w = _core.ramp(motion.w, self.values["slowness_w"], motion.dt, self._w)
         return replace(motion, v=v, w=w)
+
+    def settle(self, motion: Motion) -> None:
+        """Have reached v and w."""
+        self._v, self._w = float(motion.v[-1]), float(motion.w[-1])

@@ -26,3 +26,7 @@ class Backlash(Effect):
         w, self._level = _core.play(motion.w, self.values["play"] / 2, self._level)
         moving = (motion.v != 0) | (motion.w != 0)
         return replace(motion, w=moving * w)
+
+    def settle(self, motion: Motion) -> None:
+        """Stand in the middle of the play."""
+        self._level = float(motion.w[-1])

@@ -114,6 +114,9 @@ class Effect(BaseEffect, ABC):
     def apply(self, motion: Motion) -> Motion:
         """Return the motion with this effect, continuing from where the last chunk ended."""
 
+    def settle(self, motion: Motion) -> None:
+        """Begin in the middle of a drive: as if the rates of this one step had been held for long."""
+
 
 class VoltageEffect(BaseEffect, ABC):
     """An effect on the voltages, before they become rates."""

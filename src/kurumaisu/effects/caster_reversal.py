@@ -48,6 +48,10 @@ class CasterReversal(Effect):
         self._travel = float(since[-1] + way[-1])
         return replace(motion, w=motion.w + side * kick * (motion.v != 0))
 
+    def settle(self, motion: Motion) -> None:
+        """Have the casters trail."""
+        self._direction, self._turn = float(np.sign(motion.v[-1])), float(np.sign(motion.w[-1]))
+
 
 def _held(signs: FloatArray, before: float) -> FloatArray:
     """Return signs (n,) with the last one before in place of each 0."""

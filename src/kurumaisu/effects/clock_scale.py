@@ -22,4 +22,8 @@ class ClockScale(ReferenceEffect):
     def apply(self, reference: Reference) -> Reference:
         """Stretch the times."""
         stretch = 1 + self.values["scale"]
-        return replace(reference, times=np.asarray(reference.times * stretch), rates=reference.rates / stretch)
+        return replace(
+            reference,
+            times=np.asarray(self.since + (reference.times - self.since) * stretch),
+            rates=reference.rates / stretch,
+        )

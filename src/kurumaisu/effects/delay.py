@@ -29,8 +29,14 @@ class Delay(Effect):
         keep = int(whole) + 1
         if self._past is None:
             self._past = np.zeros((2, keep))
-        samples = np.hstack([self._past, np.stack([motion.v, motion.w])])
+        past = self._past[:, -keep:]
+        missing = keep - past.shape[1]  # where the delay has been lengthened: the oldest sample was held
+        samples = np.hstack([past[:, :1].repeat(missing, axis=1), past, np.stack([motion.v, motion.w])])
         n = len(motion.v)
         shifted = (1 - part) * samples[:, 1 : n + 1] + part * samples[:, :n]
         self._past = samples[:, -keep:]
         return replace(motion, v=shifted[0], w=shifted[1])
+
+    def settle(self, motion: Motion) -> None:
+        """Have v and w under way."""
+        self._past = np.array([[motion.v[-1]], [motion.w[-1]]])

@@ -15,7 +15,7 @@ class _Lag(Effect):
 
     def __init__(self, values: Mapping[str, float], context: Context) -> None:
         super().__init__(values, context)
-        self._lag = FirstOrder(self.values["tau"])
+        self._lag = FirstOrder()
 
 
 class LagV(_Lag):
@@ -32,7 +32,11 @@ class LagV(_Lag):
 
     def apply(self, motion: Motion) -> Motion:
         """Filter v."""
-        return replace(motion, v=self._lag.follow(motion.v, motion.dt))
+        return replace(motion, v=self._lag.follow(motion.v, motion.dt, self.values["tau"]))
+
+    def settle(self, motion: Motion) -> None:
+        """Have followed v."""
+        self._lag.level = float(motion.v[-1])
 
 
 class LagW(_Lag):
@@ -49,4 +53,8 @@ class LagW(_Lag):
 
     def apply(self, motion: Motion) -> Motion:
         """Filter w."""
-        return replace(motion, w=self._lag.follow(motion.w, motion.dt))
+        return replace(motion, w=self._lag.follow(motion.w, motion.dt, self.values["tau"]))
+
+    def settle(self, motion: Motion) -> None:
+        """Have followed w."""
+        self._lag.level = float(motion.w[-1])

@@ -46,8 +46,14 @@ class Mechanism:
     choices: ClassVar[tuple[Mapping[str, float], ...]] = ()
     random: ClassVar[bool] = False  # it draws noise, so its mean effect is none, or not the whole of it
 
+    since = 0.0  # [s] after the reset: when it began to act, which is the time 0 of its formula
+
     def __init__(self, values: Mapping[str, float]) -> None:
         """Take a value for each parameter. Raise Error for one that is missing, unknown or out of its bounds."""
+        self.change(values)
+
+    def change(self, values: Mapping[str, float]) -> None:
+        """Go on with other values from the state that it is in. Raise Error, with nothing changed, as at the start."""
         self.check(values)
         self.values = dict(values)
 

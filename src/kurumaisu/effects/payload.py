@@ -25,10 +25,16 @@ class Payload(Effect):
 
     def __init__(self, values: Mapping[str, float], context: Context) -> None:
         super().__init__(values, context)
-        self._lags = FirstOrder(self.values["tau"]), FirstOrder(self.values["tau"])
+        self._lags = FirstOrder(), FirstOrder()
 
     def apply(self, motion: Motion) -> Motion:
         """Scale and filter v and w."""
-        left = 1 - self.values["droop"]
-        v, w = (lag.follow(left * rate, motion.dt) for lag, rate in zip(self._lags, (motion.v, motion.w), strict=True))
+        left, tau = 1 - self.values["droop"], self.values["tau"]
+        both = zip(self._lags, (motion.v, motion.w), strict=True)
+        v, w = (lag.follow(left * rate, motion.dt, tau) for lag, rate in both)
         return replace(motion, v=v, w=w)
+
+    def settle(self, motion: Motion) -> None:
+        """Have driven without the load, which is put on now."""
+        for lag, rate in zip(self._lags, (motion.v, motion.w), strict=True):
+            lag.level = float(rate[-1])

@@ -7,6 +7,8 @@ import numpy as np
 
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 
+_USUAL = 0.8  # [m/s, rad/s] rates in whose units the noise grows
+
 
 class ProcessNoise(Effect):
     """Ornstein-Uhlenbeck noise on both rates; it starts at rest and acts only on a moving chair."""
@@ -17,9 +19,12 @@ class ProcessNoise(Effect):
         Parameter("sd_v", "m/s", null=0.0, scale=0.01, lower=0.0, upper=1.0),
         Parameter("sd_w", "rad/s", null=0.0, scale=0.02, lower=0.0, upper=2.0),
         Parameter("tau", "s", null=0.3, scale=0.3, lower=1.0e-3, upper=30.0),
+        Parameter("growth", "1", null=0.0, scale=0.5, lower=0.0, upper=100.0),
     )
     sentence = "the rates fluctuate about their command"
-    formula = "v + n_v, w + n_w while moving; n: Ornstein-Uhlenbeck, sd, tau"
+    formula = (
+        "v + n_v · g, w + n_w · g while moving; n: Ornstein-Uhlenbeck, sd, tau; g = 1 + growth · (|v| + |w|) / 0.8"
+    )
     source = "assumed: floor, tyres, casters; 10 mm/s, 20 mrad/s, 0.3 s"
     shows_in = Rate.W
     follows = Follows.W
@@ -36,8 +41,9 @@ class ProcessNoise(Effect):
         noise = [lfilter([1], [1, -decay], draws[:, i], zi=[decay * self._level[i]])[0] for i in range(2)]
         self._level = (float(noise[0][-1]), float(noise[1][-1]))
         moving = (motion.v != 0) | (motion.w != 0)
+        size = moving * (1 + self.values["growth"] * (np.abs(motion.v) + np.abs(motion.w)) / _USUAL)
         return replace(
             motion,
-            v=motion.v + moving * self.values["sd_v"] * noise[0],
-            w=motion.w + moving * self.values["sd_w"] * noise[1],
+            v=motion.v + size * self.values["sd_v"] * noise[0],
+            w=motion.w + size * self.values["sd_w"] * noise[1],
         )

@@ -45,9 +45,18 @@ class Smooth(Effect):
     covariate: ClassVar[str]
 
     def __init__(self, values: Mapping[str, float], context: Context) -> None:
+        self._follower = Follower(self.covariate, 0.0)
         super().__init__(values, context)
+
+    def change(self, values: Mapping[str, float]) -> None:
+        """Go on with another curve, from what the covariate has come to."""
+        super().change(values)
         constant = constant_of(self.covariate)
-        self._follower = Follower(self.covariate, values[constant] if constant else 0.0)
+        self._follower.constant = values[constant] if constant else 0.0
+
+    def settle(self, motion: Motion) -> None:
+        """Have been asked for the same, in the same direction."""
+        self._follower.settle(motion)
 
     @classmethod
     def check(cls, values: Mapping[str, float]) -> None:

@@ -46,7 +46,7 @@ class Follower:
     """
 
     def __init__(self, name: str, constant: float) -> None:
-        self._name, self._constant = name, constant
+        self._name, self.constant = name, constant
         self._elapsed = 0.0  # [s]
         self._heading = 0.0  # [rad] before the next chunk, where nobody knows it
         self._position = (0.0, 0.0)  # [m] likewise
@@ -60,7 +60,13 @@ class Follower:
         if self._name in motion.known:
             return np.broadcast_to(np.asarray(motion.known[self._name], dtype=float), motion.v.shape)
         function = COVARIATES.get(self._name)
-        return np.full(len(motion.v), self._constant) if function is None else function(self, motion)
+        return np.full(len(motion.v), self.constant) if function is None else function(self, motion)
+
+    def settle(self, motion: Motion) -> None:
+        """Begin in the middle of a drive whose rates, and what asks for them, have been held for long."""
+        asked = asked_for(motion)
+        self._asked = float(asked[0][-1]), float(asked[1][-1])
+        self._direction = float(np.sign(motion.v[-1]))
 
     def time(self, motion: Motion) -> FloatArray:
         """Return the time since the start, in the middle of each step [s]."""
@@ -107,7 +113,7 @@ class Follower:
 
     def wheel(self, motion: Motion, side: int) -> FloatArray:
         """Return the speed of the left (side -1) or right (side 1) wheel [m/s]; the constant is the track."""
-        return np.asarray(motion.v + side * motion.w * self._constant / 2)
+        return np.asarray(motion.v + side * motion.w * self.constant / 2)
 
 
 def asked_for(motion: Motion) -> tuple[FloatArray, FloatArray]:

@@ -24,9 +24,14 @@ class SteeringLaw(VoltageEffect):
     follows = Follows.W
 
     def __init__(self, values: Mapping[str, float], context: Context) -> None:
+        self.context = context
         super().__init__(values, context)
+
+    def change(self, values: Mapping[str, float]) -> None:
+        """Take another law, which knows nothing yet of the branch that it is on."""
+        super().change(values)
         factor = 1 - 2 * self.values["flip"]
-        sides = context.steering.positive, context.steering.negative
+        sides = self.context.steering.positive, self.context.steering.negative
         self._inverse = AxisInverse(AxisLaw(*(Branch(side.slope, factor * side.intercept) for side in sides)))
 
     def apply(self, volts: Volts) -> Volts:

@@ -15,10 +15,12 @@ from geometry_msgs.msg import Twist
 
 from kurumaisu.errors import Error, one_line
 from kurumaisu.msg import Voltages
+from kurumaisu.params import EffectSetting
 from kurumaisu.ros import messages
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.services import Services
+from kurumaisu.ros.sim_effects import NAMESPACE, LiveEffects
 from kurumaisu.ros.sim_laser import LaserOutput, laser_output
 from kurumaisu.ros.sim_publish import SimTopics
 from kurumaisu.ros.sim_settings import SimSettings, read_settings
@@ -54,6 +56,7 @@ class SimNode:
         ]
         self._requests = Requests()
         self._services = Services(self, self._requests, "")
+        self._effects = LiveEffects(settings.model.effects, self._switch)
 
     @property
     def time(self) -> float:
@@ -114,6 +117,10 @@ class SimNode:
             self._given_up = None
         self._epoch = self._now - round(observation.time * _NS)
         self._publish(observation)
+
+    def _switch(self, settings: tuple[EffectSetting, ...]) -> None:
+        """Let other effects act from the next step on, asked by another thread."""
+        self._requests.ask(partial(self._simulator.switch, settings))
 
     def _has_requests(self) -> bool:
         return bool(self._requests)
@@ -179,7 +186,8 @@ def main() -> None:
     """Run the node; exit with 1 and one line for bad configuration."""
     rospy.init_node("sim_node")
     try:
-        settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
+        values = {key: value for key, value in rospy.get_param("~", {}).items() if key != NAMESPACE}
+        settings = read_settings(values, rospy.get_name())
         node = SimNode(settings)
     except Error as error:
         rospy.logfatal(one_line(error))

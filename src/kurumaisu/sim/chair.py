@@ -12,11 +12,11 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.effects import Reference, Volts
 from kurumaisu.errors import Error
-from kurumaisu.params import Model
+from kurumaisu.params import EffectSetting, Model
 from kurumaisu.sim import state
 from kurumaisu.sim.chair_body import seat
 from kurumaisu.sim.chair_data import NEUTRAL, Command, Observation
-from kurumaisu.sim.chair_world import ChairWorld
+from kurumaisu.sim.chair_walls import Walls
 from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.plant import Plant
 from kurumaisu.sim.scanner import Scan, Scanner
@@ -45,8 +45,8 @@ class ChairSimulator:
         self._dynamics = dynamics
         self._scene = seat(world, model.chassis)
         effects.check(model.effects)
-        self._errs = bool(effects.build_world(model.effects, np.random.default_rng(0)))
-        self._world = self._build(None)
+        self._walls = Walls(self._scene, model.chassis, dynamics)
+        self._world = self._walls.as_drawn()
         if self._world.overlaps():
             raise Error(
                 f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose, "
@@ -56,20 +56,16 @@ class ChairSimulator:
         name = self._scene.models[self._scene.chair].name
         own = [replace(s, robot=name) if s.robot == EVERY_ROBOT and name else s for s in sensors]
         self._sensors = tuple(own)
-        self._fingerprint = state.digest(
-            (self._scene.models, self._scene.poses, model.chassis, model.effects, self._sensors, self._dynamics)
-        )
+        self._fingerprint = self._print()
         self.reset(0)
 
     def reset(self, seed: int) -> Observation:
         """Put all back to the start, at rest, and start time and randomness anew."""
         self._seed = seed
-        streams = np.random.SeedSequence(seed).spawn(5)
-        *others, world_seed = streams[0], streams[1], streams[2], streams[4], streams[3]
-        plant_rng, laser_rng, effects_rng, self._sensor_rng = map(np.random.default_rng, others)
+        plant_rng, laser_rng, effects_rng, _walls, self._sensor_rng = _streams(seed)
         self._plant = Plant(self._model, self.step_time, plant_rng)
-        if self._errs:
-            self._world = self._build(world_seed)
+        if effects.of_world(self._model.effects):
+            self._world = self._walls.built(self._model.effects, seed)
         self._world.begin()
         chain = effects.build_laser(self._model.effects, effects_rng)
         self._scanner = Scanner(self._model.laser, Sight(self._world), chain, laser_rng)
@@ -86,6 +82,31 @@ class ChairSimulator:
         rates, contact = around.drive(float(motion.v[0]), float(motion.w[0]), u)
         self._steps += 1
         return self._observe(rates, contact)
+
+    def switch(self, settings: tuple[EffectSetting, ...]) -> None:
+        """Go on with these effects in place of those so far, between two steps; a reset keeps them.
+
+        Those that act already keep their state, with values that may be others; time begins at 0 for the others.
+        Raise Error, with nothing changed, for effects that are unknown or whose parameters do not fit, and for walls
+        that would overlap the chair where it is.
+        """
+        effects.check(settings)
+        if effects.of_world(settings) != effects.of_world(self._model.effects):
+            self._move_walls(settings)
+        self._plant.switch(settings, self.time)
+        self._scanner.switch(settings, self.time, _streams(self._seed)[2])
+        self._model = replace(self._model, effects=settings)
+        self._fingerprint = self._print()
+
+    def _move_walls(self, settings: tuple[EffectSetting, ...]) -> None:
+        """Put all that moves among the walls that these effects make."""
+        self._world = self._walls.among(self._world, settings, self._seed)
+        self._scanner.sight.enter(self._world)
+        if self._sensing is not None:
+            known, random = self._sensing.state(), remember(self._sensor_rng)
+            self._power_up()
+            self._sensing.restore(known)
+            recall(self._sensor_rng, random)
 
     def command(self, robot: str, velocity: FloatArray | Sequence[float]) -> None:
         """Let another robot drive on at forward, leftward [m/s], turn [rad/s], as its world file bounds it.
@@ -183,15 +204,10 @@ class ChairSimulator:
         reference = self._plant.seen(Reference(np.array(time), pose, rates))
         return Observation(time, pose, rates, self._contact, scan, reference, readings)
 
-    def _build(self, seed: np.random.SeedSequence | None) -> ChairWorld:
-        """Build the world, with a seed for the effects on what its file says of walls."""
-
-        def distort(walls: FloatArray) -> FloatArray:
-            for effect in effects.build_world(self._model.effects, np.random.default_rng(seed)):
-                walls = effect.apply(walls)
-            return walls
-
-        return ChairWorld(self._scene, self._model.chassis, self._dynamics, distort if seed else None)
+    def _print(self) -> str:
+        """Return what a state must be of."""
+        scene, model = self._scene, self._model
+        return state.digest((scene.models, scene.poses, model.chassis, model.effects, self._sensors, self._dynamics))
 
     def _power_up(self) -> None:
         """Start the further sensors."""
@@ -213,6 +229,11 @@ class ChairSimulator:
     def ambiguous_samples(self) -> int:
         """Steps since the reset whose voltages stood for two rates."""
         return self._plant.ambiguous_samples
+
+
+def _streams(seed: int) -> list[np.random.Generator]:
+    """Return the randomness of plant, laser, the laser's effects, walls (drawn by themselves) and sensors."""
+    return [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(5)]
 
 
 def _volts(command: Command) -> Volts:

@@ -14,6 +14,8 @@ from kurumaisu._core import AxisInverse, AxisLaw
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
+_ASKED, _OUT = "asked", "out"  # before and after all effects
+
 
 class Driven(Protocol):
     """What Plant needs to know of a Model."""
@@ -43,9 +45,9 @@ class Plant:
         self._model = model
         self._translation = AxisInverse(model.translation)
         self._steering = AxisInverse(model.steering)
-        self.effects = effects.build(
-            model.effects, effects.Context(translation=model.translation, steering=model.steering, rng=rng)
-        )
+        self._context = effects.Context(translation=model.translation, steering=model.steering, rng=rng)
+        self.effects = effects.build(model.effects, self._context)
+        self._passed: dict[str, tuple[float, float]] = {}  # v, w that last came to each effect, by ids; and two more
 
     @property
     def ambiguous_samples(self) -> int:
@@ -76,6 +78,31 @@ class Plant:
         volts = effects.Volts(model.translation.volts(v), model.steering.volts(w), np.sign(v), np.sign(w))
         return self.from_voltages(volts, heading, known)
 
+    def switch(self, settings: tuple[EffectSetting, ...], time: float) -> None:
+        """Go on with these effects from a time [s] on, in the middle of the drive.
+
+        Those that act already keep their state; others begin as if the last step's rates had been held for long.
+        Raise Error, with nothing changed, for effects that are unknown or whose parameters do not fit.
+        """
+        effects.check(settings)
+        before = {effect.id for effect in self.effects.all}
+        self.effects = effects.build(settings, self._context, self.effects)
+        for effect in self.effects.all:
+            if effect.id not in before:
+                effect.since = time
+        if not self._passed:
+            return  # nothing has moved yet
+        v, w = self._passed[_OUT]
+        asked = {
+            name: np.array([rate]) for name, rate in zip(("v_asked", "w_asked"), self._passed[_ASKED], strict=True)
+        }
+        for rate in reversed(self.effects.rates):
+            if rate.id in before:
+                v, w = self._passed[rate.id]
+            else:
+                self._passed[rate.id] = v, w
+                rate.settle(effects.Motion(self.dt, np.array([v]), np.array([w]), known=asked))
+
     def seen(self, reference: effects.Reference) -> effects.Reference:
         """Return what a reference measures where the truth is as given."""
         for effect in self.effects.reference:
@@ -86,9 +113,15 @@ class Plant:
         self, v: FloatArray, w: FloatArray, heading: float | None, known: Mapping[str, FloatArray]
     ) -> effects.Motion:
         motion = effects.Motion(self.dt, v, w, heading=heading, known={"v_asked": v, "w_asked": w, **known})
+        self._note(_ASKED, motion)
         for effect in self.effects.rates:
+            self._note(effect.id, motion)
             motion = effect.apply(motion)
+        self._note(_OUT, motion)
         return motion
+
+    def _note(self, place: str, motion: effects.Motion) -> None:
+        self._passed[place] = float(motion.v[-1]), float(motion.w[-1])
 
 
 def path(motion: effects.Motion, start: FloatArray) -> FloatArray:

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose
-from kurumaisu.params import Laser
+from kurumaisu.params import EffectSetting, Laser
 from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.sight import Sight
 from kurumaisu.types import FloatArray
@@ -65,6 +66,18 @@ class Scanner:
         self._start(self._count + 1)
         self.sight.forget(min(self._beams.stamp, self._beams.times.min()))
         return scan
+
+    def switch(self, settings: tuple[EffectSetting, ...], time: float, rng: np.random.Generator) -> None:
+        """Go on with these effects from a time [s] on; a scan under way keeps its beams. rng: for the new ones.
+
+        Raise Error, with nothing changed, for effects that are unknown or whose parameters do not fit.
+        """
+        effects.check(settings)
+        before = {effect.id for effect in self._chain.effects}
+        self._chain = effects.build_laser(settings, rng, self._chain.effects)
+        for effect in self._chain.effects:
+            if effect.id not in before:
+                effect.since = time
 
     def state(self) -> dict[str, Any]:
         """Return all that the next scans depend on."""

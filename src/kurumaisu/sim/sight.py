@@ -39,6 +39,10 @@ class Sight:
         keep = max(0, int(np.searchsorted(self._times, before, side="right")) - 1)
         del self._times[:keep], self._chair[:keep], self._frames[:keep]
 
+    def enter(self, world: ChairWorld) -> None:
+        """Look at another world with the same bodies, all of which are where they were."""
+        self._world = world
+
     def restart(self) -> None:
         """Forget where the others were, as some have come or been put elsewhere; the chair's way stays."""
         self._frames = [] if self._world.alone else [self._others()] * len(self._times)

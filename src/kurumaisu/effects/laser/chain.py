@@ -27,6 +27,11 @@ class LaserChain:
         self._before = [effect for effect in readings if effect.stage <= LaserStage.NOISE]
         self._after = [effect for effect in readings if effect.stage > LaserStage.NOISE]
 
+    @property
+    def effects(self) -> tuple[LaserEffect, ...]:
+        """All of them."""
+        return *self._beams, *self._before, *self._after
+
     def aim(self, beams: Beams) -> Beams:
         """Return where the beams leave from in truth, and when, for what model and message say."""
         for effect in self._beams:

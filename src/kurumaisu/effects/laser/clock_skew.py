@@ -18,4 +18,4 @@ class ClockSkew(BeamEffect):
 
     def apply(self, beams: Beams) -> Beams:
         """Stretch the times."""
-        return replace(beams, times=beams.times / (1 + self.values["skew"]))
+        return replace(beams, times=self.since + (beams.times - self.since) / (1 + self.values["skew"]))

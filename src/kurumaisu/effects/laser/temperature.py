@@ -24,5 +24,6 @@ class Temperature(ReadingEffect):
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by the temperature of now."""
-        warmer = self.values["swing"] * math.sin(2 * math.pi * echoes.stamp / self.values["period"])
+        time = echoes.stamp - self.since
+        warmer = self.values["swing"] * math.sin(2 * math.pi * time / self.values["period"])
         return replace(echoes, mean=echoes.mean + self.values["coefficient"] * warmer)

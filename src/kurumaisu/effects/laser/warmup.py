@@ -23,5 +23,5 @@ class WarmUp(ReadingEffect):
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by what is left."""
-        left = math.exp(-echoes.stamp / self.values["tau"])
+        left = math.exp(-(echoes.stamp - self.since) / self.values["tau"])
         return replace(echoes, mean=echoes.mean + self.values["amplitude"] * left)

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects on the base once more, from the formulas of docs/effects.md: plain loops, no code of the package.
+
+Each function takes parameters and a drive and returns what the drive becomes. Laws are read from the model file.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+_FILE = yaml.safe_load((Path(__file__).resolve().parents[1] / "launch/md100.yaml").read_text())
+_LAWS = _FILE["voltage_laws"][_FILE["voltage_law"]]
+
+
+@dataclass
+class Drive:
+    """Rates of steps of dt [s]: v [m/s], w [rad/s]; heading [rad] at the start."""
+
+    dt: float
+    v: list[float]
+    w: list[float]
+    heading: float
+
+
+Rates = tuple[list[float], list[float], list[float]]  # v, u, w
+RATES: dict[str, Callable[[dict[str, float], Drive], Rates]] = {}
+VOLTS: dict[str, Callable[[dict[str, float], list[float], list[float], list[float]], tuple[list, list]]] = {}
+
+
+def _rates(name):
+    def register(function):
+        RATES[name] = function
+        return function
+
+    return register
+
+
+def _volts(name):
+    def register(function):
+        VOLTS[name] = function
+        return function
+
+    return register
+
+
+def branch(axis: str, rate: float) -> tuple[float, float]:
+    """Return slope and intercept of the side of a law that a rate is on."""
+    side = _LAWS[axis]["negative" if rate < 0 else "positive"]
+    return side["slope"], side["intercept"]
+
+
+def volts(axis: str, rate: float) -> float:
+    slope, intercept = branch(axis, rate)
+    return 0.0 if rate == 0 else slope * rate + intercept
+
+
+def _still(n: int) -> list[float]:
+    return [0.0] * n
+
+
+def _each(rule):
+    """A rule for one step: v, w -> v, u, w."""
+
+    def all_steps(p, drive):
+        rows = [rule(p, v, w) for v, w in zip(drive.v, drive.w, strict=True)]
+        return tuple(list(column) for column in zip(*rows, strict=True))
+
+    return all_steps
+
+
+for _name, _rule in {
+    "base.gain_v": lambda p, v, w: (v + p["gain"] * v, 0.0, w),
+    "base.gain_w": lambda p, v, w: (v, 0.0, w + p["gain"] * w),
+    "base.left_right_gain": lambda p, v, w: (v, 0.0, w + p["asymmetry"] * abs(w)),
+    "base.veer": lambda p, v, w: (v, 0.0, w + p["curvature"] * v),
+    "base.reverse_gain": lambda p, v, w: (v * (1 + p["gain"]) if v < 0 else v, 0.0, w),
+    "base.curvature_v": lambda p, v, w: (0.0 if p["curvature"] * abs(v) > 1 else v - p["curvature"] * v * abs(v), 0, w),
+    "base.curvature_w": lambda p, v, w: (v, 0, 0.0 if p["curvature"] * abs(w) > 1 else w - p["curvature"] * w * abs(w)),
+    "base.cross_w_to_v": lambda p, v, w: (v + p["lever"] * w, 0.0, w),
+    "base.understeer": lambda p, v, w: (v, 0.0, 0.0 if p["k"] * v * v > 1 else w - p["k"] * v * v * w),
+    "base.lateral_slip": lambda p, v, w: (v, -p["c"] * v * w, w),
+}.items():
+    RATES[_name] = _each(_rule)
+
+
+@_rates("base.saturation")
+@_each
+def saturation(p, v, w):
+    def limit(rate, inverse):
+        return math.copysign(1 / inverse, rate) if abs(rate) * inverse > 1 else rate
+
+    return limit(v, p["inverse_v"]), 0.0, limit(w, p["inverse_w"])
+
+
+@_rates("base.sign")
+@_each
+def sign(p, v, w):
+    s = p["swap"]
+    return p["factor_v"] * (v - s * v + s * w), 0.0, p["factor_w"] * (w - s * w + s * v)
+
+
+@_rates("base.cross_v_to_w")
+@_each
+def cross_v_to_w(p, v, w):
+    """A leak [V] beside V_s turns the chair by its slope."""
+    slope, _ = branch("steering", w)
+    return v, 0.0, w + p["share"] * volts("translation", v) / slope
+
+
+def _swallowed(axis, rate, width):
+    """The voltage is moved by the width towards the branch's threshold, which it does not pass."""
+    if rate == 0:
+        return 0.0
+    slope, intercept = branch(axis, rate)
+    above = volts(axis, rate) - intercept
+    left = abs(above) - width
+    return math.copysign(left, above) / slope if left > 0 else 0.0
+
+
+RATES["base.dead_zone_v"] = _each(lambda p, v, w: (_swallowed("translation", v, p["width"]), 0.0, w))
+RATES["base.dead_zone_w"] = _each(lambda p, v, w: (v, 0.0, _swallowed("steering", w, p["width"])))
+
+
+@_rates("base.backlash")
+def backlash(p, drive):
+    """A peg in a slot as wide as the play."""
+    half, peg, out = p["play"] / 2, 0.0, []
+    for v, w in zip(drive.v, drive.w, strict=True):
+        if w - half > peg:
+            peg = w - half
+        elif w + half < peg:
+            peg = w + half
+        out.append(0.0 if v == 0 and w == 0 else peg)
+    return drive.v, _still(len(out)), out
+
+
+@_rates("base.battery_sag")
+def battery_sag(p, drive):
+    """The mean over a step of 1 - sag t, which is 0 once it has come there: by the parts of a thousand."""
+    v, w, parts = [], [], 1000
+    for k in range(len(drive.v)):
+        times = [drive.dt * (k + (j + 0.5) / parts) for j in range(parts)] if k % 50 == 0 else [drive.dt * (k + 0.5)]
+        left = sum(max(0.0, 1 - p["sag"] * t) for t in times) / len(times)
+        v.append(drive.v[k] * left)
+        w.append(drive.w[k] * left)
+    return v, _still(len(v)), w
+
+
+def _lagged(targets, tau, dt):
+    """Means of y over steps, tau y' = target - y, from 0: Runge-Kutta of fourth order in 20 parts of a step."""
+    if tau == 0:
+        return list(targets)
+    parts, y, means = 20, 0.0, []
+    h = dt / parts
+    for target in targets:
+        area = 0.0
+        for _ in range(parts):
+            k1 = (target - y) / tau
+            k2 = (target - y - h / 2 * k1) / tau
+            k3 = (target - y - h / 2 * k2) / tau
+            k4 = (target - y - h * k3) / tau
+            area += h * y + h * h / 6 * (k1 + k2 + k3)  # of the same method, for area' = y
+            y += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        means.append(area / dt)
+    return means
+
+
+@_rates("base.lag_v")
+def lag_v(p, drive):
+    return _lagged(drive.v, p["tau"], drive.dt), _still(len(drive.v)), drive.w
+
+
+@_rates("base.lag_w")
+def lag_w(p, drive):
+    return drive.v, _still(len(drive.v)), _lagged(drive.w, p["tau"], drive.dt)
+
+
+@_rates("base.payload")
+def payload(p, drive):
+    left = 1 - p["droop"]
+    v, w = (_lagged([left * rate for rate in rates], p["tau"], drive.dt) for rates in (drive.v, drive.w))
+    return v, _still(len(v)), w
+
+
+@_rates("base.delay")
+def delay(p, drive):
+    """What was asked for, held, over the time from t - delay to t + dt - delay: by the overlaps of all steps."""
+
+    def late(rates):
+        out, dt = [], drive.dt
+        for k in range(len(rates)):
+            start = k * dt - p["delay"]
+            overlaps = [max(0.0, min(start + dt, (j + 1) * dt) - max(start, j * dt)) for j in range(len(rates))]
+            out.append(sum(o * rate for o, rate in zip(overlaps, rates, strict=True)) / dt)
+        return out
+
+    return late(drive.v), _still(len(drive.v)), late(drive.w)
+
+
+@_rates("base.accel_limit")
+def accel_limit(p, drive):
+    def ramp(targets, slowness):
+        if slowness == 0:
+            return list(targets)
+        parts, y, means = 1000, 0.0, []
+        most = drive.dt / parts / slowness
+        for target in targets:
+            area = 0.0
+            for _ in range(parts):
+                before, gap = y, target - y
+                y += math.copysign(min(abs(gap), most), gap)
+                area += (before + y) / 2
+            means.append(area / parts)
+        return means
+
+    return ramp(drive.v, p["slowness_v"]), _still(len(drive.v)), ramp(drive.w, p["slowness_w"])
+
+
+@_rates("base.slope")
+def slope(p, drive):
+    heading, v = drive.heading, []
+    for speed, w in zip(drive.v, drive.w, strict=True):
+        middle = heading + w * drive.dt / 2
+        uphill = p["climb_x"] * math.cos(middle) + p["climb_y"] * math.sin(middle)
+        v.append(speed - uphill if (speed, w) != (0, 0) else 0.0)
+        heading += w * drive.dt
+    return v, _still(len(v)), drive.w
+
+
+@_rates("base.caster_reversal")
+def caster_reversal(p, drive):
+    """Somebody who watches: which way did it last drive, which way last turn, how far is the last reversal ago."""
+    last_way = last_side = kicked_to = 0.0
+    since, out = 0.0, []
+    for v, w in zip(drive.v, drive.w, strict=True):
+        way = (v > 0) - (v < 0)
+        if way != 0:
+            if last_way not in (0, way):
+                kicked_to, since = last_side, 0.0
+            last_way = way
+        travelled = abs(v) * drive.dt
+        kick = p["kick"] * math.exp(-(since + travelled / 2) / p["length"]) if v != 0 else 0.0
+        out.append(w + kicked_to * kick)
+        since += travelled
+        if w != 0:
+            last_side = math.copysign(1.0, w)
+    return drive.v, _still(len(out)), out
+
+
+@_volts("base.dac_zero_f")
+def dac_zero_f(p, v_f, v_s, _signs):
+    return [v + p["offset"] for v in v_f], v_s
+
+
+@_volts("base.dac_zero_s")
+def dac_zero_s(p, v_f, v_s, _signs):
+    return v_f, [v + p["offset"] for v in v_s]
+
+
+@_volts("base.dac_quantisation")
+def dac_quantisation(p, v_f, v_s, _signs):
+    """The nearest of two neighbouring steps."""
+
+    def nearest(v):
+        below = math.floor(v / p["step"]) * p["step"]
+        return below if v - below < p["step"] / 2 else below + p["step"]
+
+    return ([nearest(v) for v in volts] if p["step"] > 0 else volts for volts in (v_f, v_s))
+
+
+@_volts("base.steering_law")
+def steering_law(p, v_f, v_s, signs):
+    """What the other law makes of V_s, as the voltage that the model's law has for it."""
+    sides = _LAWS["steering"]
+    factor = 1 - 2 * p["flip"]
+    out = []
+    for v, meant in zip(v_s, signs, strict=True):
+        if p["flip"] == 0 or v == 0:
+            out.append(v)
+            continue
+        left = (v - factor * sides["positive"]["intercept"]) / sides["positive"]["slope"]
+        right = (v - factor * sides["negative"]["intercept"]) / sides["negative"]["slope"]
+        answers = [w for w in (left, right) if (w > 0) == (w is left) and w != 0]
+        if len(answers) == 2:
+            answers = [w for w in answers if w * meant > 0]
+        out.append(volts("steering", answers[0]) if answers else 0.0)
+    return v_f, out
