@@ -137,8 +137,9 @@ void bindKalman(py::module_& m) {
       },
       py::arg("poses"), py::arg("times"), py::arg("columns"), py::arg("activity"), py::kw_only(),
       py::arg("position_sd"), py::arg("heading_sd"), py::arg("process_sd"), py::arg("process_tau"),
-      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and log determinants "
-      "(n,). activity (n,): factors on the noise of the rates, whose two colours are rows of process_sd (2, "
+      "Whitened columns (3 n, m) of increment residuals between poses (n + 1, 3), and log variances "
+      "(n, 3) that sum to a log determinant. activity (n,): factors on the noise of the rates, whose two "
+      "colours are rows of process_sd (2, "
       "3).");
 }
 

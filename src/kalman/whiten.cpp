@@ -94,7 +94,7 @@ Whitened filter(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, cons
     cov.template block<3, 3>(3 + 3 * c, 3 + 3 * c) = rate_cov[c];
   }
 
-  Whitened out{Eigen::MatrixXd(columns.rows(), columns.cols()), Eigen::VectorXd(n)};
+  Whitened out{Eigen::MatrixXd(columns.rows(), columns.cols()), Eigen::MatrixX3d(n, 3)};
   using Mean = Eigen::Matrix<double, kSize, Eigen::Dynamic>;
   Mean mean = Mean::Zero(kSize, columns.cols());
   Eigen::Matrix<double, 3, Eigen::Dynamic> innovation(3, columns.cols());
@@ -126,7 +126,7 @@ Whitened filter(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, cons
     if (llt.info() != Eigen::Success) throw std::invalid_argument("the increments' covariance is singular");
     innovation.noalias() = columns.middleRows(3 * k, 3) - h * mean;
     out.columns.middleRows(3 * k, 3) = llt.matrixL().solve(innovation);
-    out.log_determinants[k] = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+    out.log_determinants.row(k) = 2.0 * llt.matrixLLT().diagonal().array().log().transpose();
 
     const Eigen::Matrix<double, kSize, 3> cross = keep.asDiagonal() * seen + shared;
     const Eigen::Matrix<double, kSize, 3> gain = llt.solve(cross.transpose()).transpose();

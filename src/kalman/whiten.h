@@ -21,11 +21,11 @@ struct MotionNoise {
   Colour slow;
 };
 
-/// Whitened columns (rows: 3 per increment) and, per increment, the log determinant of its covariance given the
-/// increments before it; their sum is that of the joint covariance.
+/// Whitened columns (rows: 3 per increment) and, per increment, the log variances of dx, of dy given dx, and of dtheta
+/// given both, all given the increments before it; their sum is the log determinant of the joint covariance.
 struct Whitened {
   Eigen::MatrixXd columns;
-  Eigen::VectorXd log_determinants;
+  Eigen::MatrixX3d log_determinants;
 };
 
 /// Whitens columns of residual increments: L^-1 X with L L' the joint covariance of all increments of a run.

@@ -24,6 +24,7 @@ NAMES = (
     "fuzz",
     "base",
     "slam",
+    "predict",
 )
 
 

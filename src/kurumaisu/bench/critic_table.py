@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import repeat
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,6 +18,7 @@ import numpy as np
 
 from kurumaisu.bench.hidden import Ask, make, names_of
 from kurumaisu.bench.hidden.baselines import BASELINES
+from kurumaisu.bench.hidden.oracle import gain_share
 from kurumaisu.bench.hidden.score import Score, calibration_error, score, scored_names, share
 from kurumaisu.bench.table import Table
 from kurumaisu.critic import pipeline
@@ -115,7 +116,9 @@ def _answers(job: Job, folder: str) -> dict[str, Score]:
     """Return the scores of the critic and, if asked, of the baselines."""
     case = make(job.ask, job.seed, Path(folder))
     start = time.process_time()
-    out = {"critic": score(case.truth, _criticised(case.recording), time.process_time() - start)}
+    verdict = _criticised(case.recording)
+    cpu = time.process_time() - start
+    out = {"critic": replace(score(case.truth, verdict, cpu), gain_share=gain_share(case, verdict.gain))}
     for name, baseline in BASELINES.items() if job.baselines else ():
         start = time.process_time()
         named = baseline(case.recording)
@@ -149,6 +152,11 @@ def _summary(scores: Sequence[Score]) -> None:
     sure = [right for p, right in stated if p >= 0.95]
     print(f"\nof {len(stated)} causes named: calibration error {calibration_error(stated):.3f}; ", end="")
     print(f"right when p >= 0.95: {share(sum(sure), len(sure))}, {len(sure)} of them")
+    gained = [one.gain_share for one in scores if one.gain_share is not None and one.truth.z >= 10]
+    if gained:
+        low, middle = np.quantile(gained, [0.1, 0.5])
+        print(f"gain on data held out, as a share of the oracle's, z >= 10: median {middle:.3f}, ", end="")
+        print(f"10 % quantile {low:.3f}, of {len(gained)}")
 
 
 def _log(path: Path | None, jobs: Sequence[Job], answers: Sequence[dict[str, Score]]) -> None:
@@ -163,4 +171,6 @@ def _lines(jobs: Sequence[Job], answers: Sequence[dict[str, Score]]) -> Iterator
     for job, answer in zip(jobs, answers, strict=True):
         one = answer["critic"]
         truth = {key: value for key, value in asdict(one.truth).items() if value}
-        yield json.dumps({"seed": job.seed, "right": one.right, "answer": one.words, "truth": truth})
+        yield json.dumps(
+            {"seed": job.seed, "right": one.right, "answer": one.words, "gain_share": one.gain_share, "truth": truth}
+        )

@@ -13,7 +13,7 @@ from kurumaisu.critic.checks import check_run
 from kurumaisu.critic.clean import Faults, Table, clean
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.meta import Meta
-from kurumaisu.critic.read_csv import OPTIONAL, REQUIRED
+from kurumaisu.critic.read_csv import OPTIONAL, QUERY, REQUIRED, check_queries
 from kurumaisu.critic.reading import require_use, split
 from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.critic.reference import with_reference
@@ -38,7 +38,8 @@ def criticise_arrays(
 
     runs: by name, tables whose first column is t [s]: command (n, 3) of t, v, w; voltage (n, 3) of t, v_f, v_s, or
     (n, 5) with the v, w that they stand for; pose (n, 4) of t, x, y, theta; odom (n, 6) of t, x, y, theta, v, w; scan
-    (n, 1 + beams); any other name: a covariate, (n, 2). SI units, radians. meta: what meta.yaml would say.
+    (n, 1 + beams); query (n, 2) of t0, t1; any other name: a covariate, (n, 2). SI units, radians. meta: what meta.yaml
+    would say.
     only, without: ids or patterns of effects; seed: of the particle filter that makes a missing reference.
     Raise Error naming run and table, or effect, for what cannot be used.
     """
@@ -75,9 +76,13 @@ def run_of(name: str, tables: Tables, faults: Faults) -> Run:
     """Return the tables of one drive as a run; faults gets what was found wrong. Raise Error naming a misshapen one."""
     parts: dict[str, Series | None] = {}
     covariates: dict[str, Series] = {}
+    queries = None
     for part, given in tables.items():
         where = f"{name}/{part}"
         rows = _rows(where, given)
+        if part == QUERY:
+            queries = check_queries(where, rows)
+            continue
         columns = _columns(where, part, rows.shape[1] - 1)
         table = Table(where, rows[:, 0], rows[:, 1:], columns, "row", 0)
         series = clean(table, faults, ranges=part == "scan")
@@ -93,6 +98,7 @@ def run_of(name: str, tables: Tables, faults: Faults) -> Run:
         odom=parts.get("odom"),
         scan=parts.get("scan"),
         covariates=covariates,
+        queries=queries,
     )
 
 

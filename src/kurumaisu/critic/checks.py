@@ -18,7 +18,7 @@ FARTHEST_MEDIAN = 100.0
 def usable(run: Run) -> bool:
     """Tell whether a run says something about base or laser."""
     driven = run.command is not None or run.voltage is not None
-    followed = run.pose is not None or run.odom is not None
+    followed = run.pose is not None or run.odom is not None or run.queries is not None
     return run.scan is not None or (driven and followed) or (run.odom is not None and run.pose is not None)
 
 

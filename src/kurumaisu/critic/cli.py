@@ -89,9 +89,8 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
     found = find.recordings(options.recordings, options.output)
     if not found:
         raise Error(f"{options.recordings[0]}: holds no recording")
-    asked = Job(
-        Path(), Path(), "", options.model, options.runs, effect_ids(options.only, options.without), options.seed
-    )
+    ids = effect_ids(options.only, options.without)
+    asked = Job(Path(), Path(), "", options.model, options.runs, ids, options.seed, not options.no_slam)
     if len(found) == 1:
         return [replace(asked, recording=found[0], output=options.output, name=found[0].name)]
     return [

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic import gain, naming, noise, smooth_fit, smooth_judge
+from kurumaisu.critic import gain, naming, noise, predict_doubt, smooth_fit, smooth_judge
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.prior import odds
@@ -40,9 +40,11 @@ class Decision:
         """Return what was found, fitted to other drives."""
         best, extension = self.found.best, self.beyond.extension
         if extension is not None:
-            other = smooth_fit.again(extension, drives, self.problem)
-            return gain.Fitted(other.settings, lambda drive: smooth_fit.doubt(self.problem, drive, other))
-        return gain.Fitted(self.problem.changed(drives=drives).fit_candidates(best.candidates, best.start).settings)
+            curved = smooth_fit.again(extension, drives, self.problem)
+            return gain.Fitted(curved.settings, lambda drive: smooth_fit.doubt(self.problem, drive, curved))
+        other = self.problem.changed(drives=drives)
+        fit = other.fit_candidates(best.candidates, best.start)
+        return gain.Fitted(fit.settings, predict_doubt.doubt(other, fit.settings, predict_doubt.about_fit(other, fit)))
 
 
 def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:

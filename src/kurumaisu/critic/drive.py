@@ -15,9 +15,10 @@ from kurumaisu._core import AxisInverse
 from kurumaisu.critic.recording import Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
-from kurumaisu.types import FloatArray
+from kurumaisu.types import FloatArray, IntArray
 
 GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
+_CLOCK = 0.02  # share by which the reference's clock may be off, and more
 LONGEST = 100_000.0  # [s] a day: what is longer has its times in another unit, and its grid would fill the memory
 # [s] least time between reference poses. Closer ones add cost, hardly information; and odometry is itself measured:
 # over short intervals its noise, in the input and in the residual alike, would pass for a gain below 1 (errors in
@@ -34,7 +35,7 @@ class Drive:
 
     source: the channel that drives the replay; start [s] of the grid; v, w (n,) rates asked for on the grid;
     times (m + 1,) and poses (m + 1, 3) of the reference; known: what unknown effects may follow, (n,) each on the
-    grid, by the names that effects.Motion has.
+    grid, by the names that effects.Motion has; heading [rad] at the start of the grid, None: that of the first pose.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Drive:
     times: FloatArray
     poses: FloatArray
     known: Mapping[str, FloatArray] = field(default_factory=dict)
+    heading: float | None = None
 
     @property
     def measured(self) -> FloatArray:
@@ -64,6 +66,10 @@ class Drive:
     def pace(self) -> FloatArray:
         """Rates asked for during each increment, in units of what is usual, (m,)."""
         return self._means(np.abs(self.v) / _USUAL_V + np.abs(self.w) / _USUAL_W, 0.0)
+
+    def seen_at(self, times: FloatArray, poses: FloatArray) -> Drive:
+        """Return the drive with other poses (m + 1, 3) at other times (m + 1,)."""
+        return replace(self, times=times, poses=poses)
 
     def _means(self, values: FloatArray, before: float) -> FloatArray:
         """Return means (m,) of values (n,) on the grid, over the increments and the time [s] before each."""
@@ -103,15 +109,45 @@ def prepare(run: Run, model: Model, interval: float | None = None) -> Drive:
     )
 
 
+def prepare_all(run: Run, model: Model, until: float) -> Drive:
+    """Return the drive of a run with all its poses, be they few or none, and its inputs until a time [s] at least.
+
+    Raise Error when nothing says what drove the robot.
+    """
+    source, times, v, w = _inputs(run, model)
+    pose = run.pose or Series(np.empty(0), np.empty((0, 3)), ("x", "y", "theta"))
+    use = pose.t >= times[0]
+    first, last = min(times[0], *pose.t[use][:1], until), max([until, *pose.t[use][-1:]])
+    if last - first > LONGEST:
+        raise Error(f"{run.name}: lasts {last - first:.6g} s: are its times in seconds?")
+    # A reference whose clock is off sees the path at other times.
+    edges = np.arange(first, last + 2 * GRID + _CLOCK * (last - first), GRID)
+    v, w = _mean_rates(times, v, edges), _mean_rates(times, w, edges)
+    return Drive(run.name, source, float(edges[0]), v, w, pose.t[use], pose.values[use, :3])
+
+
 def split(drive: Drive, parts: int) -> list[Drive]:
     """Return the drive cut into parts of equally many increments; each keeps all inputs, so effects keep their past."""
-    bounds = np.linspace(0, len(drive.times) - 1, parts + 1).astype(int)
+    return _cut(drive, np.linspace(0, len(drive.times) - 1, parts + 1).astype(int))
+
+
+def pieces(drive: Drive, gap: float) -> list[Drive]:
+    """Return the drive without the increments that are longer than a gap [s]; each piece keeps all inputs."""
+    long = np.flatnonzero(np.diff(drive.times) > gap)
+    edges = np.concatenate([[-1], long, [len(drive.times) - 1]])
+    return [piece for a, b in pairwise(edges) for piece in _cut(drive, np.array([a + 1, b]))]
+
+
+def _cut(drive: Drive, bounds: IntArray) -> list[Drive]:
+    """Return the parts between rows of poses that have two increments at least."""
+    heading = float(drive.poses[0, 2]) if drive.heading is None else drive.heading
     return [
         replace(
             drive,
-            name=f"{drive.name}[{i + 1}/{parts}]",
+            name=f"{drive.name}[{i + 1}/{len(bounds) - 1}]",
             times=drive.times[a : b + 1],
             poses=drive.poses[a : b + 1],
+            heading=heading,
         )
         for i, (a, b) in enumerate(pairwise(bounds))
         if b - a >= 2

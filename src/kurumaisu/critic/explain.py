@@ -18,6 +18,7 @@ from kurumaisu.critic.extended import process_noise
 from kurumaisu.critic.material import FELT, MATERIAL, confirmed, felt_share, moved_share
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
+from kurumaisu.critic.predict import Prediction
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
@@ -33,12 +34,13 @@ _PICTURE = 0.1  # [s] between the poses drawn
 
 @dataclass(frozen=True)
 class Criticism:
-    """Everything that the critic has to say. settings: what extends the model."""
+    """Everything that the critic has to say. settings: what extends the model; predictions: what was asked for."""
 
     verdict: Verdict
     story: Story
     model: Model
     settings: tuple[EffectSetting, ...]
+    predictions: tuple[Prediction, ...] = ()
 
 
 def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Criticism:

@@ -27,7 +27,8 @@ class Job:
     """A recording, the folder to write into, and what was asked.
 
     name: for the table; model: None takes the recording's, else the package's; runs: only these, empty takes all;
-    ids: effects that may be named, None takes all; seed: of the particle filter that makes a missing reference.
+    ids: effects that may be named, None takes all; seed: of the particle filter that makes a missing reference;
+    slam: whether SLAM is run with both models.
     """
 
     recording: Path
@@ -37,6 +38,7 @@ class Job:
     runs: tuple[str, ...] = ()
     ids: frozenset[str] | None = None
     seed: int = 1
+    slam: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,8 @@ def criticise(job: Job, progress: Callable[[str], None]) -> Criticism:
     progress(f"reading {job.recording}")
     recording = with_reference(read_recording(job.recording, job.runs), job.seed, progress)
     model = job.model or recording.model or shipped("launch/md100.yaml")
-    criticism = pipeline.criticise(recording, model, progress, assume_law=job.model is not None, ids=job.ids)
+    criticism = pipeline.criticise(
+        recording, model, progress, assume_law=job.model is not None, ids=job.ids, slam=job.slam
+    )
     pipeline.write(criticism, model, job.output)
     return criticism

@@ -55,7 +55,7 @@ _SAME = 0.03  # share of a column beyond those before it that makes it one of it
 
 
 def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
-    """Return L^-1 X for columns X (3 m, k) of increment residuals, L L' their covariance; its log det in m parts."""
+    """Return L^-1 X for columns X (3 m, k), L L' their covariance, and its log determinant in parts (m, 3)."""
     return whiten(
         drive.poses,
         drive.times,

@@ -52,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--runs", type=name_list, default=(), metavar="A,B", help="use only these runs; patterns like drive_* count")
     add_effects(parser)
     add("--seed", type=int, default=1, help="of the particle filter that makes a missing reference (1)")
+    add("--no-slam", action="store_true", help="do not run SLAM with both models, which takes some seconds")
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--jobs", type=whole_number, default=1, metavar="N", help="recordings at a time on this machine (1)"

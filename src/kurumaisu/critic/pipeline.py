@@ -3,22 +3,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic import explain, gain, next_experiment, noise, sanity, smooth_explain
+from kurumaisu.critic import explain, gain, next_experiment, noise, predict, sanity, smooth_explain, worth
 from kurumaisu.critic.decide import Progress, decide, scatter
-from kurumaisu.critic.drive import driven, prepare
+from kurumaisu.critic.drive import Drive, driven, prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
 from kurumaisu.critic.laser.merge import with_laser
 from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
-from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.predict_extended import forecast_of
+from kurumaisu.critic.predict_motion import Settings
+from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.verdict import write_verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, follow_commands, load_model
+
+_UNDRIVEN = worth.Extension(None, (), lambda _: ())
 
 
 def criticise(
@@ -28,32 +33,70 @@ def criticise(
     *,
     assume_law: bool = False,
     ids: frozenset[str] | None = None,
+    slam: bool = False,
 ) -> Criticism:
     """Return the criticism of a model by a recording whose runs have reference poses.
 
     Without voltages the model is "velocity follows command", unless the recording names a model or assume_law says
     that the robot has the model's voltage law. ids: the effects that may be named; None for all that are criticised.
+    slam: whether SLAM is run with both models on a run held out, which takes some seconds.
     Raise Error when a run has no reference, or nothing that drove the robot.
     """
     model = load_model(model_file)
     if not assume_law and recording.model is None and all(run.voltage is None for run in recording.runs):
         model = follow_commands(model)
-    wrong = [*recording.invalid, *sanity.examine(recording, model).invalid]
+    whole = replace(recording, runs=tuple(run for run in recording.runs if not _withheld(recording, run)))
+    wrong = [*recording.invalid, *sanity.examine(whole, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
-    moved = any(driven(run) for run in recording.runs)
-    base = _criticise_base(recording, model, progress, ids) if moved else None
-    finding = criticise_laser(recording, model, progress, ids)
-    if base is None and finding.refused:
+    moved = any(driven(run) for run in whole.runs)
+    base, extension = _criticise_base(recording, model, progress, ids) if moved else (None, _UNDRIVEN)
+    scans = criticise_laser(recording, model, progress, ids)
+    if base is None and scans.refused:
         nothing = "has neither voltages nor commands nor odometry"
-        raise Error(f"{recording.runs[0].name}: {nothing}; laser: {finding.refused}")
-    return with_laser(base or explain.undriven(recording, model), finding)
+        raise Error(f"{recording.runs[0].name}: {nothing}; laser: {scans.refused}")
+    found = with_laser(base or explain.undriven(recording, model), scans)
+    found = _with_worth(found, recording, replace(extension, scans=scans.settings), progress, slam=slam)
+    if not predict.asked(recording):
+        return found
+    progress("predicting what was asked for")
+    return replace(found, predictions=tuple(predict.predictions(recording, model, extension.forecast, found.settings)))
 
 
-def _criticise_base(recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None) -> Criticism:
-    drives = {run.name: informed(prepare(run, model), run) for run in recording.runs}
+def _with_worth(
+    found: Criticism, recording: Recording, extension: worth.Extension, progress: Progress, *, slam: bool
+) -> Criticism:
+    progress("measuring the gain on scans held out")
+    found = worth.with_laser_gain(found, recording, extension)
+    if slam:
+        progress("running SLAM with both models")
+        found = worth.with_slam(found, recording, extension)
+    return found
+
+
+def _withheld(recording: Recording, run: Run) -> bool:
+    """Tell whether a run lacks poses because they are to be predicted: gaps in it are no fault."""
+    return run.queries is not None and run.name in recording.test
+
+
+def _drives(recording: Recording, model: Model) -> dict[str, Drive]:
+    """Return the drives, without those of withheld runs that have too few poses left to judge by."""
+    drives = {}
+    for run in recording.runs:
+        try:
+            drives[run.name] = informed(prepare(run, model), run)
+        except Error:
+            if not _withheld(recording, run):
+                raise
+    return drives
+
+
+def _criticise_base(
+    recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None
+) -> tuple[Criticism, worth.Extension]:
+    drives = _drives(recording, model)
     train = [drives[name] for name in recording.train]
-    test = [drives[name] for name in recording.test]
+    test = [drives[name] for name in recording.test if name in drives]
 
     progress("estimating the noise")
     rough = Problem(train, model, noise.START, ids=ids)
@@ -63,16 +106,30 @@ def _criticise_base(recording: Recording, model: Model, progress: Progress, ids:
 
     progress("measuring the gain on drives held out")
     baseline = scatter(rough, empty, recording.truth, project=False).estimate(made.problem.noise).noise
-    splits = gain.folds(train, test)
-    worth = gain.measure(model, splits, made.refit, baseline, made.problem.noise) if splits and made.something else None
+    withheld = [drives[run.name] for run in recording.runs if run.name in drives and _withheld(recording, run)]
+    names = {drive.name for drive in withheld}
+    whole = [drive for drive in test if drive.name not in names]
+    splits = gain.with_withheld(gain.folds(train, whole), train, withheld)
+    held = gain.measure(model, splits, made.refit, baseline, made.problem.noise) if splits and made.something else None
     progress("planning the next drive")
     proposal = next_experiment.propose(made.problem, made.found, next_experiment.drives())
     judge = explain.criticism if made.beyond.extension is None else smooth_explain.criticism
-    return judge(recording, made, worth, train + test, proposal)
+    judged = judge(recording, made, held, train + test, proposal)
+    forecast = forecast_of(made, judged.settings, baseline)
+
+    def refit(name: str) -> Settings:
+        others = [drive for drive in train if drive.name != name]
+        again = forecast.settings and len(others) in range(1, len(train))
+        return tuple(made.refit(others).settings) if again else forecast.settings
+
+    return judged, worth.Extension(forecast, (), refit)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
-    """Write verdict.json, extended.yaml and report.html. Raise Error naming what cannot be written."""
+    """Write verdict.json, extended.yaml, report.html and, if asked for, prediction.csv.
+
+    Raise Error naming what cannot be written.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -80,3 +137,5 @@ def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
     write_verdict(folder / "verdict.json", criticism.verdict)
     write_report(folder / "report.html", criticism.verdict, criticism.story)
     write_extended(folder / "extended.yaml", model_file, criticism.model, criticism.settings, criticism.story.recording)
+    if criticism.predictions:
+        predict.write_predictions(folder / predict.FILE, criticism.predictions)

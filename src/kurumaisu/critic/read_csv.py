@@ -65,11 +65,17 @@ def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
 def read_queries(path: Path) -> FloatArray:
     """Read query.csv into (q, 2) of t0, t1 [s]. Raise Error naming file and line for t1 before t0."""
     columns, rows, _ = _read(path, ("t0", "t1"))
-    queries = rows[:, [columns.index("t0"), columns.index("t1")]]
+    return check_queries(str(path), rows[:, [columns.index("t0"), columns.index("t1")]], first=2)
+
+
+def check_queries(where: str, queries: FloatArray, first: int = 0) -> FloatArray:
+    """Return queries (q, 2). Raise Error naming where, and the row counted from `first`, for t1 before t0."""
+    if queries.shape[1] != 2:
+        raise Error(f"{where}: must have the columns t0, t1; it has {queries.shape[1]} columns")
     bad = np.flatnonzero(~(queries[:, 1] >= queries[:, 0]) | ~np.isfinite(queries).all(axis=1))
     if len(bad):
         t0, t1 = queries[bad[0]]
-        raise Error(f"{path}:{bad[0] + 2}: t1 must not be before t0: {t0:g}, {t1:g}")
+        raise Error(f"{where}:{bad[0] + first}: t1 must not be before t0: {t0:g}, {t1:g}")
     return queries
 
 

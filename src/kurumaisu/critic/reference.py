@@ -21,14 +21,15 @@ Progress = Callable[[str], None]
 
 
 def with_reference(recording: Recording, seed: int, progress: Progress) -> Recording:
-    """Return the recording with a pose for every run, mapping those that have none.
+    """Return the recording with a pose for every run, mapping those that have none and need not be predicted.
 
     Raise Error for a run that has neither a pose nor scans and odometry to find one from.
     """
-    if all(run.pose is not None for run in recording.runs):
+    if all(run.pose is not None or run.queries is not None for run in recording.runs):
         return recording
     runs = tuple(
-        run if run.pose is not None else _with_mapped_pose(recording, run, seed, progress) for run in recording.runs
+        run if run.pose is not None or run.queries is not None else _with_mapped_pose(recording, run, seed, progress)
+        for run in recording.runs
     )
     return replace(recording, runs=runs)
 

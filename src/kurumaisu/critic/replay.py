@@ -38,34 +38,41 @@ def motion(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> eff
     return _driven(drive, model, settings)[1]
 
 
+def odometry(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[FloatArray, FloatArray]:
+    """Return times (n,) [s] and poses (n, 3) of the simulated chair itself, whatever a reference would see of it."""
+    poses = plant.path(_driven(drive, model, settings)[1], np.zeros(3))
+    return drive.start + GRID * np.arange(len(poses)), poses
+
+
 def path(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return the simulated reference at its times, (m + 1, 3), starting at the first measured pose."""
-    at = _seen(drive, model, settings)
+    at = seen(drive, model, settings)
     return geometry.compose(drive.poses[0], geometry.between(at[0], at))
 
 
 def increments(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return the simulated body increments between the reference's times, (m, 3)."""
-    at = _seen(drive, model, settings)
+    at = seen(drive, model, settings)
     return geometry.between(at[:-1], at[1:])
 
 
-def _seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
+def seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return what the reference measures of the simulated chair at its times, (m + 1, 3), in a frame of its own."""
     chair, motion = _driven(drive, model, settings)
     poses = plant.path(motion, np.zeros(3))
     times = GRID * np.arange(len(poses))  # since the start: a clock that runs fast is right at the start
     if not chair.effects.reference:
         return geometry.interpolate(drive.start + times, poses, drive.times)
-    seen = chair.seen(effects.Reference(times, poses, np.zeros_like(poses)))
-    return geometry.interpolate(drive.start + seen.times, seen.poses, drive.times)
+    measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses)))
+    return geometry.interpolate(drive.start + measured.times, measured.poses, drive.times)
 
 
 def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:
     extended = extend(model, settings)
     mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in _random()))
     chair = plant.Plant(mean, GRID, np.random.default_rng(0))
-    heading = float(drive.poses[0, 2])  # the grid begins at the first pose, or a little before it
+    # The grid begins at the first pose, or a little before it, unless the drive is a part of a longer one.
+    heading = float(drive.poses[0, 2]) if drive.heading is None else drive.heading
     return chair, chair.from_rates(drive.v, drive.w, heading, drive.known)
 
 

@@ -47,7 +47,12 @@ def _gain(gain: Gain) -> list[str]:
         f"gain on held-out data: {density.gain:+.3f} nats per sample ({interval})",
         *(
             f"  {name}: rms error {error.baseline:.3f} -> {error.extended:.3f} {error.unit}"
+            + (f" (noise alone: {error.achievable:.3f})" if error.achievable is not None else "")
             for name, error in gain.rmse.items()
+        ),
+        *(
+            f"  {name}: {channel.log_density_per_sample.gain:+.3g} nats per sample"
+            for name, channel in gain.channels.items()
         ),
     ]
 

@@ -18,16 +18,22 @@ def informed(drive: Drive, run: Run) -> Drive:
     Poses are the reference's, not the simulated ones: those drift away from where the chair was. Voltages are held,
     further quantities are taken to change evenly between their samples.
     """
-    middle = drive.start + GRID * (np.arange(len(drive.v)) + 0.5)
-    known: dict[str, FloatArray] = {}
-    for name, series in run.covariates.items():
-        known[name] = np.interp(middle, series.t, series.values[:, 0])
-    for i, name in enumerate(("x", "y", "heading")):
-        known[name] = np.interp(middle, drive.times, drive.poses[:, i])
+    middle = _middle(drive)
+    places = {name: np.interp(middle, drive.times, drive.poses[:, i]) for i, name in enumerate(("x", "y", "heading"))}
+    return replace(drive, known={**beside(drive, run).known, **places})
+
+
+def beside(drive: Drive, run: Run) -> Drive:
+    """Return the drive with what its run knows on the grid, but for where the chair was."""
+    middle = _middle(drive)
+    known = {name: np.interp(middle, series.t, series.values[:, 0]) for name, series in run.covariates.items()}
     if run.voltage is not None:
-        for name in ("v_f", "v_s"):
-            known[name] = _held(run.voltage, name, middle)
+        known |= {name: _held(run.voltage, name, middle) for name in ("v_f", "v_s")}
     return replace(drive, known=known)
+
+
+def _middle(drive: Drive) -> FloatArray:
+    return np.asarray(drive.start + GRID * (np.arange(len(drive.v)) + 0.5))
 
 
 def _held(series: Series, column: str, at: FloatArray) -> FloatArray:

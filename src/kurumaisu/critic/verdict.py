@@ -73,7 +73,10 @@ class LogDensityGain:
 
 @dataclass(frozen=True)
 class RmseGain:
-    """Held-out root mean square error of both models; gain = baseline - extended with its 90 % interval."""
+    """Held-out root mean square error of both models; gain = baseline - extended with its 90 % interval.
+
+    achievable: what noise alone leaves to a model without fault; None where that is not known.
+    """
 
     baseline: float
     extended: float
@@ -81,14 +84,43 @@ class RmseGain:
     lo90: float
     hi90: float
     unit: str
+    achievable: float | None = None
+
+
+@dataclass(frozen=True)
+class ChannelGain:
+    """The same of one channel; rmse: None where no error could be measured."""
+
+    log_density_per_sample: LogDensityGain
+    rmse: RmseGain | None = None
+
+
+@dataclass(frozen=True)
+class SlamGain:
+    """A map and path made from one run's scans, with the odometry and laser of either model.
+
+    Root mean square errors of the path against the reference, aligned; run: the one held out; scans: how many.
+    """
+
+    run: str
+    scans: int
+    position: RmseGain
+    heading: RmseGain
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What the extension is worth on data that it did not fit. rmse: by what is predicted, in words."""
+    """What the extension is worth on data that it did not fit. rmse: by what is predicted, in words.
+
+    log_density_per_sample: of the base, a sample being an increment; where nothing was found in the base, of the
+    laser, a sample being a reading. channels: dx, dy (given dx), dtheta (given both) and range, as far as measured.
+    slam: None where it was not run.
+    """
 
     log_density_per_sample: LogDensityGain
     rmse: dict[str, RmseGain] = field(default_factory=dict)
+    channels: dict[str, ChannelGain] = field(default_factory=dict)
+    slam: SlamGain | None = None
 
 
 @dataclass(frozen=True)
@@ -153,7 +185,19 @@ def _gain(item: dict[str, Any] | None) -> Gain | None:
     if item is None:
         return None
     rmse = {name: RmseGain(**value) for name, value in item["rmse"].items()}
-    return Gain(LogDensityGain(**item["log_density_per_sample"]), rmse)
+    channels = {name: _channel(value) for name, value in item.get("channels", {}).items()}
+    return Gain(LogDensityGain(**item["log_density_per_sample"]), rmse, channels, _slam(item.get("slam")))
+
+
+def _channel(item: dict[str, Any]) -> ChannelGain:
+    rmse = item["rmse"]
+    return ChannelGain(LogDensityGain(**item["log_density_per_sample"]), None if rmse is None else RmseGain(**rmse))
+
+
+def _slam(item: dict[str, Any] | None) -> SlamGain | None:
+    if item is None:
+        return None
+    return SlamGain(item["run"], item["scans"], RmseGain(**item["position"]), RmseGain(**item["heading"]))
 
 
 def _check(content: Any, where: str) -> None:

@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from kurumaisu.bench.hidden import sizing
 from kurumaisu.bench.hidden.base_case import Scale, draw_drives, recording
 from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.case import Ask, Case, Truth
-from kurumaisu.bench.hidden.motion import Fault, Sizes
+from kurumaisu.bench.hidden.case import Ask, Case, Known, Truth
+from kurumaisu.bench.hidden.motion import Fault, Sizes, drive
 from kurumaisu.bench.hidden.noise import REGIMES, draw_regime
 from kurumaisu.types import FloatArray
 
@@ -35,7 +36,10 @@ def make_base(ask: Ask, seed: int) -> Case:
     name = f"hidden {seed}"
     null = recording(name, drives, ())
     found = recording(name, drives, faults) if faults else null
-    return Case(found, null, _truth(ask, scale, sizes), seed)
+    known = None
+    if ids and not {"base.process_noise", "base.sign"} & set(ids):  # no mean, or no data that anybody would fit
+        known = Known(tuple(drive(replace(s, noise=None), faults)[0] for s in drives.settings), regime)
+    return Case(found, null, _truth(ask, scale, sizes), seed, known)
 
 
 def _random_ids(count: int, rng: np.random.Generator) -> tuple[str, ...]:

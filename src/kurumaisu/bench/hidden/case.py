@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from kurumaisu.bench.hidden.noise import Regime
 from kurumaisu.critic.recording import Recording
+from kurumaisu.types import FloatArray
 
 KINDS = ("null", "single", "pair", "triple", "unknown", "wrong", "confounded")
 
@@ -39,13 +41,25 @@ class Truth:
 
 
 @dataclass(frozen=True)
+class Known:
+    """What an oracle knows: poses (m, 3) to be expected at each run's stamps, without any noise; and the noise."""
+
+    poses: tuple[FloatArray, ...]
+    regime: Regime
+
+
+@dataclass(frozen=True)
 class Case:
-    """recording: what the critic is given; null: the same drives and noise with nothing hidden; seed: of both."""
+    """recording: what the critic is given; null: the same drives and noise with nothing hidden; seed: of both.
+
+    known: to an oracle, where what is hidden changes the mean motion.
+    """
 
     recording: Recording
     null: Recording
     truth: Truth
     seed: int
+    known: Known | None = None
 
 
 @dataclass(frozen=True)

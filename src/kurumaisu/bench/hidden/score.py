@@ -20,7 +20,8 @@ _SEEN = 3.0  # whitened norm below which nobody can tell two effects apart
 class Score:
     """One answer: right for its kind, and what else it was; covered: of intervals whose parameter has a truth.
 
-    stated: probability and truth of each cause named; cpu [s]; z, z_rival of the case; words: of the answer, short.
+    stated: probability and truth of each cause named; cpu [s]; z, z_rival of the case; words: of the answer, short;
+    gain_share: of the oracle's gain on data held out, None where there is no oracle.
     """
 
     right: bool
@@ -33,6 +34,7 @@ class Score:
     cpu: float
     truth: Truth
     words: str
+    gain_share: float | None = None
 
 
 def score(truth: Truth, verdict: Verdict, cpu: float) -> Score:

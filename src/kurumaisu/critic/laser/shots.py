@@ -86,7 +86,7 @@ def missing(recording: Recording) -> str | None:
 def gather(recording: Recording, model: Model) -> Shots:
     """Return the scans of the runs to fit, thinned evenly to at most MOST_SCANS. missing(recording) must be None."""
     assert recording.world is not None
-    laser = _laser(model.laser, recording.laser, recording.runs)
+    laser = laser_of(model.laser, recording.laser, recording.runs)
     runs = [run for run in recording.runs if run.name in recording.train and run.scan is not None and run.pose]
     chosen = [(i, index) for i, run in enumerate(runs) for index in _within(run)]
     chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, MOST_SCANS).astype(int))]
@@ -130,7 +130,7 @@ def _within(run: Run) -> IntArray:
     return np.asarray(np.flatnonzero(inside & np.isfinite(run.scan.values).any(axis=1)))
 
 
-def _laser(laser: Laser, mount: LaserMount | None, runs: Sequence[Run]) -> Laser:
+def laser_of(laser: Laser, mount: LaserMount | None, runs: Sequence[Run]) -> Laser:
     """Return the model's laser, mounted and fanned as the recording says."""
     if mount is not None:
         place = Mount(mount.x, mount.y, laser.mount.z, mount.yaw)

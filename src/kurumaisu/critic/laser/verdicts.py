@@ -195,7 +195,14 @@ def _noise_told(assembly: Assembly, normal: Normal) -> str:
 
 
 def _told(sizes: Mapping[str, float]) -> list[str]:
-    return [f"{name}: changes the readings by {1e3 * size:.2g} mm (rms)." for name, size in sorted(sizes.items())]
+    return [
+        f"{name}: changes the readings by {1e3 * size:.2g} mm (rms){_weight(size)}."
+        for name, size in sorted(sizes.items())
+    ]
+
+
+def _weight(size: float) -> str:
+    return "" if size >= MATERIAL else ": detectable, but it does not matter"
 
 
 def _off_null(setting: EffectSetting) -> dict[str, float]:
