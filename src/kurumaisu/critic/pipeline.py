@@ -41,7 +41,7 @@ def criticise(
     wrong = [*recording.invalid, *sanity.examine(recording, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
-    if any(driven(run) for run in recording.runs):
+    if any(driven(run) for run in recording.runs if run.name in recording.train):
         base = _criticise_base(recording, model, progress, ids)
     else:
         base = explain.undriven(recording, model)
@@ -49,9 +49,9 @@ def criticise(
 
 
 def _criticise_base(recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None) -> Criticism:
-    drives = {run.name: informed(prepare(run, model), run) for run in recording.runs}
-    train = [drives[name] for name in recording.train]
-    test = [drives[name] for name in recording.test]
+    drives = {run.name: informed(prepare(run, model), run) for run in recording.runs if driven(run)}
+    train = [drives[name] for name in recording.train if name in drives]
+    test = [drives[name] for name in recording.test if name in drives]
 
     progress("estimating the noise")
     rough = Problem(train, model, noise.START, ids=ids)
