@@ -9,7 +9,7 @@ import numpy as np
 
 from kurumaisu.real import urg_log
 from kurumaisu.real.asking import ask, recording, there
-from kurumaisu.real.by_hand import robust
+from kurumaisu.real.by_hand import least_squares
 from kurumaisu.types import FloatArray
 
 STILL = 34  # scans before somebody moves the sensor
@@ -26,10 +26,13 @@ def run(data: Path, output: Path) -> None:
     print(f"{np.isnan(log.readings).mean():.1%} of the readings are error codes")
     device = np.unwrap(log.device, period=64**4 * 1e-3)
     since = log.host - log.host[0]
-    at = robust(np.column_stack([since, np.ones(len(since))]), device - device[0])
-    left = device - device[0] - at[0] * since - at[1]
+    behind = since - (device - device[0])
+    step = np.zeros(len(since))
+    step[int(np.argmax(np.abs(np.diff(behind)))) + 1 :] = 1.0  # once, a request of the host's came out of step
+    line = least_squares(np.column_stack([since, np.ones(len(since)), step]), device - device[0])
     print(
-        f"device clock over host clock: {at[0] - 1:+.3%}; host times scatter by {1e3 * np.median(np.abs(left)):.1f} ms"
+        f"device clock over host clock: {line.at[0] - 1:+.3%} +- {line.sd[0]:.3%}, scattered by {1e3 * line.rms:.1f} ms, "
+        f"beside a step of {1e3 * line.at[2]:+.0f} ms after scan {int(np.argmax(step))}"
     )
     print(f"longest gap between scans: {np.diff(log.host).max():.2f} s; median {np.median(np.diff(log.host)):.3f} s")
     for told in repeatability(log.readings[:STILL]):

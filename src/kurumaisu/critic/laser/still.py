@@ -82,7 +82,7 @@ def words(recording: Recording, model: Model) -> tuple[str, ...]:
                 at = float(np.median(found.ranges[(found.ranges >= low) & (found.ranges < high)]))
                 measured, said = 1e3 * found.sd_between(low, high), 1e3 * _model_sd(model, at)
                 told.append(
-                    f"{run.name}: readings around {at:.2g} m scatter by {measured:.1f} mm (sd); the model: {said:.1f} mm"
+                    f"{run.name}: readings around {at:.2g} m scatter by {measured:.1f} mm, the model's by {said:.1f} mm"
                 )
         lags = ", ".join(f"{value:.2f}" for value in found.correlation.values())
         told.append(
