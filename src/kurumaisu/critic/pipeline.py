@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kurumaisu.critic import explain, gain, next_experiment, noise, sanity, smooth_explain
+from kurumaisu.critic import excitation, explain, gain, next_experiment, noise, sanity, smooth_explain
 from kurumaisu.critic.decide import Progress, decide, scatter
 from kurumaisu.critic.drive import driven, prepare
 from kurumaisu.critic.evidence import Problem
@@ -64,9 +64,10 @@ def _criticise_base(recording: Recording, model: Model, progress: Progress, ids:
     splits = gain.folds(train, test)
     worth = gain.measure(model, splits, made.refit, baseline, made.problem.noise) if splits and made.something else None
     progress("planning the next drive")
-    proposal = next_experiment.propose(made.problem, made.found, next_experiment.drives())
+    scripts = next_experiment.drives()
+    proposal = next_experiment.propose(made.problem, made.found, scripts)
     judge = explain.criticism if made.beyond.extension is None else smooth_explain.criticism
-    return judge(recording, made, worth, train + test, proposal)
+    return excitation.told(judge(recording, made, worth, train + test, proposal), made, train, scripts)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:

@@ -31,7 +31,7 @@ def run(data: Path, output: Path) -> None:
     step[int(np.argmax(np.abs(np.diff(behind)))) + 1 :] = 1.0  # once, a request of the host's came out of step
     line = least_squares(np.column_stack([since, np.ones(len(since)), step]), device - device[0])
     print(
-        f"device clock over host clock: {line.at[0] - 1:+.3%} +- {line.sd[0]:.3%}, scattered by {1e3 * line.rms:.1f} ms, "
+        f"device clock over host clock: {line.at[0] - 1:+.3%} +- {line.sd[0]:.3%} (scatter {1e3 * line.rms:.1f} ms), "
         f"beside a step of {1e3 * line.at[2]:+.0f} ms after scan {int(np.argmax(step))}"
     )
     print(f"longest gap between scans: {np.diff(log.host).max():.2f} s; median {np.median(np.diff(log.host)):.3f} s")
