@@ -110,6 +110,10 @@ def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Ch
     for other in screen.fixed:
         if other.id not in fit.ids and screen.mends(other):
             yield fit.candidates | {other}, kept
+    for other in problem.candidates:
+        if other.rough and other.id not in fit.ids:
+            yield frozenset({other}), {}
+            yield fit.candidates | {other}, kept
 
 
 def _confounded(
