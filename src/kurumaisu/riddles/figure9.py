@@ -20,7 +20,8 @@ from kurumaisu.riddles import lab
 # Noise by the law of incidence: [m], [1], [1/m] at normal incidence; and its growth per unit of (1 / cos a - 1).
 _NORMAL = (0.0020, -0.0002, 0.00015)
 _GROWTH = 0.25
-_HALF = 0.5  # [m] half the width of the board
+_EFFECTIVE = 100.0  # beams whose noise is independent, of some hundreds
+_ASKED = frozenset({"laser.incidence_noise", "laser.range_noise"})
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,22 @@ def tell(seed: int) -> Iterator[str]:
     for law in laws:
         sds = _pooled(law.chair, square, seed)
         yield f"{law.name:21s}" + "".join(f"{1e3 * sd:10.2f}" for sd in sds)
-    error = 1e3 * 0.00215 / np.sqrt(2 * (lab.SCANS - 1) * _EFFECTIVE)
-    yield f"sampling error about {error:.2f} mm where {_EFFECTIVE:.0f} beams count as independent"
+    sampled = 1e3 * 0.00215 / np.sqrt(2 * (lab.SCANS - 1) * _EFFECTIVE)
+    yield f"sampling error about {sampled:.2f} mm where {_EFFECTIVE:.0f} beams count as independent"
 
-
-_EFFECTIVE = 100.0
+    wide = lab.chair(), replace(lab.chair(), laser=oblique.laser, effects=oblique.effects)
+    wide = wide[0], lab.with_laser(wide[1], mount=wide[0].laser.mount)
+    for name, script, chairs in (
+        ("the board, square on", square, [law.chair for law in laws]),
+        ("a wall 8 m wide, from one distance: wall_yawed", "wall_yawed", wide),
+        ("a wall 8 m wide, from five distances: wall_five_distances", "wall_five_distances", wide),
+    ):
+        yield ""
+        yield f"the critic, asked between range and incidence, by every beam; {name}:"
+        nominal = printed if script is square else lab.chair()
+        for law, chair in zip(laws, chairs, strict=True):
+            found = lab.laser_answer(lab.measured(chair, script, nominal.laser, seed), nominal, _ASKED)
+            yield f"  truth {law.name:21s} {found.told()}"
 
 
 def _with_sigma(model: Model, sigma: tuple[float, float, float]) -> Model:
@@ -64,5 +76,5 @@ def _error(sigma: tuple[float, float, float]) -> LaserError:
 def _pooled(chair: Model, script: Script, seed: int) -> list[float]:
     """Return the sd [m] of all beams of the wall together, per distance."""
     recording = lab.measured(chair, script, chair.laser, seed)
-    sds = [lab.sd_by_bearing(lab.board(recording, _HALF), run)[1] for run in range(len(recording.runs))]
+    sds = [lab.sd_by_bearing(recording, run)[1] for run in range(len(recording.runs))]
     return [float(np.sqrt(np.nanmean(sd**2))) for sd in sds]

@@ -36,14 +36,14 @@ def with_laser(model: Model, **changes: object) -> Model:
 
 
 def bench(distances: Sequence[float], yaws: Sequence[float] = (0.0,)) -> Script:
-    """Return an experiment: a laser on a bench before the paper's wall, at distances [m] and turned by yaws [rad]."""
+    """Return an experiment: a laser on a bench before a board, at distances [m] and turned by yaws [rad]."""
     places = tuple(
         Place(np.array([WALL - distance, 0.0, yaw]), SCANS * 0.1 + 0.05) for distance in distances for yaw in yaws
     )
-    return Script("bench", "the paper's wall", "wall.world", Box(2.0, 5.0, 1.0, 1.0), None, (), places)
+    return Script("bench", "the paper's wall", "board.world", Box(2.0, 5.0, 1.0, 1.0), None, (), places)
 
 
-WALL = 1.30  # [m] of wall.world's wall, seen from its start
+WALL = 1.30  # [m] of the walls of wall.world and board.world, seen from the start
 
 
 def on_bench(model: Model) -> Model:
@@ -67,22 +67,6 @@ def measured(model: Model, script: Script | str, nominal: Laser, seed: int, *, t
     return replace(recording, world=world, laser=place)
 
 
-def board(recording: Recording, half: float) -> Recording:
-    """Return a bench's recording with only the beams that meet the wall within half its width [m] of the middle."""
-    laser = recording.laser
-    assert laser is not None
-    bearings = laser.angle_min + laser.angle_increment * np.arange(laser.beams)
-    runs = []
-    for run in recording.runs:
-        assert run.scan is not None
-        assert run.pose is not None
-        x, y, yaw = np.median(run.pose.values, axis=0)
-        across = y + (WALL - x) * np.tan(yaw + bearings)
-        keep = (np.cos(yaw + bearings) > 0) & (np.abs(across) < half)
-        runs.append(replace(run, scan=replace(run.scan, values=np.where(keep, run.scan.values, np.nan))))
-    return replace(recording, runs=tuple(runs))
-
-
 @dataclass(frozen=True)
 class Answer:
     """What the critic says of scans: named ids with their probability, and sets that it cannot tell apart."""
@@ -97,9 +81,9 @@ class Answer:
         return "; ".join(words) or "none"
 
 
-def laser_answer(recording: Recording, model: Model) -> Answer:
-    """Return what the critic says of a recording's scans, held against a model."""
-    found: LaserFinding = criticise_laser(recording, model, lambda _: None)
+def laser_answer(recording: Recording, model: Model, ids: frozenset[str] | None = None) -> Answer:
+    """Return what the critic says of scans, held against a model; ids: that may be named, None for all."""
+    found: LaserFinding = criticise_laser(recording, model, lambda _: None, ids)
     if found.refused is not None:
         return Answer({}, ((f"refused: {found.refused}",),))
     return Answer({cause.id: cause.p for cause in found.causes}, found.confounded)

@@ -71,8 +71,7 @@ class Statistics:
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
         out.append(self._mixed(readings))
-        # What no reading tells of is as the simulations have it: it is 0 there, too.
-        return np.nan_to_num(np.array([*out, *_values(readings[self._trust])]))
+        return np.array([*out, *_values(readings[self._trust])])
 
     def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what poses and common mode leave of the errors (k, b), in deviations, and the common modes (k,) [m].
