@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kurumaisu._core import AxisLaw, Branch
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.recording import Recording
 from kurumaisu.params import EffectSetting, Model, shipped
 from kurumaisu.riddles import lab
 
-_DRIVE = "circles_slow_fast"  # turns in both ways at several rates, as a joystick drive has them
+_DRIVE = "spin_three_speeds"  # turns in both ways at several rates, as a joystick drive has them
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,10 @@ def tell(seed: int) -> Iterator[str]:
         yield f"  {name:10s} {_middle(recording)}"
     yield ""
     yield f"the critic, from commands and poses alone ({_DRIVE}; velocity follows command):"
-    drives = {truth.name: lab.measured(truth.chair, _DRIVE, chair.laser, seed, taped=False) for truth in truths}
-    yield f"  {'published':10s} {_answer(_without_volts(drives['published']))}"
-    yield "  corrected  the same: a base that turns commands into voltages by the law that the chair has hides it"
+    # A base that turns commands into voltages by the law that the chair has.
+    for name, own in (("published", chair), ("corrected", replace(chair, steering=_flipped(chair)))):
+        drive = lab.measured(own, _DRIVE, chair.laser, seed, taped=False)
+        yield f"  {name:10s} {_answer(_without_volts(drive))}"
     yield ""
     yield "the critic, from steering_sweep (voltages and poses):"
     for name, recording in sweeps.items():
@@ -62,6 +64,12 @@ def _middle(recording: Recording) -> str:
         inside = some & (np.abs(volts) < 0.1)
         told.append(f"{name}: w {np.min(rate[inside]):+.2f} to {np.max(rate[inside]):+.2f} rad/s")
     return ", ".join(told)
+
+
+def _flipped(chair: Model) -> AxisLaw:
+    """Return the steering law with both intercepts of the other sign."""
+    sides = chair.steering.positive, chair.steering.negative
+    return AxisLaw(*(Branch(side.slope, -side.intercept) for side in sides))
 
 
 def _without_volts(recording: Recording) -> Recording:

@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu.critic.laser.verdicts import LaserFinding
 from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
-from kurumaisu.critic.recording import LaserMount, Recording
+from kurumaisu.critic.recording import LaserMount, Recording, Series
 from kurumaisu.critic.rehearsal import Manner, Rehearsal
 from kurumaisu.critic.rehearse import manner
 from kurumaisu.experiments import Place, Script, shipped_script
@@ -65,6 +65,20 @@ def measured(model: Model, script: Script | str, nominal: Laser, seed: int, *, t
         nominal.mount.x, nominal.mount.y, nominal.mount.yaw, nominal.angle_min, nominal.angle_increment, nominal.beams
     )
     return replace(recording, world=world, laser=place)
+
+
+def middle(recording: Recording, bearing: float) -> Recording:
+    """Return a recording with only the beams within a bearing [rad] of straight ahead."""
+    laser = recording.laser
+    assert laser is not None
+    keep = np.flatnonzero(np.abs(laser.angle_min + laser.angle_increment * np.arange(laser.beams)) < bearing)
+    fan = replace(laser, angle_min=laser.angle_min + laser.angle_increment * float(keep[0]), beams=len(keep))
+    columns = tuple(f"r{i}" for i in range(len(keep)))
+    runs = []
+    for run in recording.runs:
+        assert run.scan is not None
+        runs.append(replace(run, scan=Series(run.scan.t, run.scan.values[:, keep], columns)))
+    return replace(recording, runs=tuple(runs), laser=fan)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ from kurumaisu.params import Model
 from kurumaisu.riddles import lab
 
 OFFSET = 0.058826  # [m] paper, equation (4)
+_AHEAD = np.radians(5.0)  # bearings of the beams that a mean reading at a distance is taken from
+_OPEN = frozenset({"laser.offset", "laser.mount_x", "world.map_error"})
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,14 @@ def tell(seed: int) -> Iterator[str]:
     for truth in truths:
         recording = lab.measured(truth.chair, "wall_five_distances", plain.laser, seed)
         yield f"  {truth.name:34s} {_line(recording, plain)}"
+    yield ""
+    yield "the critic, from those middle beams alone, asked between the three that the paper leaves open:"
+    for truth in truths:
+        recording = lab.measured(truth.chair, "wall_five_distances", plain.laser, seed)
+        yield f"  {truth.name:34s} {lab.laser_answer(lab.middle(recording, _AHEAD), plain, _OPEN).told()}"
     for script in ("wall_five_distances", "room_poses"):
         yield ""
-        yield f"the critic, from {script}:"
+        yield f"the critic, from {script}, all beams:"
         for truth in truths:
             found = lab.laser_answer(lab.measured(truth.chair, script, plain.laser, seed), plain)
             yield f"  {truth.name:34s} {found.told()}"
