@@ -26,6 +26,8 @@ from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
+# Growth of the noise that counts beside other causes: less is left by causes of a slightly other form, too.
+_GROWTH_BESIDE = 1.0
 _PICTURE = 0.1  # [s] between the poses drawn
 
 
@@ -86,7 +88,8 @@ def criticism(
     causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
     # Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
     asked = problem.ids is None or process_noise(problem).id in problem.ids
-    if asked and growth.p >= naming.NAMED and all(drive.source != "odom" for drive in drives):
+    sure = growth.p >= naming.NAMED and growth.noise.growth >= (_GROWTH_BESIDE if causes else 0.0)
+    if asked and sure and all(drive.source != "odom" for drive in drives):
         kind, causes = "named", (*causes, Cause(process_noise(problem).id, growth.p, {}, growth.gain_nats))
     settings = best.settings if kind in ("named", "confounded") else ()
     verdict = Verdict(

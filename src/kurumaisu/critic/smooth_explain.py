@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu import effects
 from kurumaisu.critic import explain, replay, smooth_shapes, smooth_words
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import GRID, Drive
@@ -75,7 +74,7 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
     mean, sd = smooth_shapes.band(extension, at)
     return Misfit(
         channel=smooth_words.CHANNELS[extension.curve.channel],
-        unit=effects.CHANNELS[extension.curve.channel],
+        unit=smooth_words.unit_of(extension.curve),
         covariate_name=covariate,
         covariate_unit=unit,
         covariate=x,
@@ -89,7 +88,8 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
 
 def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[FloatArray, FloatArray]:
     """Return covariate and residual rate per increment in which the chair moves throughout."""
-    channel = list(effects.CHANNELS).index(extension.curve.channel)
+    rate = extension.curve.channel.removesuffix("_gain")
+    channel = ("v", "lateral", "w").index(rate)
     motion = replay.motion(drive, problem.model, extension.fit.settings)
     values = extension.curve.basis.samples(motion)
     middle = np.clip(((drive.times[1:] + drive.times[:-1]) / 2 - drive.start) / GRID, 0, len(values) - 1).astype(int)
@@ -98,7 +98,12 @@ def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[Floa
     if "period" in extension.curve.basis.constants:
         x = np.mod(x, extension.curve.basis.constants["period"])
     use = np.isfinite(x) & ((motion.v != 0) | (motion.w != 0))[middle]
-    return x[use], (left[:, channel] / np.diff(drive.times))[use]
+    residual = left[:, channel] / np.diff(drive.times)
+    if rate != extension.curve.channel:  # a share of the rate: of a small one nothing can be said
+        rates = (motion.v if rate == "v" else motion.w)[middle]
+        use &= np.abs(rates) > 0.3 * np.abs(rates).max()
+        residual = residual / np.where(use, rates, 1.0)
+    return x[use], residual[use]
 
 
 def _told(extension: Extension, beyond: Beyond, share: float) -> str:
