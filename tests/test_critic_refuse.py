@@ -130,16 +130,24 @@ def test_scans_alone_are_judged_for_how_they_repeat_themselves():
 HOURS = """
 import sys, numpy as np
 from pathlib import Path
+from kurumaisu.critic import portion, sanity
 from kurumaisu.critic.reading import read_recording
-from kurumaisu.errors import Error
+from kurumaisu.params import load_model, shipped
 folder = Path(sys.argv[1])
 folder.mkdir()
-t = np.arange(0, 36000, 0.02)
-rows = np.column_stack([t, 0.01 * t, 0.1 * np.sin(t), 0 * t])
-np.savetxt(folder / "pose.csv", rows, fmt="%.4f", delimiter=",", header="t,x,y,theta", comments="")
-np.savetxt(folder / "command.csv", rows[:, :3], fmt="%.4f", delimiter=",", header="t,v,w", comments="")
-run = read_recording(folder).runs[0]
-assert len(run.pose.t) == len(run.command.t) == len(t), len(run.pose.t)
+t = np.arange(0, 36000, 0.05)
+turns = t, 5.0 * np.sin(0.04 * t), 5.0 - 5.0 * np.cos(0.04 * t), 0.04 * t  # a circle of 5 m at 0.2 m/s
+lines = [f"{a:.2f},{x:.4f},{y:.4f},{h:.4f}" for a, x, y, h in zip(t.tolist(), *(c.tolist() for c in turns[1:]))]
+(folder / "pose.csv").write_text("t,x,y,theta\\n" + "\\n".join(lines) + "\\n")
+(folder / "command.csv").write_text("t,v,w\\n" + "".join(f"{k},0.2,0.04\\n" for k in range(36000)))
+recording = read_recording(folder)
+assert len(recording.runs[0].pose.t) == len(t)
+assert not sanity.examine(recording, load_model(shipped("launch/md100.yaml"))).invalid
+pieces = portion.bounded(recording)
+assert len(pieces.runs) == len(pieces.train) == 6, pieces.train
+assert pieces.runs[0].pose.t[0] == 0 and pieces.runs[-1].pose.t[-1] == t[-1]
+assert all(len(run.pose.t) <= 12001 and len(run.command.t) <= 602 for run in pieces.runs)
+assert "10.0 h" in pieces.problems[-1]
 """
 
 

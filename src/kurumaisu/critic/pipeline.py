@@ -13,6 +13,7 @@ from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
 from kurumaisu.critic.laser.merge import with_laser
 from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
+from kurumaisu.critic.portion import bounded
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.smooth_known import informed
@@ -41,6 +42,7 @@ def criticise(
     wrong = [*recording.invalid, *sanity.examine(recording, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
+    recording = bounded(recording)
     if any(driven(run) for run in recording.runs if run.name in recording.train):
         base = _criticise_base(recording, model, progress, ids)
     else:
