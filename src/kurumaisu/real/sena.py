@@ -61,6 +61,8 @@ def _against_walls(walls: FloatArray, odom: FloatArray) -> str:
     drift = np.unwrap(apart[known], period=quarter)
     first, last = np.median(drift[:10]), np.median(drift[-10:])
     made = float(odom[known[-10:]].mean() - odom[known[:10]].mean())
+    if abs(made) < np.pi:
+        return f"walls against odometry: {np.degrees(made):+.0f} deg of turning are too little for it"
     steps = 1.4826 * float(np.median(np.abs(np.diff(drift))))
     return (
         f"heading of odometry less that of walls, {len(known)} scans: {np.degrees(last - first):+.1f} deg by the end, "
