@@ -145,7 +145,7 @@ assert len(recording.runs[0].pose.t) == len(t)
 assert not sanity.examine(recording, load_model(shipped("launch/md100.yaml"))).invalid
 pieces = portion.bounded(recording)
 assert len(pieces.runs) == len(pieces.train) == 6, pieces.train
-assert pieces.runs[0].pose.t[0] == 0 and pieces.runs[-1].pose.t[-1] == t[-1]
+assert pieces.runs[0].pose.t[0] == 0 and pieces.runs[-1].pose.t[-1] > t[-1] - 0.06
 assert all(len(run.pose.t) <= 12001 and len(run.command.t) <= 602 for run in pieces.runs)
 assert "10.0 h" in pieces.problems[-1]
 """

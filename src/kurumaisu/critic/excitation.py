@@ -37,7 +37,7 @@ def told(criticism: Criticism, made: Decision, drives: Sequence[Drive], scripts:
         return criticism
     wanted = unseen if made.found.enough else ids
     best = _supplier(problem.model, scripts, wanted)
-    why = lacking(drives)
+    why = lacking(drives, enough=made.found.enough)
     listed = ", ".join(wanted[:_LISTED]) + (f" and {len(wanted) - _LISTED} more" if len(wanted) > _LISTED else "")
     sentence = f"Of {len(ids)} effects on the base, {len(wanted)} could not show: {listed}."
     headline = f"Nothing can be named, because {why}: {len(wanted)} of {len(ids)} effects could not have shown."
@@ -57,8 +57,8 @@ def told(criticism: Criticism, made: Decision, drives: Sequence[Drive], scripts:
     return replace(criticism, story=story, verdict=replace(criticism.verdict, next_experiment=best))
 
 
-def lacking(drives: Sequence[Drive]) -> str:
-    """Return in words what drives lack."""
+def lacking(drives: Sequence[Drive], *, enough: bool) -> str:
+    """Return in words what drives lack; enough: there are more data than the catalogue could fit."""
     ahead = max(float(np.abs(drive.v).max()) for drive in drives)
     turn = max(float(np.abs(drive.w).max()) for drive in drives)
     seconds = sum(float(drive.times[-1] - drive.times[0]) for drive in drives)
@@ -66,6 +66,9 @@ def lacking(drives: Sequence[Drive]) -> str:
         return "nothing asked the chair to move"
     if seconds < _SHORT:
         return f"only {seconds:.1f} s were recorded"
+    if not enough:
+        count = sum(len(drive.times) - 1 for drive in drives)
+        return f"{count} intervals between poses are too few to tell effects from noise"
     if turn < _REST:
         return "the chair was never asked to turn"
     if ahead < _REST:
