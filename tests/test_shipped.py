@@ -20,7 +20,7 @@ SHARE = Path(rospkg.RosPack().get_path("kurumaisu"))
 YAMLS = sorted((SHARE / "launch").glob("*.yaml"))
 LAUNCHES = sorted((SHARE / "launch").glob("*.launch"))
 WORLDS = sorted((SHARE / "worlds").glob("*.world"))
-SOURCE_TREE_TOOLS = {"bench", "demo", "run", "setup", "test"}  # they build or need the source tree
+SOURCE_TREE_TOOLS = {"bench", "demo", "real", "run", "setup", "test"}  # they build or need the source tree
 
 # The strict readers of private parameters, by node type. Nodes in C++ read theirs when they start: rostests.
 READERS = {

@@ -228,6 +228,9 @@ class Problem:
                 continue
             if not p.lower <= at + share * term.step * p.scale <= p.upper:
                 share = -share
+            if not p.lower <= at + share * term.step * p.scale <= p.upper:  # no room on either side: as far as it goes
+                ends = p.lower - at, p.upper - at
+                share = max(ends, key=abs) / (term.step * p.scale)
             moved = at + share * term.step * p.scale
             if i is None:
                 yield settings_of((*terms, term), np.append(values, moved)), share

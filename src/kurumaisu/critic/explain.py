@@ -106,7 +106,7 @@ def criticism(
     story = Story(
         recording=recording.name,
         model=problem.model.name,
-        headline=words.headline(verdict, found, matters),
+        headline=words.headline(verdict, found, matters, shares),
         details=words.details(problem, found, drives, shares, matters),
         pose_source=_pose_source(recording),
         provenance=_provenance(),

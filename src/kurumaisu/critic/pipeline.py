@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic import explain, gain, next_experiment, noise, predict, sanity, smooth_explain, worth
+from kurumaisu.critic import excitation, explain, gain, next_experiment, noise, predict, sanity, smooth_explain, worth
 from kurumaisu.critic.decide import Progress, decide, scatter
 from kurumaisu.critic.drive import Drive, driven, prepare
 from kurumaisu.critic.evidence import Problem
@@ -14,6 +14,7 @@ from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
 from kurumaisu.critic.laser.merge import with_laser
 from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
+from kurumaisu.critic.portion import bounded
 from kurumaisu.critic.predict_extended import forecast_of
 from kurumaisu.critic.predict_motion import Settings
 from kurumaisu.critic.recording import Recording, Run
@@ -49,12 +50,12 @@ def criticise(
     wrong = [*recording.invalid, *sanity.examine(whole, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
-    moved = any(driven(run) for run in whole.runs)
+    recording = bounded(recording)
+    moved = any(driven(run) for run in recording.runs if run.name in recording.train)
+    if not moved and all(run.scan is None for run in recording.runs):
+        raise Error(f"{recording.runs[0].name}: has neither voltages nor commands nor odometry, and no scans either")
     base, extension = _criticise_base(recording, model, progress, ids) if moved else (None, _UNDRIVEN)
     scans = criticise_laser(recording, model, progress, ids)
-    if base is None and scans.refused:
-        nothing = "has neither voltages nor commands nor odometry"
-        raise Error(f"{recording.runs[0].name}: {nothing}; laser: {scans.refused}")
     found = with_laser(base or explain.undriven(recording, model), scans)
     found = _with_worth(found, recording, replace(extension, scans=scans.settings), progress, slam=slam)
     if not predict.asked(recording):
@@ -82,7 +83,7 @@ def _withheld(recording: Recording, run: Run) -> bool:
 def _drives(recording: Recording, model: Model) -> dict[str, Drive]:
     """Return the drives, without those of withheld runs that have too few poses left to judge by."""
     drives = {}
-    for run in recording.runs:
+    for run in filter(driven, recording.runs):
         try:
             drives[run.name] = informed(prepare(run, model), run)
         except Error:
@@ -95,7 +96,7 @@ def _criticise_base(
     recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None
 ) -> tuple[Criticism, worth.Extension]:
     drives = _drives(recording, model)
-    train = [drives[name] for name in recording.train]
+    train = [drives[name] for name in recording.train if name in drives]
     test = [drives[name] for name in recording.test if name in drives]
 
     progress("estimating the noise")
@@ -112,9 +113,10 @@ def _criticise_base(
     splits = gain.with_withheld(gain.folds(train, whole), train, withheld)
     held = gain.measure(model, splits, made.refit, baseline, made.problem.noise) if splits and made.something else None
     progress("planning the next drive")
-    proposal = next_experiment.propose(made.problem, made.found, next_experiment.drives())
+    scripts = next_experiment.drives()
+    proposal = next_experiment.propose(made.problem, made.found, scripts)
     judge = explain.criticism if made.beyond.extension is None else smooth_explain.criticism
-    judged = judge(recording, made, held, train + test, proposal)
+    judged = excitation.told(judge(recording, made, held, train + test, proposal), made, train, scripts)
     forecast = forecast_of(made, judged.settings, baseline)
 
     def refit(name: str) -> Settings:

@@ -126,8 +126,9 @@ def split(
 def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
     """Raise Error unless a run says something about base or laser; note the runs that do not."""
     useless = [run for run in runs if not usable(run)]
-    for run in useless:
-        faults.add(f"{run.name}: says nothing: it has {_has(run)}")
+    told = {f"{run.name}: says nothing: it has {_has(run)}" for run in useless}
+    for words in sorted(told):
+        faults.add(words)
     if len(useless) == len(runs):
         topic = resolve(meta.topics)
         raise Error(
@@ -135,6 +136,7 @@ def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Fault
             f"Needed are scans (scan.csv or {topic['scan']}), or commands or voltages "
             f"(command.csv, voltage.csv, {topic['command']} or {topic['voltage']}) "
             f"together with poses (pose.csv, odom.csv, {topic['pose']} or {topic['odom']})"
+            + "".join(f"; {note}" for note in faults.notes if note not in told)
         )
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kurumaisu.critic.drive import driven
 from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
@@ -21,14 +22,18 @@ Progress = Callable[[str], None]
 
 
 def with_reference(recording: Recording, seed: int, progress: Progress) -> Recording:
-    """Return the recording with a pose for every run, mapping those that have none and need not be predicted.
+    """Return the recording with a pose for every run that somebody drove, mapping those that have none.
 
-    Raise Error for a run that has neither a pose nor scans and odometry to find one from.
+    A run of which motions are to be predicted may go without.
+
+    Raise Error for a run that was driven and has neither a pose nor scans and odometry to find one from.
     """
     if all(run.pose is not None or run.queries is not None for run in recording.runs):
         return recording
     runs = tuple(
-        run if run.pose is not None or run.queries is not None else _with_mapped_pose(recording, run, seed, progress)
+        _with_mapped_pose(recording, run, seed, progress)
+        if run.pose is None and run.queries is None and driven(run)
+        else run
         for run in recording.runs
     )
     return replace(recording, runs=runs)

@@ -81,6 +81,8 @@ def _channels(covariate: str) -> Iterator[str]:
 
 def columns(problem: Problem, settings: Sequence[EffectSetting], curves: Sequence[Curve]) -> FloatArray:
     """Return the whitened columns of curves about drives simulated with some effects, (rows, k)."""
+    if not curves:  # a chair that never changes its rates follows nothing
+        return np.empty((sum(3 * (len(drive.times) - 1) for drive in problem.drives), 0))
     parts = []
     for drive in problem.drives:
         own = raw_columns(drive, problem.model, settings, curves)

@@ -17,6 +17,7 @@ from kurumaisu.critic.smooth_fit import Extension, extend
 from kurumaisu.critic.smooth_search import Rivalry, compare
 
 _ALARM = 0.01  # share of null draws with as much evidence above which a curve is not believed
+_HOPELESS = 100.0  # [nat] behind the catalogue, when simulated, that no other effects beside a curve make good
 _HINT = 0.0  # [nat] of lead, where slow noise is not believed, from which the noise is estimated about a curve
 
 
@@ -51,7 +52,10 @@ def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> B
     rivalry = compare(problem, found)
     if rivalry.winner is None:
         return Beyond(rivalry, None, 1.0)
-    curved = replay.extend(problem.model, [_extension(problem, rivalry).unknown])
+    first = _extension(problem, rivalry)
+    if not _holds(problem, found, first, _HOPELESS):
+        return Beyond(Rivalry((), -np.inf, {}, dict(found.p)), None, 1.0)
+    curved = replay.extend(problem.model, [first.unknown])
     # With the curve in, sets may be best that nobody would have tried without it.
     other = naming.search(problem.changed(model=curved), progress).best
     if other.candidates not in {fit.candidates for fit in found.fits}:
@@ -60,8 +64,21 @@ def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> B
     rivalry = compare(problem, found, also=other.candidates)
     if rivalry.winner is None:
         return Beyond(rivalry, None, 1.0)
+    extension = _extension(problem, rivalry)
+    if not _holds(problem, found, extension, 0.0):
+        return Beyond(Rivalry((), -np.inf, {}, dict(found.p)), None, 1.0)
     alarm = false_alarm(problem, rivalry)
-    return Beyond(rivalry, _extension(problem, rivalry) if alarm <= _ALARM else None, alarm)
+    return Beyond(rivalry, extension if alarm <= _ALARM else None, alarm)
+
+
+def _holds(problem: Problem, found: Naming, extension: Extension, behind: float) -> bool:
+    """Tell whether a curve that wins by straight lines about a fit is not so many nats behind when it is simulated.
+
+    Where the model is far off, as with another steering law, lines lead astray by any number of nats.
+    """
+    curved = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
+    left = curved.residual(extension.fit.terms, extension.fit.values)
+    return -0.5 * float(left @ left) > found.best.log_likelihood - behind
 
 
 def false_alarm(problem: Problem, rivalry: Rivalry) -> float:

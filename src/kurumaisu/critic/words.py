@@ -22,8 +22,11 @@ _MINUTE = 60.0  # [s]
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
 
-def headline(verdict: Verdict, found: Naming, matters: set[str]) -> str:
-    """Return the verdict in one sentence; matters: effects of the best set that move the chair enough."""
+def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[str, float]) -> str:
+    """Return the verdict in one sentence.
+
+    matters: effects of the best set that move the chair enough, as data held out confirm; shares: how far each does.
+    """
     if verdict.verdict == "named":
         text = "; ".join(effects.by_id(cause.id).sentence for cause in verdict.causes)
         return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in verdict.causes)})."
@@ -33,6 +36,8 @@ def headline(verdict: Verdict, found: Naming, matters: set[str]) -> str:
     listed = ", ".join(sorted(found.best.ids))
     if found.best.ids and verdict.gain is None:
         return f"Nothing can be named: {listed} is suspected, but too little was recorded to test it on data held out."
+    if found.best.ids and not matters and max(shares.values()) >= MATERIAL:
+        return f"Nothing can be named: {listed} fits these drives, but does not hold on data held out."
     if found.best.ids and not matters:
         return f"Nothing that matters: {listed} is detectable, but too small to gain anything."
     if not found.enough:

@@ -17,7 +17,10 @@ def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
     """Return a criticism of the base with what the scans say besides."""
     verdict, story = criticism.verdict, criticism.story
     if finding.refused is not None:
-        return replace(criticism, story=replace(story, details=(*story.details, _refusal(finding.refused))))
+        told = replace(story, details=(*story.details, _refusal(finding.refused), *finding.details))
+        if not story.noise and verdict.verdict == _NOTHING_SAID:  # nothing was said of the base either
+            told = replace(told, headline=f"Nothing can be named: {finding.refused}.")
+        return replace(criticism, story=told)
     kind: Kind = verdict.verdict
     if finding.unknown:
         kind = "unknown"

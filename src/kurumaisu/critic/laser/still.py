@@ -7,10 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kurumaisu.critic.recording import Recording
 from kurumaisu.errors import Error
+from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
 _FEWEST = 10  # scans
+_ROOMS = ((0.06, 0.75), (0.75, 1.5), (1.5, 3.0), (3.0, 10.0))  # [m] distances that are told apart
+_FEW_BEAMS = 10
 _OUTLIER = 5.0  # deviations
 _MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
 _LAGS = (1, 2, 3, 5)  # beams
@@ -60,3 +64,35 @@ def repeatability(readings: FloatArray) -> Repeatability:
     unit[:, use] = (left - common[:, np.newaxis]) / np.nanstd(left - common[:, np.newaxis], axis=0)
     correlation = {lag: float(np.nanmean(unit[:, lag:] * unit[:, :-lag])) for lag in _LAGS}
     return Repeatability(middle[use], sds, correlation, float(np.std(common)), float(np.mean(~np.isfinite(readings))))
+
+
+def words(recording: Recording, model: Model) -> tuple[str, ...]:
+    """Return how the laser repeats itself in runs of scans alone, beside what the model has; a sentence each."""
+    told: list[str] = []
+    for run in recording.runs:
+        if run.scan is None or run.pose is not None or run.odom is not None:
+            continue
+        try:
+            found = repeatability(run.scan.values)
+        except Error as error:
+            told.append(f"{run.name}: {error}")
+            continue
+        for low, high in _ROOMS:
+            if np.sum((found.ranges >= low) & (found.ranges < high)) >= _FEW_BEAMS:
+                at = float(np.median(found.ranges[(found.ranges >= low) & (found.ranges < high)]))
+                measured, said = 1e3 * found.sd_between(low, high), 1e3 * _model_sd(model, at)
+                told.append(
+                    f"{run.name}: readings around {at:.2g} m scatter by {measured:.1f} mm, the model's by {said:.1f} mm"
+                )
+        lags = ", ".join(f"{value:.2f}" for value in found.correlation.values())
+        told.append(
+            f"{run.name}: neighbours correlate by {lags} at lags {', '.join(map(str, found.correlation))} (the model's "
+            f"are independent unless an effect says otherwise); whole scans scatter by {1e3 * found.common_sd:.2g} mm; "
+            f"{found.missing:.1%} of the readings are missing"
+        )
+    return tuple(told)
+
+
+def _model_sd(model: Model, at: float) -> float:
+    """Return the sd [m] that the model gives readings around a distance [m], by equation (4)."""
+    return float(model.laser.error.deviation(model.laser.error.range(np.array([at])))[0])

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.laser import rivals
+from kurumaisu.critic.laser import rivals, still
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.rivals import Rival, Weighed
@@ -57,7 +57,7 @@ def criticise(
     """
     why = missing(recording)
     if why is not None:
-        return LaserFinding(refused=why)
+        return LaserFinding(refused=why, details=still.words(recording, model))
     progress("laser: predicting the scans")
     assembly = Assembly(gather(recording, model), ids)
     progress("laser: estimating the noise")

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What docs/real_data.md says of real recordings, as far as it is measured by hand; and the readers' faults."""
+
+import re
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kurumaisu.critic.laser.still import repeatability
+from kurumaisu.critic.reading import read_recording
+from kurumaisu.errors import Error
+from kurumaisu.real import by_hand, mines, sena, urg_log, warthog
+from kurumaisu.real.__main__ import main
+
+DATA = Path(__file__).resolve().parents[2] / "shared/data"
+
+
+def needs(path):
+    """Skip, saying so, where a recording is not there."""
+    if not path.exists():
+        pytest.skip(f"the real recording {path.name} is not there")
+    return path
+
+
+def test_the_warthogs_wheels_and_track():
+    needs(DATA / "norlab_drive")
+    log = warthog.load(DATA)
+    for span in ((134.0, 218.0), (405.0, 430.0)):
+        radius, track, _ = warthog.wheels_against_ground(log, *span)
+        assert radius == pytest.approx(0.283, abs=0.005)
+        assert track == pytest.approx(1.77, abs=0.06)
+    late = np.nanquantile(warthog.lateness(log, warthog.between(log.all_poses, 134.0, 218.0), 0.286), [0.5, 0.95])
+    kept = np.nanquantile(warthog.lateness(log, warthog.between(log.pose, 134.0, 218.0), 0.286), [0.5, 0.95])
+    assert late[1] > 0.25
+    assert kept[1] < 0.1
+
+
+def test_a_tick_of_the_mines_rover_is_what_its_speed_says():
+    needs(DATA / "breezyslam_mines")
+    log = mines.load(DATA)
+    plain = np.diff(log.way, axis=0).mean(axis=1) / np.diff(log.t)
+    good = np.diff(log.t) > 0.05
+    line = by_hand.least_squares(plain[good, None], log.speed[1:][good])
+    assert line.at[0] == pytest.approx(1.0, abs=0.01)
+    assert np.isnan(log.ranges).mean() == pytest.approx(0.553, abs=0.001)
+
+
+def test_the_real_urg_repeats_itself_and_its_neighbours_agree():
+    log = urg_log.load(needs(DATA / "player_urg04lx/hokuyo_aist.logr"))
+    assert log.readings.shape == (121, 677)
+    assert log.codes <= set(range(20))
+    found = repeatability(log.readings[:34])
+    assert 1e3 * found.sd_between(0.06, 0.75) == pytest.approx(2.3, abs=0.2)
+    assert 1e3 * found.sd_between(2.0, 2.5) == pytest.approx(3.6, abs=0.3)
+    assert found.correlation[1] == pytest.approx(0.53, abs=0.05)
+    assert found.correlation[3] == pytest.approx(0.15, abs=0.05)
+
+
+def test_sena_drives_a_loop_of_76_metres():
+    drive = read_recording(needs(sena.FOLDER / sena.LOG)).runs[0]
+    assert drive.scan.values.shape == (225, 361)
+    assert np.hypot(*np.diff(drive.odom.values[:, :2], axis=0).T).sum() == pytest.approx(76.4, abs=0.5)
+
+
+def test_a_recording_that_is_not_there_is_an_error_that_names_it(tmp_path, capsys):
+    assert main(["warthog", "--data", str(tmp_path)]) == 1
+    assert re.search(r"norlab_drive.*is not there", capsys.readouterr().err)
+
+
+def record(payload, seconds=1):
+    """Return a record of the log."""
+    return struct.pack(">III", seconds, 0, len(payload)) + payload
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (record(b"VV\n00P\n\n"), "holds no scan"),
+        (record(b"VV\n00P\n\n")[:-2], "cut in the record at byte 0"),
+        (record(b"VV") + b"\0\0", "cut in the record at byte 14"),
+        (record(b"GD0046072201\n00P\n0000@\nabcX\n\n"), "checksum"),
+        (record(b"GD0046072201\n00P\n00000\n000@\n\n"), "characters"),
+    ],
+)
+def test_a_broken_log_says_where(tmp_path, content, said):
+    path = tmp_path / "a.logr"
+    path.write_bytes(content)
+    with pytest.raises(Error, match=said):
+        urg_log.load(path)
+
+
+def test_least_squares_against_the_textbook():
+    rng = np.random.default_rng(1000)
+    x = rng.normal(size=400)
+    line = by_hand.least_squares(np.column_stack([x, np.ones(400)]), 2 * x + 1 + rng.normal(0, 0.1, 400))
+    np.testing.assert_allclose(line.at, [2, 1], atol=4 * 0.1 / 20)
+    np.testing.assert_allclose(line.sd, 0.1 / 20, rtol=0.15)
+
+
+def test_a_step_response_is_found_again():
+    t = np.arange(0.0, 20.0, 0.05)
+    asked = np.where(t % 8 < 4, 1.0, -0.5)
+    seen, level = np.zeros(len(t)), 0.0
+    for i in range(1, len(t)):  # Euler's rule in steps of 1 ms
+        for k in range(50):
+            at = t[i - 1] + 0.001 * k - 0.2
+            level += 0.001 / 0.4 * ((0.8 * asked[int(at / 0.05 + 1e-6)] if at >= 0 else 0.0) - level)
+        seen[i] = level
+    gain, tau, delay, rms = by_hand.step_response(t, asked, seen)
+    assert gain == pytest.approx(0.8, abs=0.02)
+    assert tau == pytest.approx(0.4, rel=0.15)
+    assert delay == pytest.approx(0.2, abs=0.051)
+    assert rms < 0.03
+
+
+def test_range_flow_sees_a_room_go_by():
+    angles = np.linspace(-2.0, 2.0, 600)
+
+    def room(x, y, theta):
+        """Return the ranges in a room of 6 by 5 m from a place in it."""
+        cos, sin = np.cos(theta + angles), np.sin(theta + angles)
+        with np.errstate(divide="ignore"):
+            return np.minimum(np.where(cos > 0, (6 - x) / cos, -x / cos), np.where(sin > 0, (5 - y) / sin, -y / sin))
+
+    lever = 0.3
+    poses = [(2 + 0.05 * k * np.cos(0.4), 2 + 0.05 * k * np.sin(0.4), 0.4) for k in range(5)]
+    poses += [(*poses[-1][:2], 0.4 + 0.03 * k) for k in range(1, 5)]
+    scans = np.array([room(x + lever * np.cos(a), y + lever * np.sin(a), a) for x, y, a in poses])
+    moves = by_hand.range_flow(scans, angles, lever)
+    np.testing.assert_allclose(moves[:4], [[0.05, 0.0]] * 4, atol=0.003)
+    np.testing.assert_allclose(moves[4:], [[0.0, 0.03]] * 4, atol=0.003)
