@@ -38,7 +38,7 @@ def full_story():
     y = 0.1 * x + rng.normal(size=4000)
     bins = Bins(np.array([-1.0, 1.0]), np.array([-0.1, 0.1]), np.array([-0.2, 0.0]), np.array([0.0, 0.2]))
     curve = np.array([[-1.0, -0.1], [1.0, 0.1]])
-    runs = [Overlay(f"run_{i}", path, path + 0.3, path + 0.003, held_out=i == 6) for i in range(1, 7)]
+    runs = [Overlay(f"run_{i}", path, path + 0.3, path + 0.003, i == 6, 10.0, 0.424, 0.004) for i in range(1, 7)]
     return Story(
         recording="corridor",
         model="MD-100",

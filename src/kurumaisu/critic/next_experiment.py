@@ -11,6 +11,7 @@ from scipy.special import logsumexp
 
 from kurumaisu.critic import design, naming
 from kurumaisu.critic.design import Explanation
+from kurumaisu.critic.digits import odds
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.prior import log_prior
@@ -65,8 +66,8 @@ def propose(problem: Problem, found: Naming, scripts: Sequence[Script]) -> Propo
     best = options[0]
     experiment = NextExperiment(best.script.name, best.script.seconds, best.nats, tuple(open_ids))
     sentence = (
-        f"Run the experiment {best.script.name} ({best.script.seconds:.0f} s): it is expected to bring "
-        f"{best.nats:.1f} nats about {listed}."
+        f"critic experiment {best.script.name} ({best.script.seconds:.0f} s). It is expected to make the right one of "
+        f"{listed} {odds(best.nats)} times as probable as a wrong one."
     )
     return Proposal(experiment, sentence, tuple(options))
 

@@ -10,12 +10,13 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic import naming
 from kurumaisu.critic.catalogue import Term
+from kurumaisu.critic.digits import quantities, with_interval
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import HORIZON, MATERIAL
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.story import Rival
-from kurumaisu.critic.verdict import Estimate, Verdict
+from kurumaisu.critic.verdict import Cause, Estimate, Verdict
 from kurumaisu.params import Model
 
 _MINUTE = 60.0  # [s]
@@ -26,8 +27,7 @@ _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 def headline(verdict: Verdict, found: Naming, matters: set[str]) -> str:
     """Return the verdict in one sentence; matters: effects of the best set that move the chair enough."""
     if verdict.verdict == "named":
-        text = "; ".join(effects.by_id(cause.id).sentence for cause in verdict.causes)
-        return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in verdict.causes)})."
+        return named(verdict.causes)
     if verdict.verdict == "confounded":
         group = " or ".join(verdict.confounded[0])
         return f"Something is missing in the model, but these drives cannot tell which: {group}."
@@ -44,6 +44,17 @@ def headline(verdict: Verdict, found: Naming, matters: set[str]) -> str:
     return "Nothing is missing in the model that these drives could show."
 
 
+def named(causes: Sequence[Cause]) -> str:
+    """Return in a sentence what acts, with ids and sizes."""
+    text = "; ".join(f"{effects.by_id(cause.id).sentence} ({_sizes(cause)})" for cause in causes)
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _sizes(cause: Cause) -> str:
+    said = [f"{name} {quantities([e.estimate], e.unit)[0]}" for name, e in cause.parameters.items()]
+    return f"{cause.id}: {', '.join(said)}" if said else cause.id
+
+
 def details(
     problem: Problem, found: Naming, drives: Sequence[Drive], shares: dict[str, float], matters: set[str]
 ) -> tuple[str, ...]:
@@ -52,20 +63,25 @@ def details(
     said = [
         f"{len(drives)} drive{'s' * (len(drives) > 1)}, {seconds:.0f} s, replayed from the {drives[0].source} channel.",
     ]
+    fitted: dict[str, list[str]] = {}
     for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True):
         e = estimate(problem.model, term, value, sd)
-        unit = "" if e.unit == "1" else f" {e.unit}"
+        size = with_interval(e.estimate, e.lo90, e.hi90, e.unit)
+        fitted.setdefault(term.id, []).append(f"{term.parameter.name} {size}")
+    for name, sizes in fitted.items():
         weight = ""
-        if term.id not in matters:
-            small = shares[term.id] < MATERIAL
+        if name not in matters:
+            small = shares[name] < MATERIAL
             weight = ": detectable, but it does not matter" if small else ": not confirmed on data held out"
         said.append(
-            f"{term.id}: {term.parameter.name} {e.estimate:.3g}{unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
-            f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."
+            f"{name}: {', '.join(sizes)}; within {HORIZON:g} s it moves the chair by {shares[name]:.1%} of its way or "
+            f"turn{weight}."
         )
     n = problem.noise
     wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
-    said.append(f"The yaw rate fluctuates at random: the heading wanders by {wander:.1f} deg (sd) in a minute.")
+    said.append(
+        f"The yaw rate fluctuates at random: in a minute the heading strays by {wander:.0f}° or so, whatever the model."
+    )
     alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
     said.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
     return tuple(said)
@@ -77,14 +93,17 @@ def suspects(found: Naming) -> tuple[str, ...]:
     if not some:
         return ()
     listed = ", ".join(f"{name} ({found.p[name]:.2f})" for name in some)
-    return (f"Not certain enough to be named (probability): {listed}. More drives that excite them would decide.",)
+    return (f"Not certain enough to be named (probability): {listed}.",)
 
 
 def rivals(found: Naming) -> tuple[Rival, ...]:
     """Return sets with other causes and sets with more or fewer, the best of each kind, by their evidence."""
     best = found.best
-    swapped = [fit for fit in found.fits if not (fit.ids >= best.ids or fit.ids < best.ids)]
-    others = [fit for fit in found.fits if fit.ids > best.ids or fit.ids < best.ids]
+    # Of the ways in which the same effects may act, the best one stands for all.
+    unlike = {fit.ids: fit for fit in reversed(found.fits) if fit.ids != best.ids}
+    ranked = sorted(unlike.values(), key=lambda fit: -fit.score)
+    swapped = [fit for fit in ranked if not (fit.ids >= best.ids or fit.ids < best.ids)]
+    others = [fit for fit in ranked if fit.ids > best.ids or fit.ids < best.ids]
     shown = sorted(swapped[:_RIVALS_SHOWN] + others[:_RIVALS_SHOWN], key=lambda fit: -fit.score)
     return tuple(_rival(fit, best) for fit in shown)
 
@@ -96,7 +115,7 @@ def _rival(fit: Fit, best: Fit) -> Rival:
     elif fit.ids > best.ids:
         why = f"fits better by {likelihood:.1f} nats, less than another effect costs"
     elif fit.ids < best.ids or likelihood < 0:
-        why = f"leaves {-likelihood:.1f} nats unexplained"
+        why = f"fits worse by {-likelihood:.1f} nats"
     else:
         why = f"fits better by {likelihood:.1f} nats, but needs more effects"
     return Rival(" + ".join(sorted(fit.ids)) or "no effect", fit.score - best.score, why)
