@@ -37,7 +37,7 @@ _STYLE = {
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
     "legend.frameon": False,
-    "legend.handlelength": 2.6,
+    "legend.handlelength": 1.8,
 }
 # More points than this are a blot in a picture of this size, and megabytes of SVG.
 MOST_POINTS = 1500
@@ -95,15 +95,15 @@ def misfit_svg(misfit: Misfit, shown: Shown, name: str) -> str:
             axes.fill_between(x * at, y * low, y * high, color=EXTENDED, alpha=0.25, linewidth=0, label="90 % band")
         if misfit.curve is not None:
             at, curve = misfit.curve.T
-            axes.plot(x * at, y * curve, color=EXTENDED, linewidth=2.0, label="extension adds")
-        _means(axes, misfit.bins, (x, y), "o", BASELINE, "mean before")
+            axes.plot(x * at, y * curve, color=EXTENDED, linewidth=2.0, label="effect")
+        _means(axes, misfit.bins, (x, y), "o", BASELINE, "before")
         if misfit.after is not None:
-            _means(axes, misfit.after, (x, y), "D", EXTENDED, "mean after")
+            _means(axes, misfit.after, (x, y), "D", EXTENDED, "after")
         axes.set_ylim(y * shown.low, y * shown.high)
         axes.grid(visible=True)
         axes.set_xlabel(_label(misfit.covariate_name, x_unit))
         axes.set_ylabel(_label(f"misfit of {misfit.channel}", y_unit))
-        for line in _legend(figure, columns=4).get_lines():
+        for line in _legend(figure, columns=5).get_lines():
             line.set_alpha(1.0)
         return _svg(figure, name)
 
@@ -165,7 +165,7 @@ def shown_points(misfit: Misfit) -> Shown:
 
 def _legend(figure: Figure, columns: int) -> Any:
     """Put the legend above the picture, where it hides nothing."""
-    legend = figure.legend(loc="upper left", ncols=columns, fontsize=9, columnspacing=1.3, handletextpad=0.5)
+    legend = figure.legend(loc="upper left", ncols=columns, fontsize=9, columnspacing=1.0, handletextpad=0.4)
     legend.set_in_layout(False)
     return legend
 

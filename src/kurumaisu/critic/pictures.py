@@ -72,9 +72,9 @@ def overlay_picture(overlay: Overlay, name: str) -> Picture:
 def misfit_picture(misfit: Misfit, name: str) -> Picture:
     """Return measured minus simulated; name as in overlay_picture."""
     shown = figures.shown_points(misfit)
-    caption = ["Misfit: measured minus simulated, without this effect and with all others found."]
+    caption = ["Misfit: measured minus simulated. Before: without this effect, but with all others that were found."]
     if misfit.after is not None:
-        caption.append("With it, the means should lie on zero.")
+        caption.append("After: with it; the means should lie on zero. Bars: 90 % intervals.")
     count = len(misfit.residual)
     if shown.index.sum() < count:
         caption.append(f"{shown.index.sum()} of {count} samples are drawn.")

@@ -67,7 +67,7 @@ def criticism(
 def figure(problem: Problem, extension: Extension) -> Misfit:
     """Return the residual without the curve over the covariate, and the curve with its band."""
     name, covariate, unit = smooth_words.covariate(extension.curve)
-    x, residual = (
+    x, residual, left = (
         np.concatenate(parts)
         for parts in zip(*(_samples(problem, drive, extension) for drive in problem.drives), strict=True)
     )
@@ -83,22 +83,27 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
         bins=bins(x, residual),
         explained_by=f"not in the catalogue, over {name}",
         curve=np.column_stack([at, mean]),
+        after=bins(x, left),
         band=np.column_stack([at, mean - NORMAL90 * sd, mean + NORMAL90 * sd]),
     )
 
 
-def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[FloatArray, FloatArray]:
-    """Return covariate and residual rate per increment in which the chair moves throughout."""
+def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return covariate, residual rate, and that with the curve in, per increment in which the chair moves throughout."""
     channel = list(effects.CHANNELS).index(extension.curve.channel)
     motion = replay.motion(drive, problem.model, extension.fit.settings)
     values = extension.curve.basis.samples(motion)
     middle = np.clip(((drive.times[1:] + drive.times[:-1]) / 2 - drive.start) / GRID, 0, len(values) - 1).astype(int)
-    left = drive.measured - problem.simulated(drive, extension.fit.settings)
+    dt = np.diff(drive.times)
+    residual, left = (
+        (drive.measured - problem.simulated(drive, settings))[:, channel] / dt
+        for settings in (extension.fit.settings, extension.settings)
+    )
     x = values[middle]
     if "period" in extension.curve.basis.constants:
         x = np.mod(x, extension.curve.basis.constants["period"])
     use = np.isfinite(x) & ((motion.v != 0) | (motion.w != 0))[middle]
-    return x[use], (left[:, channel] / np.diff(drive.times))[use]
+    return x[use], residual[use], left[use]
 
 
 def _told(extension: Extension, beyond: Beyond, share: float) -> str:
