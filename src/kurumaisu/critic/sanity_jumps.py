@@ -13,6 +13,7 @@ _FAR = 10.0  # robust sd of the reference that a jump exceeds
 _TURN = 0.6  # [rad] between two poses, least jump of a heading
 _BUNCH = 4.0
 _HALF = 0.4  # [rad] from half a turn
+_PAUSE = 5.0  # [s] without a pose after which nobody knows how far the robot was driven, or carried
 
 
 def words(pose: Series) -> list[str]:
@@ -45,7 +46,8 @@ def _heading(pose: Series) -> str | None:
     step = np.diff(theta)
     usual = float(np.quantile(np.abs(step) / dt, 0.95)) * np.maximum(dt, float(np.median(dt)))
     noise = 1.4826 * float(np.median(np.abs(np.diff(theta, n=3)))) / np.sqrt(20)
-    odd = np.flatnonzero(np.abs(step) > np.maximum(np.maximum(2 * usual, 1.5 * _FAR * noise), _TURN))
+    large = np.abs(step) > np.maximum(np.maximum(2 * usual, 1.5 * _FAR * noise), _TURN)
+    odd = np.flatnonzero(large & (dt < _PAUSE))
     odd = np.array([i for i in odd if i >= 4 and _lasts(theta, int(i))], dtype=int)
     if not len(odd) or float(np.median(usual)) > _TURN:
         return None
@@ -81,7 +83,7 @@ def jumps(pose: Series, slack: float = 1.0) -> tuple[list[int], list[int]]:
     )
     lasting: list[int] = []
     single: list[int] = []
-    for i in np.flatnonzero(odd > np.maximum(limit, 1e-6)):
+    for i in np.flatnonzero((odd > np.maximum(limit, 1e-6)) & (dt < _PAUSE)):
         before = np.median(xy[max(0, i - 3) : i + 1] - xy[i], axis=0)
         after = np.median(xy[i + 1 : i + 5] - xy[i + 1], axis=0) + step[i]
         here = lasting if np.hypot(*(after - before)) > 0.6 * odd[i] and len(xy) - i > 5 and i >= 4 else single

@@ -76,12 +76,12 @@ def bases(drives: Sequence[Drive], model: Model, settings: Sequence[EffectSettin
         if len(known) < _FEWEST or np.ptp(known) <= _ROUNDING * max(1.0, float(np.abs(known).max())):
             continue
         period = constants.get("period", 0.0)
-        knots = np.empty(0) if period else _knots(known)
+        knots = np.empty(0) if period else knots_of(known)
         if not period and len(knots) < 3:
             continue
         matrix = _matrix(knots, period, pooled)
         low, high = np.quantile(known, [0.025, 0.975])
-        yield Basis(name, knots, constants, tuple(_priors(knots, matrix)), float(low), float(high))
+        yield Basis(name, knots, constants, tuple(priors_of(knots, matrix)), float(low), float(high))
 
 
 def _samples(name: str, constants: dict[str, float], motion: effects.Motion) -> FloatArray:
@@ -100,11 +100,11 @@ def _constants(name: str, drives: Sequence[Drive], model: Model) -> dict[str, fl
     return {constant: float(np.mean(np.concatenate([drive.known[name] for drive in drives])))}
 
 
-def _knots(values: FloatArray) -> FloatArray:
+def knots_of(values: FloatArray, hats: int = _HATS) -> FloatArray:
     """Return knots half way between evenly spaced ones and ones with as many samples between them."""
     low, high = np.quantile(values, [0.01, 0.99])
     inside = np.clip(values, low, high)
-    knots = 0.5 * (np.linspace(low, high, _HATS) + np.quantile(inside, np.linspace(0, 1, _HATS)))
+    knots = 0.5 * (np.linspace(low, high, hats) + np.quantile(inside, np.linspace(0, 1, hats)))
     keep = np.append(True, np.diff(knots) > 1e-3 * (high - low))
     return np.asarray(knots[keep]) if high > low else np.empty(0)
 
@@ -116,7 +116,7 @@ def _matrix(knots: FloatArray, period: float, at: FloatArray) -> FloatArray:
     return np.column_stack([np.ones(len(at)), np.cos(phase), np.sin(phase)])
 
 
-def _priors(knots: FloatArray, matrix: FloatArray) -> Iterator[FloatArray]:
+def priors_of(knots: FloatArray, matrix: FloatArray) -> Iterator[FloatArray]:
     """Yield covariances of the coefficients, without and with a level of their own, for each order.
 
     A curve without a level has mean 0 over the drives.

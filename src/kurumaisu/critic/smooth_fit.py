@@ -13,6 +13,7 @@ from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.smooth import Curve, columns, raw_columns
+from kurumaisu.critic.smooth_basis import Basis
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
@@ -31,6 +32,11 @@ class Extension:
     prior: FloatArray
     coefficients: FloatArray
     covariance: FloatArray
+
+    @property
+    def basis(self) -> Basis:
+        """Return the basis of the curve."""
+        return self.curve.basis
 
     @property
     def unknown(self) -> EffectSetting:

@@ -5,16 +5,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from kurumaisu.critic.smooth_fit import Extension
+from kurumaisu.critic.smooth_basis import Basis
 from kurumaisu.types import FloatArray
 
 _POINTS = 60  # at which a curve is described
 _DRAWS = 300  # of the posterior
 _PLACES = 25  # of a template along the covariate
 _TURN = 2 * np.pi
+
+
+class Described(Protocol):
+    """A curve over a covariate: basis, coefficients (m,) and their covariance (m, m)."""
+
+    @property
+    def basis(self) -> Basis:
+        """Return its basis of m functions."""
+
+    @property
+    def coefficients(self) -> FloatArray:
+        """Return its coefficients."""
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Return their covariance."""
 
 
 @dataclass(frozen=True)
@@ -63,31 +80,31 @@ TEMPLATES: dict[str, tuple[Callable[[FloatArray, float], FloatArray], ...]] = {
 }
 
 
-def grid(extension: Extension) -> FloatArray:
+def grid(described: Described) -> FloatArray:
     """Return values of the covariate at which its curve is known."""
-    basis = extension.curve.basis
+    basis = described.basis
     if len(basis.knots):
         low, high = max(basis.low, float(basis.knots[0])), min(basis.high, float(basis.knots[-1]))
         return np.linspace(low, high, _POINTS)
     return np.linspace(0.0, basis.constants["period"], _POINTS, endpoint=False)
 
 
-def band(extension: Extension, at: FloatArray) -> FloatArray:
+def band(described: Described, at: FloatArray) -> FloatArray:
     """Return the curve and its standard deviation at values of the covariate, (2, n)."""
-    matrix = extension.curve.basis.matrix(at)
-    variance = np.einsum("ij,jk,ik->i", matrix, extension.covariance, matrix)
-    return np.stack([matrix @ extension.coefficients, np.sqrt(np.maximum(variance, 0.0))])
+    matrix = described.basis.matrix(at)
+    variance = np.einsum("ij,jk,ik->i", matrix, described.covariance, matrix)
+    return np.stack([matrix @ described.coefficients, np.sqrt(np.maximum(variance, 0.0))])
 
 
-def shape_of(extension: Extension) -> Shape:
+def shape_of(described: Described) -> Shape:
     """Return the template that describes the curve best, with intervals from draws of its coefficients."""
-    at = grid(extension)
+    at = grid(described)
     draws = np.random.default_rng(0).multivariate_normal(
-        extension.coefficients, extension.covariance, size=_DRAWS, check_valid="ignore"
+        described.coefficients, described.covariance, size=_DRAWS, check_valid="ignore"
     )
-    curves = np.vstack([extension.coefficients, draws]) @ extension.curve.basis.matrix(at).T
-    if not len(extension.curve.basis.knots):
-        return _periodic(extension, np.vstack([extension.coefficients, draws]))
+    curves = np.vstack([described.coefficients, draws]) @ described.basis.matrix(at).T
+    if not len(described.basis.knots):
+        return _periodic(described, np.vstack([described.coefficients, draws]))
     x = (at - at[0]) / (at[-1] - at[0])
     noise = float(np.mean(curves[1:].var(axis=0)))
     kind = min(TEMPLATES, key=lambda name: _cost(name, x, curves[0], noise))
@@ -97,12 +114,12 @@ def shape_of(extension: Extension) -> Shape:
     return Shape(kind, at[0] + (at[-1] - at[0]) * _interval(places), _interval(sizes))
 
 
-def _periodic(extension: Extension, coefficients: FloatArray) -> Shape:
+def _periodic(described: Described, coefficients: FloatArray) -> Shape:
     """Return the strongest harmonic."""
     count = (coefficients.shape[1] - 1) // 2
     sizes = np.hypot(coefficients[:, 1 : 1 + count], coefficients[:, 1 + count :])
     strongest = int(np.argmax(sizes[0]))
-    period = extension.curve.basis.constants["period"] / (strongest + 1)
+    period = described.basis.constants["period"] / (strongest + 1)
     return Shape("periodic", np.full(3, period), _interval(sizes[:, strongest]))
 
 

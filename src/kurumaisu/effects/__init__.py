@@ -52,6 +52,7 @@ from kurumaisu.effects.sign import Sign
 from kurumaisu.effects.slope import Slope
 from kurumaisu.effects.smooth import CHANNELS, SMOOTH, constant_of, curve, smooth_id, smooth_of
 from kurumaisu.effects.smooth_covariates import CONSTANTS, COVARIATES, MEANINGS, PERIODIC, Follower
+from kurumaisu.effects.smooth_laser import RANGE_COVARIATES, smooth_range_id, smooth_range_of
 from kurumaisu.effects.steering_law import SteeringLaw
 from kurumaisu.effects.understeer import Understeer
 from kurumaisu.effects.veer import Veer
@@ -117,6 +118,9 @@ def by_id(name: str) -> type[Mechanism]:
     smooth = smooth_of(name)
     if smooth is not None:
         return smooth
+    ranged = smooth_range_of(name)
+    if ranged is not None:
+        return ranged
     raise Error(f"effects: {name!r} is not in the catalogue: {', '.join(effect.id for effect in ALL)}")
 
 
@@ -152,7 +156,10 @@ def build_laser(settings: tuple[EffectSetting, ...], rng: np.random.Generator) -
     """
     chosen = [(effect, values) for effect, values in _chosen(settings) if issubclass(effect, LaserEffect)]
     seed = int(rng.integers(2**63))
-    built = [effect(values, np.random.default_rng([seed, LASER.index(effect)])) for effect, values in chosen]
+    place = [LASER.index(effect) if effect in LASER else len(LASER) for effect, _ in chosen]
+    built = [
+        effect(values, np.random.default_rng([seed, i])) for i, (effect, values) in zip(place, chosen, strict=True)
+    ]
     return LaserChain(sorted(built, key=lambda effect: effect.stage))
 
 
@@ -179,6 +186,7 @@ __all__ = [
     "LASER",
     "MEANINGS",
     "PERIODIC",
+    "RANGE_COVARIATES",
     "SMOOTH",
     "WORLD",
     "BaseEffect",
@@ -215,4 +223,5 @@ __all__ = [
     "incidence",
     "slanted",
     "smooth_id",
+    "smooth_range_id",
 ]

@@ -66,8 +66,8 @@ class Smooth(Effect):
                 raise Error(
                     f"{cls.id}: {name} must be a {'positive' if name == 'period' else 'finite'} number: {value}"
                 )
-        if not start and (np.diff(_numbered(values, "knot", 0)) <= 0).any():
-            raise Error(f"{cls.id}: knots must increase: {_numbered(values, 'knot', 0)}")
+        if not start and (np.diff(numbered(values, "knot", 0)) <= 0).any():
+            raise Error(f"{cls.id}: knots must increase: {numbered(values, 'knot', 0)}")
 
     def apply(self, motion: Motion) -> Motion:
         """Add the curve to the rate where the chair moves."""
@@ -106,13 +106,15 @@ def constant_of(covariate: str) -> str | None:
 def curve(covariate: str, values: Mapping[str, float], at: FloatArray) -> FloatArray:
     """Return the curve of parameters at values of the covariate, in the unit of the rate."""
     if covariate not in PERIODIC:
-        return np.asarray(np.interp(at, _numbered(values, "knot", 0), _numbered(values, "value", 0)))
-    cosines, sines = _numbered(values, "cos", 1), _numbered(values, "sin", 1)
+        return np.asarray(np.interp(at, numbered(values, "knot", 0), numbered(values, "value", 0)))
+    cosines, sines = numbered(values, "cos", 1), numbered(values, "sin", 1)
     phase = np.multiply.outer(2 * np.pi * at / values["period"], np.arange(1, len(cosines) + 1))
     return np.asarray(values["level"] + np.cos(phase) @ cosines + np.sin(phase) @ sines)
 
 
-def _numbered(values: Mapping[str, float], stem: str, start: int) -> FloatArray:
+def numbered(values: Mapping[str, float], stem: str, start: int) -> FloatArray:
+    """Return the parameters stem_i in their order, from i = start on."""
+
     def find() -> Iterator[float]:
         i = start
         while f"{stem}_{i}" in values:

@@ -20,12 +20,13 @@ from kurumaisu.types import FloatArray
 
 @dataclass(frozen=True)
 class _Look:
-    """What the beams of a scan met: true ranges, +inf for nothing, and returns, both (samples,)."""
+    """What the beams of a scan met: true ranges, +inf for nothing, returns, both (samples,); origins: from where."""
 
     beams: Beams
     ranges: FloatArray
     returns: FloatArray
     incidence: FloatArray
+    origins: FloatArray
 
 
 class FanEffects:
@@ -69,7 +70,7 @@ class FanEffects:
         if self._chain.oblique:
             angles = incidence(lambda poses, bearings: cast(poses, bearings)[0], origins, bearings, ranges)
         self._forget(float(min(beams.times.min(), time)))
-        return _Look(beams, slanted(ranges, beams), returns, angles)
+        return _Look(beams, slanted(ranges, beams), returns, angles, origins)
 
     def read(self, look: _Look, noisy: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return readings (samples,) [m], +inf no return, NaN no valid one, and returns; noisy: ranges with noise."""
@@ -89,6 +90,7 @@ class FanEffects:
             sd=sd,
             noise=np.where(np.isfinite(noise) & (look.ranges < fan.range_max), noise, own),
             readings=look.ranges,
+            origins=look.origins,
         )
         readings = self._chain.read(echoes)
         beyond = readings > fan.range_max

@@ -112,6 +112,7 @@ class Scanner:
             sd=error.deviation(ranges),
             noise=noise,
             readings=ranges,
+            origins=origins,
         )
         # What the law, without its noise, makes of the range that it means by a reading: rounding and gate are left.
         return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges))), returns

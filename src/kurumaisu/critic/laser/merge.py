@@ -19,7 +19,9 @@ def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
     if finding.refused is not None:
         return replace(criticism, story=replace(story, details=(*story.details, _refusal(finding.refused))))
     kind: Kind = verdict.verdict
-    if finding.causes:
+    if finding.unknown:
+        kind = "unknown"
+    elif finding.causes and kind != "unknown":
         kind = "named"
     elif finding.confounded and kind == _NOTHING_SAID:
         kind = "confounded"
@@ -28,9 +30,10 @@ def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
         verdict=kind,
         causes=(*verdict.causes, *finding.causes),
         confounded=(*verdict.confounded, *finding.confounded),
+        unknown=(*verdict.unknown, *finding.unknown),
     )
     words = headline(finding)
-    if words and verdict.verdict in ("named", "confounded"):
+    if words and verdict.verdict in ("named", "confounded", "unknown"):
         words = f"{story.headline} {words}"
     told = replace(story, headline=words or story.headline, details=(*story.details, *finding.details))
     return replace(criticism, verdict=joined, story=told, settings=(*criticism.settings, *finding.settings))
@@ -38,6 +41,9 @@ def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
 
 def headline(finding: LaserFinding) -> str:
     """Return what the scans say in a sentence; empty when they say nothing."""
+    if finding.unknown:
+        first = finding.unknown[0]
+        return f"Something that is not in the catalogue changes the ranges with the {first.covariate}: {first.shape}."
     if finding.causes:
         text = "; ".join(effects.by_id(cause.id).sentence for cause in finding.causes)
         return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in finding.causes)})."

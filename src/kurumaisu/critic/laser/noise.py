@@ -74,7 +74,7 @@ def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[F
 
     The latter is that of the covariance, relative to independent readings.
     """
-    size = np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], _FLOOR)
+    size = sizes(noise)
     scans, stands = len(grams), int(layout.stand.max(initial=-1)) + 1
     common = len(grams[0].matrix) - grams[0].own - grams[0].shared
     inner = np.zeros((scans + 3 * stands, scans + 3 * stands))
@@ -90,10 +90,15 @@ def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[F
             index = [k, *(scans + 3 * layout.stand[k] + i for i in range(lead - 1))]
             inner[np.ix_(index, index)] += part[:lead, :lead]
             cross[index] += part[:lead, lead:]
-    prior, prior_log_det = _precision(layout, noise, np.tile(size**-2, stands))
+    prior, prior_log_det = precision(layout, noise, np.tile(size**-2, stands))
     factor = cho_factor(inner + prior)
     log_det += 2 * float(np.log(np.diag(factor[0])).sum()) - prior_log_det
     return total - cross.T @ cho_solve(factor, cross), log_det
+
+
+def sizes(noise: ScanNoise) -> FloatArray:
+    """Return the sds (3,) of a reference pose."""
+    return np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], _FLOOR)
 
 
 def _alike(grams: Sequence[Gram]) -> list[list[int]]:
@@ -115,7 +120,7 @@ def _without_own(matrices: FloatArray, own: int, size: FloatArray) -> tuple[Floa
     return rest, float(np.linalg.slogdet(inner)[1].sum())
 
 
-def _precision(layout: Layout, noise: ScanNoise, stands: FloatArray) -> tuple[FloatArray, float]:
+def precision(layout: Layout, noise: ScanNoise, stands: FloatArray) -> tuple[FloatArray, float]:
     """Return the precision of common modes, autoregressive within a run, and stands; and its log determinant."""
     n = len(layout.times)
     sd = max(noise.common_sd, _FLOOR)
@@ -139,7 +144,7 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
     The last common column is the residual. truth: known sd of the reference, else it is estimated too.
     """
     start = np.log([0.005, 0.005, 2e-4, 1.0])
-    low, high = np.log([1e-5, 1e-5, 1e-6, 0.01]), np.log([0.3, 0.3, 0.1, 1e3])
+    low, high = np.log([1e-5, 1e-5, 1e-6, 0.01]), np.log([0.3, 0.3, 0.1, 10.0])
     if truth is not None:
         start[:2] = np.log(np.maximum(truth, 1e-5))
     free = np.arange(0 if truth is None else 2, 4)

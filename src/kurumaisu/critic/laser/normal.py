@@ -9,9 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.columns import Form, Marks
+from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict, thin
+from kurumaisu.critic.laser.standing import smoothed
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
 from kurumaisu.geometry import compose
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -19,8 +22,12 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
 _OUTLIER = 4.5  # deviations from which a reading does not count
 _BINS = 6  # of the range, in which the deviation is estimated
+_JOLT = 4.0  # sds among scans from which one of them does not count
+_TOLERATED = 0.1  # share by which a scan may always be noisier than the middle one
 _ROUNDS = 3
+_UNSEEN = 0.2  # weight of a pose that no scan has moved, among others
 _SHIFTS = 2  # times that poses are sought by the scans
+_MANY = 10  # readings of a beam, and beams, from which their offsets are estimated
 _LEAST = 1e-4  # [m] deviation of a reading
 _BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau=1.0)  # before any is known
 _MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
@@ -28,11 +35,12 @@ _MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
 
 @dataclass(frozen=True)
 class BeamNoise:
-    """Deviations (k, b) [m] of readings, how neighbours correlate, and which readings count."""
+    """Deviations (k, b) [m] of readings, how neighbours correlate, which readings count, and beams' own offsets [m]."""
 
     sd: FloatArray
     rho: float
     valid: BoolArray
+    own_sd: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -54,19 +62,25 @@ class Assembly:
         self.layout = Layout(shots.stamps, shots.run, _stands(shots))
         self.tracks = shots.tracks
         self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
-        self._linearise(shots)
+        self._linearise(shots, roughly=True)
         self.first = self._trust()
-        for _ in range(_SHIFTS):
-            self._linearise(self._moved())
+        for i in range(_SHIFTS):
+            self._linearise(self._moved(), roughly=i < _SHIFTS - 1)
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base)
-        self.forms, self.columns = self.marks.forms(ids)
+        self.forms, fixed = self.marks.forms(ids)
+        self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
+        self.columns = np.concatenate([fixed, more], axis=2)
+        self._fixed = fixed.shape[2]
 
-    def _linearise(self, shots: Shots) -> None:
-        """Predict at the shots' shifted poses; the residual is as of the reference's own."""
+    def _linearise(self, shots: Shots, *, roughly: bool) -> None:
+        """Predict at the shots' shifted poses; the residual is as of the reference's own.
+
+        roughly: where poses are only sought, one side of a difference will do.
+        """
         self.shots = shots
         self.marks = Marks(shots)
-        self.poses = self._by_pose()
+        self.poses = self._by_pose((1.0,) if roughly else (-1.0, 1.0))
         self.residual = shots.measured - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
 
     def _trust(self) -> BeamNoise:
@@ -81,10 +95,12 @@ class Assembly:
             rows = self._alike_rows(k)
             sums[self.shots.run[k]][rows, :3] += errors
             sums[self.shots.run[k]][rows, 3] += 1
-        mean = [some[:, :3] / np.maximum(some[:, 3:], 1) for some in sums]
+        mean = []
         # Errors are as of the first tracks, which `shift` has moved already.
-        for track, first, error in zip(tracks, self.tracks, mean, strict=True):
-            track.poses[:] = first.poses + error
+        for track, first, some in zip(tracks, self.tracks, sums, strict=True):
+            moved = first.poses + some[:, :3] / np.maximum(some[:, 3:], 1)
+            track.poses[:] = smoothed(track.times, moved, np.where(some[:, 3] > 0, 1.0, _UNSEEN))
+            mean.append(track.poses - first.poses)
         shift = [hat.weights @ mean[self.shots.run[k]][hat.rows] for k, hat in enumerate(self.hats)]
         return replace(self.shots, tracks=tuple(tracks), shift=np.array(shift))
 
@@ -144,14 +160,42 @@ class Assembly:
         return out
 
     def settle(self, truth: tuple[float, float] | None, fitted: Sequence[Form] = ()) -> Normal:
-        """Return the normal equations with the noise estimated from these very data; fitted: forms to project out."""
-        project = np.concatenate([np.arange(len(self.columns))[form.span] for form in self._plain(fitted)])
+        """Return the normal equations with the noise estimated from these very data; fitted: forms to project out.
+
+        Without the blocks of many columns, but for those that change whole scans.
+        """
+        whole = [free.span for free in self.free if free.whole]
+        spans = [form.span for form in self._plain(fitted)] + whole
+        project = np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
         beam = self.first
         for _ in range(_ROUNDS):
             beam = self._refined(beam, project)
-        grams = self.grams(beam)
+        narrow = max((span.stop for span in whole), default=self._fixed)
+        grams, cross = self._crossed(beam, narrow)
         scan = estimate(grams, self.layout, truth, project)
-        return Normal(marginal(grams, self.layout, scan)[0], scan, beam, int(beam.valid.sum()))
+        gram = without_beams(grams, cross, self.layout, scan, beam.own_sd)
+        return Normal(gram, scan, beam, int(beam.valid.sum()))
+
+    def full(self, normal: Normal) -> Normal:
+        """Return the normal equations of all columns, in the noise that is known."""
+        grams, cross = self._crossed(normal.beam_noise, self.columns.shape[2])
+        gram = without_beams(grams, cross, self.layout, normal.scan_noise, normal.beam_noise.own_sd)
+        return replace(normal, gram=gram)
+
+    def _crossed(self, beam: BeamNoise, count: int) -> tuple[list[Gram], Crossed]:
+        """Return the first columns' normal equations of each scan, and what single beams' offsets share with them."""
+        beams = self.residual.shape[1]
+        inner, common = np.zeros((beams, beams)), np.zeros((beams, count + 1))
+        grams, parts = [], []
+        for k in range(len(self.residual)):
+            own, shared, last = self._rows(k, np.arange(count))
+            rows = whitened(np.hstack([own, shared, last]), beam.valid[k], beam.sd[k], beam.rho)
+            grams.append(Gram(rows.T @ rows, own.shape[1], shared.shape[1]))
+            products = crossed(rows, beam.valid[k], beam.sd[k], beam.rho, inner)
+            lead = own.shape[1] + shared.shape[1]
+            parts.append(products[:, :lead])
+            common += products[:, lead:]
+        return grams, Crossed(tuple(parts), common, inner)
 
     def grams(self, beam: BeamNoise, columns: IntArray | None = None) -> list[Gram]:
         """Return the normal equations of each scan; columns: which of all, None for all."""
@@ -194,11 +238,24 @@ class Assembly:
             if inside.any():
                 sd[bins == i] *= max(_MAD * float(np.median(np.abs(left[inside] / self.first.sd[inside]))), 0.05)
         z = left / sd
-        valid = self.first.valid & (np.abs(np.nan_to_num(self.leftover_all(left, beam, project) / sd)) < _OUTLIER)
+        every = self.leftover_all(left, beam, project) / sd
+        valid = self.first.valid & (np.abs(np.nan_to_num(every)) < _OUTLIER) & ~self._jolted(every)[:, np.newaxis]
         both = beam.valid[:, 1:] & beam.valid[:, :-1] & (np.abs(z[:, 1:]) < _OUTLIER) & (np.abs(z[:, :-1]) < _OUTLIER)
         a, b = z[:, 1:][both], z[:, :-1][both]
         rho = float(np.clip(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9), 0.0, 0.95))
-        return replace(beam, sd=sd, rho=rho, valid=valid)
+        kept = np.where(beam.valid & (np.abs(z) < _OUTLIER), left, np.nan)
+        return replace(beam, sd=sd, rho=rho, valid=valid, own_sd=_own_sd(kept, sd))
+
+    def _jolted(self, z: FloatArray) -> BoolArray:
+        """Return (k,) which scans nothing fits as well as the others: the speed jumped between two poses."""
+        with np.errstate(invalid="ignore"):
+            seen = np.where(self.first.valid, np.minimum(np.abs(z), _OUTLIER), np.nan)
+        some = self.first.valid.any(axis=1)
+        size = np.ones(len(z))
+        size[some] = np.sqrt(np.nanmean(seen[some] ** 2, axis=1))
+        middle = float(np.median(size[some]))
+        width = _MAD * float(np.median(np.abs(size[some] - middle)))
+        return np.asarray((size > middle + max(_JOLT * width, _TOLERATED * middle)) & (self.layout.stand < 0))
 
     def leftover_all(self, left: FloatArray, beam: BeamNoise, project: IntArray) -> FloatArray:
         """Return the leftover of every reading that may ever count, outliers of the last round too."""
@@ -226,15 +283,15 @@ class Assembly:
         mounts = np.array([each.mount for each in beams])[:, np.newaxis, :]
         return compose(poses, mounts), np.array([each.bearings for each in beams])
 
-    def _by_pose(self) -> FloatArray:
+    def _by_pose(self, signs: Sequence[float]) -> FloatArray:
         """Return the change (k, b, 3) of the mean readings per metre and radian of the pose."""
         out = []
         for axis in range(3):
-            moved = []
-            for sign in (-1.0, 1.0):
+            moved = [self.marks.base] if len(signs) == 1 else []
+            for sign in signs:
                 seen = look(self.shots, (), 0, shift=sign * np.eye(3)[axis] * _MOVE, like=self.marks.seen)
                 moved.append(predict(self.shots, (), seen, 0))
-            out.append((moved[1] - moved[0]) / (2 * _MOVE[axis]))
+            out.append((moved[1] - moved[0]) / (len(signs) * _MOVE[axis]))
         return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
 
 
@@ -251,6 +308,19 @@ def _stands(shots: Shots) -> IntArray:
         if (rows == rows[0]).all():
             out[k] = known.setdefault((int(shots.run[k]), rows[0].tobytes()), len(known))
     return out
+
+
+def _own_sd(left: FloatArray, sd: FloatArray) -> float:
+    """Return the sd [m] of what beams keep over all scans, beyond what chance leaves of so many readings."""
+    seen = np.isfinite(left)
+    count = seen.sum(axis=0)
+    many = count >= _MANY
+    if many.sum() < _MANY:
+        return 0.0
+    middle = np.nanmean(left[:, many], axis=0)
+    chance = np.nansum(np.where(seen, sd, 0.0)[:, many] ** 2, axis=0) / count[many] ** 2
+    spread = (_MAD * float(np.median(np.abs(middle - np.median(middle))))) ** 2
+    return float(np.sqrt(max(spread - float(np.median(chance)), 0.0)))
 
 
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:

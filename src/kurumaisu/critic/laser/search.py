@@ -128,16 +128,26 @@ class Search:
         known = [fit for fit in fits if fit is not None]
         scores = np.array([fit.score for fit in known])
         weights = np.exp(scores - logsumexp(scores))
+        pairs = [(fit.ids, float(weight)) for fit, weight in zip(known, weights, strict=True)]
+        return Found(tuple(known), *confusion(pairs, known[0].ids, self._ids))
 
-        def p_any(names: Iterable[str]) -> float:
-            return float(sum(w for w, fit in zip(weights, known, strict=True) if fit.ids & set(names)))
 
-        p = {name: p_any([name]) for name in self._ids}
-        best = known[0]
-        uncertain = sorted(name for name in best.ids if p[name] < NAMED)
-        group = tuple(uncertain + sorted(name for name in p if name not in best.ids and p[name] >= RIVAL))
-        one = uncertain and len(group) > 1 and p_any(group) >= NAMED
-        return Found(tuple(known), p, (group,) if one else ())
+def confusion(
+    weights: Sequence[tuple[frozenset[str], float]], best: frozenset[str], ids: Sequence[str]
+) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
+    """Return the posterior of each effect by weighed sets, and the sets of which one acts but not known which.
+
+    best: the effects of the best set; those of it that are not certain have rivals.
+    """
+
+    def p_any(names: Iterable[str]) -> float:
+        return sum(weight for chosen, weight in weights if not chosen.isdisjoint(names))
+
+    p = {name: p_any([name]) for name in ids}
+    uncertain = sorted(name for name in best if p[name] < NAMED)
+    group = tuple(uncertain + sorted(name for name in p if name not in best and p[name] >= RIVAL))
+    one = uncertain and len(group) > 1 and p_any(group) >= NAMED
+    return p, (group,) if one else ()
 
 
 def _within(form: Form, coefficients: FloatArray) -> bool:

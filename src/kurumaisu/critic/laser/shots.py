@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu import effects, geometry
+from kurumaisu.critic.laser.standing import steadied
 from kurumaisu.critic.laser.walls import Rays, Walls, walls_at
 from kurumaisu.critic.recording import LaserMount, Recording, Run
 from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
@@ -35,6 +36,7 @@ class Shots:
 
     stamps (k,) [s] since the laser's time 0; run (k,): index into tracks; measured (k, b) [m], nan no valid reading,
     inf no return; said (b,) [s] after the stamp at which beams are fired by the model. Times of tracks count alike.
+    known: what else was recorded, by name, at each scan (k,).
     shift (k, b, 3): how far the tracks have been moved from the reference, to where the readings put the chair. All is
     linearised there; a rate taken from noisy poses would be a noisy covariate.
     """
@@ -48,17 +50,22 @@ class Shots:
     measured: FloatArray
     said: FloatArray
     shift: FloatArray
+    known: Mapping[str, FloatArray]
 
 
 @dataclass(frozen=True)
 class Look:
-    """What beams meet, (k, b): ranges [m], level ones without tilt, incidence [rad], returns [1]; and the beams."""
+    """What beams meet, (k, b): ranges [m], level ones without tilt, incidence [rad], returns [1]; and the beams.
+
+    origins (k, b, 3): poses of the laser when each is fired.
+    """
 
     ranges: FloatArray
     level: FloatArray
     incidence: FloatArray
     returns: FloatArray
     beams: tuple[Beams, ...]
+    origins: FloatArray
 
 
 def missing(recording: Recording) -> str | None:
@@ -86,13 +93,18 @@ def gather(recording: Recording, model: Model) -> Shots:
     zero = min(float(run.scan.t[0]) for run in runs if run.scan is not None)
     zero = zero if zero > _DAY else 0.0
     tracks, stamps, measured = [], [], []
+    names = set.intersection(*(set(run.covariates) for run in runs))
+    known: dict[str, list[FloatArray]] = {name: [] for name in sorted(names)}
     for i, run in enumerate(runs):
         assert run.scan is not None
         assert run.pose is not None
-        tracks.append(Track(run.pose.t - zero, run.pose.values[:, :3]))
+        tracks.append(Track(run.pose.t - zero, steadied(run.pose.t, run.pose.values[:, :3])))
         rows = [index for j, index in chosen if j == i]
         stamps.append(run.scan.t[rows] - zero)
         measured.append(run.scan.values[rows])
+        for name, parts in known.items():
+            series = run.covariates[name]
+            parts.append(np.interp(run.scan.t[rows], series.t, series.values[:, 0]))
     readings = np.concatenate(measured)
     return Shots(
         laser=laser,
@@ -104,6 +116,7 @@ def gather(recording: Recording, model: Model) -> Shots:
         measured=readings,
         said=laser.time_increment * np.arange(laser.beams),
         shift=np.zeros((*readings.shape, 3)),
+        known={name: np.concatenate(parts) for name, parts in known.items()},
     )
 
 
@@ -173,14 +186,15 @@ def look(
     poses = poses_at(shots, np.array([each.times for each in beams]))
     if shift is not None:
         poses = poses + shift
-    origins = geometry.compose(poses, np.array([each.mount for each in beams])[:, np.newaxis, :]).reshape(-1, 3)
+    placed = geometry.compose(poses, np.array([each.mount for each in beams])[:, np.newaxis, :])
+    origins = placed.reshape(-1, 3)
     bearings = np.concatenate([each.bearings for each in beams])
     level, returns = rays.cast(origins, bearings)
     shape = shots.measured.shape
     angles = incidence(rays.ranges, origins, bearings, level).reshape(shape) if like is None else like.incidence
     level = level.reshape(shape)
     ranges = np.array([slanted(row, each) for row, each in zip(level, beams, strict=True)])
-    return Look(ranges, level, angles, returns.reshape(shape), tuple(beams))
+    return Look(ranges, level, angles, returns.reshape(shape), tuple(beams), placed)
 
 
 def poses_at(shots: Shots, times: FloatArray) -> FloatArray:
@@ -195,13 +209,11 @@ def poses_at(shots: Shots, times: FloatArray) -> FloatArray:
 def read(shots: Shots, seen: Look, chain: LaserChain, noise: FloatArray) -> FloatArray:
     """Return readings (k, b) [m] of what is met by a chain, for standard deviates (k, b); neither rounded nor gated."""
     mean, sd = shots.laser.error.mean(seen.ranges), shots.laser.error.deviation(seen.ranges)
+    known = [{name: float(v[k]) for name, v in shots.known.items()} for k in range(len(shots.stamps))]
+    parts = (seen.ranges, seen.incidence, seen.returns, mean, sd, noise, seen.ranges, seen.origins, known)
     rows = [
-        chain.read(
-            Echoes(stamp, shots.laser.bearings, ranges, angles, returns, mean_k, sd_k, noise_k, ranges),
-        )
-        for stamp, ranges, angles, returns, mean_k, sd_k, noise_k in zip(
-            shots.stamps.tolist(), seen.ranges, seen.incidence, seen.returns, mean, sd, noise, strict=True
-        )
+        chain.read(Echoes(stamp, shots.laser.bearings, *row))
+        for stamp, row in zip(shots.stamps.tolist(), zip(*parts, strict=True), strict=True)
     ]
     return np.array(rows)
 
@@ -221,7 +233,12 @@ def thin(shots: Shots, most: int) -> Shots:
     """Return at most so many of the scans, evenly taken."""
     rows = np.unique(np.linspace(0, len(shots.stamps) - 1, most).astype(int))
     return replace(
-        shots, stamps=shots.stamps[rows], run=shots.run[rows], measured=shots.measured[rows], shift=shots.shift[rows]
+        shots,
+        stamps=shots.stamps[rows],
+        run=shots.run[rows],
+        measured=shots.measured[rows],
+        shift=shots.shift[rows],
+        known={name: values[rows] for name, values in shots.known.items()},
     )
 
 

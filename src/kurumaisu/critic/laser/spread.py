@@ -22,15 +22,16 @@ from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
-_NULLS = 60  # simulations of the model as it is, for the covariance of the statistics
+_NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
 _MODEL = 0.5  # what the simulation of the statistics itself is off by, in their sds
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
 _COUNTS = 1.0  # no statistic but a root of a count is that large
-_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # in units of a parameter's scale, tried first
+_SIZES = (0.05, 0.2, 0.7, 2.5)  # in units of a parameter's scale, tried first
 _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
 _LARGEST = 3  # effects in a set
-_TRIES = 15  # simulations of a refit per parameter
-_REFITS = 5  # effects that are refitted
+_TRIES = 12  # simulations of a refit per parameter
+_REFITS = 4  # effects that are refitted
+_CLOSE = 0.5  # share of what the best of them gains that another one must gain, to be refitted
 _FREE = 2.0  # nats that a further parameter must bring
 
 
@@ -49,6 +50,16 @@ class _Rough:
     low: float
     effect: type[Mechanism]
     values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class _Push:
+    """What a parameter at a value does to the statistics."""
+
+    effect: type[Mechanism]
+    name: str
+    value: float
+    change: FloatArray
 
 
 def _low(rough: _Rough) -> float:
@@ -91,7 +102,7 @@ class ScatterSearch:
         # A count that is always 0 in simulations may well be 1 in truth; roots of counts have an sd of 1.
         sd = np.maximum(nulls.std(axis=0), np.where(np.abs(nulls.mean(axis=0)) >= _COUNTS, 0.7, 0.003))
         unit = (nulls - nulls.mean(axis=0)) / sd
-        half = 0.5 * (unit.T @ unit / _NULLS + np.eye(len(sd)))  # of 60 draws, correlations of 40 are uncertain
+        half = 0.5 * (unit.T @ unit / _NULLS + np.eye(len(sd)))  # of 50 draws, correlations of 40 are uncertain
         self._sd = sd
         self._whiten = np.linalg.inv(np.linalg.cholesky(half + _MODEL**2 * np.eye(len(sd))))
         self._offset = nulls.mean(axis=0)
@@ -100,32 +111,53 @@ class ScatterSearch:
         """Return the effects, greedily added while the evidence grows."""
         if np.abs((self._measured - self._offset) / self._sd).max() < _QUIET:
             return []
-        chosen: list[tuple[type[Mechanism], EffectSetting]] = []
-        here = self._misfit((), (1, 2))
+        pushes = list(self._pushes())
+        chosen: list[type[Mechanism]] = []
+        settings: list[EffectSetting] = []
         out: list[Scatter] = []
-        count = len(effects.LASER)
         while len(chosen) < _LARGEST:
-            beside = [setting for _, setting in chosen]
-            rough = sorted(
-                (self._rough(effect, beside) for effect in self._candidates([e for e, _ in chosen])), key=_low
-            )
-            tried = []
-            for start in [each for each in rough[:_REFITS] if each.low < here]:
-                setting, misfit = self._refit(start, beside)
-                z = np.sqrt(max(2 * (here - misfit), 0.0))
-                gain = here - misfit - float(occam(np.array(z))) - 2.0 * (len(start.values) - 1)
-                tried.append((gain + log_prior(1, count) - log_prior(0, count), misfit, start.effect, setting))
-            if not tried:
+            step = self._step(pushes, chosen, settings)
+            if step is None:
                 break
-            tried.sort(key=lambda item: -item[0])
-            best, misfit, effect, setting = tried[0]
-            p = float(np.exp(best - logsumexp([0.0, *(item[0] for item in tried)])))
-            if best < _ENOUGH or p < 0.5:
-                break
-            chosen.append((effect, setting))
-            out.append(Scatter(setting, p, best, self._errors(effect, setting, [s for _, s in chosen[:-1]])))
-            here = misfit
+            effect, setting, p, gain = step
+            out.append(Scatter(setting, p, gain, self._errors(effect, setting, settings)))
+            chosen.append(effect)
+            settings.append(setting)
         return out
+
+    def _step(
+        self, pushes: Sequence[_Push], chosen: Sequence[type[Mechanism]], beside: Sequence[EffectSetting]
+    ) -> tuple[type[Mechanism], EffectSetting, float, float] | None:
+        """Return the effect to add, its setting, posterior and evidence; None where there is too little."""
+        at = self._statistics(beside, (1, 2))
+        here, count = self._cost(at), len(effects.LASER)
+        starts = [
+            self._rough([push for push in pushes if push.effect is effect], at) for effect in self._candidates(chosen)
+        ]
+        starts = sorted((start for start in starts if start.low < here), key=_low)
+        tried = []
+        for start in starts[:_REFITS]:
+            if here - start.low < _CLOSE * (here - starts[0].low):
+                break
+            setting, misfit = self._refit(start, beside)
+            z = np.sqrt(max(2 * (here - misfit), 0.0))
+            gain = here - misfit - float(occam(np.array(z))) - 2.0 * (len(start.values) - 1)
+            tried.append((gain + log_prior(1, count) - log_prior(0, count), start.effect, setting))
+        if not tried:
+            return None
+        best, effect, setting = max(tried, key=lambda item: item[0])
+        p = float(np.exp(best - logsumexp([0.0, *(item[0] for item in tried)])))
+        return None if best < _ENOUGH or p < 0.5 else (effect, setting, p, best)
+
+    def _pushes(self) -> Iterator[_Push]:
+        """Yield what each parameter alone does to the statistics, at some values."""
+        plain = self._simulate((), 1)
+        for effect in self._candidates(()):
+            null = {p.name: p.null for p in effect.parameters}
+            for p in self._parameters(effect):
+                for value in _sizes(p):
+                    moved = self._simulate((EffectSetting(effect.id, {**null, p.name: value}),), 1)
+                    yield _Push(effect, p.name, value, moved - plain)
 
     def _candidates(self, without: Sequence[type[Mechanism]]) -> Iterator[type[Mechanism]]:
         for effect in effects.LASER:
@@ -136,22 +168,26 @@ class ScatterSearch:
     def _parameters(self, effect: type[Mechanism]) -> list[Parameter]:
         return [p for p in effect.parameters if f"{effect.id}.{p.name}" not in self._means]
 
-    def _misfit(self, settings: Sequence[EffectSetting], seeds: Sequence[int] = (1,)) -> float:
-        simulated = np.mean([self._simulate(settings, seed) for seed in seeds], axis=0)
-        white = self._whiten @ ((simulated - self._measured) / self._sd)
+    def _statistics(self, settings: Sequence[EffectSetting], seeds: Sequence[int]) -> FloatArray:
+        return np.asarray(np.mean([self._simulate(settings, seed) for seed in seeds], axis=0))
+
+    def _misfit(self, settings: Sequence[EffectSetting], seeds: Sequence[int] = (1, 2)) -> float:
+        return self._cost(self._statistics(settings, seeds))
+
+    def _cost(self, statistics: FloatArray) -> float:
+        white = self._whiten @ ((statistics - self._measured) / self._sd)
         return 0.5 * float(white @ white)
 
-    def _rough(self, effect: type[Mechanism], beside: Sequence[EffectSetting]) -> _Rough:
-        """Return the best of some sizes of an effect's parameters, one after the other."""
-        null = {p.name: p.null for p in effect.parameters}
+    def _rough(self, pushes: Sequence[_Push], at: FloatArray) -> _Rough:
+        """Return the best of some sizes of an effect's parameters, as if changes of the statistics were sums."""
         low, best = np.inf, dict[str, float]()
-        for p in self._parameters(effect):
-            for value in _sizes(p):
-                values = {**best, p.name: value}
-                misfit = self._misfit((*beside, EffectSetting(effect.id, {**null, **values})))
+        for name in dict.fromkeys(push.name for push in pushes):
+            known = at + sum(push.change for push in pushes if best.get(push.name) == push.value)
+            for push in pushes:
+                misfit = self._cost(known + push.change) if push.name == name else np.inf
                 if misfit < low - _FREE:
-                    low, best = misfit, values
-        return _Rough(low, effect, best)
+                    low, best = misfit, {**{k: v for k, v in best.items() if k != name}, name: push.value}
+        return _Rough(low, pushes[0].effect, best)
 
     def _refit(self, start: _Rough, beside: Sequence[EffectSetting]) -> tuple[EffectSetting, float]:
         """Return an effect's best setting and its misfit, from a rough one: those parameters that helped, together."""

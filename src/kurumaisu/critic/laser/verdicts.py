@@ -3,24 +3,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from kurumaisu import effects
+from kurumaisu.critic.laser import rivals
 from kurumaisu.critic.laser.normal import Assembly, Normal
+from kurumaisu.critic.laser.rivals import Rival, Weighed
 from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch, Simulator
 from kurumaisu.critic.laser.statistics import Statistics
+from kurumaisu.critic.laser.unknowns import unknowns
 from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.verdict import Cause, Estimate
+from kurumaisu.critic.verdict import Cause, Estimate, Unknown
 from kurumaisu.params import EffectSetting, Model
+from kurumaisu.types import FloatArray, IntArray
 
 MATERIAL = 3e-4  # [m] rms change of the readings below which an effect of the laser does not matter
-_SCATTERED = 60  # scans whose scatter is looked at: each simulation of them takes a hundredth of a second
+_SCATTERED = 45  # scans whose scatter is looked at: each simulation of them takes a hundredth of a second
 _NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
 Progress = Callable[[str], None]
 
@@ -29,12 +33,13 @@ Progress = Callable[[str], None]
 class LaserFinding:
     """What the scans say.
 
-    causes: named and material; confounded: sets of which one acts; settings: what extends the model; details: for
-    the report, in words; refused: why there is no laser criticism, None where there is.
+    causes: named and material; confounded: sets of which one acts; unknown: what is in no catalogue; settings: what
+    extends the model; details: for the report, in words; refused: why there is no laser criticism, None where there is.
     """
 
     causes: tuple[Cause, ...] = ()
     confounded: tuple[tuple[str, ...], ...] = ()
+    unknown: tuple[Unknown, ...] = ()
     settings: tuple[EffectSetting, ...] = ()
     details: tuple[str, ...] = ()
     refused: str | None = None
@@ -61,15 +66,52 @@ def criticise(
         shaped = [form for form in assembly.forms if form.start in {each.start for each in found.best.forms}]
         normal = assembly.settle(recording.truth, shaped)
         found = Search(assembly.forms, normal.gram).run()
+    normal = assembly.full(normal)
+    made = _made(assembly, normal, found)
     progress("laser: weighing effects on the scatter")
-    scatter = _scatter(assembly, normal, found, ids)
-    return _finding(assembly, normal, found, scatter)
+    scatter = _scatter(assembly, normal, made, ids)
+    return _finding(assembly, normal, made, scatter)
 
 
-def _scatter(assembly: Assembly, normal: Normal, found: Found, ids: frozenset[str] | None) -> list[Scatter]:
+@dataclass(frozen=True)
+class _Made:
+    """What acts on the mean: the forms' fit; winner: a block beside it, if any, its coefficients and covariance."""
+
+    weighed: Weighed
+    fit: Fitted
+    winner: Rival | None
+    coefficients: FloatArray
+    covariance: FloatArray
+
+    @property
+    def found(self) -> Found:
+        """The search's result with blocks in the running."""
+        return self.weighed.found
+
+    def columns(self) -> tuple[IntArray, FloatArray]:
+        """Return which columns of the whole matrix act, and by how much."""
+        spans = [form.span for form in self.fit.forms] + ([self.winner.free.span] if self.winner else [])
+        use = np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
+        return use, np.concatenate([self.fit.coefficients, self.coefficients])
+
+
+def _made(assembly: Assembly, normal: Normal, found: Found) -> _Made:
+    weighed = rivals.weigh(found, assembly.free, normal.gram)
+    winner = weighed.winner
+    if winner is None:
+        return _Made(weighed, found.best, None, np.empty(0), np.empty((0, 0)))
+    return _Made(weighed, *_with(winner, normal))
+
+
+def _with(winner: Rival, normal: Normal) -> tuple[Fitted, Rival, FloatArray, FloatArray]:
+    fit, coefficients, covariance = rivals.joint(winner, normal.gram)
+    return fit, winner, coefficients, covariance
+
+
+def _scatter(assembly: Assembly, normal: Normal, made: _Made, ids: frozenset[str] | None) -> list[Scatter]:
     """Return the effects on how readings scatter about the best fit of their mean."""
-    use = np.concatenate([np.arange(0), *(np.arange(form.span.start, form.span.stop) for form in found.best.forms)])
-    error = assembly.residual - assembly.columns[:, :, use.astype(int)] @ found.best.coefficients
+    use, at = made.columns()
+    error = assembly.residual - assembly.columns[:, :, use.astype(int)] @ at
     few = assembly.thinned(_SCATTERED)
     rows = np.unique(np.linspace(0, len(error) - 1, _SCATTERED).astype(int))
     statistics = Statistics(few, normal.scan_noise)
@@ -80,34 +122,62 @@ def _scatter(assembly: Assembly, normal: Normal, found: Found, ids: frozenset[st
     return ScatterSearch(Simulator(few, statistics), seen, sorted(means), ids).run()
 
 
-def _finding(assembly: Assembly, normal: Normal, found: Found, scatter: list[Scatter]) -> LaserFinding:
-    sizes = {form.id: _rms(assembly, normal, found.best, form.id) for form in found.best.forms}
+def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scatter]) -> LaserFinding:
+    found = made.found
+    sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
+    settings = {setting.id: setting for setting in _settings(assembly, made.fit)}
+    estimates = {name: _estimates(made.fit, setting) for name, setting in settings.items()}
+    if made.winner is not None:
+        free = made.winner.free
+        valid = normal.beam_noise.valid
+        sizes[free.id] = float(np.sqrt(np.mean((assembly.columns[valid][:, free.span] @ made.coefficients) ** 2)))
+        settings[free.id], estimates[free.id] = _of_block(made.winner, made.coefficients, normal)
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
-    settings = tuple(setting for setting in _settings(assembly, found.best) if setting.id in matters)
-    by_id = {setting.id: setting for setting in settings}
+    settings = {name: setting for name, setting in settings.items() if name in matters}
     causes = tuple(
-        Cause(name, min(found.p[name], 1.0), _estimates(found.best, by_id[name]), _gain(found, name))
-        for name in found.named
-        if name in matters
+        Cause(name, min(found.p[name], 1.0), estimates[name], _gain(made, name))
+        for name in settings
+        if found.p.get(name, 0.0) >= NAMED
     )
-    confounded = tuple(group for group in found.confounded if matters & set(group))
-    noise = normal.scan_noise
-    details = (
-        f"laser: {normal.readings} readings of {len(assembly.shots.stamps)} scans; noise of neighbours correlates by "
-        f"{normal.beam_noise.rho:.2f}, of whole scans {1e3 * noise.common_sd:.2g} mm over {noise.common_tau:.2g} s, of "
-        f"the reference {1e3 * noise.position_sd:.2g} mm and {1e3 * noise.heading_sd:.2g} mrad.",
-        *(f"{name}: changes the readings by {1e3 * size:.2g} mm (rms)." for name, size in sorted(sizes.items())),
-    )
+    curve = made.winner is not None and made.winner.free.basis is not None and made.winner.free.id in matters
+    unknown = tuple(unknowns(made.weighed, normal.gram)) if curve else ()
+    confounded = () if curve else tuple(group for group in found.confounded if matters & set(group))
+    details = (_noise_told(assembly, normal), *_told(sizes))
     known = {cause.id: cause for cause in causes}
     for each in scatter:
         if each.p >= NAMED:
             known[each.setting.id] = _joined(known.get(each.setting.id), each)
-    joined = {setting.id: setting for setting in settings}
     for each in scatter:
-        mean = joined.get(each.setting.id)
+        mean = settings.get(each.setting.id)
         at = {**each.setting.parameters, **(_off_null(mean) if mean else {})}
-        joined[each.setting.id] = EffectSetting(each.setting.id, at)
-    return LaserFinding(tuple(known.values()), confounded, tuple(joined.values()), details)
+        settings[each.setting.id] = EffectSetting(each.setting.id, at)
+    return LaserFinding(tuple(known.values()), confounded, unknown, tuple(settings.values()), details)
+
+
+def _of_block(winner: Rival, coefficients: FloatArray, normal: Normal) -> tuple[EffectSetting, dict[str, Estimate]]:
+    """Return a block as a model file has it, and the estimate of its size."""
+    free = winner.free
+    if free.basis is not None:
+        return EffectSetting(free.id, free.basis.parameters(coefficients)), {}
+    p = free.parameter
+    assert p is not None
+    at, low, high = (float(np.clip(p.null + p.scale * x, p.lower, p.upper)) for x in rivals.size(winner, normal.gram))
+    nulls = {each.name: each.null for each in effects.by_id(free.id).parameters}
+    return EffectSetting(free.id, {**nulls, p.name: at}), {p.name: Estimate(at, low, high, p.unit)}
+
+
+def _noise_told(assembly: Assembly, normal: Normal) -> str:
+    noise, beam = normal.scan_noise, normal.beam_noise
+    return (
+        f"laser: {normal.readings} readings of {len(assembly.shots.stamps)} scans; noise of neighbours correlates by "
+        f"{beam.rho:.2f}, of whole scans {1e3 * noise.common_sd:.2g} mm over {noise.common_tau:.2g} s, of "
+        f"single beams {1e3 * beam.own_sd:.2g} mm, of the reference {1e3 * noise.position_sd:.2g} mm and "
+        f"{1e3 * noise.heading_sd:.2g} mrad."
+    )
+
+
+def _told(sizes: Mapping[str, float]) -> list[str]:
+    return [f"{name}: changes the readings by {1e3 * size:.2g} mm (rms)." for name, size in sorted(sizes.items())]
 
 
 def _off_null(setting: EffectSetting) -> dict[str, float]:
@@ -167,7 +237,9 @@ def _estimates(fit: Fitted, setting: EffectSetting) -> dict[str, Estimate]:
     return out
 
 
-def _gain(found: Found, name: str) -> float:
+def _gain(made: _Made, name: str) -> float:
     """Return the log evidence of the best set over the best one without an effect [nat]."""
-    without = max((fit.score for fit in found.fits if name not in fit.ids), default=-np.inf)
-    return found.best.score - without
+    sets = [(fit.ids, fit.score) for fit in made.found.fits]
+    sets += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in made.weighed.rivals]
+    own = max((worth for ids, worth in sets if name in ids), default=-np.inf)
+    return float(own - max((worth for ids, worth in sets if name not in ids), default=-np.inf))

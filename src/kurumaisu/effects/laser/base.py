@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import ClassVar
 
@@ -53,6 +53,8 @@ class Echoes:
     and where no effect of the chain is oblique; returns [1]: reflectance, 1 being the surface that the laser's law was
     measured on; mean, sd [m] of a reading; noise [1]: standard deviates; readings [m]: made of the three after the
     stage NOISE, until then they mean nothing.
+    origins (n, 3): the laser's pose in the map when each beam is fired, None where nobody knows it.
+    known: what else was recorded at the stamp, by name, such as temperature [deg C].
     A beam that met nothing has a range of +inf in the stages OUTLIER and GRID, and of 0 before them.
     """
 
@@ -65,6 +67,8 @@ class Echoes:
     sd: FloatArray
     noise: FloatArray
     readings: FloatArray
+    origins: FloatArray | None = None
+    known: Mapping[str, float] = field(default_factory=dict)
 
 
 class LaserEffect(Mechanism):

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Offsets that single beams keep over all scans, integrated out: they do not average out, however many the scans."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, precision, sizes
+from kurumaisu.types import BoolArray, FloatArray
+
+_FLOOR = 1e-7  # [m] below which no sd of the beams' offsets counts
+
+
+@dataclass(frozen=True)
+class Crossed:
+    """What the beams' offsets (b,) have in common with the other columns, whitened within each scan.
+
+    own: for each scan (b, own + shared); common (b, p + 1): summed over the scans; inner (b, b): with one another.
+    """
+
+    own: tuple[FloatArray, ...]
+    common: FloatArray
+    inner: FloatArray
+
+
+def crossed(rows: FloatArray, valid: BoolArray, sd: FloatArray, rho: float, inner: FloatArray) -> FloatArray:
+    """Return (b, m) products of a scan's offsets with its whitened rows (n, m), and add theirs to inner (b, b)."""
+    at = np.flatnonzero(valid)
+    out = np.zeros((len(valid), rows.shape[1]))
+    if not len(at):
+        return out
+    shared = rho ** np.diff(at)
+    pace = 1 / np.sqrt(1 - shared**2)
+    diagonal = np.concatenate([[1.0], pace]) / sd[at]
+    below = -shared * pace / sd[at[:-1]]
+    out[at] = diagonal[:, np.newaxis] * rows
+    out[at[:-1]] += below[:, np.newaxis] * rows[1:]
+    inner[at, at] += diagonal**2
+    inner[at[:-1], at[:-1]] += below**2
+    side = below * diagonal[1:]
+    inner[at[:-1], at[1:]] += side
+    inner[at[1:], at[:-1]] += side
+    return out
+
+
+def without_beams(
+    grams: Sequence[Gram], cross: Crossed, layout: Layout, noise: ScanNoise, beam_sd: float
+) -> FloatArray:
+    """Return normal equations as noise.marginal, with an offset of sd beam_sd [m] of each beam integrated out too."""
+    size, beams = sizes(noise), len(cross.inner)
+    scans, stands = len(grams), int(layout.stand.max(initial=-1)) + 1
+    shared = scans + 3 * stands
+    common = cross.common.shape[1]
+    inner = np.zeros((shared + beams, shared + beams))
+    outer = np.zeros((shared + beams, common))
+    total = np.zeros((common, common))
+    inner[shared:, shared:] = cross.inner
+    outer[shared:] = cross.common
+    for k, gram in enumerate(grams):
+        rest, beside, taken = _without_own(gram, cross.own[k], size)
+        lead = gram.shared
+        index = [k, *(scans + 3 * layout.stand[k] + i for i in range(lead - 1))]
+        inner[np.ix_(index, index)] += rest[:lead, :lead]
+        inner[shared:, index] += beside[:, :lead]
+        outer[index] += rest[:lead, lead:]
+        total += rest[lead:, lead:]
+        if taken is not None:
+            part, columns = taken
+            inner[shared:, shared:] -= part.T @ part
+            outer[shared:] -= part.T @ columns[:, lead:]
+    inner[:shared, shared:] = inner[shared:, :shared].T
+    inner[:shared, :shared] += precision(layout, noise, np.tile(size**-2, stands))[0]
+    inner[range(shared, len(inner)), range(shared, len(inner))] += max(beam_sd, _FLOOR) ** -2
+    return np.asarray(total - outer.T @ cho_solve(cho_factor(inner), outer))
+
+
+def _without_own(
+    gram: Gram, cross: FloatArray, size: FloatArray
+) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray] | None]:
+    """Return the rest of a gram, and of the beams' products with it, when errors of its own poses are integrated out.
+
+    The third is what that takes from the beams: roots (own, b) and (own, m).
+    """
+    own = gram.own
+    if own == 0:
+        return gram.matrix, cross, None
+    scale = np.tile(size, own // 3)
+    inner = gram.matrix[:own, :own] * np.outer(scale, scale) + np.eye(own)
+    lower = np.linalg.cholesky(inner)
+    columns = solve_triangular(lower, gram.matrix[:own, own:] * scale[:, np.newaxis], lower=True)
+    beams = solve_triangular(lower, (cross[:, :own] * scale).T, lower=True)
+    rest = gram.matrix[own:, own:] - columns.T @ columns
+    lead = gram.shared
+    return rest, cross[:, own:] - beams.T @ columns[:, :lead], (beams, columns)
