@@ -42,6 +42,7 @@ _STYLE = {
 # More points than this are a blot in a picture of this size, and megabytes of SVG.
 MOST_POINTS = 1500
 _LONGEST_LABEL = 46  # characters that fit beside the picture
+_LONGEST_ROW = 30  # characters that leave a comparison's picture room
 MOST_NUMBERS = 12  # of a comparison in its picture
 # Left, bottom, width, height of what the legend leaves, as shares of the picture.
 _BELOW_LEGEND = (0.0, 0.0, 1.0, 0.925)
@@ -124,11 +125,11 @@ def comparison_svg(comparison: Comparison, name: str) -> str:
         ):
             off = ((comparison.measured - simulated) / comparison.sd)[most]
             axes.plot(off, rows, marker, color=colour, markersize=5, label=said)
-        axes.set_yticks(rows, [_short(comparison.names[i]) for i in most])
+        axes.set_yticks(rows, [_short(comparison.names[i], _LONGEST_ROW) for i in most], fontsize=9)
         axes.set_xscale("symlog", linthresh=5.0)
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", MINUS))
         axes.grid(visible=True, axis="x")
-        axes.set_xlabel("measured minus simulated [standard deviations]")
+        axes.set_xlabel(f"measured {MINUS} simulated [standard deviations]")
         _legend(figure, columns=2)
         return _svg(figure, name)
 
@@ -174,8 +175,8 @@ def _label(name: str, unit: str) -> str:
     return f"{_short(name)} [{unit}]" if unit else _short(name)
 
 
-def _short(name: str) -> str:
-    return name if len(name) <= _LONGEST_LABEL else f"{name[: _LONGEST_LABEL - 1]}…"
+def _short(name: str, most: int = _LONGEST_LABEL) -> str:
+    return name if len(name) <= most else f"{name[: most - 1]}…"
 
 
 def _svg(figure: Figure, name: str) -> str:

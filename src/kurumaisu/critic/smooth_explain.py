@@ -89,7 +89,7 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
 
 
 def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return covariate, residual rate, and that with the curve in, per increment in which the chair moves throughout."""
+    """Return covariate and residual rate without and with the curve, per increment in which the chair moves on."""
     channel = list(effects.CHANNELS).index(extension.curve.channel)
     motion = replay.motion(drive, problem.model, extension.fit.settings)
     values = extension.curve.basis.samples(motion)

@@ -21,6 +21,7 @@ from kurumaisu.params import Model
 
 _MINUTE = 60.0  # [s]
 NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
+_CAUSES_TOLD = 4  # in a headline
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
 
@@ -46,8 +47,9 @@ def headline(verdict: Verdict, found: Naming, matters: set[str]) -> str:
 
 def named(causes: Sequence[Cause]) -> str:
     """Return in a sentence what acts, with ids and sizes."""
-    text = "; ".join(f"{effects.by_id(cause.id).sentence} ({_sizes(cause)})" for cause in causes)
-    return f"{text[0].upper()}{text[1:]}."
+    text = "; ".join(f"{effects.by_id(cause.id).sentence} ({_sizes(cause)})" for cause in causes[:_CAUSES_TOLD])
+    rest = f"; and {', '.join(cause.id for cause in causes[_CAUSES_TOLD:])}" if len(causes) > _CAUSES_TOLD else ""
+    return f"{text[0].upper()}{text[1:]}{rest}."
 
 
 def _sizes(cause: Cause) -> str:

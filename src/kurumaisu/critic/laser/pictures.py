@@ -9,14 +9,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu.critic.laser.normal import Assembly, Normal
-from kurumaisu.critic.laser.search import Fitted, Found
+from kurumaisu.critic.laser.search import Found
 from kurumaisu.critic.misfit import FOLLOWED, bins, explained
-from kurumaisu.critic.story import Misfit, Noise, Rival
+from kurumaisu.critic.story import Comparison, Misfit, Noise, Rival
 from kurumaisu.types import FloatArray
 
 _SAMPLES = 20_000  # readings of which means are drawn, evenly taken: of 170 000, no mean is a picture's width off
 _RIVALS = 6
+_LEAST = 1e-6  # [m], [rad] sd of an error that is none
 _NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class Part:
+    """What acts on the mean: an id, its columns of the whole matrix, and its coefficients."""
+
+    id: str
+    span: slice
+    coefficients: FloatArray
 
 
 @dataclass(frozen=True)
@@ -26,35 +36,43 @@ class Pictures:
     misfits: tuple[Misfit, ...] = ()
     rivals: tuple[Rival, ...] = ()
     noise: tuple[Noise, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
 
 
-def pictures(assembly: Assembly, normal: Normal, found: Found) -> Pictures:
-    """Return what the report shows of a search on the mean of the readings."""
-    return Pictures(misfits(assembly, normal, found.best), rivals(found), noise_rows(normal))
+NO_PICTURES = Pictures()
 
 
-def misfits(assembly: Assembly, normal: Normal, fit: Fitted) -> tuple[Misfit, ...]:
-    """Return per effect of a fit what is wrong with the readings without it, over what it follows, and what it adds.
-
-    The errors that the reference and whole scans share are taken out.
-    """
-    use = np.concatenate([np.arange(0), *(np.arange(form.span.start, form.span.stop) for form in fit.forms)])
-    left = assembly.leftover(normal.beam_noise, use.astype(int))
+def misfits(assembly: Assembly, normal: Normal, parts: Sequence[Part]) -> tuple[Misfit, ...]:
+    """Return per part what is wrong with the readings without it, over what it follows, and what it adds."""
+    added = [np.asarray(assembly.columns[:, :, part.span] @ part.coefficients, dtype=np.float64) for part in parts]
+    left = _left(assembly, normal, np.asarray(assembly.residual - sum(added, np.zeros(assembly.residual.shape))))
     step = max(1, int(normal.beam_noise.valid.sum()) // _SAMPLES)
     rows = np.flatnonzero(normal.beam_noise.valid & np.isfinite(left))[::step]
     over = {name: (unit, values.ravel()[rows]) for name, (unit, values) in _covariates(assembly).items()}
-    out, start = [], 0
-    for form in fit.forms:
-        at = fit.coefficients[start : start + len(form.columns)]
-        start += len(form.columns)
-        added = np.asarray((assembly.columns[:, :, form.span] @ at).ravel()[rows], dtype=np.float64)
-        out.append(_misfit(form.id, over, left.ravel()[rows], added))
-    return tuple(out)
+    return tuple(
+        _misfit(part.id, over, left.ravel()[rows], each.ravel()[rows]) for part, each in zip(parts, added, strict=True)
+    )
+
+
+def _left(assembly: Assembly, normal: Normal, error: FloatArray) -> FloatArray:
+    """Return errors (k, b) [m] without what is most likely an error of the reference or of the whole scan."""
+    scan, beam = normal.scan_noise, normal.beam_noise
+    pose = np.maximum([scan.position_sd, scan.position_sd, scan.heading_sd], _LEAST)
+    out = error.copy()
+    for k, valid in enumerate(beam.valid):
+        shared = assembly.random_columns(k)
+        size = np.concatenate([[max(scan.common_sd, _LEAST)], np.tile(pose, shared.shape[1] // 3)])
+        use = valid & np.isfinite(error[k])
+        white = shared[use] / beam.sd[k][use, np.newaxis]
+        target = white.T @ (error[k][use] / beam.sd[k][use])
+        out[k] -= shared @ np.linalg.solve(white.T @ white + np.diag(size**-2), target)
+    return out
 
 
 def rivals(found: Found) -> tuple[Rival, ...]:
     """Return the best other sets of effects, and why each lost."""
-    best, seen, out = found.best, {found.best.ids}, []
+    best, seen = found.best, {found.best.ids}
+    out: list[Rival] = []
     for fit in found.fits:
         if fit.ids in seen or len(out) == _RIVALS:
             continue

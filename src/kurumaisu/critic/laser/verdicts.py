@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.laser import rivals
+from kurumaisu.critic.laser import pictures, rivals
 from kurumaisu.critic.laser.normal import Assembly, Normal
+from kurumaisu.critic.laser.pictures import NO_PICTURES, Part, Pictures, misfits, noise_rows
 from kurumaisu.critic.laser.rivals import Rival, Weighed
 from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
@@ -19,6 +20,7 @@ from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.unknowns import unknowns
 from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.story import Comparison
 from kurumaisu.critic.verdict import Cause, Estimate, Unknown
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray, IntArray
@@ -34,7 +36,7 @@ class LaserFinding:
     """What the scans say.
 
     causes: named and material; confounded: sets of which one acts; unknown: what is in no catalogue; settings: what
-    extends the model; details: for the report, in words; refused: why there is no laser criticism, None where there is.
+    extends the model; details, pictures: for the report; refused: why there is no laser criticism, None where there is.
     """
 
     causes: tuple[Cause, ...] = ()
@@ -42,6 +44,7 @@ class LaserFinding:
     unknown: tuple[Unknown, ...] = ()
     settings: tuple[EffectSetting, ...] = ()
     details: tuple[str, ...] = ()
+    pictures: Pictures = NO_PICTURES
     refused: str | None = None
 
 
@@ -69,8 +72,10 @@ def criticise(
     normal = assembly.full(normal)
     made = _made(assembly, normal, found)
     progress("laser: weighing effects on the scatter")
-    scatter = _scatter(assembly, normal, made, ids)
-    return _finding(assembly, normal, made, scatter)
+    scatter, comparison = _scatter(assembly, normal, made, ids)
+    finding = _finding(assembly, normal, made, scatter)
+    shown = misfits(assembly, normal, made.parts())
+    return replace(finding, pictures=Pictures(shown, pictures.rivals(made.found), noise_rows(normal), comparison))
 
 
 @dataclass(frozen=True)
@@ -87,6 +92,15 @@ class _Made:
     def found(self) -> Found:
         """The search's result with blocks in the running."""
         return self.weighed.found
+
+    def parts(self) -> list[Part]:
+        """Return what acts, one by one."""
+        out, start = [], 0
+        for form in self.fit.forms:
+            stop = start + len(form.columns)
+            out.append(Part(form.id, form.span, self.fit.coefficients[start:stop]))
+            start = stop
+        return [*out, Part(self.winner.free.id, self.winner.free.span, self.coefficients)] if self.winner else out
 
     def columns(self) -> tuple[IntArray, FloatArray]:
         """Return which columns of the whole matrix act, and by how much."""
@@ -108,8 +122,10 @@ def _with(winner: Rival, normal: Normal) -> tuple[Fitted, Rival, FloatArray, Flo
     return fit, winner, coefficients, covariance
 
 
-def _scatter(assembly: Assembly, normal: Normal, made: _Made, ids: frozenset[str] | None) -> list[Scatter]:
-    """Return the effects on how readings scatter about the best fit of their mean."""
+def _scatter(
+    assembly: Assembly, normal: Normal, made: _Made, ids: frozenset[str] | None
+) -> tuple[list[Scatter], tuple[Comparison, ...]]:
+    """Return the effects on how readings scatter about the best fit of their mean, and what they mend."""
     use, at = made.columns()
     error = assembly.residual - assembly.columns[:, :, use.astype(int)] @ at
     few = assembly.thinned(_SCATTERED)
@@ -119,7 +135,9 @@ def _scatter(assembly: Assembly, normal: Normal, made: _Made, ids: frozenset[str
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
     measured = few.shots.measured
     seen = statistics.of(measured, np.where(np.isfinite(measured), error[rows], np.nan))
-    return ScatterSearch(Simulator(few, statistics), seen, sorted(means), ids).run()
+    search = ScatterSearch(Simulator(few, statistics), seen, sorted(means), ids)
+    found = search.run()
+    return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
 
 def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scatter]) -> LaserFinding:
