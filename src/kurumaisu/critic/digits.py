@@ -18,7 +18,7 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
     """Return the factor and the unit in which numbers up to a largest one are read best."""
     if unit in MILLI and 0 < largest < _SMALL:
         return 1000.0, MILLI[unit]
-    return 1.0, "" if unit in _PURE else unit
+    return 1.0, "" if unit in _PURE else unit.replace("^2", "²")
 
 
 def quantities(values: Sequence[float], unit: str) -> list[str]:

@@ -52,7 +52,7 @@ def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Crit
     story = Story(
         recording=recording.name,
         model=model.name,
-        headline="The data are wrong, so nothing was fitted.",
+        headline=words.wrong(problems),
         details=tuple(problems),
         pose_source=_pose_source(recording),
         provenance=_provenance(recording),

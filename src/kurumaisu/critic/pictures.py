@@ -18,7 +18,7 @@ from kurumaisu.critic.story import Bins, Comparison, Misfit, Overlay
 from kurumaisu.types import FloatArray
 
 MOST_SAMPLES = 4000  # of a misfit in its data: more are megabytes that nobody reads
-MOST_PLACES = 6000  # of all measured paths of a page together, likewise
+MOST_PLACES = 4500  # of all measured paths of a page together, likewise
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
 import jinja2
 
 from kurumaisu import effects
+from kurumaisu.critic import words
 from kurumaisu.critic.digits import MINUS, bare, odds, quantities
 from kurumaisu.critic.pictures import comparison_picture, misfit_picture, overlay_picture, thinned
 from kurumaisu.critic.story import Story
@@ -49,23 +49,13 @@ def write_report(path: Path, verdict: Verdict, story: Story) -> None:
             undrawn=len(runs) - len(drawn),
             restart=max((overlay.restart for overlay in drawn), default=0.0),
             misfits=misfits + [comparison_picture(each, f"numbers{i}") for i, each in enumerate(story.comparisons)],
-            problems=grouped(verdict.problems),
+            problems=words.grouped(verdict.problems),
         )
     )
     try:
         path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise Error(f"{path}: {error.strerror}") from error
-
-
-def grouped(problems: Sequence[str]) -> list[tuple[str, list[str]]]:
-    """Return problems that differ only in their runs and numbers under one heading, with what each says."""
-    groups: dict[str, list[str]] = {}
-    for problem in problems:
-        where, _, what = problem.partition(": ")
-        kind = what.partition(": ")[0]
-        groups.setdefault(kind or where, []).append(problem)
-    return list(groups.items())
 
 
 def meaning(name: str) -> str:

@@ -56,7 +56,7 @@ def _wrapped(line: str, width: int) -> str:
         break_long_words=False,
         break_on_hyphens=False,
     )
-    return "\n".join(wrapper.wrap(line))
+    return "\n".join(wrapper.wrap(line.strip()))
 
 
 def _gain(gain: Gain) -> list[str]:

@@ -22,6 +22,7 @@ from kurumaisu.params import Model
 _MINUTE = 60.0  # [s]
 NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
 _CAUSES_TOLD = 4  # in a headline
+_KINDS_TOLD = 2  # of problems in a headline
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
 
@@ -43,6 +44,23 @@ def headline(verdict: Verdict, found: Naming, matters: set[str]) -> str:
     if found.p[nearest] >= naming.RIVAL:
         return f"Nothing can be named: noise explains these drives as well. The nearest suspect is {nearest}."
     return "Nothing is missing in the model that these drives could show."
+
+
+def grouped(problems: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Return problems that differ only in their runs and numbers under one heading, with what each says."""
+    groups: dict[str, list[str]] = {}
+    for problem in problems:
+        where, _, what = problem.partition(": ")
+        kind = what.partition(": ")[0]
+        groups.setdefault(kind or where, []).append(problem)
+    return list(groups.items())
+
+
+def wrong(problems: Sequence[str]) -> str:
+    """Return in a sentence that the data are wrong, and what is wrong first of all."""
+    kinds = [kind for kind, _ in grouped(problems)]
+    more = f"; and {len(kinds) - _KINDS_TOLD} more" if len(kinds) > _KINDS_TOLD else ""
+    return f"The data are wrong, so nothing was fitted: {'; '.join(kinds[:_KINDS_TOLD])}{more}."
 
 
 def named(causes: Sequence[Cause]) -> str:
