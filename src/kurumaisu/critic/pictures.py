@@ -17,8 +17,8 @@ from kurumaisu.critic.digits import quantities
 from kurumaisu.critic.story import Bins, Comparison, Misfit, Overlay
 from kurumaisu.types import FloatArray
 
-MOST_SAMPLES = 4000  # of a misfit in its data: more are megabytes that nobody reads
-MOST_PLACES = 4500  # of all measured paths of a page together, likewise
+MOST_SAMPLES = 3000  # of a misfit in its data: more are megabytes that nobody reads
+MOST_PLACES = 4000  # of all measured paths of a page together, likewise
 
 
 @dataclass(frozen=True)
