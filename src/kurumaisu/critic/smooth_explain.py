@@ -112,7 +112,7 @@ def _told(extension: Extension, beyond: Beyond, share: float) -> str:
     better = f"explains {beyond.rivalry.lead:.1f} nats more than the best set of the catalogue"
     return (
         f"Outside the catalogue: {where} ({smooth_words.shape(extension)}) {better}; "
-        f"within {HORIZON:g} s it moves the chair by {share:.1%} of its way or turn."
+        f"within {HORIZON:g} s it moves the chair by {100 * share:.1f} % of its way or turn."
     )
 
 

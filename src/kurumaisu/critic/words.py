@@ -94,7 +94,7 @@ def details(
             small = shares[name] < MATERIAL
             weight = ": detectable, but it does not matter" if small else ": not confirmed on data held out"
         said.append(
-            f"{name}: {', '.join(sizes)}; within {HORIZON:g} s it moves the chair by {shares[name]:.1%} of its way or "
+            f"{name}: {', '.join(sizes)}; within {HORIZON:g} s it moves the chair by {100 * shares[name]:.1f} % of its way or "
             f"turn{weight}."
         )
     n = problem.noise
@@ -102,7 +102,7 @@ def details(
     said.append(
         f"The yaw rate fluctuates at random: in a minute the heading strays by {wander:.0f}° or so, whatever the model."
     )
-    alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
+    alarm = f"{100 * found.false_alarm:.1f} %" if found.false_alarm > 0 else f"less than {100 / naming.NULLS:.2f} %"
     said.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
     return tuple(said)
 
