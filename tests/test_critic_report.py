@@ -138,7 +138,7 @@ def test_a_covariate_explains_what_follows_it_and_not_what_does_not():
 
 
 @pytest.mark.parametrize(
-    ("nats", "said"), [(-1.0, "1.0"), (0.5, "1.6"), (3.0, "20"), (7.0, "1000"), (30.0, "more than 10 000")]
+    ("nats", "said"), [(-1.0, "1.0"), (0.5, "1.6"), (3.0, "20"), (7.0, "1 000"), (30.0, "more than 10 000")]
 )
 def test_evidence_is_said_as_odds(nats, said):
     assert odds(nats) == said

@@ -46,7 +46,7 @@ def odds(nats: float) -> str:
     """Return how many times as probable a log evidence makes something, to one digit or as a power of ten."""
     if nats < math.log(1e4):
         times = math.exp(max(nats, 0.0))
-        return f"{times:.1f}" if times < 3 else f"{float(f'{times:.1g}'):.0f}"
+        return f"{times:.1f}" if times < 3 else f"{float(f'{times:.1g}'):,.0f}".replace(",", " ")
     return "more than 10 000"
 
 

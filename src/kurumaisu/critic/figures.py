@@ -133,8 +133,9 @@ def comparison_svg(comparison: Comparison, name: str) -> str:
         axes.set_yticks(rows, [_short(comparison.names[i], _LONGEST_ROW) for i in most], fontsize=9)
         axes.set_xscale("symlog", linthresh=5.0)
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", MINUS))
+        axes.margins(x=0.08)
         axes.grid(visible=True, axis="x")
-        axes.set_xlabel(f"measured {MINUS} simulated [standard deviations]")
+        axes.set_xlabel(f"measured {MINUS} simulated [sd]")
         _legend(figure, columns=2)
         return _svg(figure, name)
 

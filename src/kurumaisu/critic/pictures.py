@@ -98,8 +98,9 @@ def comparison_picture(comparison: Comparison, name: str) -> Picture:
         svg=Markup(figures.comparison_svg(comparison, name)),
         alt="By how much simulated scatter differs from the measured one, with the model as it was and extended.",
         caption=(
-            "Each number says how the readings scatter, taken from measured and from simulated scans alike. In the "
-            f"grey band, chance explains the difference. The {shown} that were furthest off."
+            "Each number says how the readings scatter, taken from measured and from simulated scans alike; sd: its "
+            "standard deviation from one simulation to the next. In the grey band, chance explains the difference. "
+            f"The {shown} that were furthest off."
         ),
         file=f"{name}.csv",
         data=_csv(("number", "measured", "model as it was", "extended", "standard deviation"), rows),

@@ -71,7 +71,7 @@ def named(causes: Sequence[Cause]) -> str:
 
 
 def _sizes(cause: Cause) -> str:
-    said = [f"{name} {quantities([e.estimate], e.unit)[0]}" for name, e in cause.parameters.items()]
+    said = [f"{name} {quantities([e.estimate], e.unit)[0]}" for name, e in cause.parameters.items() if e.estimate != 0]
     return f"{cause.id}: {', '.join(said)}" if said else cause.id
 
 
@@ -93,10 +93,8 @@ def details(
         if name not in matters:
             small = shares[name] < MATERIAL
             weight = ": detectable, but it does not matter" if small else ": not confirmed on data held out"
-        said.append(
-            f"{name}: {', '.join(sizes)}; within {HORIZON:g} s it moves the chair by {100 * shares[name]:.1f} % of its way or "
-            f"turn{weight}."
-        )
+        moved = f"within {HORIZON:g} s it moves the chair by {100 * shares[name]:.1f} % of its way or turn"
+        said.append(f"{name}: {', '.join(sizes)}; {moved}{weight}.")
     n = problem.noise
     wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
     said.append(

@@ -35,6 +35,9 @@ def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
     words = headline(finding)
     if words and verdict.verdict in ("named", "confounded", "unknown"):
         words = f"{story.headline} {words}"
+    if finding.small and not words and kind == _NOTHING_SAID:
+        slight = f"{', '.join(finding.small)} is detectable in the scans, but too small to matter."
+        words = f"{story.headline} {slight}" if story.noise else f"Nothing that matters: {slight}"
     shown = finding.pictures
     told = replace(
         story,

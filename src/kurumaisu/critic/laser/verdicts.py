@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,7 +36,8 @@ class LaserFinding:
     """What the scans say.
 
     causes: named and material; confounded: sets of which one acts; unknown: what is in no catalogue; settings: what
-    extends the model; details, pictures: for the report; refused: why there is no laser criticism, None where there is.
+    extends the model; details, pictures: for the report; small: certain, but they do not matter; refused: why there
+    is no laser criticism, None where there is.
     """
 
     causes: tuple[Cause, ...] = ()
@@ -45,6 +46,7 @@ class LaserFinding:
     settings: tuple[EffectSetting, ...] = ()
     details: tuple[str, ...] = ()
     pictures: Pictures = NO_PICTURES
+    small: tuple[str, ...] = ()
     refused: str | None = None
 
 
@@ -160,7 +162,8 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scat
     curve = made.winner is not None and made.winner.free.basis is not None and made.winner.free.id in matters
     unknown = tuple(unknowns(made.weighed, normal.gram)) if curve else ()
     confounded = () if curve else tuple(group for group in found.confounded if matters & set(group))
-    details = (_noise_told(assembly, normal), *_told(sizes))
+    small = tuple(name for name in sizes if name not in matters and found.p.get(name, 0.0) >= NAMED)
+    details = (_noise_told(assembly, normal), *_told(sizes, small))
     known = {cause.id: cause for cause in causes}
     for each in scatter:
         if each.p >= NAMED:
@@ -169,7 +172,7 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scat
         mean = settings.get(each.setting.id)
         at = {**each.setting.parameters, **(_off_null(mean) if mean else {})}
         settings[each.setting.id] = EffectSetting(each.setting.id, at)
-    return LaserFinding(tuple(known.values()), confounded, unknown, tuple(settings.values()), details)
+    return LaserFinding(tuple(known.values()), confounded, unknown, tuple(settings.values()), details, small=small)
 
 
 def _of_block(winner: Rival, coefficients: FloatArray, normal: Normal) -> tuple[EffectSetting, dict[str, Estimate]]:
@@ -194,8 +197,12 @@ def _noise_told(assembly: Assembly, normal: Normal) -> str:
     )
 
 
-def _told(sizes: Mapping[str, float]) -> list[str]:
-    return [f"{name}: changes the readings by {1e3 * size:.2g} mm (rms)." for name, size in sorted(sizes.items())]
+def _told(sizes: Mapping[str, float], small: Sequence[str]) -> list[str]:
+    return [
+        f"{name}: changes the readings by {1e3 * size:.2g} mm (rms)"
+        f"{': detectable, but it does not matter' if name in small else ''}."
+        for name, size in sorted(sizes.items())
+    ]
 
 
 def _off_null(setting: EffectSetting) -> dict[str, float]:
