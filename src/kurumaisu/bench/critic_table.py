@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -75,22 +76,20 @@ def run(options: argparse.Namespace) -> int:
     """Print the table of one kind. Raise Error for a name that this kind does not know."""
     kind, family = KINDS[options.kind]
     rows = tuple(options.effects) or (("",) if kind in ("null", "pair", "triple") else names_of(kind, family))
+    asks = [Ask(kind, (name,) if name else (), options.z, options.form, family=family) for name in rows]
+    baselines = options.baselines and family == "base"
+    jobs = [Job(ask, options.seed + i, baselines) for i, ask in enumerate(np.repeat(np.array(asks), options.draws))]
+    answers = _all_answers(jobs, options.jobs, options.log)
     headings = ("right           ", "misnamed        ", "confounded      ", "unknown         ", "nothing         ")
     title = f"{options.kind}, seeds from {options.seed}; right: {RIGHT[kind]}; shares with 90 % intervals"
     table = Table(title, "hidden", "number", *headings, "interval covers ", "median z", "CPU [s]")
-    baselines = options.baselines and family == "base"
     scores: dict[str, list[Score]] = {}
-    with TemporaryDirectory() as folder, ProcessPoolExecutor(options.jobs) as pool:
-        for i, name in enumerate(rows):
-            ask = Ask(kind, (name,) if name else (), options.z, options.form, family=family)
-            jobs = [Job(ask, options.seed + options.draws * i + k, baselines) for k in range(options.draws)]
-            answers = list(pool.map(_answers, jobs, repeat(folder)))
-            _log(options.log, jobs, answers)
-            for answer in answers:
-                for who, one in answer.items():
-                    scores.setdefault(who, []).append(one)
-            if name:
-                _row(table, name, [answer["critic"] for answer in answers])
+    for answer in answers:
+        for who, one in answer.items():
+            scores.setdefault(who, []).append(one)
+    for i, name in enumerate(rows):
+        if name:
+            _row(table, name, scores["critic"][i * options.draws : (i + 1) * options.draws])
     for who, all_of in scores.items():
         _row(table, f"all: {who}", all_of)
         if kind in ("single", "pair", "triple"):
@@ -98,6 +97,18 @@ def run(options: argparse.Namespace) -> int:
             _row(table, f"  z >= 10, rival's z >= 6: {who}", hard)
     _summary(scores["critic"])
     return 0
+
+
+def _all_answers(jobs: Sequence[Job], processes: int, log: Path | None) -> list[dict[str, Score]]:
+    """Return the scores of all draws, in order; say on a terminal how far it is."""
+    out: list[dict[str, Score]] = []
+    with TemporaryDirectory() as folder, ProcessPoolExecutor(processes) as pool:
+        for job, answer in zip(jobs, pool.map(_answers, jobs, repeat(folder)), strict=True):
+            out.append(answer)
+            _log(log, [job], [answer])
+            if sys.stderr.isatty():
+                print(f"\r{len(out)} of {len(jobs)}", end="" if len(out) < len(jobs) else "\n", file=sys.stderr)
+    return out
 
 
 def _answers(job: Job, folder: str) -> dict[str, Score]:

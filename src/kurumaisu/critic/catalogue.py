@@ -20,6 +20,7 @@ _TYPICAL = 8.0  # whitened norm of the step by which a parameter is judged
 _NEAR = 0.4  # of the log of the norm
 _TRIALS = 12
 _FARTHEST = 2.0**7  # scales
+_STRAIGHT = 0.9  # correlation of the changes by a step and by two from which a derivative says what a parameter does
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,8 @@ class Term:
     """One parameter of one effect as the critic may fit it.
 
     null: its value in the model criticised; step: from there to where it shows typically, in units of its scale;
-    shape: it changes how another parameter of the effect shows, and nothing by itself.
+    shape: it changes how another parameter of the effect shows, and nothing by itself; rough: twice the step does not
+    do twice the same, so that a derivative says little.
     """
 
     id: str
@@ -35,6 +37,7 @@ class Term:
     null: float
     step: float = 0.2
     shape: bool = False
+    rough: bool = False
 
     @property
     def key(self) -> Key:
@@ -59,6 +62,11 @@ class Candidate:
     def fixed(self) -> bool:
         """Tell whether there is nothing to fit."""
         return all(term.fixed for term in self.terms)
+
+    @property
+    def rough(self) -> bool:
+        """Tell whether a linearisation says little about it."""
+        return any(term.rough for term in self.terms)
 
 
 def catalogue(model: Model, ids: frozenset[str] | None = None) -> tuple[Term, ...]:
@@ -115,6 +123,19 @@ def _showing(own: Sequence[Term], norm: Norm) -> Iterator[Term]:
             loud = {j: other.step for j, other in found.items()}
             if abs(at({**loud, i: 0.5}) - at(loud)) > 1e-3:
                 yield replace(term, step=0.2, shape=True)
+
+
+def roughened(terms: Iterable[Term], moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> tuple[Term, ...]:
+    """Return the terms, marked where twice the step does not do twice the same; moved: the change by settings."""
+    return tuple(replace(term, rough=not term.shape and _is_rough(term, moved)) for term in terms)
+
+
+def _is_rough(term: Term, moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> bool:
+    p = term.parameter
+    steps = np.clip(term.null + np.array([1.0, 2.0]) * term.step * p.scale, p.lower, p.upper)
+    one, two = (moved(settings_of([term], np.array([value]))) for value in steps)
+    norms = float(np.linalg.norm(one) * np.linalg.norm(two))
+    return norms > 0 and float(one @ two) < _STRAIGHT * norms
 
 
 def _typical_step(term: Term, norm: Callable[[float], float]) -> float | None:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from kurumaisu.critic import replay, solve
-from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalogue, settings_of, showing
+from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalogue, roughened, settings_of, showing
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.noise import Noise, whitened
 from kurumaisu.critic.prior import Z_USUAL, occam, occam_plane
@@ -19,6 +19,7 @@ from kurumaisu.types import FloatArray
 
 _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
 _STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a refit may start
+_ROUGH_STARTS = tuple(float(n) for n in np.geomspace(0.25, 64, 49))  # of a parameter whose derivative says little
 
 
 @dataclass(frozen=True)
@@ -80,11 +81,11 @@ class Problem:
             return self._terms
         here = self.residual((), np.empty(0))
 
-        def norm(settings: tuple[EffectSetting, ...]) -> float:
-            moved = np.concatenate([self._whitened(drive, settings) for drive in self.drives])
-            return float(np.linalg.norm(moved - here))
+        def moved(settings: tuple[EffectSetting, ...]) -> FloatArray:
+            return np.concatenate([self._whitened(drive, settings) for drive in self.drives]) - here
 
-        return showing(catalogue(self.model, self.ids), norm)
+        shown = showing(catalogue(self.model, self.ids), lambda settings: float(np.linalg.norm(moved(settings))))
+        return roughened(shown, moved)
 
     @cached_property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -162,7 +163,8 @@ class Problem:
         for i, term in enumerate(terms):
             if term.key in start or term.shape or term.fixed:
                 continue
-            guesses = [term.null + sign * n * term.step * term.parameter.scale for n in _STARTS for sign in (1, -1)]
+            sizes = _ROUGH_STARTS if term.rough else _STARTS
+            guesses = [term.null + sign * n * term.step * term.parameter.scale for n in sizes for sign in (1, -1)]
             tried = [np.where(np.arange(len(values)) == i, guess, values) for guess in guesses]
             inside = [guess for guess in tried if lower[i] <= guess[i] <= upper[i]] or [values]
             values = min(inside, key=lambda guess: float(np.sum(self.residual(terms, guess) ** 2)))
@@ -220,6 +222,9 @@ class Problem:
             p = term.parameter
             at = term.null if i is None else float(values[i])
             share = 1.0 if i is None else _DERIVATIVE
+            if term.fixed:
+                yield settings_of(terms, values), share
+                continue
             if not p.lower <= at + share * term.step * p.scale <= p.upper:
                 share = -share
             moved = at + share * term.step * p.scale

@@ -17,7 +17,7 @@ from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import FELT, MATERIAL, felt_share, moved_share
+from kurumaisu.critic.material import FELT, MATERIAL, confirmed, felt_share, moved_share
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
 from kurumaisu.critic.options import version
@@ -29,6 +29,8 @@ from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
+# Growth of the noise that counts beside other causes: less is left by causes of a slightly other form, too.
+_GROWTH_BESIDE = 1.0
 _PICTURE = 0.1  # [s] between the poses drawn
 # [s] after which a simulated path begins again at the measured pose: the random wander of the heading adds up, and
 # after a minute hides what the model does.
@@ -85,14 +87,15 @@ def criticism(
     problem, found, growth = made.problem, made.found, made.growth
     best = found.best
     shares = {name: moved_share(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
-    gains = worth is not None and worth.log_density_per_sample.lo90 > 0
+    gains = confirmed(worth, best.score - found.empty.score)
     felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     kind = _kind(found, matters)
     causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
     # Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
     asked = problem.ids is None or process_noise(problem).id in problem.ids
-    if asked and growth.p >= naming.NAMED and all(drive.source != "odom" for drive in drives):
+    sure = growth.p >= naming.NAMED and growth.noise.growth >= (_GROWTH_BESIDE if causes else 0.0)
+    if asked and sure and all(drive.source != "odom" for drive in drives):
         kind, causes = "named", (*causes, Cause(process_noise(problem).id, growth.p, {}, growth.gain_nats))
     settings = best.settings if kind in ("named", "confounded") else ()
     verdict = Verdict(

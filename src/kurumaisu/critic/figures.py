@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from kurumaisu.critic.digits import MINUS, scaled
 from kurumaisu.critic.story import Bins, Comparison, Misfit, Overlay
-from kurumaisu.critic.words import NORMAL90
+from kurumaisu.critic.verdict import NORMAL90
 from kurumaisu.types import BoolArray
 
 # Stand-ins that the page's style sheet replaces; the names are its variables.

@@ -12,13 +12,28 @@ from kurumaisu.critic import replay
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.noise import whitened
+from kurumaisu.critic.verdict import NORMAL90, Gain
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray, IntArray
 
 MATERIAL = 0.005  # share of the way (or of the turn) from which an effect matters to a driver
 FELT = 0.1  # share of what is uncertain anyway, per increment, from which an effect matters to a prediction
 _SAME = 1e-6  # [s] less than any clock resolves: stamps of equal spacing differ by rounding
+_STRONG = 8.0  # [nat] of evidence from which _LIKELY will do
+_LIKELY = 0.84  # standard deviations: a gain with a probability of 0.8
 HORIZON = 2.0  # [s] over which ways and turns are compared
+
+
+def confirmed(worth: Gain | None, nats: float) -> bool:
+    """Return whether drives held out confirm a finding that gains so much evidence on the drives it was fitted to.
+
+    Blocks of a few drives scatter widely: what is certain by the evidence need not be so by the blocks again.
+    """
+    if worth is None:
+        return False
+    gain = worth.log_density_per_sample
+    sd = max(gain.hi90 - gain.lo90, 1e-12) / (2 * NORMAL90)
+    return gain.lo90 > 0 or (nats >= _STRONG and gain.gain > _LIKELY * sd)
 
 
 def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:

@@ -12,7 +12,7 @@ from kurumaisu import effects
 from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.story import Bins, Misfit
-from kurumaisu.critic.words import NORMAL90
+from kurumaisu.critic.verdict import NORMAL90
 from kurumaisu.effects import Follows, Rate
 from kurumaisu.geometry import wrap
 from kurumaisu.params import EffectSetting

@@ -45,6 +45,11 @@ class Naming:
         return self.fits[0]
 
     @property
+    def empty(self) -> Fit:
+        """Return the fit of nothing."""
+        return next(fit for fit in self.fits if not fit.candidates)
+
+    @property
     def named(self) -> tuple[str, ...]:
         """Return the effects of the best set that are certain enough to be named."""
         return tuple(name for name in sorted(self.best.ids) if self.p[name] >= NAMED)
@@ -109,6 +114,10 @@ def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Ch
                 yield fit.candidates - {one} | {other}, kept
     for other in screen.fixed:
         if other.id not in fit.ids and screen.mends(other):
+            yield fit.candidates | {other}, kept
+    for other in problem.candidates:
+        if other.rough and other.id not in fit.ids:
+            yield frozenset({other}), {}
             yield fit.candidates | {other}, kept
 
 

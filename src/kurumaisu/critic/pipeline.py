@@ -41,11 +41,13 @@ def criticise(
     wrong = [*recording.invalid, *sanity.examine(recording, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
-    if any(driven(run) for run in recording.runs):
-        base = _criticise_base(recording, model, progress, ids)
-    else:
-        base = explain.undriven(recording, model)
-    return with_laser(base, criticise_laser(recording, model, progress, ids))
+    moved = any(driven(run) for run in recording.runs)
+    base = _criticise_base(recording, model, progress, ids) if moved else None
+    finding = criticise_laser(recording, model, progress, ids)
+    if base is None and finding.refused:
+        nothing = "has neither voltages nor commands nor odometry"
+        raise Error(f"{recording.runs[0].name}: {nothing}; laser: {finding.refused}")
+    return with_laser(base or explain.undriven(recording, model), finding)
 
 
 def _criticise_base(recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None) -> Criticism:

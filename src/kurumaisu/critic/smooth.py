@@ -28,6 +28,11 @@ from kurumaisu.types import FloatArray
 # Sizes of a curve, whitened: with the catalogue's prior of the size of an effect, nine tenths up to Z_USUAL.
 _SIZES = np.concatenate([np.geomspace(Z_LOW, Z_USUAL, 8), np.geomspace(Z_USUAL, Z_HIGH, 5)[1:]])
 _LOG_WEIGHTS = np.log(np.concatenate([np.full(8, 0.9 / 8), np.full(4, 0.1 / 4)]))
+# What a rate's factor may follow: over the rate itself it would be the sum of a rate and a curve again.
+_BRAKES = {
+    "v_gain": ("w", "abs_w", "v_times_w", "time", "since_command", "since_reversal", "heading", "x", "y"),
+    "w_gain": ("v", "abs_v", "v_times_w", "time", "since_command", "since_reversal", "heading", "x", "y"),
+}
 
 
 @dataclass(frozen=True)
@@ -60,11 +65,18 @@ class Design:
         self.curves: list[Curve] = []
         at = 0
         for basis in bases(problem.drives, problem.model, settings):
-            for channel in effects.CHANNELS:
+            for channel in _channels(basis.covariate):
                 if effects.smooth_id(channel, basis.covariate) not in taken:
                     self.curves.append(Curve(channel, basis, slice(at, at + basis.size)))
                     at += basis.size
         self.columns = columns(problem, settings, self.curves)
+
+
+def _channels(covariate: str) -> Iterator[str]:
+    """Yield the channels in which a curve over a covariate is tried; what was measured beside may act on all."""
+    for channel in effects.CHANNELS:
+        if covariate not in effects.COVARIATES or covariate in _BRAKES.get(channel, (covariate,)):
+            yield channel
 
 
 def columns(problem: Problem, settings: Sequence[EffectSetting], curves: Sequence[Curve]) -> FloatArray:

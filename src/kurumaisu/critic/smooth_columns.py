@@ -18,6 +18,7 @@ class Sensitivity:
         poses = plant.path(motion, np.array([0.0, 0.0, motion.heading or 0.0]))
         edges = drive.start + GRID * np.arange(len(poses))
         self._moving = ((motion.v != 0) | (motion.w != 0)).astype(float)[:, None]
+        self._rates = {"v_gain": motion.v[:, None], "w_gain": motion.w[:, None]}
         self._heading = 0.5 * (poses[:-1, 2] + poses[1:, 2])
         self._steps = np.diff(poses[:, :2], axis=0)
         # Interpolation of anything summed over the grid at the reference's times: two weights each.
@@ -28,9 +29,9 @@ class Sensitivity:
         self._headings = self._at(poses[:, 2:])[:, 0]
 
     def increments(self, channel: str, rates: FloatArray) -> FloatArray:
-        """Return the change of the increments by rates (n, k) added to a channel: v, lateral or w; (3 m, k)."""
-        rates = rates * self._moving * GRID
-        if channel == "w":
+        """Return the change of the increments by rates (n, k) added to a channel, or by factors less 1; (3 m, k)."""
+        rates = rates * self._moving * GRID * self._rates.get(channel, 1.0)
+        if channel.startswith("w"):
             return self._turned(rates)
         heading = (self._heading + (np.pi / 2 if channel == "lateral" else 0.0))[:, None]
         x, y = (self._differences(_sum(rates * side(heading))) for side in (np.cos, np.sin))

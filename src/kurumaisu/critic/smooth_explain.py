@@ -8,14 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu import effects
 from kurumaisu.critic import explain, replay, smooth_shapes, smooth_words
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, felt_share, moved_share
+from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, confirmed, felt_share, moved_share
 from kurumaisu.critic.misfit import bins
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
@@ -23,8 +22,7 @@ from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.smooth_fit import Extension, extend
 from kurumaisu.critic.smooth_judge import Beyond
 from kurumaisu.critic.story import Misfit, Rival
-from kurumaisu.critic.verdict import Gain, Unknown
-from kurumaisu.critic.words import NORMAL90
+from kurumaisu.critic.verdict import NORMAL90, Gain, Unknown
 from kurumaisu.types import FloatArray
 
 _LISTED = 3  # curves that may act, at most
@@ -45,7 +43,7 @@ def criticism(
     beside = explain.criticism(recording, replace(made, problem=curved, found=inner), worth, drives, proposal)
     share = moved_share(problem, extension.settings, extension.fit.settings)
     felt = felt_share(problem, extension.settings, extension.fit.settings)
-    gains = worth is not None and worth.log_density_per_sample.lo90 > 0
+    gains = confirmed(worth, beyond.rivalry.lead)
     told = _told(extension, beyond, share)
     if not gains or (share < MATERIAL and felt < FELT):
         small = f"{told} It is too small to matter, or was not confirmed on data held out."
@@ -75,7 +73,7 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
     mean, sd = smooth_shapes.band(extension, at)
     return Misfit(
         channel=smooth_words.CHANNELS[extension.curve.channel],
-        unit=effects.CHANNELS[extension.curve.channel],
+        unit=smooth_words.unit_of(extension.curve),
         covariate_name=covariate,
         covariate_unit=unit,
         covariate=x,
@@ -90,7 +88,8 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
 
 def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return covariate and residual rate without and with the curve, per increment in which the chair moves on."""
-    channel = list(effects.CHANNELS).index(extension.curve.channel)
+    rate = extension.curve.channel.removesuffix("_gain")
+    channel = ("v", "lateral", "w").index(rate)
     motion = replay.motion(drive, problem.model, extension.fit.settings)
     values = extension.curve.basis.samples(motion)
     middle = np.clip(((drive.times[1:] + drive.times[:-1]) / 2 - drive.start) / GRID, 0, len(values) - 1).astype(int)
@@ -103,6 +102,10 @@ def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[Floa
     if "period" in extension.curve.basis.constants:
         x = np.mod(x, extension.curve.basis.constants["period"])
     use = np.isfinite(x) & ((motion.v != 0) | (motion.w != 0))[middle]
+    if rate != extension.curve.channel:  # a share of the rate: of a small one nothing can be said
+        rates = (motion.v if rate == "v" else motion.w)[middle]
+        use &= np.abs(rates) > 0.3 * np.abs(rates).max()
+        residual, left = (each / np.where(use, rates, 1.0) for each in (residual, left))
     return x[use], residual[use], left[use]
 
 

@@ -11,7 +11,14 @@ from kurumaisu.critic.smooth_fit import Extension
 from kurumaisu.critic.smooth_shapes import Shape, grid, shape_of
 
 # How a reader calls them, and their units.
-CHANNELS = {"v": "forward speed", "lateral": "sideways speed", "w": "yaw rate"}
+CHANNELS = {
+    "v": "forward speed",
+    "lateral": "sideways speed",
+    "w": "yaw rate",
+    "v_gain": "forward speed",
+    "w_gain": "yaw rate",
+}
+_SHARES = {"v_gain": "of the forward speed", "w_gain": "of the yaw rate"}  # in place of a unit
 COVARIATES = {
     "v": ("v", "forward speed", "m/s"),
     "abs_v": ("|v|", "speed", "m/s"),
@@ -39,13 +46,18 @@ def covariate(curve: Curve) -> tuple[str, str, str]:
 
 def channel(curve: Curve) -> str:
     """Return the channel as the verdict has it."""
-    return f"base.{curve.channel}"
+    return f"base.{curve.channel.removesuffix('_gain')}"
+
+
+def unit_of(curve: Curve) -> str:
+    """Return the unit of the curve; in words where it is a share."""
+    return _SHARES.get(curve.channel, effects.CHANNELS[curve.channel])
 
 
 def shape(extension: Extension, *, intervals: bool = True) -> str:
     """Return the curve's shape with place and size, each with its unit and, if asked for, its 90 % interval."""
     found = shape_of(extension)
-    unit, rate = covariate(extension.curve)[2], effects.CHANNELS[extension.curve.channel]
+    unit, rate = covariate(extension.curve)[2], unit_of(extension.curve)
     size = _quantity(found, "size", rate, intervals)
     if found.kind == "periodic":
         times = round(extension.curve.basis.constants["period"] / found.place[0])

@@ -17,6 +17,8 @@ from kurumaisu.errors import Error
 SCHEMA_VERSION = 1
 Kind = Literal["none", "named", "confounded", "unknown", "invalid_data"]
 
+NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
+
 
 @dataclass(frozen=True)
 class Estimate:

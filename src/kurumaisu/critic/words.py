@@ -16,11 +16,10 @@ from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import HORIZON, MATERIAL
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.story import Rival
-from kurumaisu.critic.verdict import Cause, Estimate, Verdict
+from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, Verdict
 from kurumaisu.params import Model
 
 _MINUTE = 60.0  # [s]
-NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
 _CAUSES_TOLD = 4  # in a headline
 _KINDS_TOLD = 2  # of problems in a headline
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer

@@ -20,7 +20,8 @@ from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 
 SMOOTH = "smooth"  # stands for every curve where effects are chosen by id
-CHANNELS: Mapping[str, str] = {"v": "m/s", "lateral": "m/s", "w": "rad/s"}
+# A rate gets the curve added, or is multiplied by 1 + curve: something that brakes acts against either direction.
+CHANNELS: Mapping[str, str] = {"v": "m/s", "lateral": "m/s", "w": "rad/s", "v_gain": "1", "w_gain": "1"}
 _ID = re.compile(rf"smooth\.({'|'.join(CHANNELS)})\.([A-Za-z][\w.]*)")
 _MOST = 64  # knots
 
@@ -70,13 +71,17 @@ class Smooth(Effect):
             raise Error(f"{cls.id}: knots must increase: {numbered(values, 'knot', 0)}")
 
     def apply(self, motion: Motion) -> Motion:
-        """Add the curve to the rate where the chair moves."""
+        """Add the curve to the rate where the chair moves, or multiply the rate by 1 + curve."""
         moving = (motion.v != 0) | (motion.w != 0)
         added = moving * curve(self.covariate, self.values, self._follower.values(motion))
         if self.channel == "v":
             return replace(motion, v=motion.v + added)
         if self.channel == "w":
             return replace(motion, w=motion.w + added)
+        if self.channel == "v_gain":
+            return replace(motion, v=motion.v * (1 + added))
+        if self.channel == "w_gain":
+            return replace(motion, w=motion.w * (1 + added))
         return replace(motion, u=added if motion.u is None else motion.u + added)
 
 
@@ -104,7 +109,7 @@ def constant_of(covariate: str) -> str | None:
 
 
 def curve(covariate: str, values: Mapping[str, float], at: FloatArray) -> FloatArray:
-    """Return the curve of parameters at values of the covariate, in the unit of the rate."""
+    """Return the curve of parameters at values of the covariate, in the unit of the channel."""
     if covariate not in PERIODIC:
         return np.asarray(np.interp(at, numbered(values, "knot", 0), numbered(values, "value", 0)))
     cosines, sines = numbered(values, "cos", 1), numbered(values, "sin", 1)

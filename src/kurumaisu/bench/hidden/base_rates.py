@@ -153,7 +153,8 @@ def _kicks(r: Rates, s: Sizes, shape: Callable[[FloatArray], FloatArray]) -> Flo
     turning = np.flatnonzero(r.asked_w != 0)
     turns = driving[1:][np.sign(r.v[driving[1:]]) != np.sign(r.v[driving[:-1]])]
     for start, end in pairwise([*turns, len(out)]):
-        last = np.searchsorted(turning, start) - 1
+        # A command may fall into the cell before `start`, whose mean then has part of the new turn.
+        last = np.searchsorted(turning, start - 1) - 1
         if last >= 0:
             middle = (way[start:end] + way[start + 1 : end + 1]) / 2 - way[start]
             out[start:end] = s["size"] * np.sign(r.asked_w[turning[last]]) * shape(middle)

@@ -13,6 +13,8 @@ from kurumaisu.bench.hidden.case import Truth
 from kurumaisu.bench.hidden.wrong import WRONG
 from kurumaisu.critic.verdict import Verdict
 
+_SEEN = 3.0  # whitened norm below which nobody can tell two effects apart
+
 
 @dataclass(frozen=True)
 class Score:
@@ -67,6 +69,10 @@ def _right(truth: Truth, verdict: Verdict, named: set[str]) -> bool:
     if truth.kind == "unknown":
         return not named and any(_follows(truth, u.channel, u.covariate) for u in verdict.unknown[:3])
     if truth.kind == "confounded":
+        allowed = {name for ids in truth.accepted for name in ids}
+        return any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
+    if len(truth.ids) == 1 and len(truth.accepted) > 1 and truth.z_rival < _SEEN:
+        # The drives cannot tell it from others: the set of them is the only honest answer.
         allowed = {name for ids in truth.accepted for name in ids}
         return any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
     clean = verdict.verdict not in ("unknown", "invalid_data", "confounded") and not verdict.unknown
