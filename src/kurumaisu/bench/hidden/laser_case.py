@@ -116,6 +116,8 @@ def _without(backdrop: Backdrop, ids: Sequence[str]) -> Backdrop:
 def _sizes(name: str, scale: LaserScale, ask: Ask, rng: np.random.Generator) -> Sizes:
     hidden = LASER[name]
     sizes = hidden.draw(rng)
+    if ask.kind == "confounded":
+        sizes["size"] = abs(sizes["size"])  # what a tilt stands in for is longer ranges: it shortens none
     wanted = ask.z or float(np.exp(rng.uniform(np.log(5.0), np.log(60.0))))
     if hidden.by != "mean":
         return sizes

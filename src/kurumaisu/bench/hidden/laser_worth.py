@@ -20,13 +20,14 @@ from scipy.stats import norm, t
 from kurumaisu.bench.hidden import laws
 from kurumaisu.bench.hidden.backdrop import Backdrop
 from kurumaisu.bench.hidden.laser_catalogue import LASER
-from kurumaisu.bench.hidden.motion import Fault, Sizes
-from kurumaisu.bench.hidden.scanning import MOUNT, Scans, expected
-from kurumaisu.bench.hidden.tours import Tour
+from kurumaisu.bench.hidden.motion import STEP, Fault, Sizes
+from kurumaisu.bench.hidden.scanning import BEAM_TIME, MOUNT, Scans, expected
+from kurumaisu.bench.hidden.tours import REFERENCE_TIME, Tour
 from kurumaisu.types import BoolArray, FloatArray
 
 _PART = 1e-5
 _OBLIQUE = 0.2  # least cosine of the incidence that counts
+_JUMP = 0.05  # [m/s, rad/s] from one step of the integration to the next, more than the noise of the rates
 _SELDOM = 1e-4  # share of readings that are wild anyway
 EVERY = 5  # of the scans, the first of so many is looked at and stands for all
 
@@ -38,7 +39,7 @@ class LaserScale:
         """Look once without faults."""
         self.tour, self._backdrop = tour, backdrop
         self.nominal = expected(tour, (), EVERY)
-        self._seen = seen(self.nominal)
+        self._seen = seen(self.nominal) & ~jolted(tour, self.nominal)[:, None]
         self.count = sum(len(leg.stamps) for leg in tour.legs) / len(self.nominal.stamps)
 
     def signal(self, fault: Fault) -> FloatArray:
@@ -66,10 +67,11 @@ class LaserScale:
     def _taken(self, products: FloatArray, k: int) -> FloatArray:
         """Return the products' part that errors of poses and of whole scans explain, (k, k)."""
         group = np.unique(self.nominal.stop, return_inverse=True)[1]
-        scans, groups = len(group), int(group.max()) + 1
-        effects = 3 if self._backdrop.common_sd == 0 else 4
-        place = np.column_stack([3 * group[:, None] + np.arange(3), 3 * groups + np.arange(scans)])[:, :effects]
-        size = 3 * groups + (scans if effects == 4 else 0)
+        scans, own = len(group), products.shape[1] - k - 1
+        groups, common = int(group.max()) + 1, self._backdrop.common_sd > 0
+        effects = own + common
+        place = np.column_stack([own * group[:, None] + np.arange(own), own * groups + np.arange(scans)])[:, :effects]
+        size = own * groups + (scans if common else 0)
         rows = np.repeat(place[:, :, None], effects, axis=2).ravel()
         columns = np.repeat(place[:, None, :], effects, axis=1).ravel()
         inner = sparse.coo_matrix(
@@ -78,8 +80,8 @@ class LaserScale:
         outer = np.zeros((size, k))
         np.add.at(outer, place, products[:, k : k + effects, :k])
         position, heading = self.tour.truth
-        prior = np.tile([position**-2, position**-2, heading**-2], groups)
-        whole = sparse.diags(prior) if effects == 3 else sparse.block_diag([sparse.diags(prior), self._whole(scans)])
+        prior = np.tile([position**-2, position**-2, heading**-2], groups * own // 3)
+        whole = sparse.diags(prior) if not common else sparse.block_diag([sparse.diags(prior), self._whole(scans)])
         solved = splu(sparse.csc_matrix(inner + whole)).solve(outer)
         return np.asarray(outer.T @ solved)
 
@@ -92,7 +94,10 @@ class LaserScale:
         return sparse.diags([side, middle, side], [-1, 0, 1]) / ((1 - keep**2) * self._backdrop.common_sd**2)
 
     def _pose_columns(self) -> FloatArray:
-        """Return what 1 m of x, 1 m of y, 1 rad of heading of base_link, and 1 m of a whole scan do, (s, b, 4)."""
+        """Return what errors of poses and 1 m of a whole scan do, (s, b, 4), or (s, b, 10) of a drive.
+
+        1 m of x, 1 m of y, 1 rad of heading of base_link; while it drives, of each pose of the reference around a scan.
+        """
         c = self.nominal
         ux, uy = np.cos(c.angles), np.sin(c.angles)
         nx, ny = c.normal[..., 0], c.normal[..., 1]
@@ -102,9 +107,12 @@ class LaserScale:
         reach = np.where(np.isfinite(c.ranges), c.ranges, 0.0)
         turned_x = lever_x[:, None] - reach * uy
         turned_y = lever_y[:, None] + reach * ux
-        return np.stack(
-            [-nx / facing, -ny / facing, -(nx * turned_x + ny * turned_y) / facing, np.ones_like(ux)], axis=-1
-        )
+        rigid = np.stack([-nx / facing, -ny / facing, -(nx * turned_x + ny * turned_y) / facing], axis=-1)
+        if self.tour.moving:  # errors of neighbouring poses are independent, and a scan rests on three of them
+            since = BEAM_TIME * np.arange(rigid.shape[1]) / REFERENCE_TIME
+            hats = np.maximum(1 - np.abs(since[:, None] - np.arange(3)), 0.0)
+            rigid = (hats[:, :, None] * rigid[:, :, None, :]).reshape(*ux.shape, 9)
+        return np.concatenate([rigid, np.ones_like(ux)[..., None]], axis=-1)
 
     def rivals(self, names: Sequence[str]) -> dict[str, FloatArray]:
         """Return the signals (s, b, k) of rivals at typical sizes, those with a free shape in several."""
@@ -148,6 +156,18 @@ def _unchained(columns: FloatArray, rho: float) -> FloatArray:
         return columns
     out = columns.copy()
     out[:, 1:] = (columns[:, 1:] - rho * columns[:, :-1]) / np.sqrt(1 - rho**2)
+    return out
+
+
+def jolted(tour: Tour, scans: Scans) -> BoolArray:
+    """Return the scans (s,) of a drive in which, or beside which, a rate jumps: no reference shows when exactly."""
+    out = np.zeros(len(scans.stamps), dtype=bool)
+    for i, leg in enumerate(tour.legs if tour.moving else ()):
+        rates = np.diff(leg.path, axis=0) / STEP
+        kinks = STEP * (1 + np.flatnonzero((np.abs(np.diff(rates, axis=0)) > _JUMP).any(axis=1)))
+        mine = scans.leg == i
+        since = scans.stamps[mine][:, None] - kinks
+        out[mine] = ((since < REFERENCE_TIME) & (since > -3 * REFERENCE_TIME)).any(axis=1)
     return out
 
 

@@ -13,6 +13,7 @@ from kurumaisu.bench.hidden.rooms import Room, draw_room, one_wall
 from kurumaisu.types import FloatArray, IntArray
 
 SCAN_TIME = 0.1  # [s]
+REFERENCE_TIME = 0.05  # [s] between poses of the reference in a drive; a scan is stamped with one of them
 _SETTLED = 20.0  # [s] that the laser has stood at a stop before its first scan
 _HALF = (1.3, 0.8)  # [m] of the part of a room in which the chair drives
 
@@ -93,7 +94,7 @@ def _driven(regime: Regime, rng: np.random.Generator, seconds: float = 30.0) -> 
     start = np.array([*rng.uniform(-0.5, 0.5, 2), rng.uniform(-np.pi, np.pi)])
     command = _wander(seconds, start, rng)
     noise = draw_rates(regime, round((seconds + 3.0) / STEP), rng)
-    times = np.round(np.arange(0.0, seconds + 1.0, 0.05), 6)
+    times = np.round(np.arange(0.0, seconds + 1.0, REFERENCE_TIME), 6)
     setting = Setting(command, start, times, noise)
     path = integrate(drive(setting, ())[1])
     stamps = np.round(0.2 + SCAN_TIME * np.arange(round((seconds - 0.4) / SCAN_TIME)), 6)

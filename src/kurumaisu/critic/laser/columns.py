@@ -238,7 +238,7 @@ class Marks:
             units = np.array([_unit(self._slope(effect, acting[0], {parameter.name: value})) for value in grid])
             sizes = np.linalg.svd(units, compute_uv=False)
             rank = int(np.sum(sizes > _RANK * sizes[0]))
-            if rank > 2:
+            if rank > 2 or (rank == 2 and _geometric(parameter)):  # within bounds, which a sum of two would ignore
                 grids[parameter.name] = grid
             elif rank == 2:
                 other = int(np.argmin(np.abs(units @ units[0])))

@@ -28,6 +28,7 @@ _STOPS = 20  # stops of which each may have a knot of its own
 _DRAWS = 150  # coefficients of an effect that are still told one by one; of more, so many draws stand for all
 _STEP = 0.2  # of a finite difference, in units of a parameter's scale
 _ROUNDING = 1e-6
+_LEAST = 0.3  # [m, rad, s] spread of a covariate that a curve may follow
 _SAMPLES = 20000  # readings that say how often a covariate has which value
 
 
@@ -88,9 +89,9 @@ def _drawn(shots: Shots, marks: Marks, ids: frozenset[str] | None) -> Iterator[t
                 continue
             values = {**null, p.name: p.null + _STEP * p.scale}
             counter = _Spike(-1, 0.0)
-            effect(values, counter).apply(shots.walls.segments)
-            moved = _moved(shots, effect(values, _Spike(0, 1.0)).apply(shots.walls.segments), marks)
-            if not counter.asked or not np.abs(moved).max() > 0:
+            drawn = effect(values, np.random.default_rng(0)).apply(shots.walls.segments)
+            still = effect(values, counter).apply(shots.walls.segments)
+            if not counter.asked or not np.array_equal(still, shots.walls.segments) or np.array_equal(still, drawn):
                 continue
             many = counter.asked > _DRAWS
             made = []
@@ -130,7 +131,7 @@ def _curves(shots: Shots, marks: Marks) -> Iterator[tuple[Free, FloatArray]]:
     for name, of in effects.RANGE_COVARIATES.items():
         at = np.asarray(of(echoes), dtype=float)
         values = at[known]
-        if np.ptp(values) <= _ROUNDING * max(1.0, float(np.abs(values).max())):
+        if np.ptp(values) < _LEAST:
             continue
         whole = bool((np.ptp(at, axis=1) <= _ROUNDING).mean() > 0.5) or name == "heading"
         knots = _knots(at[:, 0] if whole else values[:: max(len(values) // _SAMPLES, 1)])

@@ -14,14 +14,15 @@ from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict, thin
-from kurumaisu.critic.laser.standing import smoothed
+from kurumaisu.critic.laser.standing import kinks, smoothed
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
 from kurumaisu.geometry import compose
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
 _OUTLIER = 4.5  # deviations from which a reading does not count
-_BINS = 6  # of the range, in which the deviation is estimated
+_BINS = 6  # of the range, and of the incidence, in which the deviation is estimated
+_SURE = 0.3  # share of the scans that must lie on a smooth path, or else none is preferred
 _JOLT = 4.0  # sds among scans from which one of them does not count
 _TOLERATED = 0.1  # share by which a scan may always be noisier than the middle one
 _ROUNDS = 3
@@ -61,6 +62,7 @@ class Assembly:
         self.hats = [hats(shots, row) for row in range(len(shots.stamps))]
         self.layout = Layout(shots.stamps, shots.run, _stands(shots))
         self.tracks = shots.tracks
+        self.kinked = [np.zeros(len(track.times), dtype=bool) for track in shots.tracks]
         self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
         self._linearise(shots, roughly=True)
         self.first = self._trust()
@@ -84,8 +86,12 @@ class Assembly:
         self.residual = shots.measured - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
 
     def _trust(self) -> BeamNoise:
-        sd = np.maximum(predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base, _LEAST)
-        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base))
+        one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
+        sd = np.maximum(np.nan_to_num(one), _LEAST)  # a beam that meets nothing has none
+        sure = np.array([not self.kinked[self.shots.run[k]][hat.rows].any() for k, hat in enumerate(self.hats)])
+        if sure.mean() < _SURE:
+            sure[:] = True
+        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & sure[:, np.newaxis])
 
     def _moved(self) -> Shots:
         """Return the shots on tracks that are moved to where the scans put them, each scan alone."""
@@ -95,12 +101,17 @@ class Assembly:
             rows = self._alike_rows(k)
             sums[self.shots.run[k]][rows, :3] += errors
             sums[self.shots.run[k]][rows, 3] += 1
-        mean = []
+        mean, sought = [], []
         # Errors are as of the first tracks, which `shift` has moved already.
         for track, first, some in zip(tracks, self.tracks, sums, strict=True):
             moved = first.poses + some[:, :3] / np.maximum(some[:, 3:], 1)
+            sought.append(moved)
             track.poses[:] = smoothed(track.times, moved, np.where(some[:, 3] > 0, 1.0, _UNSEEN))
             mean.append(track.poses - first.poses)
+        self.kinked = [
+            kinks(moved_to, track.poses, some[:, 3] > 0)
+            for moved_to, track, some in zip(sought, tracks, sums, strict=True)
+        ]
         shift = [hat.weights @ mean[self.shots.run[k]][hat.rows] for k, hat in enumerate(self.hats)]
         return replace(self.shots, tracks=tuple(tracks), shift=np.array(shift))
 
@@ -230,13 +241,9 @@ class Assembly:
 
     def _refined(self, beam: BeamNoise, project: IntArray) -> BeamNoise:
         left = np.where(beam.valid, self.leftover(beam, project), np.nan)
-        edges = np.nanquantile(np.where(beam.valid, self.marks.seen.ranges, np.nan), np.linspace(0, 1, _BINS + 1)[1:-1])
-        bins = np.digitize(self.marks.seen.ranges, edges)
         sd = self.first.sd.copy()
-        for i in range(_BINS):
-            inside = (bins == i) & beam.valid
-            if inside.any():
-                sd[bins == i] *= max(_MAD * float(np.median(np.abs(left[inside] / self.first.sd[inside]))), 0.05)
+        for covariate in (self.marks.seen.ranges, self.marks.seen.incidence):  # oblique walls may be read more noisily
+            sd *= _factors(left, sd, np.where(beam.valid, covariate, np.nan), covariate)
         z = left / sd
         every = self.leftover_all(left, beam, project) / sd
         valid = self.first.valid & (np.abs(np.nan_to_num(every)) < _OUTLIER) & ~self._jolted(every)[:, np.newaxis]
@@ -307,6 +314,17 @@ def _stands(shots: Shots) -> IntArray:
         rows = track.poses[low : high + 1]
         if (rows == rows[0]).all():
             out[k] = known.setdefault((int(shots.run[k]), rows[0].tobytes()), len(known))
+    return out
+
+
+def _factors(left: FloatArray, sd: FloatArray, known: FloatArray, covariate: FloatArray) -> FloatArray:
+    """Return by how much the deviations (k, b) of what is left differ from sd, in bins of a covariate."""
+    bins = np.digitize(covariate, np.nanquantile(known, np.linspace(0, 1, _BINS + 1)[1:-1]))
+    out = np.ones_like(sd)
+    for i in range(_BINS):
+        inside = (bins == i) & np.isfinite(known)
+        if inside.any():
+            out[bins == i] = max(_MAD * float(np.median(np.abs(left[inside] / sd[inside]))), 0.05)
     return out
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
 _ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
 _FITS = 10  # best sets beside which blocks are tried
 _SINGLES = 12  # best single effects likewise
+_PRUNED = 3  # best sets with a block that are pruned
 _WEAK = 1e-4  # prior precision of a coefficient of the catalogue, in units of its parameter's scale
 _SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in units of its scale
 
@@ -60,16 +61,16 @@ class Weighed:
 
 def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:
     """Try every block beside the best sets, beside single effects, and beside none."""
-    count = len(found.p)
+    ids = tuple(dict.fromkeys([*found.p, *(each.id for each in free if each.basis is None)]))
+    count = len(ids)
     curves = sum(each.basis is not None for each in free)
+    shares = {e.id: float(np.log(odds(count) if e.basis is None else _ODDS / curves)) for e in free}
+    known = {fit.ids: fit for fit in reversed(found.fits)}
     rivals = []
     for fit in _tried(found.fits):
-        for each in free:
-            if each.id not in fit.ids:
-                inner, b = _beside(fit, each, gram)
-                share = np.log(odds(count)) if each.basis is None else np.log(_ODDS / curves)
-                seen = belief(inner, b, each.priors)
-                rivals.append(Rival(fit, each, seen, fit.score + seen.nats + float(share)))
+        rivals += [_beside(fit, each, gram, shares[each.id]) for each in free if each.id not in fit.ids]
+    rivals.sort(key=lambda rival: -rival.worth)
+    rivals = [*_pruned(rivals[:_PRUNED], known, gram, shares), *rivals]
     rivals.sort(key=lambda rival: -rival.worth)
     plain = [(fit.ids, fit.score) for fit in found.fits]
     plain += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in rivals if rival.free.basis is None]
@@ -78,12 +79,36 @@ def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:
     sets = [*plain, *((rival.fit.ids, rival.worth) for rival in curved)]
     weights = [(ids, float(np.exp(worth - total))) for ids, worth in sets]
     best = max(plain, key=lambda each: each[1])
-    p, confounded = confusion(weights, best[0], tuple(found.p))
+    p, confounded = confusion(weights, best[0], ids)
     lead = curved[0].worth - best[1] if curved else -np.inf
     by_curve = {each.id: 0.0 for each in free if each.basis is not None}
     for rival in curved:
         by_curve[rival.free.id] += float(np.exp(rival.worth - total))
     return Weighed(replace(found, p=p, confounded=confounded), tuple(rivals), lead, by_curve)
+
+
+def _beside(fit: Fitted, free: Free, gram: FloatArray, share: float) -> Rival:
+    seen = belief(*beside(fit, free, gram), free.priors)
+    return Rival(fit, free, seen, fit.score + seen.nats + share)
+
+
+def _pruned(
+    rivals: Sequence[Rival], known: Mapping[frozenset[str], Fitted], gram: FloatArray, shares: Mapping[str, float]
+) -> Iterator[Rival]:
+    """Yield the rivals with as few effects beside the block as are worth it."""
+    done: set[tuple[frozenset[str], str]] = set()
+    for rival in rivals:
+        best = rival
+        while True:
+            fewer = [best.fit.ids - {name} for name in best.fit.ids]
+            fits = [known[ids] for ids in fewer if ids in known and (ids, best.free.id) not in done]
+            done |= {(fit.ids, best.free.id) for fit in fits}
+            tried = [_beside(fit, best.free, gram, shares[best.free.id]) for fit in fits]
+            yield from tried
+            top = max(tried, key=lambda each: each.worth, default=best)
+            if top.worth <= best.worth:
+                break
+            best = top
 
 
 def joint(rival: Rival, gram: FloatArray) -> tuple[Fitted, FloatArray, FloatArray]:
@@ -105,7 +130,7 @@ def joint(rival: Rival, gram: FloatArray) -> tuple[Fitted, FloatArray, FloatArra
 
 def size(rival: Rival, gram: FloatArray) -> tuple[float, float, float]:
     """Return the sd of a block's coefficients in units of its scale, with its 90 % interval."""
-    inner, b = _beside(rival.fit, rival.free, gram)
+    inner, b = beside(rival.fit, rival.free, gram)
     values, vectors = np.linalg.eigh(inner)
     c, values = vectors.T @ b, np.maximum(values, 0.0)
     square = _SIZES[:, np.newaxis] ** 2
@@ -127,7 +152,7 @@ def _use(fit: Fitted) -> IntArray:
     return np.concatenate([np.arange(0), *(np.arange(form.span.start, form.span.stop) for form in fit.forms)])
 
 
-def _beside(fit: Fitted, free: Free, gram: FloatArray) -> tuple[FloatArray, FloatArray]:
+def beside(fit: Fitted, free: Free, gram: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return gram and target of a block, without what a set's own columns could take up."""
     use, own = _use(fit), np.arange(free.span.start, free.span.stop)
     inner, b = gram[np.ix_(own, own)], gram[own, -1]

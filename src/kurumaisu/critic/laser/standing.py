@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray
 
 _PAUSE = 5.0  # [s] without a pose, after which the chair may stand elsewhere
 _STEP = 6.0  # sds of the poses' jitter that lie between two of them where the chair stands
@@ -13,6 +13,7 @@ _SPREAD = 1.5  # sds of the jitter that poses of one place scatter by
 _FEWEST = 5  # poses of a stand
 _WINDOW = 0.25  # [s] on each side, over which a chair's path is smooth
 _LEAST = 2.01  # poses on each side, however seldom they are taken
+_MISS = 4.0  # usual misses of a smooth path
 _MOST = 30  # likewise, however often
 
 
@@ -32,6 +33,19 @@ def steadied(times: FloatArray, poses: FloatArray) -> FloatArray:
         if len(rows) >= _FEWEST and _stands(poses[rows], jitter):
             out[rows] = poses[rows].mean(axis=0)
     return out
+
+
+def kinks(sought: FloatArray, smooth: FloatArray, seen: BoolArray) -> BoolArray:
+    """Return which poses (n,) a smooth path misses by more than most: rates jump there, and are not known.
+
+    sought (n, 3): as the scans have them; seen (n,): where they do.
+    """
+    off = np.abs(sought - smooth)
+    moved = seen & (off > 0).any(axis=1)
+    if moved.sum() < _FEWEST:
+        return np.zeros(len(seen), dtype=bool)
+    usual = np.maximum(1.4826 * np.median(off[moved], axis=0), 1e-6)
+    return np.asarray(moved & (off > _MISS * usual).any(axis=1))
 
 
 def _stands(poses: FloatArray, jitter: FloatArray) -> bool:

@@ -17,6 +17,7 @@ from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch, Simulator
 from kurumaisu.critic.laser.statistics import Statistics
+from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
 from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.recording import Recording
@@ -161,7 +162,10 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scat
     )
     curve = made.winner is not None and made.winner.free.basis is not None and made.winner.free.id in matters
     unknown = tuple(unknowns(made.weighed, normal.gram)) if curve else ()
-    confounded = () if curve else tuple(group for group in found.confounded if matters & set(group))
+    confounded = (
+        () if curve else tuple(group for group in _confused(assembly, normal, made, causes) if matters & set(group))
+    )
+    causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
     small = tuple(name for name in sizes if name not in matters and found.p.get(name, 0.0) >= NAMED)
     details = (_noise_told(assembly, normal), *_told(sizes, small))
     known = {cause.id: cause for cause in causes}
@@ -173,6 +177,11 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scat
         at = {**each.setting.parameters, **(_off_null(mean) if mean else {})}
         settings[each.setting.id] = EffectSetting(each.setting.id, at)
     return LaserFinding(tuple(known.values()), confounded, unknown, tuple(settings.values()), details, small=small)
+
+
+def _confused(assembly: Assembly, normal: Normal, made: _Made, causes: Sequence[Cause]) -> Groups:
+    names = [cause.id for cause in causes]
+    return joined(made.found.confounded, twins(made.found, made.winner, assembly.free, normal.gram, names))
 
 
 def _of_block(winner: Rival, coefficients: FloatArray, normal: Normal) -> tuple[EffectSetting, dict[str, Estimate]]:

@@ -16,7 +16,7 @@ class Temperature(ReadingEffect):
     parameters = (
         Parameter("coefficient", "m/K", null=0.0, scale=5.0e-4, lower=-0.01, upper=0.01),
         Parameter("swing", "K", null=5.0, scale=5.0, lower=0.0, upper=50.0),
-        Parameter("reference", "deg C", null=20.0, scale=10.0, lower=-40.0, upper=85.0),
+        Parameter("reference", "deg C", null=20.0, scale=2.0, lower=10.0, upper=30.0),
         Parameter("period", "s", null=600.0, scale=600.0, lower=1.0, upper=1.0e5),
     )
     sentence = "ranges follow the temperature"
