@@ -193,9 +193,9 @@ def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *
 def _restarted(drive: Drive, path: FloatArray) -> tuple[FloatArray, float | None]:
     """Return a simulated path (n, 2) in pieces that begin at measured poses, nan between, and how far off they end."""
     since = drive.times - drive.times[0]
-    starts = [*np.flatnonzero(np.diff(since // _RESTART, prepend=-1.0)), len(since) - 1]
+    bounds = np.unique([*np.flatnonzero(np.diff(since // _RESTART, prepend=-1.0)), len(since) - 1])
     pieces, off = [], []
-    for a, b in pairwise(starts):
+    for a, b in pairwise(bounds.tolist()):
         piece = geometry.compose(drive.poses[a], geometry.between(path[a], path[a : b + 1]))[:, :2]
         pieces += [piece, np.full((1, 2), np.nan)]
         if since[b] - since[a] > _RESTART / 2:
