@@ -34,11 +34,11 @@ def full_verdict():
 def full_story():
     rng = np.random.default_rng(5)
     path = np.cumsum(rng.normal(size=(50, 2)), axis=0)
-    x = rng.normal(size=4000)
-    y = 0.1 * x + rng.normal(size=4000)
+    x = rng.normal(size=3000)
+    y = 0.1 * x + rng.normal(size=3000)
     bins = Bins(np.array([-1.0, 1.0]), np.array([-0.1, 0.1]), np.array([-0.2, 0.0]), np.array([0.0, 0.2]))
     curve = np.array([[-1.0, -0.1], [1.0, 0.1]])
-    runs = [Overlay(f"run_{i}", path, path + 0.3, path + 0.003, held_out=i == 6) for i in range(1, 7)]
+    runs = [Overlay(f"run_{i}", path, path + 0.3, path + 0.003, i == 6, 10.0, 0.424, 0.004) for i in range(1, 7)]
     return Story(
         recording="corridor",
         model="MD-100",

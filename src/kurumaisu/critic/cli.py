@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import shutil
 import sys
@@ -26,6 +27,8 @@ _BROKEN_PIPE = 141  # 128 + SIGPIPE
 def main(arguments: Sequence[str] | None = None) -> int:
     """Criticise recordings; return the exit code, which critic --help explains."""
     options = parse(arguments)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal without a minus sign must not cost the verdict
     try:
         code = _criticise(options)
         sys.stdout.flush()
@@ -130,13 +133,13 @@ def _complain(outcome: Outcome, shown: Display, *, many: bool) -> None:
 
 
 def _print(outcomes: Sequence[Outcome], *, many: bool) -> None:
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
     if many:
-        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
         print(results.table(outcomes, width))
         return
     for outcome in outcomes:
         if outcome.verdict is not None:
-            print(results.summary(outcome.verdict, outcome.headline, outcome.details))
+            print(results.summary(outcome, width))
             print(f"report: {outcome.job.output / 'report.html'}")
 
 

@@ -5,17 +5,42 @@ from __future__ import annotations
 
 import shutil
 import time
+import unicodedata
 from typing import TextIO
 
+from kurumaisu.critic.digits import NBSP
 from kurumaisu.critic.job import Outcome
 
 _BAR = 24  # characters
+_SHORTEST_BAR = 5  # characters; of less there is nothing to be seen
 _REDRAW = 0.05  # [s] at least between two pictures
 
 
 def printable(text: str) -> str:
     """Return text without what would move a cursor: names of files may hold anything."""
-    return "".join(c if c.isprintable() else "?" for c in text)
+    return "".join(c if c.isprintable() else "?" for c in text.replace(NBSP, " "))
+
+
+def cells(text: str) -> int:
+    """Return how many cells of a terminal a printable text takes: some characters take two, accents none."""
+    return sum(_cells(c) for c in text)
+
+
+def cut(text: str, most: int) -> str:
+    """Return a printable text in at most so many cells, with a sign where it was longer."""
+    if cells(text) <= most:
+        return text
+    used, kept = 1, []
+    for c in text:
+        used += _cells(c)
+        if used > most:
+            break
+        kept.append(c)
+    return "".join(kept) + "…" * (most > 0)
+
+
+def _cells(c: str) -> int:
+    return 0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1
 
 
 class Display:
@@ -91,26 +116,33 @@ class Terminal(Display):
         """Draw all lines."""
         self._drawn = time.monotonic()
         size = shutil.get_terminal_size()
-        lines = [self._line(name, *state) for name, state in self._running.items()]
+        width = size.columns - 1
+        lines = [self._line(name, *state, width) for name, state in self._running.items()]
         if self._total > 1:
-            lines = [*lines[: max(size.lines - 2, 0)], self._bar()]
-        self._put([printable(line)[: size.columns - 1] for line in lines])
+            lines = [*lines[: max(size.lines - 2, 0)], self._bar(width)]
+        self._put([cut(line, width) for line in lines])
 
     def close(self) -> None:
         """Wipe all lines out."""
         self._put([])
 
-    def _line(self, name: str, since: float, message: str) -> str:
-        seconds = f"{time.monotonic() - since:4.0f} s"
-        return f"{seconds}  {message}" if self._total == 1 else f"{seconds}  {name}: {message or 'starting'}"
+    def _line(self, name: str, since: float, message: str, width: int) -> str:
+        seconds, message = f"{time.monotonic() - since:4.0f} s", printable(message)
+        if self._total == 1:
+            return f"{seconds}  {message}"
+        return f"{seconds}  {cut(printable(name), width // 2)}: {message or 'starting'}"
 
-    def _bar(self) -> str:
-        full = _BAR * self._done // self._total
+    def _bar(self, width: int) -> str:
         left = ""
         if self._done:
             seconds = (time.monotonic() - self._began) / self._done * (self._total - self._done)
             left = f", {seconds / 60:.0f} min left" if seconds >= 90 else f", {seconds:.0f} s left"
-        return f"[{'#' * full}{'.' * (_BAR - full)}] {self._done} of {self._total}{left}"
+        said = f"{self._done} of {self._total}{left}"
+        bar = min(_BAR, width - len(said) - 3)
+        if bar < _SHORTEST_BAR:
+            return said
+        full = bar * self._done // self._total
+        return f"[{'#' * full}{'.' * (bar - full)}] {said}"
 
     def _put(self, lines: list[str]) -> None:
         # To the start of the first line, then down over the old ones; the cursor rests below the last.

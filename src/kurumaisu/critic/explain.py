@@ -6,10 +6,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy
 
+from kurumaisu import geometry
 from kurumaisu.critic import misfit, naming, replay, words
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import Drive, prepare
@@ -18,6 +20,7 @@ from kurumaisu.critic.extended import process_noise
 from kurumaisu.critic.material import FELT, MATERIAL, confirmed, felt_share, moved_share
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
+from kurumaisu.critic.options import version
 from kurumaisu.critic.predict import Prediction
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.smooth_known import informed
@@ -30,6 +33,9 @@ from kurumaisu.types import FloatArray
 # Growth of the noise that counts beside other causes: less is left by causes of a slightly other form, too.
 _GROWTH_BESIDE = 1.0
 _PICTURE = 0.1  # [s] between the poses drawn
+# [s] after which a simulated path begins again at the measured pose: the random wander of the heading adds up, and
+# after a minute hides what the model does.
+_RESTART = 10.0
 
 
 @dataclass(frozen=True)
@@ -50,10 +56,10 @@ def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Crit
     story = Story(
         recording=recording.name,
         model=model.name,
-        headline="The data are wrong, so nothing was fitted.",
+        headline=words.wrong(problems),
         details=tuple(problems),
         pose_source=_pose_source(recording),
-        provenance=_provenance(),
+        provenance=_provenance(recording),
         overlays=overlays(recording, model),
     )
     return Criticism(verdict, story, model, ())
@@ -67,7 +73,7 @@ def undriven(recording: Recording, model: Model) -> Criticism:
         headline="Nothing is missing in the model that these scans could show.",
         details=("base not criticised: there are neither voltages nor commands nor odometry.",),
         pose_source=_pose_source(recording),
-        provenance=_provenance(),
+        provenance=_provenance(recording),
     )
     return Criticism(Verdict("none", problems=recording.problems), story, model, ())
 
@@ -109,7 +115,7 @@ def criticism(
         headline=words.headline(verdict, found, matters, shares),
         details=words.details(problem, found, drives, shares, matters),
         pose_source=_pose_source(recording),
-        provenance=_provenance(),
+        provenance=_provenance(recording),
         overlays=overlays(recording, problem.model, settings or None),
         misfits=_misfits(problem, found),
         rivals=words.rivals(found),
@@ -143,7 +149,7 @@ def _cause(problem: Problem, found: Naming, name: str) -> Cause:
 
 def _noise(problem: Problem) -> tuple[Noise, ...]:
     n = problem.noise
-    rows = (
+    rows: tuple[tuple[str, float, str], ...] = (
         ("reference position, each axis", n.position_sd, "m"),
         ("reference heading", n.heading_sd, "rad"),
         ("forward speed", n.sd_v, "m/s"),
@@ -151,6 +157,13 @@ def _noise(problem: Problem) -> tuple[Noise, ...]:
         ("yaw rate", n.sd_w, "rad/s"),
         ("time constant of the rates' noise", n.tau, "s"),
     )
+    if n.slow_v or n.slow_lateral or n.slow_w:
+        rows += (
+            ("forward speed, slower part", n.slow_v, "m/s"),
+            ("sideways speed, slower part", n.slow_lateral, "m/s"),
+            ("yaw rate, slower part", n.slow_w, "rad/s"),
+            ("time constant of the slower part", n.slow_tau, "s"),
+        )
     return tuple(Noise(name, value, float("nan"), float("nan"), unit) for name, value, unit in rows)
 
 
@@ -173,20 +186,34 @@ def overlays(
 
 def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *, held_out: bool) -> Overlay:
     drive = informed(prepare(run, model, _PICTURE), run)
+    baseline, off = _restarted(drive, replay.path(drive, model, ()))
+    extended, off_extended = None, None
+    if settings is not None:
+        extended, off_extended = _restarted(drive, replay.path(drive, model, settings))
+    return Overlay(drive.name, drive.poses[:, :2], baseline, extended, held_out, _RESTART, off, off_extended)
 
-    def seen(extra: Sequence[EffectSetting]) -> FloatArray:
-        return replay.path(drive, model, extra)[:, :2]
 
-    extended = None if settings is None else seen(settings)
-    return Overlay(drive.name, drive.poses[:, :2], seen(()), extended, held_out)
+def _restarted(drive: Drive, path: FloatArray) -> tuple[FloatArray, float | None]:
+    """Return a simulated path (n, 2) in pieces that begin at measured poses, nan between, and how far off they end."""
+    since = drive.times - drive.times[0]
+    bounds = np.unique([*np.flatnonzero(np.diff(since // _RESTART, prepend=-1.0)), len(since) - 1])
+    pieces, off = [], []
+    for a, b in pairwise(bounds.tolist()):
+        piece = geometry.compose(drive.poses[a], geometry.between(path[a], path[a : b + 1]))[:, :2]
+        pieces += [piece, np.full((1, 2), np.nan)]
+        if since[b] - since[a] > _RESTART / 2:
+            off.append(np.sum((piece[-1] - drive.poses[b, :2]) ** 2))
+    return np.concatenate(pieces)[:-1], float(np.sqrt(np.mean(off))) if off else None
 
 
 def _pose_source(recording: Recording) -> str:
     return "; ".join(dict.fromkeys(run.pose_source for run in recording.runs))
 
 
-def _provenance() -> dict[str, str]:
+def _provenance(recording: Recording) -> dict[str, str]:
     return {
-        "named from": f"posterior {naming.NAMED:g}",
-        "numpy, scipy": f"{np.__version__}, {scipy.__version__}",
+        "runs fitted": ", ".join(recording.train),
+        "runs held out": ", ".join(recording.test) or "each in turn",
+        "named from": f"a probability of {naming.NAMED:g}",
+        "kurumaisu, numpy, scipy": f"{version()}, {np.__version__}, {scipy.__version__}",
     }

@@ -45,7 +45,8 @@ class Job:
 class Outcome:
     """What came of a job after so many seconds of wall time.
 
-    error: why there is no verdict, on one line; trace: the stack, where that is the critic's own fault.
+    next_drive: what to drive next, or empty; error: why there is no verdict, on one line; trace: the stack, where that
+    is the critic's own fault.
     """
 
     job: Job
@@ -53,6 +54,7 @@ class Outcome:
     verdict: Verdict | None = None
     headline: str = ""
     details: tuple[str, ...] = ()
+    next_drive: str = ""
     error: str = ""
     trace: str = ""
 
@@ -78,7 +80,8 @@ def run(job: Job, progress: Callable[[str], None]) -> Outcome:
         words = f"the critic itself failed: {type(error).__name__}: {' '.join(str(error).split())}"
         return Outcome(job, time.monotonic() - start, error=words, trace=traceback.format_exc())
     seconds = time.monotonic() - start
-    return Outcome(job, seconds, criticism.verdict, criticism.story.headline, criticism.story.details)
+    story = criticism.story
+    return Outcome(job, seconds, criticism.verdict, story.headline, story.details, story.next_drive)
 
 
 def criticise(job: Job, progress: Callable[[str], None]) -> Criticism:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,20 +14,34 @@ from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.story import Bins, Misfit
 from kurumaisu.critic.verdict import NORMAL90
 from kurumaisu.effects import Follows, Rate
+from kurumaisu.geometry import wrap
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 _BINS = 15  # at most
 _FEWEST = 5  # points of which a mean has an interval
 _CHANGE = 0.5  # [s] over which a change of the input is taken
+FOLLOWED = 0.3  # share of an effect that means over a covariate must explain, to be drawn over it
+_CLEARLY = 0.15  # of that share, by which another covariate must be better than the usual one
 _NOTEWORTHY = 4.0  # standard errors from which a remaining correlation is said
 
-_UNITS = {Rate.V: "m/s", Rate.W: "rad/s", Follows.V: "m/s", Follows.W: "rad/s"}
+# Increments as rates, in the order of their columns, with their units.
+CHANNELS = {"v": ("forward speed", "m/s"), "lateral": ("sideways speed", "m/s"), "w": ("yaw rate", "rad/s")}
+_UNITS = {Follows.V: "m/s", Follows.W: "rad/s"}
 _UNITS |= {Follows.V_CHANGE: f"m/s in {_CHANGE:g} s", Follows.W_CHANGE: f"rad/s in {_CHANGE:g} s"}
 
 
+@dataclass(frozen=True)
+class Covariate:
+    """What a misfit may be drawn over: as a reader calls it, its unit, and a value per sample, (n,)."""
+
+    name: str
+    unit: str
+    values: FloatArray
+
+
 def figures(problem: Problem, settings: Sequence[EffectSetting], ids: Iterable[str]) -> tuple[Misfit, ...]:
-    """Return, per effect, the residual without it over the quantity that it follows, and what it adds there.
+    """Return, per effect, what is wrong without it where it acts most, over what it follows best, and what it adds.
 
     The other effects of the fit are in, so each figure shows one cause alone.
     """
@@ -65,42 +80,62 @@ def remaining(problem: Problem, fit: Fit) -> tuple[str, ...]:
 
 def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[effects.BaseEffect]) -> Misfit:
     others = tuple(setting for setting in settings if setting.id != effect.id)
-    channel = 0 if effect.shows_in is Rate.V else 2
-    x, residual, added = (
-        np.concatenate(parts)
-        for parts in zip(
-            *(_samples(problem, drive, settings, others, effect.follows, channel) for drive in problem.drives),
-            strict=True,
-        )
-    )
-    shown = bins(x, residual)
-    curve = bins(x, added, 1)
+    samples = [_samples(problem, drive, settings, others) for drive in problem.drives]
+    residual, added = (np.concatenate(parts) for parts in zip(*samples, strict=True))
+    # The channel in which the effect stands out most from what is left when it is in.
+    left = residual - added
+    channel = int(np.argmax(np.mean(added**2, axis=0) / np.maximum(left.var(axis=0), 1e-12)))
+    name, unit = list(CHANNELS.values())[channel]
+    over = _followed(_covariates(problem.drives), effect.follows.value, added[:, channel])
+    x = over.values if over is not None else added[:, channel]
+    curve = bins(x, added[:, channel], 1)
     return Misfit(
-        channel=effect.shows_in.value,
-        unit=_UNITS[effect.shows_in],
-        covariate_name=effect.follows.value,
-        covariate_unit=_UNITS[effect.follows],
+        channel=name,
+        unit=unit,
+        covariate_name=over.name if over is not None else f"what {effect.id} adds",
+        covariate_unit=over.unit if over is not None else unit,
         covariate=x,
-        residual=residual,
-        bins=shown,
+        residual=residual[:, channel],
+        bins=bins(x, residual[:, channel]),
         explained_by=effect.id,
         curve=np.column_stack([curve.centre, curve.mean]),
+        after=bins(x, left[:, channel]),
     )
 
 
 def _samples(
-    problem: Problem,
-    drive: Drive,
-    settings: Sequence[EffectSetting],
-    others: Sequence[EffectSetting],
-    follows: Follows,
-    channel: int,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    dt = np.diff(drive.times)
-    without = problem.simulated(drive, others)[:, channel]
-    residual = (drive.measured[:, channel] - without) / dt
-    added = (problem.simulated(drive, settings)[:, channel] - without) / dt
-    return covariate(drive, follows), residual, added
+    problem: Problem, drive: Drive, settings: Sequence[EffectSetting], others: Sequence[EffectSetting]
+) -> tuple[FloatArray, FloatArray]:
+    """Return residual without an effect and what it adds, as rates (m, 3)."""
+    dt = np.diff(drive.times)[:, np.newaxis]
+    without = problem.simulated(drive, others)
+    return (drive.measured - without) / dt, (problem.simulated(drive, settings) - without) / dt
+
+
+def _covariates(drives: Sequence[Drive]) -> list[Covariate]:
+    """Return what an effect may be drawn over, per increment of all drives."""
+    parts = {f.value: [covariate(drive, f) for drive in drives] for f in Follows}
+    out = [Covariate(f.value, _UNITS[f], np.concatenate(parts[f.value])) for f in Follows]
+    v, w = out[0].values, out[1].values
+    out.append(Covariate("product of the rates asked for", "m/s²", v * w))
+    out.append(Covariate("size of the forward speed asked for", "m/s", np.abs(v)))
+    out.append(Covariate("size of the yaw rate asked for", "rad/s", np.abs(w)))
+    out.append(Covariate("heading", "rad", np.concatenate([wrap(drive.poses[:-1, 2]) for drive in drives])))
+    since = [drive.times[:-1] - drive.times[0] for drive in drives]
+    return [*out, Covariate("time since the start", "s", np.concatenate(since))]
+
+
+def _followed(covariates: Sequence[Covariate], usual: str, added: FloatArray) -> Covariate | None:
+    """Return what the added part follows: the usual covariate where none is clearly better, None where it has none."""
+    share = {each.name: explained(each.values, added) for each in covariates}
+    best = max(covariates, key=lambda each: share[each.name] + (_CLEARLY if each.name == usual else 0.0))
+    return best if share[best.name] >= FOLLOWED else None
+
+
+def explained(x: FloatArray, y: FloatArray) -> float:
+    """Return the share of the sum of squares of y that means in bins of x explain."""
+    means = bins(x, y, 1)
+    return 1.0 - float(np.mean((y - np.interp(x, means.centre, means.mean)) ** 2) / max(np.mean(y**2), 1e-300))
 
 
 def bins(x: FloatArray, y: FloatArray, fewest: int = _FEWEST) -> Bins:

@@ -11,6 +11,7 @@ from scipy.special import logsumexp
 
 from kurumaisu.critic import design, naming
 from kurumaisu.critic.design import Explanation
+from kurumaisu.critic.digits import odds
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.prior import log_prior
@@ -19,6 +20,7 @@ from kurumaisu.experiments import Script, names, shipped_script
 from kurumaisu.types import FloatArray
 
 DECIDED = 12.0  # [nat] more than that between two explanations decides nothing more
+_TOLD = 4  # ids in a sentence; the verdict has them all
 _RIVALS = 6  # explanations that are compared, at most
 
 
@@ -59,14 +61,14 @@ def propose(problem: Problem, found: Naming, scripts: Sequence[Script]) -> Propo
     possible = [script for script in scripts if design.possible(script, problem.model)]
     options = [_option(problem, script, fits[0], rivals, weights) for script in possible]
     options.sort(key=lambda option: -option.worth / option.script.seconds)
-    listed = " or ".join([", ".join(open_ids[:-1]), open_ids[-1]] if len(open_ids) > 1 else open_ids)
+    listed = _listed(open_ids)
     if not options or max(option.nats for option in options) < design.NOTHING:
         return Proposal(None, f"No scripted drive can decide about {listed}: measure it in another way.", ())
     best = options[0]
     experiment = NextExperiment(best.script.name, best.script.seconds, best.nats, tuple(open_ids))
     sentence = (
-        f"Run the experiment {best.script.name} ({best.script.seconds:.0f} s): it is expected to bring "
-        f"{best.nats:.1f} nats about {listed}."
+        f"critic experiment {best.script.name} ({best.script.seconds:.0f} s). It is expected to make the right one of "
+        f"{listed} {odds(best.nats)} times as probable as a wrong one."
     )
     return Proposal(experiment, sentence, tuple(options))
 
@@ -86,6 +88,11 @@ def remaining(problem: Problem, found: Naming) -> tuple[list[Fit], FloatArray]:
     kept = [(log, fit) for log, fit in ranked if log >= ranked[0][0] + np.log(naming.RIVAL)]
     logs = np.array([log for log, _ in kept])
     return [fit for _, fit in kept], np.exp(logs - logsumexp(logs))
+
+
+def _listed(ids: Sequence[str]) -> str:
+    told = [*ids[:_TOLD], f"{len(ids) - _TOLD} more"] if len(ids) > _TOLD + 1 else list(ids)
+    return " or ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
 
 
 def _option(

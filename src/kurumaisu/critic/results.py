@@ -6,14 +6,17 @@ from __future__ import annotations
 import csv
 import io
 import json
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
-from kurumaisu.critic.display import printable
+from kurumaisu.critic.digits import bare, quantities
+from kurumaisu.critic.display import cells, cut, printable
 from kurumaisu.critic.job import Outcome
 from kurumaisu.critic.verdict import Gain, Verdict, to_json
 from kurumaisu.errors import Error
 
+_NARROWEST = 12  # cells of a recording's name in a table
 COLUMNS = (
     "recording",
     "verdict",
@@ -32,29 +35,41 @@ COLUMNS = (
 )
 
 
-def summary(verdict: Verdict, headline: str, details: Sequence[str]) -> str:
-    """Return the verdict in words."""
-    lines = [f"verdict: {verdict.verdict}", headline, *(f"  {detail}" for detail in details)]
+def summary(outcome: Outcome, width: int) -> str:
+    """Return the verdict in words, lines at most so wide unless a word is wider; outcome must have one."""
+    verdict = outcome.verdict
+    assert verdict is not None
+    lines = [f"verdict: {verdict.verdict}", outcome.headline, *(f"  {detail}" for detail in outcome.details)]
     if verdict.gain is not None:
         lines += _gain(verdict.gain)
-    return "\n".join(map(printable, lines))
+    lines += [f"drive next: {outcome.next_drive}"] if outcome.next_drive else []
+    return "\n".join(_wrapped(printable(line), width) for line in lines)
+
+
+def _wrapped(line: str, width: int) -> str:
+    """Return a line in several, all but the first indented further."""
+    indent = " " * (len(line) - len(line.lstrip()))
+    wrapper = textwrap.TextWrapper(
+        width,
+        initial_indent=indent,
+        subsequent_indent=f"{indent}  ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return "\n".join(wrapper.wrap(line.strip()))
 
 
 def _gain(gain: Gain) -> list[str]:
     density = gain.log_density_per_sample
-    interval = f"90 % {density.lo90:+.3f} to {density.hi90:+.3f}"
-    return [
-        f"gain on held-out data: {density.gain:+.3f} nats per sample ({interval})",
-        *(
-            f"  {name}: rms error {error.baseline:.3f} -> {error.extended:.3f} {error.unit}"
-            + (f" (noise alone: {error.achievable:.3f})" if error.achievable is not None else "")
-            for name, error in gain.rmse.items()
-        ),
-        *(
-            f"  {name}: {channel.log_density_per_sample.gain:+.3g} nats per sample"
-            for name, channel in gain.channels.items()
-        ),
-    ]
+    interval = f"90 %: {density.lo90:+.3f} to {density.hi90:+.3f}"
+    told = [f"gain on held-out data: {density.gain:+.3f} nats per sample ({interval})"]
+    for name, error in gain.rmse.items():
+        before, after = quantities([error.baseline, error.extended], error.unit)
+        alone = "" if error.achievable is None else f" (noise alone: {quantities([error.achievable], error.unit)[0]})"
+        told.append(f"  {name}: rms error {bare(before)} -> {after}{alone}")
+    for name, channel in gain.channels.items():
+        told.append(f"  {name}: {channel.log_density_per_sample.gain:+.3g} nats per sample")
+    return told
 
 
 def as_json(outcome: Outcome, *, alone: bool) -> str:
@@ -77,11 +92,14 @@ def table(outcomes: Sequence[Outcome], width: int) -> str:
     """Return a table of outcomes for people, each line at most so wide, and a line that counts the verdicts."""
     rows = [("recording", "verdict", "gain", "what")]
     rows += [(outcome.job.name, outcome.word, _gain_cell(outcome.verdict), _what(outcome)) for outcome in outcomes]
-    widths = [max(len(row[i]) for row in rows) for i in range(3)]
-    lines = [
-        f"{row[0]:<{widths[0]}}  {row[1]:<{widths[1]}}  {row[2]:>{widths[2]}}  {row[3]}".rstrip()[:width]
-        for row in ([printable(cell) for cell in row] for row in rows)
-    ]
+    longest = max(width // 3, _NARROWEST)
+    rows = [(cut(printable(a), longest), printable(b), printable(c), printable(d)) for a, b, c, d in rows]
+    widths = [max(cells(row[i]) for row in rows) for i in range(3)]
+    lines = []
+    for row in rows:
+        gap = [" " * (most - cells(cell)) for most, cell in zip(widths, row[:3], strict=True)]
+        line = f"{row[0]}{gap[0]}  {row[1]}{gap[1]}  {gap[2]}{row[2]}  {row[3]}"
+        lines.append(cut(line.rstrip(), width))
     words = [outcome.word for outcome in outcomes]
     counts = ", ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(sorted(words)))
     return "\n".join([*lines, f"{len(outcomes)} recordings: {counts}"])

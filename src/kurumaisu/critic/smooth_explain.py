@@ -65,7 +65,7 @@ def criticism(
 def figure(problem: Problem, extension: Extension) -> Misfit:
     """Return the residual without the curve over the covariate, and the curve with its band."""
     name, covariate, unit = smooth_words.covariate(extension.curve)
-    x, residual = (
+    x, residual, left = (
         np.concatenate(parts)
         for parts in zip(*(_samples(problem, drive, extension) for drive in problem.drives), strict=True)
     )
@@ -81,28 +81,32 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
         bins=bins(x, residual),
         explained_by=f"not in the catalogue, over {name}",
         curve=np.column_stack([at, mean]),
+        after=bins(x, left),
         band=np.column_stack([at, mean - NORMAL90 * sd, mean + NORMAL90 * sd]),
     )
 
 
-def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[FloatArray, FloatArray]:
-    """Return covariate and residual rate per increment in which the chair moves throughout."""
+def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return covariate and residual rate without and with the curve, per increment in which the chair moves on."""
     rate = extension.curve.channel.removesuffix("_gain")
     channel = ("v", "lateral", "w").index(rate)
     motion = replay.motion(drive, problem.model, extension.fit.settings)
     values = extension.curve.basis.samples(motion)
     middle = np.clip(((drive.times[1:] + drive.times[:-1]) / 2 - drive.start) / GRID, 0, len(values) - 1).astype(int)
-    left = drive.measured - problem.simulated(drive, extension.fit.settings)
+    dt = np.diff(drive.times)
+    residual, left = (
+        (drive.measured - problem.simulated(drive, settings))[:, channel] / dt
+        for settings in (extension.fit.settings, extension.settings)
+    )
     x = values[middle]
     if "period" in extension.curve.basis.constants:
         x = np.mod(x, extension.curve.basis.constants["period"])
     use = np.isfinite(x) & ((motion.v != 0) | (motion.w != 0))[middle]
-    residual = left[:, channel] / np.diff(drive.times)
     if rate != extension.curve.channel:  # a share of the rate: of a small one nothing can be said
         rates = (motion.v if rate == "v" else motion.w)[middle]
         use &= np.abs(rates) > 0.3 * np.abs(rates).max()
-        residual = residual / np.where(use, rates, 1.0)
-    return x[use], residual[use]
+        residual, left = (each / np.where(use, rates, 1.0) for each in (residual, left))
+    return x[use], residual[use], left[use]
 
 
 def _told(extension: Extension, beyond: Beyond, share: float) -> str:
@@ -111,7 +115,7 @@ def _told(extension: Extension, beyond: Beyond, share: float) -> str:
     better = f"explains {beyond.rivalry.lead:.1f} nats more than the best set of the catalogue"
     return (
         f"Outside the catalogue: {where} ({smooth_words.shape(extension)}) {better}; "
-        f"within {HORIZON:g} s it moves the chair by {share:.1%} of its way or turn."
+        f"within {HORIZON:g} s it moves the chair by {100 * share:.1f} % of its way or turn."
     )
 
 

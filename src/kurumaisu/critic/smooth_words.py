@@ -54,11 +54,11 @@ def unit_of(curve: Curve) -> str:
     return _SHARES.get(curve.channel, effects.CHANNELS[curve.channel])
 
 
-def shape(extension: Extension) -> str:
-    """Return the curve's shape with place and size, each with unit and 90 % interval."""
+def shape(extension: Extension, *, intervals: bool = True) -> str:
+    """Return the curve's shape with place and size, each with its unit and, if asked for, its 90 % interval."""
     found = shape_of(extension)
     unit, rate = covariate(extension.curve)[2], unit_of(extension.curve)
-    size = _quantity(found, "size", rate)
+    size = _quantity(found, "size", rate, intervals)
     if found.kind == "periodic":
         times = round(extension.curve.basis.constants["period"] / found.place[0])
         turn = extension.curve.basis.covariate == "heading"
@@ -68,7 +68,7 @@ def shape(extension: Extension) -> str:
     span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}".rstrip()
     if found.kind == "line":
         return f"monotone, {'rises' if found.size[0] > 0 else 'falls'} by {size} {span}"
-    place = _quantity(found, "place", unit)
+    place = _quantity(found, "place", unit, intervals)
     what = {"step": f"of {size}", "bump": f"of {size}", "threshold": f"; beyond it a change of up to {size}"}
     return f"{found.kind} at {place} {what[found.kind]}".replace(" ;", ";")
 
@@ -77,12 +77,14 @@ def headline(extension: Extension) -> str:
     """Return the finding in one sentence."""
     name = covariate(extension.curve)[1]
     return (
-        f"Something that is not in the catalogue changes the {CHANNELS[extension.curve.channel]} with the {name}: "
-        f"{shape(extension)}."
+        f"The {CHANNELS[extension.curve.channel]} is off in a way that is not in the catalogue. The error follows the "
+        f"{name}: {shape(extension, intervals=False)}."
     )
 
 
-def _quantity(found: Shape, which: str, unit: str) -> str:
+def _quantity(found: Shape, which: str, unit: str, interval: bool) -> str:
     estimate, low, high = np.abs(found.size) if which == "size" and found.kind == "line" else getattr(found, which)
+    if not interval:
+        return f"{estimate:.3g} {unit}".rstrip()
     low, high = min(low, high), max(low, high)
     return f"{estimate:.3g} {unit} (90 %: {low:.3g} to {high:.3g})".replace("  ", " ")

@@ -10,13 +10,20 @@ from kurumaisu.types import FloatArray
 
 @dataclass(frozen=True)
 class Overlay:
-    """One run from above [m]: measured path (n, 2), simulated paths (m, 2); held_out: no model fitted it."""
+    """One run from above [m]: measured path (n, 2), simulated paths (m, 2); held_out: no model fitted it.
+
+    restart [s]: after so long the simulation begins again at the measured pose (0: never), and a row of nan parts the pieces;
+    off, off_extended [m]: how far the pieces' ends are from the measured place, rms, None where there is none.
+    """
 
     run: str
     measured: FloatArray
     baseline: FloatArray
     extended: FloatArray | None
     held_out: bool
+    restart: float
+    off: float | None = None
+    off_extended: float | None = None
 
 
 @dataclass(frozen=True)
@@ -35,7 +42,8 @@ class Misfit:
 
     covariate, residual: (n,) points; channel and covariate_name as a reader says them, with their units;
     explained_by: the id or shape that is blamed; curve: (m, 2) covariate and what the extension adds, if any;
-    band: (m, 3) covariate and the ends of the curve's 90 % interval, if known.
+    band: (m, 3) covariate and the ends of the curve's 90 % interval, if known; after: means of what is left with the
+    extension in.
     """
 
     channel: str
@@ -48,6 +56,23 @@ class Misfit:
     explained_by: str
     curve: FloatArray | None = None
     band: FloatArray | None = None
+    after: Bins | None = None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Numbers that measured and simulated data have in common, for effects that have no mean: all (k,).
+
+    explained_by: the ids blamed; measured, baseline, extended: the numbers; sd: by which they vary from one
+    simulation to the next.
+    """
+
+    explained_by: str
+    names: tuple[str, ...]
+    measured: FloatArray
+    baseline: FloatArray
+    extended: FloatArray
+    sd: FloatArray
 
 
 @dataclass(frozen=True)
@@ -87,6 +112,7 @@ class Story:
     provenance: dict[str, str]
     overlays: tuple[Overlay, ...] = ()
     misfits: tuple[Misfit, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
     rivals: tuple[Rival, ...] = ()
     noise: tuple[Noise, ...] = ()
     unexplained: tuple[str, ...] = ()

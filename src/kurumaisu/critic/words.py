@@ -10,15 +10,18 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic import naming
 from kurumaisu.critic.catalogue import Term
+from kurumaisu.critic.digits import quantities, with_interval
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import HORIZON, MATERIAL
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.story import Rival
-from kurumaisu.critic.verdict import NORMAL90, Estimate, Verdict
+from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, Verdict
 from kurumaisu.params import Model
 
 _MINUTE = 60.0  # [s]
+_CAUSES_TOLD = 4  # in a headline
+_KINDS_TOLD = 2  # of problems in a headline
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
 
@@ -28,8 +31,7 @@ def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[st
     matters: effects of the best set that move the chair enough, as data held out confirm; shares: how far each does.
     """
     if verdict.verdict == "named":
-        text = "; ".join(effects.by_id(cause.id).sentence for cause in verdict.causes)
-        return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in verdict.causes)})."
+        return named(verdict.causes)
     if verdict.verdict == "confounded":
         group = " or ".join(verdict.confounded[0])
         return f"Something is missing in the model, but these drives cannot tell which: {group}."
@@ -48,6 +50,35 @@ def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[st
     return "Nothing is missing in the model that these drives could show."
 
 
+def grouped(problems: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Return problems that differ only in their runs and numbers under one heading, with what each says."""
+    groups: dict[str, list[str]] = {}
+    for problem in problems:
+        where, _, what = problem.partition(": ")
+        kind = what.partition(": ")[0]
+        groups.setdefault(kind or where, []).append(problem)
+    return list(groups.items())
+
+
+def wrong(problems: Sequence[str]) -> str:
+    """Return in a sentence that the data are wrong, and what is wrong first of all."""
+    kinds = [kind for kind, _ in grouped(problems)]
+    more = f"; and {len(kinds) - _KINDS_TOLD} more" if len(kinds) > _KINDS_TOLD else ""
+    return f"The data are wrong, so nothing was fitted: {'; '.join(kinds[:_KINDS_TOLD])}{more}."
+
+
+def named(causes: Sequence[Cause]) -> str:
+    """Return in a sentence what acts, with ids and sizes."""
+    text = "; ".join(f"{effects.by_id(cause.id).sentence} ({_sizes(cause)})" for cause in causes[:_CAUSES_TOLD])
+    rest = f"; and {', '.join(cause.id for cause in causes[_CAUSES_TOLD:])}" if len(causes) > _CAUSES_TOLD else ""
+    return f"{text[0].upper()}{text[1:]}{rest}."
+
+
+def _sizes(cause: Cause) -> str:
+    said = [f"{name} {quantities([e.estimate], e.unit)[0]}" for name, e in cause.parameters.items() if e.estimate != 0]
+    return f"{cause.id}: {', '.join(said)}" if said else cause.id
+
+
 def details(
     problem: Problem, found: Naming, drives: Sequence[Drive], shares: dict[str, float], matters: set[str]
 ) -> tuple[str, ...]:
@@ -56,21 +87,24 @@ def details(
     said = [
         f"{len(drives)} drive{'s' * (len(drives) > 1)}, {seconds:.0f} s, replayed from the {drives[0].source} channel.",
     ]
+    fitted: dict[str, list[str]] = {}
     for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True):
         e = estimate(problem.model, term, value, sd)
-        unit = "" if e.unit == "1" else f" {e.unit}"
+        size = with_interval(e.estimate, e.lo90, e.hi90, e.unit)
+        fitted.setdefault(term.id, []).append(f"{term.parameter.name} {size}")
+    for name, sizes in fitted.items():
         weight = ""
-        if term.id not in matters:
-            small = shares[term.id] < MATERIAL
+        if name not in matters:
+            small = shares[name] < MATERIAL
             weight = ": detectable, but it does not matter" if small else ": not confirmed on data held out"
-        said.append(
-            f"{term.id}: {term.parameter.name} {e.estimate:.3g}{unit}, 90 % {e.lo90:.3g} to {e.hi90:.3g}; within "
-            f"{HORIZON:g} s it moves the chair by {shares[term.id]:.1%} of its way or turn{weight}."
-        )
+        moved = f"within {HORIZON:g} s it moves the chair by {100 * shares[name]:.1f} % of its way or turn"
+        said.append(f"{name}: {', '.join(sizes)}; {moved}{weight}.")
     n = problem.noise
     wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
-    said.append(f"The yaw rate fluctuates at random: the heading wanders by {wander:.1f} deg (sd) in a minute.")
-    alarm = f"{found.false_alarm:.1%}" if found.false_alarm > 0 else f"less than {1 / naming.NULLS:.2%}"
+    said.append(
+        f"The yaw rate fluctuates at random: in a minute the heading strays by {wander:.0f}° or so, whatever the model."
+    )
+    alarm = f"{100 * found.false_alarm:.1f} %" if found.false_alarm > 0 else f"less than {100 / naming.NULLS:.2f} %"
     said.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
     return tuple(said)
 
@@ -81,14 +115,17 @@ def suspects(found: Naming) -> tuple[str, ...]:
     if not some:
         return ()
     listed = ", ".join(f"{name} ({found.p[name]:.2f})" for name in some)
-    return (f"Not certain enough to be named (probability): {listed}. More drives that excite them would decide.",)
+    return (f"Not certain enough to be named (probability): {listed}.",)
 
 
 def rivals(found: Naming) -> tuple[Rival, ...]:
     """Return sets with other causes and sets with more or fewer, the best of each kind, by their evidence."""
     best = found.best
-    swapped = [fit for fit in found.fits if not (fit.ids >= best.ids or fit.ids < best.ids)]
-    others = [fit for fit in found.fits if fit.ids > best.ids or fit.ids < best.ids]
+    # Of the ways in which the same effects may act, the best one stands for all.
+    unlike = {fit.ids: fit for fit in reversed(found.fits) if fit.ids != best.ids}
+    ranked = sorted(unlike.values(), key=lambda fit: -fit.score)
+    swapped = [fit for fit in ranked if not (fit.ids >= best.ids or fit.ids < best.ids)]
+    others = [fit for fit in ranked if fit.ids > best.ids or fit.ids < best.ids]
     shown = sorted(swapped[:_RIVALS_SHOWN] + others[:_RIVALS_SHOWN], key=lambda fit: -fit.score)
     return tuple(_rival(fit, best) for fit in shown)
 
@@ -100,7 +137,7 @@ def _rival(fit: Fit, best: Fit) -> Rival:
     elif fit.ids > best.ids:
         why = f"fits better by {likelihood:.1f} nats, less than another effect costs"
     elif fit.ids < best.ids or likelihood < 0:
-        why = f"leaves {-likelihood:.1f} nats unexplained"
+        why = f"fits worse by {-likelihood:.1f} nats"
     else:
         why = f"fits better by {likelihood:.1f} nats, but needs more effects"
     return Rival(" + ".join(sorted(fit.ids)) or "no effect", fit.score - best.score, why)

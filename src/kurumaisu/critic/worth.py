@@ -66,9 +66,9 @@ def with_slam(criticism: Criticism, recording: Recording, extension: Extension) 
     told = replace(story, details=(*story.details, seen.told))
     if seen.gain is None or seen.measured is None or seen.baseline is None:
         return replace(criticism, story=told)
-    picture = Overlay(
-        f"SLAM on {seen.gain.run}", seen.measured, seen.baseline, seen.extended, seen.gain.run in recording.test
-    )
+    held_out = seen.gain.run in recording.test
+    name = f"SLAM on {seen.gain.run}"
+    picture = Overlay(name, seen.measured, seen.baseline, seen.extended, held_out, restart=0.0)
     whole = replace(verdict, gain=replace(verdict.gain, slam=seen.gain))
     return replace(criticism, verdict=whole, story=replace(told, overlays=(picture, *story.overlays)))
 

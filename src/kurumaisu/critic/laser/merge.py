@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kurumaisu import effects
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.laser.verdicts import LaserFinding
 from kurumaisu.critic.verdict import Kind
+from kurumaisu.critic.words import named
 
 _NOTHING_SAID = "none"
 
@@ -38,7 +38,20 @@ def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
     words = headline(finding)
     if words and verdict.verdict in ("named", "confounded", "unknown"):
         words = f"{story.headline} {words}"
-    told = replace(story, headline=words or story.headline, details=(*story.details, *finding.details))
+    if finding.small and not words and kind == _NOTHING_SAID:
+        slight = f"{', '.join(finding.small)} is detectable in the scans, but too small to matter."
+        words = f"{story.headline} {slight}" if story.noise else f"Nothing that matters: {slight}"
+    shown = finding.pictures
+    told = replace(
+        story,
+        headline=words or story.headline,
+        details=(*story.details, *finding.details),
+        # The base's nearest suspect is of no interest where the scans have found something.
+        misfits=(*(() if verdict.verdict == _NOTHING_SAID and words else story.misfits), *shown.misfits),
+        comparisons=(*story.comparisons, *shown.comparisons),
+        rivals=(*story.rivals, *shown.rivals),
+        noise=(*story.noise, *shown.noise),
+    )
     return replace(criticism, verdict=joined, story=told, settings=(*criticism.settings, *finding.settings))
 
 
@@ -48,8 +61,7 @@ def headline(finding: LaserFinding) -> str:
         first = finding.unknown[0]
         return f"Something that is not in the catalogue changes the ranges with the {first.covariate}: {first.shape}."
     if finding.causes:
-        text = "; ".join(effects.by_id(cause.id).sentence for cause in finding.causes)
-        return f"{text[0].upper()}{text[1:]} ({', '.join(cause.id for cause in finding.causes)})."
+        return named(finding.causes)
     if finding.confounded:
         return f"The scans miss something, but cannot tell which: {' or '.join(finding.confounded[0])}."
     return ""

@@ -18,6 +18,7 @@ from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.shots import own_with, read
 from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.prior import log_prior, occam
+from kurumaisu.critic.story import Comparison
 from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
@@ -33,6 +34,7 @@ _LARGEST = 3  # effects in a set
 _TRIES = 12  # simulations of a refit per parameter
 _REFITS = 4  # effects that are refitted
 _CLOSE = 0.5  # share of what the best of them gains that another one must gain, to be refitted
+_COMPARED = 10  # simulations with the effects, for the report
 _FREE = 2.0  # nats that a further parameter must bring
 
 
@@ -126,6 +128,12 @@ class ScatterSearch:
             chosen.append(effect)
             settings.append(setting)
         return out
+
+    def compared(self, names: Sequence[str], settings: Sequence[EffectSetting]) -> Comparison:
+        """Return the statistics of the measured scans and of simulated ones without and with effects."""
+        extended = self._statistics(settings, range(1, _COMPARED + 1))
+        blamed = " + ".join(setting.id for setting in settings)
+        return Comparison(blamed, tuple(names), self._measured, self._offset, extended, self._sd)
 
     def _step(
         self, pushes: Sequence[_Push], chosen: Sequence[type[Mechanism]], beside: Sequence[EffectSetting]

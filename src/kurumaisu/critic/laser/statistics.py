@@ -73,6 +73,29 @@ class Statistics:
         out.append(self._mixed(readings))
         return np.array([*out, *_values(readings[self._trust])])
 
+    def names(self) -> list[str]:
+        """Return what a reader calls the numbers, in their order."""
+        groups = [
+            f"reflectance {at}" if kind == "return" else f"{kind} {int(at) + 1} of 4"
+            for kind, at in (name.split() for name in self._groups.names)
+        ]
+        return [
+            *(f"spread, {name}" for name in groups),
+            *(f"correlation of beams {lag} apart" for lag in (1, 2, 4)),
+            *(f"readings more than {far:g} sd off" for far in (3, 4.5, _FAR)),
+            f"neighbours more than {_FAR:g} sd off",
+            "spread of whole scans",
+            "correlation of whole scans",
+            "spread of the beams' means",
+            "spread of the places' means",
+            *(f"missing readings, {name}" for name in groups),
+            "readings without return",
+            "readings inside jumps",
+            "different values",
+            "readings of the least value",
+            "readings of the greatest value",
+        ]
+
     def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what poses and common mode leave of the errors (k, b), in deviations, and the common modes (k,) [m].
 

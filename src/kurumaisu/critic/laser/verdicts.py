@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.laser import rivals, still
+from kurumaisu.critic.laser import pictures, rivals, still
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
+from kurumaisu.critic.laser.pictures import NO_PICTURES, Part, Pictures, misfits, noise_rows
 from kurumaisu.critic.laser.rivals import Rival, Weighed
 from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
@@ -21,6 +22,7 @@ from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
 from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.story import Comparison
 from kurumaisu.critic.verdict import Cause, Estimate, Unknown
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting, Model
@@ -37,7 +39,8 @@ class LaserFinding:
     """What the scans say.
 
     causes: named and material; confounded: sets of which one acts; unknown: what is in no catalogue; settings: what
-    extends the model; details: for the report, in words; refused: why there is no laser criticism, None where there is.
+    extends the model; details, pictures: for the report; small: certain, but they do not matter; refused: why there
+    is no laser criticism, None where there is.
     """
 
     causes: tuple[Cause, ...] = ()
@@ -45,6 +48,8 @@ class LaserFinding:
     unknown: tuple[Unknown, ...] = ()
     settings: tuple[EffectSetting, ...] = ()
     details: tuple[str, ...] = ()
+    pictures: Pictures = NO_PICTURES
+    small: tuple[str, ...] = ()
     refused: str | None = None
 
 
@@ -72,8 +77,10 @@ def criticise(
     normal = assembly.full(normal)
     made = _made(assembly, normal, found)
     progress("laser: weighing effects on the scatter")
-    scatter = _scatter(assembly, normal, made, ids)
-    return _finding(assembly, normal, made, scatter)
+    scatter, comparison = _scatter(assembly, normal, made, ids)
+    finding = _finding(assembly, normal, made, scatter)
+    shown = misfits(assembly, normal, made.parts())
+    return replace(finding, pictures=Pictures(shown, pictures.rivals(made.found), noise_rows(normal), comparison))
 
 
 @dataclass(frozen=True)
@@ -90,6 +97,15 @@ class _Made:
     def found(self) -> Found:
         """The search's result with blocks in the running."""
         return self.weighed.found
+
+    def parts(self) -> list[Part]:
+        """Return what acts, one by one."""
+        out, start = [], 0
+        for form in self.fit.forms:
+            stop = start + len(form.columns)
+            out.append(Part(form.id, form.span, self.fit.coefficients[start:stop]))
+            start = stop
+        return [*out, Part(self.winner.free.id, self.winner.free.span, self.coefficients)] if self.winner else out
 
     def columns(self) -> tuple[IntArray, FloatArray]:
         """Return which columns of the whole matrix act, and by how much."""
@@ -111,8 +127,10 @@ def _with(winner: Rival, normal: Normal) -> tuple[Fitted, Rival, FloatArray, Flo
     return fit, winner, coefficients, covariance
 
 
-def _scatter(assembly: Assembly, normal: Normal, made: _Made, ids: frozenset[str] | None) -> list[Scatter]:
-    """Return the effects on how readings scatter about the best fit of their mean."""
+def _scatter(
+    assembly: Assembly, normal: Normal, made: _Made, ids: frozenset[str] | None
+) -> tuple[list[Scatter], tuple[Comparison, ...]]:
+    """Return the effects on how readings scatter about the best fit of their mean, and what they mend."""
     use, at = made.columns()
     error = assembly.residual - assembly.columns[:, :, use.astype(int)] @ at
     few = assembly.thinned(_SCATTERED)
@@ -122,7 +140,9 @@ def _scatter(assembly: Assembly, normal: Normal, made: _Made, ids: frozenset[str
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
     measured = few.shots.measured
     seen = statistics.of(measured, np.where(np.isfinite(measured), error[rows], np.nan))
-    return ScatterSearch(Simulator(few, statistics), seen, sorted(means), ids).run()
+    search = ScatterSearch(Simulator(few, statistics), seen, sorted(means), ids)
+    found = search.run()
+    return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
 
 def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scatter]) -> LaserFinding:
@@ -147,11 +167,12 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scat
     groups = () if curve else _confused(assembly, normal, made, causes)
     confounded = tuple(group for group in groups if matters & set(group))
     causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
-    details = (_noise_told(assembly, normal), *lacking(assembly), *_told(sizes))
+    small = tuple(name for name in sizes if name not in matters and found.p.get(name, 0.0) >= NAMED)
+    details = (_noise_told(assembly, normal), *lacking(assembly), *_told(sizes, small))
     if made.winner is not None and curve:
         scatter = [each for each in scatter if each.nats > rivals.LEFT * made.winner.belief.nats]
     causes, added = _with_scatter(causes, settings, scatter)
-    return LaserFinding(causes, confounded, unknown, added, details)
+    return LaserFinding(causes, confounded, unknown, added, details, small=small)
 
 
 def _with_scatter(
@@ -194,15 +215,12 @@ def _noise_told(assembly: Assembly, normal: Normal) -> str:
     )
 
 
-def _told(sizes: Mapping[str, float]) -> list[str]:
+def _told(sizes: Mapping[str, float], small: Sequence[str]) -> list[str]:
     return [
-        f"{name}: changes the readings by {1e3 * size:.2g} mm (rms){_weight(size)}."
+        f"{name}: changes the readings by {1e3 * size:.2g} mm (rms)"
+        f"{': detectable, but it does not matter' if name in small else ''}."
         for name, size in sorted(sizes.items())
     ]
-
-
-def _weight(size: float) -> str:
-    return "" if size >= MATERIAL else ": detectable, but it does not matter"
 
 
 def _off_null(setting: EffectSetting) -> dict[str, float]:
