@@ -101,7 +101,13 @@ def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:
     by_curve = {each.id: 0.0 for each in free if each.basis is not None}
     for rival in curved:
         by_curve[rival.free.id] += float(np.exp(rival.worth - total))
-    return Weighed(replace(found, p=p, confounded=confounded), tuple(rivals), lead, by_curve)
+    made = Weighed(replace(found, p=p, confounded=confounded), tuple(rivals), lead, by_curve)
+    if lead > made.least:
+        return made
+    # A curve that does not lead by enough takes nothing from the effects that it imitates.
+    total = logsumexp([worth for _, worth in plain])
+    p, confounded = confusion([(names, float(np.exp(worth - total))) for names, worth in plain], best[0], ids)
+    return replace(made, found=replace(found, p=p, confounded=confounded))
 
 
 def _beside(fit: Fitted, free: Free, gram: FloatArray, share: float) -> Rival:
