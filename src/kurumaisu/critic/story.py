@@ -12,7 +12,7 @@ from kurumaisu.types import FloatArray
 class Overlay:
     """One run from above [m]: measured path (n, 2), simulated paths (m, 2); held_out: no model fitted it.
 
-    restart [s]: after so long the simulation begins again at the measured pose (0: never), and a row of nan parts the pieces;
+    restart [s]: after so long the simulation begins again at the measured pose (0: never); a row of nan parts pieces;
     off, off_extended [m]: how far the pieces' ends are from the measured place, rms, None where there is none.
     """
 
