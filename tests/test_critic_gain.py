@@ -2,6 +2,7 @@
 """What an extension is worth on data held out: by channel, on scans, and to SLAM; beside each gain its null."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from kurumaisu.bench.hidden.oracle import gain_share, noise_of
 from kurumaisu.critic import gain, gain_laser, replay, slam_gain
 from kurumaisu.critic.drive import prepare, split
 from kurumaisu.critic.explain import Criticism
+from kurumaisu.critic.job import Outcome
 from kurumaisu.critic.results import summary
 from kurumaisu.critic.slam_readings import corrected
 from kurumaisu.critic.story import Story
@@ -68,8 +70,9 @@ def test_a_model_without_fault_is_as_good_as_noise_allows():
         assert error.extended == pytest.approx(error.achievable, rel=0.35)
     near = worth.rmse["position after 2 s"]
     assert near.baseline > 1.5 * near.achievable
-    story = summary(Verdict("none", gain=worth), "", ())
-    assert f"noise alone: {near.achievable:.3f}" in story
+    story = summary(Outcome(None, 0.0, verdict=Verdict("none", gain=worth)), 100)
+    told = re.search(r"after 2 s: .*noise alone: ([\d.]+) (mm|cm|m)\)", story)
+    assert float(told[1]) * {"mm": 1e-3, "cm": 1e-2, "m": 1.0}[told[2]] == pytest.approx(near.achievable, rel=0.1)
 
 
 def test_a_gap_of_a_whole_turn_is_no_surprise():

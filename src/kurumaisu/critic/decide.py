@@ -67,9 +67,9 @@ def _judged(
 ) -> Decision:
     progress("estimating the noise again, beside what was found")
     left = scatter(first, found.best, truth, project=True, beside=beside)
-    final = left.estimate(first.noise).noise
+    final = left.estimate(first.noise)
     growth = left.growth(final, odds(len(found.p)))
-    problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final)
+    problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
     again = naming.search(problem, progress, found.best)
     beyond = smooth_judge.judge(problem, again, progress)
     return Decision(problem, replace(again, p=beyond.rivalry.p_effects), growth, beyond)

@@ -20,7 +20,7 @@ from kurumaisu.types import FloatArray
 _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
 _STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a refit may start
 _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
-_ROUGH_STARTS = tuple(float(n) for n in np.geomspace(0.25, 64, 49))  # of a parameter whose derivative says little
+_ROUGH_STARTS = tuple(float(n) for n in np.geomspace(0.25, 64, 25))  # of a parameter whose derivative says little
 
 
 @dataclass(frozen=True)
