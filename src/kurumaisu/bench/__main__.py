@@ -15,6 +15,7 @@ NAMES = (
     "arena",
     "stageros",
     "critic",
+    "critic_time",
     "next_experiment",
     "experiments_doc",
     "sanity",

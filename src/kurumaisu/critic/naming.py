@@ -87,7 +87,10 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
         near = [guess for guess in guesses[:_REFITS] if guess.score > guesses[0].score - _CLOSE]
         best = try_sets((guess.chosen, guess.start) for guess in near)
         if best is centre:  # the last word is by fits: could others stand in, and does each have to be there?
-            best = try_sets(_neighbours(problem, screen, best))
+            alone: list[tuple[Chosen, Mapping[Key, float]]] = [
+                (frozenset({other}), {}) for other in screen.fixed if nothing.mends(other)
+            ]
+            best = try_sets([*alone, *_neighbours(problem, screen, best)])
         if best is centre:
             break
         centre = best
@@ -110,7 +113,8 @@ def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Ch
     for one in sorted(fit.candidates, key=lambda candidate: candidate.id):
         yield fit.candidates - {one}, kept
         for other in problem.candidates:
-            if other.id not in fit.ids - {one.id} and other not in fit.candidates and screen.related(one, other):
+            new = other.id not in fit.ids - {one.id} and other not in fit.candidates
+            if new and (screen.mends(other, one) if other.fixed else screen.related(one, other)):
                 yield fit.candidates - {one} | {other}, kept
     for other in screen.fixed:
         if other.id not in fit.ids and screen.mends(other):

@@ -12,8 +12,8 @@ from kurumaisu.critic.drive import Drive, driven, prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
+from kurumaisu.critic.laser.aside import aside
 from kurumaisu.critic.laser.merge import with_laser
-from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
 from kurumaisu.critic.portion import bounded
 from kurumaisu.critic.predict_extended import forecast_of
 from kurumaisu.critic.predict_motion import Settings
@@ -54,8 +54,9 @@ def criticise(
     moved = any(driven(run) for run in recording.runs if run.name in recording.train)
     if not moved and all(run.scan is None for run in recording.runs):
         raise Error(f"{recording.runs[0].name}: has neither voltages nor commands nor odometry, and no scans either")
-    base, extension = _criticise_base(recording, model, progress, ids) if moved else (None, _UNDRIVEN)
-    scans = criticise_laser(recording, model, progress, ids)
+    with aside(recording, model, model_file, ids) as scans_say:
+        base, extension = _criticise_base(recording, model, progress, ids) if moved else (None, _UNDRIVEN)
+        scans = scans_say(progress)
     found = with_laser(base or explain.undriven(recording, model), scans)
     found = _with_worth(found, recording, replace(extension, scans=scans.settings), progress, slam=slam)
     if not predict.asked(recording):

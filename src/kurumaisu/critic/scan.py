@@ -57,10 +57,11 @@ class Screen:
         """Tell whether one could stand in for the other: their columns have something in common, or one has none."""
         return one.fixed or other.fixed or self._common(one, other) > _STAND_IN
 
-    def mends(self, fixed: Candidate) -> bool:
-        """Tell whether the fit gets better with an effect that can only act or not."""
+    def mends(self, fixed: Candidate, instead: Candidate | None = None) -> bool:
+        """Tell whether the fit gets better with an effect that can only act or not, perhaps instead of another."""
         start = {**self.centre.start, **{term.key: term.parameter.lower for term in fixed.terms}}
-        terms = (*self.centre.terms, *fixed.terms)
+        gone = {term.key for term in instead.terms} if instead else set()
+        terms = (*(term for term in self.centre.terms if term.key not in gone), *fixed.terms)
         left = self.problem.residual(terms, np.array([start[term.key] for term in terms]))
         return 0.5 * float(left @ left) < -self.centre.log_likelihood
 

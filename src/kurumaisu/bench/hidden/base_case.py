@@ -29,9 +29,11 @@ class Drives:
     regime: Regime
 
 
-def draw_drives(design: str | None, regime: Regime, rng: np.random.Generator, seconds: float = SECONDS) -> Drives:
-    """Return drives with all their noise drawn; design None: one of the rich ones per drive."""
-    rate = float(rng.choice([5.0, 10.0, 10.0, 20.0]))
+def draw_drives(
+    design: str | None, regime: Regime, rng: np.random.Generator, seconds: float = SECONDS, rate: float | None = None
+) -> Drives:
+    """Return drives with all their noise drawn; design None: one of the rich ones per drive; rate [Hz] likewise."""
+    rate = rate or float(rng.choice([5.0, 10.0, 10.0, 20.0]))
     stamps = np.round(np.arange(0.0, seconds + _TAIL, 1 / rate), 6)
     settings, errors = [], []
     for _ in range(RUNS):
