@@ -64,9 +64,9 @@ def _gain(gain: Gain) -> list[str]:
     interval = f"90 %: {density.lo90:+.3f} to {density.hi90:+.3f}"
     told = [f"gain on held-out data: {density.gain:+.3f} nats per sample ({interval})"]
     for name, error in gain.rmse.items():
-        before, after = quantities([error.baseline, error.extended], error.unit)
-        alone = "" if error.achievable is None else f" (noise alone: {quantities([error.achievable], error.unit)[0]})"
-        told.append(f"  {name}: rms error {bare(before)} -> {after}{alone}")
+        alone = [] if error.achievable is None else [error.achievable]
+        before, after, *least = quantities([error.baseline, error.extended, *alone], error.unit)
+        told.append(f"  {name}: rms error {bare(before)} -> {after}{f' (noise alone: {least[0]})' if least else ''}")
     for name, channel in gain.channels.items():
         told.append(f"  {name}: {channel.log_density_per_sample.gain:+.3g} nats per sample")
     return told
