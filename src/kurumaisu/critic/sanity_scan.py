@@ -39,7 +39,9 @@ def _stuck(scan: Series, pose: Series | None) -> str | None:
     if pose is None or len(scan.t) < 10:
         return None
     at = geometry.interpolate(pose.t, pose.values[:, :3], scan.t)
-    moved = np.abs(np.diff(at, axis=0)).max(axis=1) > 0.02
+    # Where nothing is in sight, every scan is like the other.
+    seen = np.isfinite(scan.values[1:]).any(axis=1)
+    moved = (np.abs(np.diff(at, axis=0)).max(axis=1) > 0.02) & seen
     same = np.array([np.array_equal(a, b, equal_nan=True) for a, b in zip(scan.values, scan.values[1:], strict=False)])
     if moved.sum() < 10 or same[moved].mean() < _STUCK:
         return None

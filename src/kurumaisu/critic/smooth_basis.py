@@ -67,7 +67,11 @@ def bases(drives: Sequence[Drive], model: Model, settings: Sequence[EffectSettin
     """Yield the curves over every covariate that varies in these drives, as simulated with some effects."""
     motions = [replay.motion(drive, model, settings) for drive in drives]
     extras = set.intersection(*(set(drive.known) for drive in drives)) - {"x", "y", "heading", "v_f", "v_s"}
+    # Rows of odometry are no commands: the time since the last one says how the rows are spaced, and nothing else.
+    measured = any(drive.source == "odom" for drive in drives)
     for name in (*effects.COVARIATES, *sorted(extras)):
+        if measured and name == "since_command":
+            continue
         constants = _constants(name, drives, model)
         samples = [_samples(name, constants, motion) for motion in motions]
         moving = [(motion.v != 0) | (motion.w != 0) for motion in motions]

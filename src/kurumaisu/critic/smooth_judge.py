@@ -36,7 +36,7 @@ class Beyond:
 
 def hinted(problem: Problem, found: Naming) -> Extension | None:
     """Return the best set with a curve if one may well act, for an estimate of the noise about it."""
-    if not _asked(problem):
+    if not _asked(problem) or not found.enough:
         return None
     quick = replace(problem.noise, slow_v=0.0, slow_lateral=0.0, slow_w=0.0)
     easy = problem.changed(noise=quick)
@@ -46,7 +46,7 @@ def hinted(problem: Problem, found: Naming) -> Extension | None:
 
 def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> Beyond:
     """Return whether a curve beats the catalogue, and the best one with the effects that act beside it."""
-    if not _asked(problem):
+    if not _asked(problem) or not found.enough:
         return Beyond(Rivalry((), -np.inf, {}, dict(found.p)), None, 1.0)
     progress("trying what is not in the catalogue")
     rivalry = compare(problem, found)

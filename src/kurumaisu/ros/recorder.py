@@ -45,6 +45,10 @@ class Recorder:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        # `rosbag` is a wrapper, which may end before the recorder itself has given the bag its name.
+        deadline = time.monotonic() + _PATIENCE
+        while Path(f"{self._path}.active").exists() and time.monotonic() < deadline:
+            time.sleep(_GLANCE)
         if not self._path.exists():
             raise Error(f"{self._path}: was not written")
 
