@@ -13,7 +13,8 @@ from kurumaisu.bench.hidden.case import Truth
 from kurumaisu.bench.hidden.wrong import WRONG
 from kurumaisu.critic.verdict import Verdict
 
-_SEEN = 3.0  # whitened norm below which nobody can tell two effects apart
+_SEEN = 3.0  # whitened norm below which nobody can tell two effects apart for sure
+_TWINS = 0.1  # and below which they do the same
 
 
 @dataclass(frozen=True)
@@ -73,13 +74,15 @@ def _right(truth: Truth, verdict: Verdict, named: set[str]) -> bool:
     if truth.kind == "confounded":
         allowed = {name for ids in truth.accepted for name in ids}
         return any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
-    if len(truth.ids) == 1 and len(truth.accepted) > 1 and truth.z_rival < _SEEN:
-        # The drives cannot tell it from others: the set of them is the only honest answer.
-        allowed = {name for ids in truth.accepted for name in ids}
-        return any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
     clean = verdict.verdict not in ("unknown", "invalid_data", "confounded") and not verdict.unknown
     discrete = truth.ids == ("base.sign",) and verdict.verdict == "invalid_data"
-    return discrete or (clean and named == set(truth.ids))
+    exact = discrete or (clean and named == set(truth.ids))
+    if len(truth.ids) == 1 and len(truth.accepted) > 1 and truth.z_rival < _SEEN:
+        # The drives hardly tell it from others: the set of them is right, too; of twins it is the only right answer.
+        allowed = {name for ids in truth.accepted for name in ids}
+        a_set = any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
+        return a_set or (exact and truth.z_rival > _TWINS)
+    return exact
 
 
 def _follows(truth: Truth, channel: str, covariate: str) -> bool:
