@@ -96,7 +96,7 @@ def criticism(
     causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
     # Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
     asked = problem.ids is None or process_noise(problem).id in problem.ids
-    beside = bool(causes) or made.beyond.extension is not None
+    beside = bool(causes or found.confounded) or made.beyond.extension is not None
     sure = growth.p >= naming.NAMED and growth.noise.growth >= (_GROWTH_BESIDE if beside else 0.0)
     if asked and sure and all(drive.source != "odom" for drive in drives):
         kind, causes = "named", (*causes, Cause(process_noise(problem).id, growth.p, {}, growth.gain_nats))

@@ -13,6 +13,7 @@ _FAR = 10.0  # robust sd of the reference that a jump exceeds
 _TURN = 0.6  # [rad] between two poses, least jump of a heading
 _BUNCH = 4.0
 _HALF = 0.4  # [rad] from half a turn
+_LONG = 1.15  # of the way that the robot makes between poses at its fastest, from which a step is no drive
 _PAUSE = 5.0  # [s] without a pose after which nobody knows how far the robot was driven, or carried
 
 
@@ -81,9 +82,11 @@ def jumps(pose: Series, slack: float = 1.0) -> tuple[list[int], list[int]]:
     limit = np.maximum(
         _FAR * max(position_noise(pose), 1e-9) * 1.5, 1.5 * slack * fast * np.maximum(dt, float(np.median(dt)))
     )
+    # A robot that turns back between two poses is far from where it was going, but has not come far.
+    far = np.hypot(*step.T) > _LONG * fast * np.maximum(dt, float(np.median(dt)))
     lasting: list[int] = []
     single: list[int] = []
-    for i in np.flatnonzero((odd > np.maximum(limit, 1e-6)) & (dt < _PAUSE)):
+    for i in np.flatnonzero((odd > np.maximum(limit, 1e-6)) & far & (dt < _PAUSE)):
         before = np.median(xy[max(0, i - 3) : i + 1] - xy[i], axis=0)
         after = np.median(xy[i + 1 : i + 5] - xy[i + 1], axis=0) + step[i]
         here = lasting if np.hypot(*(after - before)) > 0.6 * odd[i] and len(xy) - i > 5 and i >= 4 else single
