@@ -14,6 +14,7 @@ from kurumaisu.bench.hidden.wrong import WRONG
 from kurumaisu.critic.verdict import Verdict
 
 _SEEN = 3.0  # whitened norm below which nobody can tell two effects apart for sure
+_TOLD_APART = 6.0  # whitened norm from which a rival is to be told from the truth
 _TWINS = 0.1  # and below which they do the same
 
 
@@ -82,6 +83,10 @@ def _right(truth: Truth, verdict: Verdict, named: set[str]) -> bool:
         allowed = {name for ids in truth.accepted for name in ids}
         a_set = any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
         return a_set or (exact and truth.z_rival > _TWINS)
+    if len(truth.ids) > 1 and truth.z_rival < _TOLD_APART and verdict.verdict != "unknown":
+        # Of several causes one may have a twin: it is right to name the others, and to give the set for that one.
+        sets = {name for group in verdict.confounded for name in group}
+        return named <= set(truth.ids) <= named | sets
     return exact
 
 
