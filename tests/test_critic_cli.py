@@ -107,6 +107,15 @@ def test_patterns_choose_effects():
     }
 
 
+@pytest.mark.parametrize("only", ["laser.offset", "base.process_noise", "base.sign"])
+def test_effects_that_these_drives_have_no_size_for_may_be_asked_for_alone(drives, tmp_path, capsys, only):
+    assert main([str(drives), "-q", "-o", str(tmp_path / "out"), "--only", only]) == 0
+    told = capsys.readouterr()
+    assert told.out.startswith("verdict: none")
+    assert told.err == ""
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
 def test_only_chosen_runs_are_read(drives):
     (drives / "run_2" / "pose.csv").write_text("spoilt\n")
     chosen = read_recording(drives, ["run_[13]"])

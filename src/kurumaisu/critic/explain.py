@@ -168,8 +168,8 @@ def _noise(problem: Problem) -> tuple[Noise, ...]:
 
 
 def _misfits(problem: Problem, found: Naming) -> tuple[Misfit, ...]:
-    """Return a figure per effect of the best set; where that is empty, of the effect that comes nearest."""
-    fit = found.best if found.best.ids else next(fit for fit in found.fits if fit.ids)
+    """Return a figure per effect of the best set; where that is empty, of the effect that comes nearest, if any."""
+    fit = found.best if found.best.ids else next((fit for fit in found.fits if fit.ids), found.best)
     return misfit.figures(problem, fit.settings, sorted(fit.ids))
 
 

@@ -44,8 +44,9 @@ def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[st
         return f"Nothing that matters: {listed} is detectable, but too small to gain anything."
     if not found.enough:
         return "Nothing can be named: too little was recorded to tell effects from noise."
-    nearest = max(found.p, key=lambda name: found.p[name])
-    if found.p[nearest] >= naming.RIVAL:
+    # Nothing is near where nothing of the base was looked for.
+    nearest = max(found.p, key=lambda name: found.p[name], default=None)
+    if nearest is not None and found.p[nearest] >= naming.RIVAL:
         return f"Nothing can be named: noise explains these drives as well. The nearest suspect is {nearest}."
     return "Nothing is missing in the model that these drives could show."
 
