@@ -9,11 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import beta
 
 from kurumaisu.bench import critic_table, hidden_effect
 from kurumaisu.bench.hidden_effect import Disturbance
-from kurumaisu.bench.table import Table
+from kurumaisu.bench.table import Table, share
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.params import shipped
@@ -103,13 +102,6 @@ def _row(table: Table, label: str, effect: str | None, draws: Sequence[_Draw]) -
         label,
         str(n),
         *(share(k, n) for k in (right, wrong, a_set, n - right - wrong - a_set)),
-        share(sum(covered), len(covered)) if covered else "-",
+        share(sum(covered), len(covered)),
         float(np.median([draw.cpu for draw in draws])),
     )
-
-
-def share(k: int, n: int) -> str:
-    """Return a share with its exact (Clopper-Pearson) 90 % interval."""
-    low = beta.ppf(0.05, k, n - k + 1) if k else 0.0
-    high = beta.ppf(0.95, k + 1, n - k) if k < n else 1.0
-    return f"{k / n:.2f} ({low:.2f}-{high:.2f})"

@@ -19,8 +19,8 @@ import numpy as np
 from kurumaisu.bench.hidden import Ask, make, names_of
 from kurumaisu.bench.hidden.baselines import BASELINES
 from kurumaisu.bench.hidden.oracle import gain_share
-from kurumaisu.bench.hidden.score import Score, calibration_error, score, scored_names, share
-from kurumaisu.bench.table import Table
+from kurumaisu.bench.hidden.score import Score, calibration_error, score, scored_names
+from kurumaisu.bench.table import Table, share
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.verdict import Verdict

@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.bench.critic import share
 from kurumaisu.bench.hidden.base_case import run_of
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.motion import STEP, Fault, Setting, drive
 from kurumaisu.bench.hidden.noise import USUAL, draw_rates, draw_reference
-from kurumaisu.bench.table import Table
+from kurumaisu.bench.table import Table, share
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.verdict import Verdict

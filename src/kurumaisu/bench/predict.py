@@ -12,17 +12,16 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.bench.hidden import Ask, Case, make, names_of
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.bench.hidden.score import share
-from kurumaisu.bench.table import Table
+from kurumaisu.bench.table import Table, share
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.drive import Drive, prepare_all
 from kurumaisu.critic.predict_motion import motion_ahead
 from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.verdict import NORMAL90
 from kurumaisu.params import load_model, shipped
 from kurumaisu.types import BoolArray, FloatArray
 
 _HORIZONS = (0.2, 1.0, 5.0)  # [s]
-_NORMAL90 = 1.6449
 _HELD = -1  # index of the run of which poses are withheld
 
 
@@ -72,7 +71,7 @@ def _of_draw(name: str, seed: int) -> list[_Row]:
     found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None)
     rows = []
     for one, measured, oracle in zip(found.predictions, truth, _oracle(case, recording.runs[_HELD]), strict=True):
-        inside = np.abs(_off(measured, one.means)) < _NORMAL90 * one.sds
+        inside = np.abs(_off(measured, one.means)) < NORMAL90 * one.sds
         density = _density(_off(measured, one.means), one.sds)
         rows.append(_Row(one.t1 - one.t0, inside, density, _density(_off(measured, oracle[0]), oracle[1])))
     return rows

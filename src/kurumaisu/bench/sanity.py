@@ -10,10 +10,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from scipy.stats import beta
 
 from kurumaisu.bench import drives, wrong_data, wrong_scans
-from kurumaisu.bench.table import Table
+from kurumaisu.bench.table import Table, share
 from kurumaisu.critic import sanity
 from kurumaisu.critic.checks import check_run
 from kurumaisu.critic.clean import Faults, clean
@@ -41,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             continue
         said = [said_of(name, [options.seed, k, i]) for i in range(options.draws)]
         right = [any(word in line for line in lines) for lines in said]
-        table.row(name, str(len(said)), share(sum(map(bool, said)), len(said)), share(sum(right), len(said)))
+        table.row(name, str(len(said)), share(sum(map(bool, said)), len(said), 3), share(sum(right), len(said), 3))
         for i, lines in enumerate(said):
             if options.show and not right[i]:
                 print("   ", i, drives.draw(np.random.default_rng([options.seed, k, i]), easy=True), lines)
@@ -50,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for i, lines in enumerate(said):
             if options.show and lines:
                 print("   ", i, drives.draw(np.random.default_rng([options.seed, 999 + bool(name), i])), lines)
-        table.row(f"none (good data) {name}", str(options.good), share(sum(map(bool, said)), options.good), "-")
+        table.row(f"none (good data) {name}", str(options.good), share(sum(map(bool, said)), options.good, 3), "-")
     return 0
 
 
@@ -103,10 +102,3 @@ def run_of(tables: drives.Tables, parts: Sequence[str], faults: Faults) -> Run:
         return clean(Rows(f"{name}.csv", rows[:, 0], rows[:, 1:], REQUIRED[name], "line", 2), faults)
 
     return Run("run_1", command=part("command"), voltage=part("voltage"), pose=part("pose"))
-
-
-def share(k: int, n: int) -> str:
-    """Return a share with its exact (Clopper-Pearson) 90 % interval."""
-    low = beta.ppf(0.05, k, n - k + 1) if k else 0.0
-    high = beta.ppf(0.95, k + 1, n - k) if k < n else 1.0
-    return f"{k / n:.3f} ({low:.2f}-{high:.2f})"

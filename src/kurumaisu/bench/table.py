@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from scipy.stats import beta
+
 
 class Table:
     """A table whose first column is text, the others numbers or short text, all as wide as their headings."""
@@ -23,3 +25,12 @@ class Table:
         first, *others = zip(cells, self._widths, strict=True)
         text = [f"{first[0]:<{first[1]}}", *(f"{cell:>{width}}" for cell, width in others)]
         print("  ".join(text).rstrip(), flush=True)
+
+
+def share(k: int, n: int, digits: int = 2) -> str:
+    """Return a share with its exact (Clopper-Pearson) 90 % interval, or a dash of none."""
+    if n == 0:
+        return "-"
+    low = beta.ppf(0.05, k, n - k + 1) if k else 0.0
+    high = beta.ppf(0.95, k + 1, n - k) if k < n else 1.0
+    return f"{k / n:.{digits}f} ({low:.2f}-{high:.2f})"

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +16,7 @@ from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.meta import Meta
 from kurumaisu.critic.read_csv import OPTIONAL, QUERY, REQUIRED, check_queries
 from kurumaisu.critic.reading import require_use, split
-from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.recording import Recording, Run, Series, run_of_parts
 from kurumaisu.critic.reference import with_reference
 from kurumaisu.critic.selection import effect_ids
 from kurumaisu.errors import Error
@@ -90,16 +91,7 @@ def run_of(name: str, tables: Tables, faults: Faults) -> Run:
             parts[part] = series
         elif series is not None:
             covariates[part] = series
-    return Run(
-        name=name,
-        command=parts.get("command"),
-        voltage=parts.get("voltage"),
-        pose=parts.get("pose"),
-        odom=parts.get("odom"),
-        scan=parts.get("scan"),
-        covariates=covariates,
-        queries=queries,
-    )
+    return replace(run_of_parts(name, parts, covariates), queries=queries)
 
 
 def _rows(where: str, given: ArrayLike) -> FloatArray:

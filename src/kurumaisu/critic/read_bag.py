@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from kurumaisu.critic import messages
 from kurumaisu.critic.bag import Topic, read_topics
 from kurumaisu.critic.clean import Faults, Table, clean
-from kurumaisu.critic.recording import Fan, Run, Series
+from kurumaisu.critic.recording import Fan, Run, Series, run_of_parts
 from kurumaisu.errors import Error
 
 # Topic of each part, where meta.yaml names no other.
@@ -55,16 +56,7 @@ def read_bag_run(path: Path, topics: dict[str, str], faults: Faults) -> Run:
             series[part] = clean(Table(where, topic.times(), rows, columns, "message", 1), faults)
         else:
             covariates.update(_covariates(part, where, topic, faults))
-    return Run(
-        name=path.stem,
-        command=series.get("command"),
-        voltage=series.get("voltage"),
-        pose=series.get("pose"),
-        odom=series.get("odom"),
-        scan=series.get("scan"),
-        covariates=covariates,
-        fan=fan,
-    )
+    return replace(run_of_parts(path.stem, series, covariates), fan=fan)
 
 
 def resolve(topics: dict[str, str]) -> dict[str, str]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from kurumaisu.critic.clean import Faults, Table, clean
-from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.recording import Run, Series, run_of_parts
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 
@@ -50,16 +51,7 @@ def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
             parts[part], more = _part(path, f"{name}/{path.name}", part, faults)
             _merge(covariates, more, path)
     query = folder / f"{QUERY}.csv"
-    return Run(
-        name=name,
-        command=parts.get("command"),
-        voltage=parts.get("voltage"),
-        pose=parts.get("pose"),
-        odom=parts.get("odom"),
-        scan=parts.get("scan"),
-        covariates=covariates,
-        queries=read_queries(query) if query.is_file() else None,
-    )
+    return replace(run_of_parts(name, parts, covariates), queries=read_queries(query) if query.is_file() else None)
 
 
 def read_queries(path: Path) -> FloatArray:

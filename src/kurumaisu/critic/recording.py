@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -59,6 +60,19 @@ class Run:
     queries: FloatArray | None = None
     pose_source: str = "measured"
     fan: Fan | None = None
+
+
+def run_of_parts(name: str, parts: Mapping[str, Series | None], covariates: dict[str, Series]) -> Run:
+    """Return the run that its tables make; those that are not among parts are missing."""
+    return Run(
+        name=name,
+        command=parts.get("command"),
+        voltage=parts.get("voltage"),
+        pose=parts.get("pose"),
+        odom=parts.get("odom"),
+        scan=parts.get("scan"),
+        covariates=covariates,
+    )
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import beta
 
 from kurumaisu.bench.hidden.case import Truth
 from kurumaisu.bench.hidden.wrong import WRONG
@@ -111,15 +110,6 @@ def _words(verdict: Verdict) -> str:
     parts += [f"{unknown.channel} by {unknown.covariate}" for unknown in verdict.unknown]
     parts += [problem[:60] for problem in verdict.problems[:1]]
     return f"{verdict.verdict}: {'; '.join(parts)}".rstrip(": ")
-
-
-def share(k: int, n: int) -> str:
-    """Return a share with its exact (Clopper-Pearson) 90 % interval, or a dash of none."""
-    if n == 0:
-        return "-"
-    low = beta.ppf(0.05, k, n - k + 1) if k else 0.0
-    high = beta.ppf(0.95, k + 1, n - k) if k < n else 1.0
-    return f"{k / n:.2f} ({low:.2f}-{high:.2f})"
 
 
 def calibration_error(stated: Sequence[tuple[float, bool]]) -> float:

@@ -23,14 +23,13 @@ from kurumaisu.critic.laser.unknowns import unknowns
 from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Comparison
-from kurumaisu.critic.verdict import Cause, Estimate, Unknown
+from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, Unknown
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray, IntArray
 
 MATERIAL = 3e-4  # [m] rms change of the readings below which an effect of the laser does not matter
 _SCATTERED = 45  # scans whose scatter is looked at: each simulation of them takes a hundredth of a second
-_NORMAL90 = 1.645  # half width of a 90 % interval, in standard deviations
 Progress = Callable[[str], None]
 
 
@@ -232,7 +231,7 @@ def _joined(cause: Cause | None, scatter: Scatter) -> Cause:
     parameters = {p.name: p for p in effects.by_id(scatter.setting.id).parameters}
     estimates = dict(cause.parameters) if cause is not None else {}
     for name, sd in scatter.sds.items():
-        p, value, half = parameters[name], scatter.setting.parameters[name], _NORMAL90 * sd
+        p, value, half = parameters[name], scatter.setting.parameters[name], NORMAL90 * sd
         estimates[name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
     nats = scatter.nats + (cause.gain_nats if cause is not None else 0.0)
     return Cause(scatter.setting.id, max(min(scatter.p, 1.0), cause.p if cause is not None else 0.0), estimates, nats)
@@ -294,7 +293,7 @@ def _estimates(fit: Fitted, setting: EffectSetting) -> dict[str, Estimate]:
                 names = [name for name, size in form.at.items() if size]
                 sd /= 2 * float(np.sqrt(max(fit.coefficients[start + i], sd)))
             for name in names:
-                p, value, half = parameters[name], setting.parameters[name], _NORMAL90 * parameters[name].scale * sd
+                p, value, half = parameters[name], setting.parameters[name], NORMAL90 * parameters[name].scale * sd
                 out[name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
         start += len(form.columns)
     return out
