@@ -124,6 +124,10 @@ SerialSettings readSerial(Section& top, Channels& channels) {
   const int bits = top.integer("bits", 1, kBitsMost);
   channels = readChannels(top.section("channels"), [&serial, bits](Section& channel, Signal signal) {
     serial.ch[signal] = channel.text("ch");
+    if (serial.ch[signal].find_first_of("*?[") != std::string::npos) {
+      throw channel.error(
+          "ch", "must not have *, ? or [ in it, which mean something in expect: " + serial.ch[signal]);
+    }
     serial.codings[signal] = readCoding(channel.section("code"), bits);
   });
   checkDifferent(top, serial.ch);
