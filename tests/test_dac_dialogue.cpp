@@ -130,10 +130,10 @@ TEST(DacDialogue, RepliesThatCannotBeMixedUpAreNotWaitedFor) {
 
 TEST(DacDialogue, ALateReplyBeforeTheRightOneIsSkipped) {
   Talk talk(0);
-  EXPECT_NO_THROW(talk.dialogue->tell("1", "OK 1"));
-  talk.peer->say("OK 2\n");
-  talk.peer->habits = {{true, 0, "OK 2"}};
-  EXPECT_EQ(talk.dialogue->ask("2", "OK 2"), "OK 2") << "and what came unasked is none";
+  talk.peer->habits = {{true, -1, ""}, {true, 0, "OK 1\nOK 2"}, {true, 0, "OK 1\nOK 3"}};
+  talk.dialogue->tell("1", "OK 1");
+  EXPECT_EQ(talk.dialogue->ask("2", "OK 2"), "OK 2");
+  EXPECT_THROW(talk.dialogue->ask("3", "OK 3"), d::Fault) << "nothing is owed any more";
 }
 
 TEST(DacDialogue, WhatComesUnaskedAnswersNothing) {
