@@ -100,7 +100,7 @@ def test_it_ends_with_its_input_and_takes_its_link_along(start, tmp_path):
 
 
 def test_without_an_input_it_goes_on_until_it_is_told(start, tmp_path):
-    board = start(stdin=subprocess.DEVNULL)
+    board = start("__name:=board", stdin=subprocess.DEVNULL)  # as roslaunch starts it
     assert set_voltages(tmp_path, 0, 0, 2.5).returncode == 0
     board.send_signal(signal.SIGTERM)
     assert board.wait(DEADLINE) == 0
