@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Maps of map_server read as map_server reads them: a YAML file and the image that it names."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from kurumaisu import settings
+from kurumaisu.errors import Error
+from kurumaisu.settings import Section
+from kurumaisu.types import FloatArray
+
+_MOST_CELLS = 400_000_000  # 10^4 x 10^4 cells fit four times
+_MODES = ("trinary", "scale", "raw")
+_WALL = 100  # occupancy [%]
+_OPAQUE = 255
+
+
+@dataclass(frozen=True)
+class MapFile:
+    """Occupancy: cells (height, width) from the lower left corner, 0 free to 100 occupied, -1 unknown.
+
+    resolution: edge of a cell [m]; origin: x, y [m] and yaw [rad] of the lower left corner.
+    """
+
+    cells: NDArray[np.int8]
+    resolution: float
+    origin: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class _Said:
+    image: Path
+    resolution: float
+    origin: tuple[float, float, float]
+    negate: bool
+    occupied: float
+    free: float
+    mode: str
+
+
+def read_map(path: Path) -> MapFile:
+    """Read a map. Raise Error naming the file, and the key, that is wrong."""
+    said = _read_yaml(path)
+    return MapFile(np.ascontiguousarray(_cells(said)[::-1]), said.resolution, said.origin)
+
+
+def _read_yaml(path: Path) -> _Said:
+    top = settings.load(path)
+    said = _Said(
+        image=path.parent / top.text("image"),
+        resolution=top.number("resolution", above=0),
+        origin=_origin(top),
+        negate=_negate(top),
+        occupied=top.number("occupied_thresh"),
+        free=top.number("free_thresh"),
+        mode=top.text("mode", _MODES) if "mode" in top else "trinary",
+    )
+    top.end()
+    for key, value in (("occupied_thresh", said.occupied), ("free_thresh", said.free)):
+        if not 0 <= value <= 1:
+            raise top.error(key, f"must be from 0 to 1: {value:g}")
+    if said.free >= said.occupied:
+        raise top.error("free_thresh", f"must be below occupied_thresh {said.occupied:g}: {said.free:g}")
+    return said
+
+
+def _origin(top: Section) -> tuple[float, float, float]:
+    x, y, yaw = top.numbers("origin", 3)
+    return x, y, yaw
+
+
+def _negate(top: Section) -> bool:
+    value = top.take("negate")
+    if value not in (0, 1):  # False and True are, too
+        raise top.error("negate", f"must be 0 or 1: {value!r}")
+    return bool(value)
+
+
+def _cells(said: _Said) -> NDArray[np.int8]:
+    """Return the image's cells, row 0 at the top."""
+    sums, channels, opaque = _pixels(said.image)
+    table = _occupancies(said, np.arange(255 * channels + 1) / channels)
+    cells: NDArray[np.int8] = table[sums]
+    if opaque is not None and said.mode != "raw":
+        # What shines through is not known, but for walls and free space in plain sight.
+        cells[~opaque & (cells > 0) & (cells < _WALL)] = -1
+    return cells
+
+
+def _occupancies(said: _Said, shades: FloatArray) -> NDArray[np.int8]:
+    """Return the occupancy of every shade (0 black to 255 white), after map_server's image_loader."""
+    if said.negate:
+        shades = 255 - shades
+    if said.mode == "raw":
+        return np.where(shades <= _WALL, np.floor(shades), -1).astype(np.int8)
+    occupied = (255 - shades) / 255
+    between = 1 + 98 * (occupied - said.free) / (said.occupied - said.free)
+    middle = np.floor(between) if said.mode == "scale" else np.full(len(shades), -1.0)
+    cells = np.where(occupied > said.occupied, _WALL, np.where(occupied < said.free, 0, middle))
+    return cells.astype(np.int8)
+
+
+def _pixels(path: Path) -> tuple[NDArray[np.uint16], int, NDArray[np.bool_] | None]:
+    """Return the sum of the colours of every pixel, how many colours there are, and where the image is opaque."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of large images, for which there is our own limit, and of damaged ones
+            with Image.open(path) as image:
+                if image.width * image.height > _MOST_CELLS:
+                    raise Error(f"{path}: has {image.width} x {image.height} pixels, more than {_MOST_CELLS}")
+                return _channels(image)
+    except Error:
+        raise
+    except OSError as error:
+        raise Error(f"{path}: {error.strerror or error}") from error
+    except Exception as error:  # decoders of foreign files raise whatever they come across
+        raise Error(f"{path}: is not a readable image ({error})") from error
+
+
+def _channels(image: Image.Image) -> tuple[NDArray[np.uint16], int, NDArray[np.bool_] | None]:
+    if image.mode.startswith("I"):  # 16 bits; map_server sees the upper 8
+        return (np.asarray(image).astype(np.uint32) >> 8).astype(np.uint16), 1, None
+    if image.mode == "1":
+        image = image.convert("L")
+    elif image.mode not in ("L", "LA", "RGB", "RGBA"):
+        image = image.convert("RGBA" if "transparency" in image.info or image.mode == "PA" else "RGB")
+    names = [name for name in image.getbands() if name != "A"]
+    opaque = np.asarray(image.getchannel("A")) == _OPAQUE if "A" in image.getbands() else None
+    sums = np.asarray(image.getchannel(names[0])).astype(np.uint16)
+    for name in names[1:]:
+        sums += np.asarray(image.getchannel(name))
+    return sums, len(names), opaque

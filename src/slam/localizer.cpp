@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "slam/localizer.h"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "slam/places.h"
+#include "slam/pose.h"
+#include "slam/search.h"
+
+namespace kurumaisu {
+namespace {
+
+constexpr int kLeastReadings = 8;     // fewer say nothing of how well they fit
+constexpr int kRounds = 4;            // of the last alignment
+constexpr double kHeadStart = 5;      // log-odds of the place where the chair was believed to be, when doubted
+constexpr double kTurnPerWay = 0.5;   // [m/rad] a turn shows as much as so much way
+
+void check(const Scan& scan, const Odometry& start, const Pose2D& end, const std::optional<Odometry>& last) {
+  validate(scan);
+  for (const double value : {start.pose.x, start.pose.y, start.pose.theta, end.x, end.y, end.theta, scan.stamp}) {
+    if (!std::isfinite(value)) throw std::invalid_argument("odometry and stamp must be finite");
+  }
+  if (last && !(start.stamp > last->stamp)) {
+    throw std::invalid_argument("a scan of " + std::to_string(start.stamp) + " s after one of " +
+                                std::to_string(last->stamp) + " s");
+  }
+}
+
+/// How well the map fits, lately and usually.
+struct Health {
+  std::optional<double> fast, slow;
+
+  void take(double fit, const RecoverySettings& settings) {
+    fast = fast ? *fast + settings.alpha_fast * (fit - *fast) : fit;
+    slow = slow ? *slow + settings.alpha_slow * (fit - *slow) : fit;
+  }
+  bool doubtful(const RecoverySettings& settings) const {
+    return fast && (*fast < settings.lost_fit || *fast < settings.lost_drop * *slow);
+  }
+};
+
+}  // namespace
+
+class Localizer::Impl {
+ public:
+  Impl(const LocalizerSettings& settings, const Chair& chair, std::uint32_t seed, const OccupancyGrid& grid,
+       const Pose2D& map_from_grid)
+      : settings_(settings),
+        process_(chair.process),
+        field_(grid, map_from_grid, settings.reading.max_distance),
+        sensor_(field_, settings_.reading, chair.laser),
+        particles_(settings_, seed),
+        places_(sensor_, settings_.recovery) {}
+
+  void setPose(const Gaussian& map_from_base) {
+    particles_.reset(map_from_base);
+    pose_ = map_from_base;
+    at_ = last_;
+    start(Knowledge::kTracking);
+    once_ = true;
+    health_ = {};
+  }
+
+  void forget() {
+    start(Knowledge::kLost);
+    known_ = false;
+  }
+
+  void updateOnce() { once_ = true; }
+
+  Estimate add(const Scan& scan, const Odometry& start, const Pose2D& end) {
+    check(scan, start, end, last_);
+    const Beams beams = pick(scan, between(start.pose, end), settings_.reading);
+    if (!at_) at_ = start;
+    const Gaussian motion = motionBetween(*at_, start, settings_.motion, process_);
+    travelled_ += last_ ? wayOf(between(last_->pose, start.pose)) : 0;
+    last_ = start;
+    const bool moves = std::hypot(motion.mean.x, motion.mean.y) >= settings_.update_min_d ||
+                       std::abs(motion.mean.theta) >= settings_.update_min_a;
+    const bool update = moves || once_;
+    Estimate estimate{moved(pose_, motion), knowledge_, 0, 0, 0, 0, update};
+    if (knowledge_ == Knowledge::kTracking) {
+      track(beams, motion, update, estimate);
+    } else if (knowledge_ == Knowledge::kLost) {
+      search(beams, motion, estimate);
+    } else {
+      follow(beams, motion, update, estimate);
+    }
+    if (update) once_ = false;
+    estimate.knowledge = told(estimate.map_from_base);
+    estimate.fit = health_.fast.value_or(0);
+    estimate.fit_usual = health_.slow.value_or(0);
+    return estimate;
+  }
+
+  std::vector<Weighted> particles() const {
+    return knowledge_ == Knowledge::kTracking ? particles_.all() : places_.all();
+  }
+
+ private:
+  static double wayOf(const Pose2D& motion) {
+    return std::hypot(motion.x, motion.y) + kTurnPerWay * std::abs(motion.theta);
+  }
+
+  void start(Knowledge knowledge) {
+    knowledge_ = knowledge;
+    places_ = Places(sensor_, settings_.recovery);
+    search_.reset();
+    travelled_ = 0;
+  }
+
+  /// Particles that are spread wide do not know one place either.
+  Knowledge told(const Gaussian& pose) const {
+    const double largest = std::sqrt(std::fmax(pose.covariance(0, 0), pose.covariance(1, 1)));
+    const bool wide = knowledge_ == Knowledge::kTracking && largest > settings_.ambiguous_spread;
+    return wide ? Knowledge::kAmbiguous : knowledge_;
+  }
+
+  void setBase(const Gaussian& pose) {
+    pose_ = pose;
+    at_ = last_;
+  }
+
+  void track(const Beams& beams, const Gaussian& motion, bool update, Estimate& estimate) {
+    if (update) {
+      const double power = settings_.reading.power;
+      particles_.update(motion, [&](const Pose2D& pose) { return power * sensor_.weigh(beams, pose); });
+      const auto all = particles_.all();
+      estimate.particles = static_cast<int>(all.size());
+      Gaussian mean = spread(all);
+      mean.covariance.diagonal().array() += 1e-8;  // all particles may be one
+      estimate.map_from_base = {sensor_.align(beams, mean.mean, mean.covariance.inverse(), kRounds).pose,
+                                mean.covariance};
+      setBase(estimate.map_from_base);
+    }
+    const Fit fit = sensor_.look(beams, estimate.map_from_base.mean);
+    if (fit.readings() >= kLeastReadings) health_.take(fit.share(), settings_.recovery);
+    if (!health_.doubtful(settings_.recovery)) return;
+    known_ = true;
+    start(Knowledge::kLost);
+    search(beams, motion, estimate);
+  }
+
+  /// Goes on with the search of one scan; the places found are moved to where they would be by now.
+  void search(const Beams& beams, const Gaussian& motion, Estimate& estimate) {
+    if (!search_ && beams.beams.size() >= kLeastReadings) {
+      search_.emplace(sensor_, settings_.recovery, beams);
+      searched_ = beams;
+      searched_from_ = *last_;
+      doubted_ = estimate.map_from_base.mean;
+    }
+    estimate.map_from_base.covariance = anywhere();
+    if (!search_) return;
+    const bool done = search_->step();
+    estimate.searched = search_->progress();
+    if (!done) return;
+    places_.add(search_->poses(), searched_, 0);
+    if (known_) places_.add({doubted_}, searched_, kHeadStart);
+    search_.reset();
+    if (places_.empty()) return;
+    at_ = searched_from_;
+    knowledge_ = Knowledge::kAmbiguous;
+    const Gaussian since = motionBetween(*at_, *last_, settings_.motion, process_);
+    health_ = {};
+    follow(beams, since, true, estimate);
+    (void)motion;
+  }
+
+  void follow(const Beams& beams, const Gaussian& motion, bool update, Estimate& estimate) {
+    if (update) {
+      places_.update(motion, beams);
+      setBase(places_.best());
+      estimate.map_from_base = pose_;
+    }
+    const Fit fit = sensor_.look(beams, estimate.map_from_base.mean);
+    if (fit.readings() >= kLeastReadings) health_.take(fit.share(), settings_.recovery);
+    estimate.particles = static_cast<int>(places_.size());
+    decide(beams, estimate);
+    if (knowledge_ != Knowledge::kAmbiguous) return;
+    // Around the likeliest, as wide as the others are away from it.
+    for (const auto& [pose, weight] : places_.all()) {
+      const Eigen::Vector3d off(pose.x - pose_.mean.x, pose.y - pose_.mean.y, wrapAngle(pose.theta - pose_.mean.theta));
+      estimate.map_from_base.covariance += weight * off * off.transpose();
+    }
+  }
+
+  void decide(const Beams& beams, Estimate& estimate) {
+    const auto& s = settings_.recovery;
+    const bool likely = places_.odds() >= s.found_odds && places_.bestFit() >= s.found_fit;
+    if (likely && travelled_ >= s.found_way) {
+      const Gaussian found = estimate.map_from_base;
+      Gaussian wide = found;
+      wide.covariance.diagonal() += Eigen::Vector3d(0.01, 0.01, 0.0025);  // 0.1 m, 3 degrees
+      setPose(wide);
+      estimate.map_from_base = wide;
+    } else if (travelled_ >= s.found_way && health_.doubtful(s)) {
+      known_ = false;
+      start(Knowledge::kLost);
+      estimate.map_from_base.covariance = anywhere();
+    }
+    (void)beams;
+  }
+
+  /// The whole map, any heading.
+  Eigen::Matrix3d anywhere() const {
+    Eigen::Matrix3d out = Eigen::Matrix3d::Zero();
+    const double edge = field_.resolution() * std::hypot(field_.width(), field_.height());
+    out.diagonal() << edge * edge / 12, edge * edge / 12, M_PI * M_PI / 3;
+    return out;
+  }
+
+  LocalizerSettings settings_;
+  ProcessNoise process_;
+  Field field_;
+  Sensor sensor_;
+  Particles particles_;
+  Places places_;
+  Knowledge knowledge_ = Knowledge::kLost;
+  Gaussian pose_{{0, 0, 0}, Eigen::Matrix3d::Zero()};  ///< at at_
+  std::optional<Odometry> at_;    ///< of the last update
+  std::optional<Odometry> last_;  ///< of the last scan
+  std::optional<Search> search_;
+  Beams searched_{};
+  Odometry searched_from_{};
+  Pose2D doubted_{0, 0, 0};
+  bool known_ = false;  ///< there was a pose before the search
+  bool once_ = false;
+  double travelled_ = 0;  ///< since all places were in question [m]
+  Health health_;
+};
+
+Localizer::Localizer(const LocalizerSettings& settings, const Chair& chair, std::uint32_t seed,
+                     const OccupancyGrid& grid, const Pose2D& map_from_grid)
+    : impl_(std::make_unique<Impl>(settings, chair, seed, grid, map_from_grid)) {}
+Localizer::~Localizer() = default;
+Localizer::Localizer(Localizer&&) noexcept = default;
+Localizer& Localizer::operator=(Localizer&&) noexcept = default;
+
+void Localizer::setPose(const Gaussian& map_from_base) { impl_->setPose(map_from_base); }
+void Localizer::forget() { impl_->forget(); }
+void Localizer::updateOnce() { impl_->updateOnce(); }
+Localizer::Estimate Localizer::add(const Scan& scan, const Odometry& start, const Pose2D& end) {
+  return impl_->add(scan, start, end);
+}
+std::vector<Weighted> Localizer::particles() const { return impl_->particles(); }
+
+}  // namespace kurumaisu
