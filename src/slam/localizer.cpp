@@ -74,7 +74,9 @@ class Localizer::Impl {
 
   Estimate add(const Scan& scan, const Odometry& start, const Pose2D& end) {
     check(scan, start, end, last_);
-    const Beams beams = pick(scan, between(start.pose, end), settings_.reading);
+    Pose2D sweep = between(start.pose, end);
+    sweep.theta = wrapAngle(sweep.theta);
+    const Beams beams = pick(scan, sweep, settings_.reading);
     if (!at_) at_ = start;
     const Gaussian motion = motionBetween(*at_, start, settings_.motion, process_);
     travelled_ += last_ ? wayOf(between(last_->pose, start.pose)) : 0;
@@ -86,7 +88,7 @@ class Localizer::Impl {
     if (knowledge_ == Knowledge::kTracking) {
       track(beams, motion, update, estimate);
     } else if (knowledge_ == Knowledge::kLost) {
-      search(beams, motion, estimate);
+      search(beams, estimate);
     } else {
       follow(beams, motion, update, estimate);
     }
@@ -103,7 +105,7 @@ class Localizer::Impl {
 
  private:
   static double wayOf(const Pose2D& motion) {
-    return std::hypot(motion.x, motion.y) + kTurnPerWay * std::abs(motion.theta);
+    return std::hypot(motion.x, motion.y) + kTurnPerWay * std::abs(wrapAngle(motion.theta));
   }
 
   void start(Knowledge knowledge) {
@@ -142,11 +144,11 @@ class Localizer::Impl {
     if (!health_.doubtful(settings_.recovery)) return;
     known_ = true;
     start(Knowledge::kLost);
-    search(beams, motion, estimate);
+    search(beams, estimate);
   }
 
   /// Goes on with the search of one scan; the places found are moved to where they would be by now.
-  void search(const Beams& beams, const Gaussian& motion, Estimate& estimate) {
+  void search(const Beams& beams, Estimate& estimate) {
     if (!search_ && beams.beams.size() >= kLeastReadings) {
       search_.emplace(sensor_, settings_.recovery, beams);
       searched_ = beams;
@@ -167,7 +169,6 @@ class Localizer::Impl {
     const Gaussian since = motionBetween(*at_, *last_, settings_.motion, process_);
     health_ = {};
     follow(beams, since, true, estimate);
-    (void)motion;
   }
 
   void follow(const Beams& beams, const Gaussian& motion, bool update, Estimate& estimate) {
@@ -179,7 +180,7 @@ class Localizer::Impl {
     const Fit fit = sensor_.look(beams, estimate.map_from_base.mean);
     if (fit.readings() >= kLeastReadings) health_.take(fit.share(), settings_.recovery);
     estimate.particles = static_cast<int>(places_.size());
-    decide(beams, estimate);
+    decide(estimate);
     if (knowledge_ != Knowledge::kAmbiguous) return;
     // Around the likeliest, as wide as the others are away from it.
     for (const auto& [pose, weight] : places_.all()) {
@@ -188,7 +189,7 @@ class Localizer::Impl {
     }
   }
 
-  void decide(const Beams& beams, Estimate& estimate) {
+  void decide(Estimate& estimate) {
     const auto& s = settings_.recovery;
     const bool likely = places_.odds() >= s.found_odds && places_.bestFit() >= s.found_fit;
     if (likely && travelled_ >= s.found_way) {
@@ -202,7 +203,6 @@ class Localizer::Impl {
       start(Knowledge::kLost);
       estimate.map_from_base.covariance = anywhere();
     }
-    (void)beams;
   }
 
   /// The whole map, any heading.

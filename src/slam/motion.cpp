@@ -57,7 +57,8 @@ double integrated(double time, double tau) {
 
 Gaussian motionBetween(const Odometry& first, const Odometry& second, const MotionSettings& settings,
                        const ProcessNoise& process) {
-  const Pose2D motion = between(first.pose, second.pose);
+  Pose2D motion = between(first.pose, second.pose);
+  motion.theta = wrapAngle(motion.theta);
   const double way = std::hypot(motion.x, motion.y);
   const double turned = std::abs(motion.theta);
   const double heading = way > 0 ? std::atan2(motion.y, motion.x) : 0;

@@ -15,8 +15,8 @@ namespace kurumaisu {
 
 /// A pose and how certain it is: x, y [m], heading [rad].
 struct Gaussian {
-  Pose2D mean;
-  Eigen::Matrix3d covariance;
+  Pose2D mean{0, 0, 0};
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
 struct Weighted {
