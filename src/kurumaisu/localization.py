@@ -77,7 +77,9 @@ def localize_scans(localizer: Localizer, log: ScanLog) -> Localization:
     said = []
     for i in range(len(log.times)):
         try:
-            said.append(localizer.add(log.times[i], log.ranges[i], log.fan, log.odom[i].tolist(), log.odom_end[i].tolist()))
+            said.append(
+                localizer.add(log.times[i], log.ranges[i], log.fan, log.odom[i].tolist(), log.odom_end[i].tolist())
+            )
         except ValueError as error:
             raise Error(f"{log.name}: scan {i}: {error}") from error
     return Localization(

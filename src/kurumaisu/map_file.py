@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -20,6 +22,8 @@ _MOST_CELLS = 400_000_000  # 10^4 x 10^4 cells fit four times
 _MODES = ("trinary", "scale", "raw")
 _WALL = 100  # occupancy [%]
 _OPAQUE = 255
+_SHADE_WALL, _SHADE_FREE, _SHADE_UNKNOWN = 0, 254, 205  # map_saver's
+OCCUPIED_ABOVE, FREE_BELOW = 65, 19.6  # [%] what map_saver's files say
 
 
 @dataclass(frozen=True)
@@ -51,8 +55,49 @@ def read_map(path: Path) -> MapFile:
     return MapFile(np.ascontiguousarray(_cells(said)[::-1]), said.resolution, said.origin)
 
 
+def write_map(written: MapFile, path: Path, suffix: str, occupied: float, free: float) -> tuple[Path, Path]:
+    """Write an image (.pgm or .png) and path.yaml and return their names; path has no suffix.
+
+    Cells above occupied [%] are drawn as walls, those below free [%] as free, all others as unknown.
+    Raise Error naming the file that cannot be written.
+    """
+    shades = np.full(written.cells.shape, _SHADE_UNKNOWN, dtype=np.uint8)
+    shades[written.cells > occupied] = _SHADE_WALL
+    shades[(written.cells >= 0) & (written.cells < free)] = _SHADE_FREE
+    image, text = path.with_name(path.name + suffix), path.with_name(path.name + ".yaml")
+    x, y, yaw = written.origin
+    try:
+        Image.fromarray(np.ascontiguousarray(shades[::-1])).save(image)
+        text.write_text(
+            f"image: {image.name}\nresolution: {written.resolution:.6f}\n"
+            f"origin: [{x:.6f}, {y:.6f}, {yaw:.9f}]\nnegate: 0\n"
+            f"occupied_thresh: {OCCUPIED_ABOVE / 100}\nfree_thresh: {FREE_BELOW / 100}\n",
+            encoding="utf-8",
+        )
+    except OSError as error:
+        raise Error(f"{error.filename}: {error.strerror}") from error
+    return image, text
+
+
 def _read_yaml(path: Path) -> _Said:
-    top = settings.load(path)
+    try:
+        return _said(path, settings.load(path))
+    except Error as error:
+        raise Error(_with_line(path, str(error))) from error
+
+
+def _with_line(path: Path, message: str) -> str:
+    """Return a message of settings.Section with the line of the key that it names, if it names one that is there."""
+    match = re.match(re.escape(f"{path}: ") + r"(\w+)[\w.]*: ", message)
+    if match is None:
+        return message
+    document = yaml.compose(path.read_text(encoding="utf-8"))
+    pairs = document.value if isinstance(document, yaml.MappingNode) else []
+    lines = [key.start_mark.line + 1 for key, _ in pairs if key.value == match.group(1)]
+    return f"{path}:{lines[-1]}:{message[len(str(path)) + 1 :]}" if lines else message
+
+
+def _said(path: Path, top: Section) -> _Said:
     said = _Said(
         image=path.parent / top.text("image"),
         resolution=top.number("resolution", above=0),
