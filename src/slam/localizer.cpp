@@ -182,7 +182,9 @@ class Localizer::Impl {
     estimate.particles = static_cast<int>(places_.size());
     decide(estimate);
     if (knowledge_ != Knowledge::kAmbiguous) return;
-    // Around the likeliest, as wide as the others are away from it.
+    // Around the likeliest, as wide as the others are away from it, and never so narrow that it looks certain.
+    const double least = settings_.ambiguous_spread * settings_.ambiguous_spread;
+    estimate.map_from_base.covariance.diagonal() += Eigen::Vector3d(least, least, 0);
     for (const auto& [pose, weight] : places_.all()) {
       const Eigen::Vector3d off(pose.x - pose_.mean.x, pose.y - pose_.mean.y, wrapAngle(pose.theta - pose_.mean.theta));
       estimate.map_from_base.covariance += weight * off * off.transpose();

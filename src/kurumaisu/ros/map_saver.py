@@ -30,8 +30,8 @@ def main() -> int:
         served = map_of(rospy.wait_for_message("map", GridMessage, options.wait))
         suffix = ".png" if options.png else ".pgm"
         image, text = write_map(served, options.name, suffix, options.occ, options.free)
-    except rospy.ROSException as error:
-        print(f"map_saver: {error}", file=sys.stderr)
+    except rospy.ROSException:
+        print(f"map_saver: {rospy.resolve_name('map')}: no map came within {options.wait:g} s", file=sys.stderr)
         return 1
     except Error as error:
         print(f"map_saver: {one_line(error)}", file=sys.stderr)
