@@ -79,7 +79,9 @@ class Localizer::Impl {
     const Beams beams = pick(scan, sweep, settings_.reading);
     if (!at_) at_ = start;
     const Gaussian motion = motionBetween(*at_, start, settings_.motion, process_);
-    travelled_ += last_ ? wayOf(between(last_->pose, start.pose)) : 0;
+    const double way = last_ ? wayOf(between(last_->pose, start.pose)) : 0;
+    travelled_ += way;
+    blind_ = beams.beams.size() < kLeastReadings ? blind_ + way : 0;
     last_ = start;
     const bool moves = std::hypot(motion.mean.x, motion.mean.y) >= settings_.update_min_d ||
                        std::abs(motion.mean.theta) >= settings_.update_min_a;
@@ -115,11 +117,11 @@ class Localizer::Impl {
     travelled_ = 0;
   }
 
-  /// Particles that are spread wide do not know one place either.
+  /// Particles that are spread wide do not know one place either, nor does who has seen nothing for long.
   Knowledge told(const Gaussian& pose) const {
     const double largest = std::sqrt(std::fmax(pose.covariance(0, 0), pose.covariance(1, 1)));
-    const bool wide = knowledge_ == Knowledge::kTracking && largest > settings_.ambiguous_spread;
-    return wide ? Knowledge::kAmbiguous : knowledge_;
+    const bool doubtful = largest > settings_.ambiguous_spread || blind_ > settings_.recovery.found_way;
+    return doubtful && knowledge_ == Knowledge::kTracking ? Knowledge::kAmbiguous : knowledge_;
   }
 
   void setBase(const Gaussian& pose) {
@@ -231,6 +233,7 @@ class Localizer::Impl {
   Pose2D doubted_{0, 0, 0};
   bool known_ = false;  ///< there was a pose before the search
   bool once_ = false;
+  double blind_ = 0;      ///< driven since a scan had readings [m]
   double travelled_ = 0;  ///< since all places were in question [m]
   Health health_;
 };
