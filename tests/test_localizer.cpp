@@ -199,7 +199,7 @@ TEST(Localizer, NoticesThatItWasCarriedAway) {
   const auto doubt = std::find_if_not(moments.begin(), moments.end(), sure);
   ASSERT_NE(doubt, moments.end());
   EXPECT_LT(doubt->t - 20, 3);
-  EXPECT_GT(doubt->sd, 0.5);
+  EXPECT_GT(doubt->sd, 0.7);
   EXPECT_TRUE(sure(moments.back()));
   EXPECT_LT(moments.back().off, 0.06);
 }

@@ -16,6 +16,11 @@ namespace {
 
 constexpr int kLeastReadings = 8;     // fewer say nothing of how well they fit
 constexpr int kRounds = 4;            // of the last alignment
+constexpr int kPatience = 8;          // scans before a new pose is doubted
+constexpr int kRelief = 50;           // scans without doubt after which an old doubt is forgotten
+constexpr double kNearby = 0.3;       // [m] around a doubted pose is searched first
+constexpr double kNearbyTurn = 0.15;  // [rad]
+constexpr double kSearchAgain = 3;    // found_way after which a search that led to nothing is repeated
 constexpr double kHeadStart = 5;      // log-odds of the place where the chair was believed to be, when doubted
 constexpr double kTurnPerWay = 0.5;   // [m/rad] a turn shows as much as so much way
 
@@ -32,14 +37,16 @@ void check(const Scan& scan, const Odometry& start, const Pose2D& end, const std
 
 /// How well the map fits, lately and usually.
 struct Health {
-  std::optional<double> fast, slow;
+  double fast = 0, slow = 0;
+  int scans = 0;
 
   void take(double fit, const RecoverySettings& settings) {
-    fast = fast ? *fast + settings.alpha_fast * (fit - *fast) : fit;
-    slow = slow ? *slow + settings.alpha_slow * (fit - *slow) : fit;
+    ++scans;
+    fast += std::fmax(settings.alpha_fast, 1.0 / scans) * (fit - fast);
+    slow += std::fmax(settings.alpha_slow, 1.0 / scans) * (fit - slow);
   }
   bool doubtful(const RecoverySettings& settings) const {
-    return fast && (*fast < settings.lost_fit || *fast < settings.lost_drop * *slow);
+    return scans > kPatience && (fast < settings.lost_fit || fast < settings.lost_drop * slow);
   }
 };
 
@@ -57,11 +64,8 @@ class Localizer::Impl {
         places_(sensor_, settings_.recovery) {}
 
   void setPose(const Gaussian& map_from_base) {
-    particles_.reset(map_from_base);
-    pose_ = map_from_base;
-    at_ = last_;
-    start(Knowledge::kTracking);
-    once_ = true;
+    settle(map_from_base);
+    doubted_for_ = 0;
     health_ = {};
   }
 
@@ -90,14 +94,15 @@ class Localizer::Impl {
     if (knowledge_ == Knowledge::kTracking) {
       track(beams, motion, update, estimate);
     } else if (knowledge_ == Knowledge::kLost) {
-      search(beams, estimate);
+      lose(beams, estimate);
     } else {
       follow(beams, motion, update, estimate);
     }
     if (update) once_ = false;
     estimate.knowledge = told(estimate.map_from_base);
-    estimate.fit = health_.fast.value_or(0);
-    estimate.fit_usual = health_.slow.value_or(0);
+    if (estimate.knowledge == Knowledge::kAmbiguous) blur(estimate.map_from_base.covariance);
+    estimate.fit = health_.fast;
+    estimate.fit_usual = health_.slow;
     return estimate;
   }
 
@@ -115,12 +120,22 @@ class Localizer::Impl {
     places_ = Places(sensor_, settings_.recovery);
     search_.reset();
     travelled_ = 0;
+    verified_ = false;
+  }
+
+  /// At one place from now on.
+  void settle(const Gaussian& pose) {
+    particles_.reset(pose);
+    pose_ = pose;
+    at_ = last_;
+    start(Knowledge::kTracking);
+    once_ = true;
   }
 
   /// Particles that are spread wide do not know one place either, nor does who has seen nothing for long.
   Knowledge told(const Gaussian& pose) const {
     const double largest = std::sqrt(std::fmax(pose.covariance(0, 0), pose.covariance(1, 1)));
-    const bool doubtful = largest > settings_.ambiguous_spread || blind_ > settings_.recovery.found_way;
+    const bool doubtful = largest > settings_.ambiguous_spread || doubted_for_ > 0 || blind_ > settings_.recovery.found_way;
     return doubtful && knowledge_ == Knowledge::kTracking ? Knowledge::kAmbiguous : knowledge_;
   }
 
@@ -141,71 +156,120 @@ class Localizer::Impl {
                                 mean.covariance};
       setBase(estimate.map_from_base);
     }
-    const Fit fit = sensor_.look(beams, estimate.map_from_base.mean);
-    if (fit.readings() >= kLeastReadings) health_.take(fit.share(), settings_.recovery);
+    look(beams, estimate);
+    if (doubted_for_ > 0) ++doubted_for_;
+    const bool relieved = doubted_for_ > kPatience && health_.fast >= settings_.recovery.found_fit;
+    if (relieved || doubted_for_ > kRelief) doubted_for_ = 0;
     if (!health_.doubtful(settings_.recovery)) return;
-    known_ = true;
-    start(Knowledge::kLost);
-    search(beams, estimate);
+    if (doubted_for_ == 0) {
+      widen(estimate.map_from_base);
+    } else if (doubted_for_ > kPatience) {
+      known_ = true;
+      start(Knowledge::kLost);
+      lose(beams, estimate);
+    }
   }
 
-  /// Goes on with the search of one scan; the places found are moved to where they would be by now.
-  void search(const Beams& beams, Estimate& estimate) {
-    if (!search_ && beams.beams.size() >= kLeastReadings) {
+  void look(const Beams& beams, const Estimate& estimate) {
+    const Fit fit = sensor_.look(beams, estimate.map_from_base.mean);
+    if (fit.readings() >= kLeastReadings) health_.take(fit.share(), settings_.recovery);
+  }
+
+  /// A doubted pose may be a little off only: that is tried first.
+  void widen(Gaussian pose) {
+    pose.covariance.diagonal() += Eigen::Vector3d(kNearby * kNearby, kNearby * kNearby, kNearbyTurn * kNearbyTurn);
+    settle(pose);
+    doubted_for_ = 1;
+  }
+
+  /// Goes on with the search for the places of one scan; when done, they are moved to where they would be by now.
+  std::optional<Places> search(const Beams& beams, const Pose2D* doubted) {
+    if (!search_) {
+      if (beams.beams.size() < kLeastReadings) return std::nullopt;
       search_.emplace(sensor_, settings_.recovery, beams);
       searched_ = beams;
       searched_from_ = *last_;
-      doubted_ = estimate.map_from_base.mean;
+      if (doubted != nullptr) doubted_ = *doubted;
     }
-    estimate.map_from_base.covariance = anywhere();
-    if (!search_) return;
-    const bool done = search_->step();
-    estimate.searched = search_->progress();
-    if (!done) return;
-    places_.add(search_->poses(), searched_, 0);
-    if (known_) places_.add({doubted_}, searched_, kHeadStart);
+    if (!search_->step()) return std::nullopt;
+    Places found(sensor_, settings_.recovery);
+    found.add(search_->poses(), searched_, 0);
+    if (doubted != nullptr) found.add({doubted_}, searched_, kHeadStart);
     search_.reset();
-    if (places_.empty()) return;
-    at_ = searched_from_;
+    found.update(motionBetween(searched_from_, *last_, settings_.motion, process_), beams);
+    return found;
+  }
+
+  void lose(const Beams& beams, Estimate& estimate) {
+    const Pose2D doubted = estimate.map_from_base.mean;
+    estimate.map_from_base.covariance = anywhere();
+    const auto found = search(beams, known_ ? &doubted : nullptr);
+    estimate.searched = search_ ? search_->progress() : 1;
+    if (!found || found->empty()) return;
+    places_ = *found;
     knowledge_ = Knowledge::kAmbiguous;
-    const Gaussian since = motionBetween(*at_, *last_, settings_.motion, process_);
     health_ = {};
-    follow(beams, since, true, estimate);
+    estimate.updated = true;
+    show(estimate);
+    mix(estimate);
   }
 
   void follow(const Beams& beams, const Gaussian& motion, bool update, Estimate& estimate) {
-    if (update) {
+    if (update || search_) {
       places_.update(motion, beams);
-      setBase(places_.best());
-      estimate.map_from_base = pose_;
+      show(estimate);
     }
-    const Fit fit = sensor_.look(beams, estimate.map_from_base.mean);
-    if (fit.readings() >= kLeastReadings) health_.take(fit.share(), settings_.recovery);
-    estimate.particles = static_cast<int>(places_.size());
+    if (search_ || travelled_ >= kSearchAgain * settings_.recovery.found_way) searchAgain(beams);
+    look(beams, estimate);
     decide(estimate);
-    if (knowledge_ != Knowledge::kAmbiguous) return;
-    // Around the likeliest, as wide as the others are away from it, and never so narrow that it looks certain.
+    if (knowledge_ == Knowledge::kAmbiguous) mix(estimate);
+  }
+
+  void searchAgain(const Beams& beams) {
+    const auto found = search(beams, nullptr);
+    if (!found) return;
+    places_.merge(*found);
+    verified_ = true;
+    travelled_ = 0;
+  }
+
+  void show(Estimate& estimate) {
+    setBase(places_.best());
+    estimate.map_from_base = pose_;
+    estimate.particles = static_cast<int>(places_.size());
+  }
+
+  /// Never so narrow that it looks certain.
+  void blur(Eigen::Matrix3d& covariance) const {
     const double least = settings_.ambiguous_spread * settings_.ambiguous_spread;
-    estimate.map_from_base.covariance.diagonal() += Eigen::Vector3d(least, least, 0);
+    for (int i = 0; i < 2; ++i) covariance(i, i) = std::fmax(covariance(i, i), least);
+  }
+
+  /// Around the likeliest, as wide as the others are away from it.
+  void mix(Estimate& estimate) const {
     for (const auto& [pose, weight] : places_.all()) {
       const Eigen::Vector3d off(pose.x - pose_.mean.x, pose.y - pose_.mean.y, wrapAngle(pose.theta - pose_.mean.theta));
       estimate.map_from_base.covariance += weight * off * off.transpose();
     }
   }
 
+  /// One place is taken when it has held against all others over some way, those of a second search among them.
   void decide(Estimate& estimate) {
     const auto& s = settings_.recovery;
-    const bool likely = places_.odds() >= s.found_odds && places_.bestFit() >= s.found_fit;
-    if (likely && travelled_ >= s.found_way) {
-      const Gaussian found = estimate.map_from_base;
-      Gaussian wide = found;
-      wide.covariance.diagonal() += Eigen::Vector3d(0.01, 0.01, 0.0025);  // 0.1 m, 3 degrees
-      setPose(wide);
-      estimate.map_from_base = wide;
-    } else if (travelled_ >= s.found_way && health_.doubtful(s)) {
+    if (search_ || travelled_ < s.found_way) return;
+    if (health_.doubtful(s)) {
       known_ = false;
       start(Knowledge::kLost);
       estimate.map_from_base.covariance = anywhere();
+    } else if (places_.odds() >= s.found_odds && places_.bestFit() >= s.found_fit) {
+      if (!verified_) {
+        travelled_ = kSearchAgain * s.found_way;  // now
+      } else {
+        Gaussian wide = estimate.map_from_base;
+        wide.covariance.diagonal() += Eigen::Vector3d(0.01, 0.01, 0.0025);  // 0.1 m, 3 degrees
+        setPose(wide);
+        estimate.map_from_base = wide;
+      }
     }
   }
 
@@ -231,7 +295,9 @@ class Localizer::Impl {
   Beams searched_{};
   Odometry searched_from_{};
   Pose2D doubted_{0, 0, 0};
-  bool known_ = false;  ///< there was a pose before the search
+  bool known_ = false;     ///< there was a pose before the search
+  bool verified_ = false;  ///< the places have held against those of a second search
+  int doubted_for_ = 0;    ///< scans since the pose was first doubted; 0 = it is not
   bool once_ = false;
   double blind_ = 0;      ///< driven since a scan had readings [m]
   double travelled_ = 0;  ///< since all places were in question [m]

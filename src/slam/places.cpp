@@ -51,6 +51,11 @@ void Places::update(const Gaussian& motion, const Beams& beams) {
   tidy();
 }
 
+void Places::merge(const Places& others) {
+  places_.insert(places_.end(), others.places_.begin(), others.places_.end());
+  tidy();
+}
+
 void Places::tidy() {
   std::stable_sort(places_.begin(), places_.end(),
                    [](const Place& a, const Place& b) { return a.log_weight > b.log_weight; });

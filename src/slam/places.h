@@ -20,6 +20,9 @@ class Places {
   /// Moves all places and weighs them by a scan; forgets those that are hopeless, or have met another.
   void update(const Gaussian& motion, const Beams& beams);
 
+  /// Takes in places found later: they compete with those there are from now on, at par.
+  void merge(const Places& others);
+
   bool empty() const { return places_.empty(); }
   std::size_t size() const { return places_.size(); }
   /// The likeliest place and its fit.
