@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulator, base_node, map_server and localization_node: a drive on an uneven floor, and a chair that is carried away."""
+"""Simulator, base_node, map_server, localization_node: a drive on an uneven floor; a chair that is carried away."""
 
 import sys
 import unittest

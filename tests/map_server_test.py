@@ -42,9 +42,7 @@ def program(name):
 
 
 def run(*arguments):
-    done = subprocess.run(
-        [*map(str, arguments)], capture_output=True, text=True, timeout=DEADLINE, check=False
-    )
+    done = subprocess.run([*map(str, arguments)], capture_output=True, text=True, timeout=DEADLINE, check=False)
     return done.returncode, done.stdout + done.stderr
 
 

@@ -46,7 +46,8 @@ inline double rangeAlong(const k::Pose2D& ray) {
 inline k::OccupancyGrid mapOf(const std::vector<Wall>& walls, double edge) {
   const int width = static_cast<int>(std::lround(11 / edge));
   const int height = static_cast<int>(std::lround(9 / edge));
-  k::OccupancyGrid grid{edge, 0, 0, width, height, std::vector<std::int8_t>(static_cast<std::size_t>(width) * height)};
+  k::OccupancyGrid grid{edge,  0,      0,
+                        width, height, std::vector<std::int8_t>(static_cast<std::size_t>(width) * height)};
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const double cx = (x + 0.5) * edge - 5.525;
@@ -82,7 +83,8 @@ inline k::Scan scanAt(double t, std::mt19937& noise) {
   std::normal_distribution<double> sigma(0, 0.003);
   for (int i = 0; i < kBeams; ++i) {
     const k::Pose2D laser = k::compose(truth(t + i * kUrg.time_increment), kUrg.base_from_laser);
-    const double range = rangeAlong({laser.x, laser.y, laser.theta + kUrg.angle_min + kUrg.angle_increment * i});
+    const double range =
+        rangeAlong({laser.x, laser.y, laser.theta + kUrg.angle_min + kUrg.angle_increment * i});
     scan.ranges[i] = range > kUrg.range_max ? std::numeric_limits<float>::infinity()
                                             : static_cast<float>(range + sigma(noise));
   }

@@ -57,7 +57,8 @@ k::LocalizerSettings settings() {
 
 const k::Chair kChair{{1, 0, {0.002334, -0.000488, 0.000199}, 0.001, 0.06, 5.6}, {0, 0, 1, 0}};
 
-k::Localizer localizer(std::uint32_t seed = 1, const k::OccupancyGrid& grid = room::mapOf(room::kWalls, 0.05)) {
+k::Localizer localizer(std::uint32_t seed = 1,
+                       const k::OccupancyGrid& grid = room::mapOf(room::kWalls, 0.05)) {
   return {settings(), kChair, seed, grid, room::kMapFromGrid};
 }
 
@@ -82,7 +83,8 @@ std::vector<Moment> drive(k::Localizer& localizer, double from, double to, const
   std::vector<Moment> out;
   room::Wheels wheels;
   std::mt19937 noise(7);
-  for (int i = static_cast<int>(std::lround(from / kStep)); i < static_cast<int>(std::lround(to / kStep)); ++i) {
+  for (int i = static_cast<int>(std::lround(from / kStep)); i < static_cast<int>(std::lround(to / kStep));
+       ++i) {
     const double t = i * kStep;
     k::Scan scan = room::scanAt(t, noise);
     k::Pose2D start = wheels.at(t);
@@ -205,7 +207,9 @@ TEST(Localizer, NoticesThatItWasCarriedAway) {
 }
 
 TEST(LocalizerFaults, WithoutOdometryItDoesNotClaimToKnow) {
-  const auto moments = faulty([](double, k::Scan&, k::Pose2D& start, k::Pose2D& end) { start = end = {0, 0, 0}; });
+  const auto moments = faulty([](double, k::Scan&, k::Pose2D& start, k::Pose2D& end) {
+    start = end = {0, 0, 0};
+  });
   EXPECT_FALSE(std::all_of(moments.begin(), moments.end(), sure));
   int wrong = 0;
   for (const Moment& m : moments) wrong = sure(m) && m.off > 0.5 ? wrong + 1 : 0;
@@ -252,7 +256,8 @@ TEST(LocalizerFaults, PeopleAroundTheChair) {
 }
 
 TEST(LocalizerFaults, ALaserThatIsMountedOtherwise) {
-  const auto yawed = faulty([](double, k::Scan& scan, k::Pose2D&, k::Pose2D&) { scan.fan.base_from_laser.theta += 0.6; });
+  const auto yawed =
+      faulty([](double, k::Scan& scan, k::Pose2D&, k::Pose2D&) { scan.fan.base_from_laser.theta += 0.6; });
   EXPECT_FALSE(sure(yawed.back()) && yawed.back().turn < 0.3);  // turned it may well find itself
   const auto upside_down = faulty([](double, k::Scan& scan, k::Pose2D&, k::Pose2D&) {
     scan.fan.angle_min = -scan.fan.angle_min;
@@ -263,8 +268,9 @@ TEST(LocalizerFaults, ALaserThatIsMountedOtherwise) {
 }
 
 TEST(LocalizerFaults, TheMapOfAnotherBuilding) {
-  const std::vector<room::Wall> other{{-4, -3, 3.5, -3}, {3.5, -3, 3.5, 3}, {3.5, 3, -4, 3},    {-4, 3, -4, -3},
-                                      {-2, -3, -2, 1},   {1, 3, 1, -1},     {-2, 1, -1, 1.5}, {1, -1, 2.5, -1.4}};
+  const std::vector<room::Wall> other{{-4, -3, 3.5, -3}, {3.5, -3, 3.5, 3}, {3.5, 3, -4, 3},
+                                      {-4, 3, -4, -3},   {-2, -3, -2, 1},   {1, 3, 1, -1},
+                                      {-2, 1, -1, 1.5},  {1, -1, 2.5, -1.4}};
   k::Localizer subject = localizer(1, room::mapOf(other, 0.05));
   subject.setPose(around(room::truth(0)));
   const auto moments = drive(subject, 0, 40);
@@ -275,15 +281,17 @@ TEST(LocalizerFaults, TheMapOfAnotherBuilding) {
 
 TEST(LocalizerFaults, MapsOfNothing) {
   for (const int value : {0, -1, 100}) {
-    k::OccupancyGrid grid{0.05, 0, 0, 200, 160, std::vector<std::int8_t>(200 * 160, static_cast<std::int8_t>(value))};
+    k::OccupancyGrid grid{0.05, 0,   0,
+                          200,  160, std::vector<std::int8_t>(200 * 160, static_cast<std::int8_t>(value))};
     k::Localizer subject(settings(), kChair, 1, grid, room::kMapFromGrid);
     subject.setPose(around(room::truth(0)));
     const auto moments = drive(subject, 0, 10);
     EXPECT_FALSE(sure(moments.back())) << value;
     EXPECT_GT(moments.back().sd, 1) << value;
   }
-  for (const k::OccupancyGrid& grid : {k::OccupancyGrid{0.05, 0, 0, 0, 0, {}}, k::OccupancyGrid{0, 0, 0, 1, 1, {0}},
-                                       k::OccupancyGrid{0.05, 0, 0, 2, 2, {0}}}) {
+  for (const k::OccupancyGrid& grid :
+       {k::OccupancyGrid{0.05, 0, 0, 0, 0, {}}, k::OccupancyGrid{0, 0, 0, 1, 1, {0}},
+        k::OccupancyGrid{0.05, 0, 0, 2, 2, {0}}}) {
     EXPECT_THROW(localizer(1, grid), std::invalid_argument);
   }
 }
@@ -317,7 +325,8 @@ TEST(LocalizerFaults, SenselessScansAreRefusedAndHarmNothing) {
 
 TEST(LocalizerFaults, AMapOf10000By10000Cells) {
   constexpr int kEdge = 10000;
-  k::OccupancyGrid grid{0.05, 0, 0, kEdge, kEdge, std::vector<std::int8_t>(static_cast<std::size_t>(kEdge) * kEdge, -1)};
+  k::OccupancyGrid grid{0.05,  0,     0,
+                        kEdge, kEdge, std::vector<std::int8_t>(static_cast<std::size_t>(kEdge) * kEdge, -1)};
   const k::OccupancyGrid part = room::mapOf(room::kWalls, 0.05);
   for (int y = 0; y < part.height; ++y) {
     std::copy_n(part.cells.begin() + static_cast<long>(y) * part.width, part.width,
@@ -335,7 +344,8 @@ TEST(LocalizationReport, SaysWhatIsWrong) {
   k::Localizer::Estimate estimate{around({0, 0, 0}), k::Knowledge::kTracking, 0.9, 0.9, 100, 0, true};
   const k::LocalizationState good{true, "", 0.1, 2, false, &estimate, 0, 0};
   EXPECT_EQ(k::judge(good).level, 0);
-  const auto expect = [&good](int level, const std::string& code, const std::function<void(k::LocalizationState&)>& change) {
+  const auto expect = [&good](int level, const std::string& code,
+                              const std::function<void(k::LocalizationState&)>& change) {
     k::LocalizationState state = good;
     change(state);
     EXPECT_EQ(k::judge(state).level, level) << code;

@@ -101,7 +101,8 @@ TEST(Beams, AreEvenlySpreadAndWithoutTheMotionDuringTheScan) {
     const double bearing = -1.0 + 0.01 * n;
     EXPECT_NEAR(still.beams[i].x, 0.2 + 2 * std::cos(bearing), 1e-5);
     const double turned = 0.2 * n / 199;
-    const double x = 0.1 * n / 199 + std::cos(turned) * still.beams[i].x - std::sin(turned) * still.beams[i].y;
+    const double x =
+        0.1 * n / 199 + std::cos(turned) * still.beams[i].x - std::sin(turned) * still.beams[i].y;
     EXPECT_NEAR(moving.beams[i].x, x, 1e-5);
   }
   // Every fourth of an autoregressive row: (1 - 0.52^4) / (1 + 0.52^4).
@@ -139,7 +140,7 @@ TEST(Sensor, TellsHitsFromThingsInTheWayAndFromWallsThatWereCrossed) {
   EXPECT_EQ(sensor.look(oneBeam(1.025F), pose).hits, 1);
   EXPECT_EQ(sensor.look(oneBeam(0.5F), pose).shorts, 1);
   EXPECT_EQ(sensor.look(oneBeam(1.5F), pose).through, 1);
-  EXPECT_EQ(sensor.look(oneBeam(9.0F), pose).through, 1);   // out of the map, through the wall
+  EXPECT_EQ(sensor.look(oneBeam(9.0F), pose).through, 1);          // out of the map, through the wall
   EXPECT_EQ(sensor.look(oneBeam(1.5F), {1, 2, M_PI}).through, 1);  // out of the map
   EXPECT_GT(sensor.weigh(oneBeam(1.025F), pose), sensor.weigh(oneBeam(1.1F), pose));
   EXPECT_GT(sensor.weigh(oneBeam(1.1F), pose), sensor.weigh(oneBeam(0.5F), pose));
@@ -168,8 +169,8 @@ TEST(Sensor, AlignsToAWallAcrossIt) {
 const k::MotionSettings kMotion{0.1, 0.05, 0.1, 0.01, 0.003, 0.004};
 
 TEST(Motion, NoiseOfTheSettings) {
-  const auto moved = k::motionBetween({0, {1, 1, M_PI / 2}, std::nullopt}, {1, {1, 3, M_PI / 2 + 0.5}, std::nullopt},
-                                      kMotion, {0, 0, 1, 0});
+  const auto moved = k::motionBetween({0, {1, 1, M_PI / 2}, std::nullopt},
+                                      {1, {1, 3, M_PI / 2 + 0.5}, std::nullopt}, kMotion, {0, 0, 1, 0});
   EXPECT_NEAR(moved.mean.x, 2, 1e-12);
   EXPECT_NEAR(moved.mean.y, 0, 1e-12);
   EXPECT_NEAR(moved.covariance(0, 0), 0.1 * 4 + 0.01 * 0.25 + 9e-6, 1e-9);
@@ -177,8 +178,8 @@ TEST(Motion, NoiseOfTheSettings) {
 }
 
 TEST(Motion, ATurnOverPiIsNone) {
-  const auto moved =
-      k::motionBetween({0, {0, 0, 3.1}, std::nullopt}, {1, {0, 0, -3.1}, std::nullopt}, kMotion, {0, 0, 1, 0});
+  const auto moved = k::motionBetween({0, {0, 0, 3.1}, std::nullopt}, {1, {0, 0, -3.1}, std::nullopt},
+                                      kMotion, {0, 0, 1, 0});
   EXPECT_NEAR(moved.mean.theta, 2 * M_PI - 6.2, 1e-9);
 }
 
@@ -189,14 +190,14 @@ TEST(Motion, CovarianceThatOdometryGivesIsTakenAsItGrows) {
   k::Gaussian second{{0.4, -0.1, 0.2}, Eigen::Matrix3d::Zero()};
   second.covariance.diagonal() << 0.003, 0.001, 0.002;
   const k::Gaussian sum = k::moved(first, second);
-  const auto grown = k::motionBetween({0, first.mean, first.covariance}, {1, sum.mean, sum.covariance}, kMotion,
-                                      {0, 0, 1, 0});
+  const auto grown = k::motionBetween({0, first.mean, first.covariance}, {1, sum.mean, sum.covariance},
+                                      kMotion, {0, 0, 1, 0});
   Eigen::Matrix3d expected = second.covariance;
   expected.diagonal() += Eigen::Vector3d(9e-6, 9e-6, 16e-6);
   EXPECT_TRUE(grown.covariance.isApprox(expected, 1e-6));
   // One that does not grow is no measure.
-  const auto flat = k::motionBetween({0, first.mean, first.covariance}, {1, sum.mean, first.covariance}, kMotion,
-                                     {0, 0, 1, 0});
+  const auto flat = k::motionBetween({0, first.mean, first.covariance}, {1, sum.mean, first.covariance},
+                                     kMotion, {0, 0, 1, 0});
   EXPECT_GT(flat.covariance(0, 0), 0.1 * 0.16);
 }
 

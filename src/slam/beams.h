@@ -21,7 +21,7 @@ struct Beam {
 struct Beams {
   Pose2D base_from_laser;
   std::vector<Beam> beams;
-  std::size_t asked = 0;  ///< beams looked at, with those that met nothing
+  std::size_t asked = 0;    ///< beams looked at, with those that met nothing
   double independence = 1;  ///< share of them that count as independent of their neighbours
 };
 

@@ -16,7 +16,8 @@ using ValueOf = std::function<double(const std::string&)>;
 /// Sets a member (double, or int, which needs a whole number) from the value of its name. Throws
 /// std::invalid_argument naming the key, its bounds and the value.
 template <typename Member>
-void setBounded(const ValueOf& value_of, const std::string& name, Member& member, double lower, double upper) {
+void setBounded(const ValueOf& value_of, const std::string& name, Member& member, double lower,
+                double upper) {
   const double value = value_of(name);
   std::ostringstream text;
   if (!(value >= lower && value <= upper)) {

@@ -96,11 +96,12 @@ void visitNear(const Bytes& kinds, int width, int limit, Test&& likes, Visit&& v
 }
 
 void check(const OccupancyGrid& grid, double reach) {
-  const bool sized = grid.width > 0 && grid.height > 0 && std::isfinite(grid.resolution) && grid.resolution > 0;
+  const bool sized =
+      grid.width > 0 && grid.height > 0 && std::isfinite(grid.resolution) && grid.resolution > 0;
   if (!sized || grid.cells.size() != static_cast<std::size_t>(grid.width) * grid.height) {
-    throw std::invalid_argument("a map of " + std::to_string(grid.width) + " x " + std::to_string(grid.height) +
-                                " cells of " + std::to_string(grid.resolution) + " m with " +
-                                std::to_string(grid.cells.size()) + " values");
+    throw std::invalid_argument("a map of " + std::to_string(grid.width) + " x " +
+                                std::to_string(grid.height) + " cells of " + std::to_string(grid.resolution) +
+                                " m with " + std::to_string(grid.cells.size()) + " values");
   }
   if (reach < grid.resolution || reach > 200 * grid.resolution) {
     throw std::invalid_argument("laser_likelihood_max_dist must be 1 to 200 cells of the map: " +
@@ -111,8 +112,12 @@ void check(const OccupancyGrid& grid, double reach) {
 }  // namespace
 
 Field::Field(const OccupancyGrid& grid, const Pose2D& map_from_grid, double reach)
-    : map_from_grid_(map_from_grid), width_(grid.width), height_(grid.height), resolution_(grid.resolution),
-      reach_(reach), quantum_(reach / (kFar - kSurface)) {
+    : map_from_grid_(map_from_grid),
+      width_(grid.width),
+      height_(grid.height),
+      resolution_(grid.resolution),
+      reach_(reach),
+      quantum_(reach / (kFar - kSurface)) {
   check(grid, reach);
   solid_ = static_cast<std::uint8_t>(kSurface + std::lround(0.25 * resolution_ / quantum_));
   codes_.assign(grid.cells.size(), kFar);
@@ -128,19 +133,26 @@ Field::Field(const OccupancyGrid& grid, const Pose2D& map_from_grid, double reac
     const long code = kSurface + std::lround(cells * resolution_ / quantum_);
     return static_cast<std::uint8_t>(std::clamp(code, 0L, static_cast<long>(kFar)));
   };
-  const auto nearer = [this, &coded](std::size_t i, double cells) { codes_[i] = std::min(codes_[i], coded(cells)); };
-  visitNear(kinds, width_, limit, [](std::uint8_t k) { return k == kThin; },
-            [&](std::size_t i, int square) { nearer(i, std::sqrt(square)); });
-  visitNear(kinds, width_, limit, [](std::uint8_t k) { return k == kThick; },
-            [&](std::size_t i, int square) { nearer(i, square == 0 ? 0 : std::sqrt(square) - 0.5); });
+  const auto nearer = [this, &coded](std::size_t i, double cells) {
+    codes_[i] = std::min(codes_[i], coded(cells));
+  };
+  visitNear(
+      kinds, width_, limit, [](std::uint8_t k) { return k == kThin; },
+      [&](std::size_t i, int square) { nearer(i, std::sqrt(square)); });
+  visitNear(
+      kinds, width_, limit, [](std::uint8_t k) { return k == kThick; },
+      [&](std::size_t i, int square) { nearer(i, square == 0 ? 0 : std::sqrt(square) - 0.5); });
   // Inside of thick walls: the nearest place outside.
   const int depth = static_cast<int>(kSurface * quantum_ / resolution_) + 1;
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     wall_cells_ += kinds[i] == kOpen ? 0 : 1;
     if (kinds[i] == kThick) codes_[i] = 0;
   }
-  visitNear(kinds, width_, depth, [](std::uint8_t k) { return k != kThick; },
-            [&](std::size_t i, int square) { if (square > 0) codes_[i] = coded(0.5 - std::sqrt(square)); });
+  visitNear(
+      kinds, width_, depth, [](std::uint8_t k) { return k != kThick; },
+      [&](std::size_t i, int square) {
+        if (square > 0) codes_[i] = coded(0.5 - std::sqrt(square));
+      });
 }
 
 bool Field::slope(double x, double y, double& distance, double& along_x, double& along_y) const {

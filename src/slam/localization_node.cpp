@@ -32,11 +32,12 @@ using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
 constexpr double kWarningPeriod = 5.0;    // [s] of throttled warnings
 constexpr double kPollPeriod = 0.01;      // [s] between looks whether scans have their transforms
+constexpr double kWorkLimit = 0.1;        // [s] of work in a row before scans that wait are skipped
 constexpr double kAskPeriod = 1.0;        // [s] between two calls of static_map
 constexpr std::size_t kQueue = 100;       // scans and odometry that may wait
 constexpr double kOdometryMemory = 10.0;  // [s] of covariances
 constexpr double kOdometryGap = 0.2;      // [s] a covariance holds for scans so near at most
-constexpr double kAhead = 10.0;           // [s] an initial pose stamped farther in the future is of another clock
+constexpr double kAhead = 10.0;  // [s] an initial pose stamped farther in the future is of another clock
 
 geometry_msgs::Pose messageOf(const k::Pose2D& pose) {
   geometry_msgs::Pose out;
@@ -66,8 +67,8 @@ Eigen::Matrix3d planarOf(const boost::array<double, 36>& values) {
 }
 
 k::OccupancyGrid gridOf(const nav_msgs::OccupancyGrid& map) {
-  return {static_cast<double>(map.info.resolution), 0, 0, static_cast<int>(map.info.width),
-          static_cast<int>(map.info.height), map.data};
+  return {static_cast<double>(map.info.resolution), 0,       0, static_cast<int>(map.info.width),
+          static_cast<int>(map.info.height),        map.data};
 }
 
 class LocalizationNode {
@@ -119,8 +120,8 @@ class LocalizationNode {
 LocalizationNode::LocalizationNode(ros::NodeHandle& nh, k::LocalizationNodeSettings settings)
     : settings_(std::move(settings)),
       nh_(nh),
-      queue_(buffer_, {settings_.odom_frame, settings_.base_frame, settings_.transform_deadline}, settings_.chair.laser,
-             "LOCALIZATION", kQueue) {
+      queue_(buffer_, {settings_.odom_frame, settings_.base_frame, settings_.transform_deadline},
+             settings_.chair.laser, "LOCALIZATION", kQueue) {
   diagnostics_.setHardwareID("none");
   diagnostics_.add("localization", this, &LocalizationNode::diagnose);
   pose_ = nh.advertise<PoseMessage>("amcl_pose", 2, true);
@@ -132,11 +133,12 @@ LocalizationNode::LocalizationNode(ros::NodeHandle& nh, k::LocalizationNodeSetti
   advertise(nh);
   // Steady timers: timers of simulated time stall when it is set back.
   const auto every = [&](double period, auto call) {
-    timers_.push_back(nh.createSteadyTimer(ros::WallDuration(period), [call](const ros::SteadyTimerEvent&) { call(); }));
+    timers_.push_back(
+        nh.createSteadyTimer(ros::WallDuration(period), [call](const ros::SteadyTimerEvent&) { call(); }));
   };
   every(kPollPeriod, [this] { work(); });
   every(kAskPeriod, [this] {
-    diagnostics_.update();
+    diagnostics_.force_update();  // update() waits for a time that may have been set back
     if (!settings_.map_topic && !map_) askForMap();
   });
 }
@@ -157,7 +159,8 @@ void LocalizationNode::advertise(ros::NodeHandle& nh) {
 }
 
 void LocalizationNode::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) {
-  if (scan->header.stamp + ros::Duration(k::kTimeJump) < last_scan_) reset("a scan is older than the last one");
+  if (scan->header.stamp + ros::Duration(k::kTimeJump) < last_scan_)
+    reset("a scan is older than the last one");
   came_ = ros::SteadyTime::now();
   queue_.push(scan);
 }
@@ -167,7 +170,8 @@ void LocalizationNode::onOdometry(const nav_msgs::Odometry& odometry) {
   if (!covariance.allFinite() || !(covariance(0, 0) > 0)) return;  // it has none
   covariances_[odometry.header.stamp] = covariance;
   const ros::Time& newest = covariances_.rbegin()->first;
-  while ((newest - covariances_.begin()->first).toSec() > kOdometryMemory) covariances_.erase(covariances_.begin());
+  while ((newest - covariances_.begin()->first).toSec() > kOdometryMemory)
+    covariances_.erase(covariances_.begin());
 }
 
 /// Interpolated; a covariance that grows in steps would grow by none, or by two.
@@ -214,7 +218,8 @@ void LocalizationNode::begin() {
   bad_map_.clear();
   if (!map_) return;
   try {
-    localizer_.emplace(settings_.localizer, settings_.chair, settings_.seed, gridOf(*map_), planarOf(map_->info.origin));
+    localizer_.emplace(settings_.localizer, settings_.chair, settings_.seed, gridOf(*map_),
+                       planarOf(map_->info.origin));
     if (settings_.known_start) localizer_->setPose(settings_.start);
   } catch (const std::exception& error) {
     bad_map_ = error.what();
@@ -229,7 +234,8 @@ void LocalizationNode::onInitialPose(const PoseMessage& message) {
 bool LocalizationNode::setPose(const PoseMessage& message) {
   const std::string& frame = message.header.frame_id;
   const k::Gaussian pose{planarOf(message.pose.pose), planarOf(message.pose.covariance)};
-  const bool finite = std::isfinite(pose.mean.x + pose.mean.y + pose.mean.theta) && pose.covariance.allFinite();
+  const bool finite =
+      std::isfinite(pose.mean.x + pose.mean.y + pose.mean.theta) && pose.covariance.allFinite();
   if (!localizer_ || !finite || (!frame.empty() && frame != settings_.map_frame)) return false;
   if (message.header.stamp > ros::Time::now() + ros::Duration(kAhead)) return false;
   localizer_->setPose(pose);
@@ -240,9 +246,11 @@ void LocalizationNode::work() {
   const ros::Time now = ros::Time::now();
   if (now + ros::Duration(k::kTimeJump) < last_clock_) reset("time ran backwards");
   last_clock_ = now;
+  const ros::SteadyTime begin = ros::SteadyTime::now();
   std::optional<k::ScanQueue::Ready> ready;
   while (ros::ok() && (ready = queue_.next())) {
-    if (queue_.size() >= static_cast<std::size_t>(settings_.backlog)) {
+    const bool is_slow = (ros::SteadyTime::now() - begin).toSec() > kWorkLimit;
+    if (is_slow && queue_.size() >= static_cast<std::size_t>(settings_.backlog)) {
       ++skipped_;
       ROS_WARN_THROTTLE(kWarningPeriod, "LOCALIZATION_TOO_SLOW: scan: skipped, %lu so far", skipped_);
       continue;
@@ -268,11 +276,13 @@ void LocalizationNode::add(const k::ScanQueue::Ready& ready) try {
   queue_.refuse(error.what());
 }
 
-void LocalizationNode::publish(const k::ScanQueue::Ready& ready, const k::Localizer::Estimate& estimate, bool is_news) {
+void LocalizationNode::publish(const k::ScanQueue::Ready& ready, const k::Localizer::Estimate& estimate,
+                               bool is_news) {
   const ros::Time until = ready.stamp + ros::Duration(settings_.transform_tolerance);
   if (settings_.broadcast && until > last_transform_) {  // tf refuses the same time twice
     last_transform_ = until;
-    const k::Pose2D map_from_odom = k::compose(estimate.map_from_base.mean, k::between(ready.start, {0, 0, 0}));
+    const k::Pose2D map_from_odom =
+        k::compose(estimate.map_from_base.mean, k::between(ready.start, {0, 0, 0}));
     broadcaster_.sendTransform(k::stamped(map_from_odom, until, settings_.map_frame, settings_.odom_frame));
   }
   if (!estimate.updated && !is_news) return;
@@ -282,7 +292,8 @@ void LocalizationNode::publish(const k::ScanQueue::Ready& ready, const k::Locali
   message.pose.pose = messageOf(estimate.map_from_base.mean);
   constexpr std::array<int, 3> kRows{0, 1, 5};
   for (int i = 0; i < 9; ++i) {
-    message.pose.covariance[6 * kRows[i / 3] + kRows[i % 3]] = estimate.map_from_base.covariance(i / 3, i % 3);
+    message.pose.covariance[6 * kRows[i / 3] + kRows[i % 3]] =
+        estimate.map_from_base.covariance(i / 3, i % 3);
   }
   pose_.publish(message);
   publishCloud(ready.stamp);
@@ -349,7 +360,8 @@ void LocalizationNode::diagnose(Status& status) {
   status.add("dropped as senseless", queue_.dropped().bad_scan);
   status.add("skipped", skipped_ + queue_.dropped().too_slow);
   status.add("last dropped", queue_.reason());
-  status.add("processor time per scan [ms]", scans_ > 0 ? 1000 * work_seconds_ / static_cast<double>(scans_) : 0);
+  status.add("processor time per scan [ms]",
+             scans_ > 0 ? 1000 * work_seconds_ / static_cast<double>(scans_) : 0);
 }
 
 }  // namespace

@@ -15,16 +15,16 @@ struct LocalizationNodeSettings {
   std::string map_frame;
   std::string odom_frame;
   std::string base_frame;
-  bool broadcast;               ///< tf map -> odom
-  double transform_tolerance;   ///< map -> odom is stamped so far ahead [s]
-  double transform_deadline;    ///< a scan waits for its transforms so long at most [s]
-  int backlog;                  ///< scans that may wait before the older ones are skipped
-  bool map_topic;               ///< the map comes from a topic, not from static_map
+  bool broadcast;              ///< tf map -> odom
+  double transform_tolerance;  ///< map -> odom is stamped so far ahead [s]
+  double transform_deadline;   ///< a scan waits for its transforms so long at most [s]
+  int backlog;                 ///< scans that may wait before the older ones are skipped
+  bool map_topic;              ///< the map comes from a topic, not from static_map
   bool first_map_only;
-  double cloud_period;          ///< least time between two particle clouds [s]; negative = none
-  double save_period;           ///< between two savings of the pose [s]; negative = never
-  double silence;               ///< without scans before diagnostics say so [s]
-  bool known_start;             ///< the start is that of the parameters; else it may be anywhere
+  double cloud_period;  ///< least time between two particle clouds [s]; negative = none
+  double save_period;   ///< between two savings of the pose [s]; negative = never
+  double silence;       ///< without scans before diagnostics say so [s]
+  bool known_start;     ///< the start is that of the parameters; else it may be anywhere
   Gaussian start;
   std::uint32_t seed;
   LocalizerSettings localizer;
@@ -55,7 +55,8 @@ inline double periodOf(Section& top, const std::string& key) {
 inline Gaussian readStart(Section& top) {
   const Pose2D pose{top.number("initial_pose_x"), top.number("initial_pose_y"), top.number("initial_pose_a")};
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  covariance.diagonal() << top.above("initial_cov_xx", 0), top.above("initial_cov_yy", 0), top.above("initial_cov_aa", 0);
+  covariance.diagonal() << top.above("initial_cov_xx", 0), top.above("initial_cov_yy", 0),
+      top.above("initial_cov_aa", 0);
   return {pose, covariance};
 }
 

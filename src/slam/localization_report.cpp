@@ -39,16 +39,19 @@ const char* nameOf(Knowledge knowledge) {
 LocalizationVerdict judge(const LocalizationState& state) {
   if (!state.bad_map.empty()) return {2, "LOCALIZATION_BAD_MAP: " + state.bad_map};
   if (!state.has_map) return {2, "LOCALIZATION_NO_MAP: none has come"};
-  if (state.waiting) return {2, "LOCALIZATION_NO_TRANSFORM: scans come, but no odometry for them, or no place of the laser"};
+  if (state.waiting)
+    return {2, "LOCALIZATION_NO_TRANSFORM: scans come, but no odometry for them, or no place of the laser"};
   if (state.silence > state.silence_limit) return {2, "LOCALIZATION_NO_SCAN: none came lately"};
   if (state.estimate == nullptr) return {1, "no scan yet"};
   if (state.estimate->knowledge == Knowledge::kLost) return {2, lost(*state.estimate)};
   if (state.estimate->knowledge == Knowledge::kAmbiguous) return {1, ambiguous(*state.estimate)};
   if (state.newly_skipped > 0) {
-    return {1, "LOCALIZATION_TOO_SLOW: scans skipped since the last message: " + std::to_string(state.newly_skipped)};
+    return {1, "LOCALIZATION_TOO_SLOW: scans skipped since the last message: " +
+                   std::to_string(state.newly_skipped)};
   }
   if (state.newly_dropped > 0) {
-    return {1, "LOCALIZATION_DROPPED: scans dropped since the last message: " + std::to_string(state.newly_dropped)};
+    return {1, "LOCALIZATION_DROPPED: scans dropped since the last message: " +
+                   std::to_string(state.newly_dropped)};
   }
   return {0, "tracking; the map explains " + percent(state.estimate->fit) + " of the readings"};
 }

@@ -11,11 +11,11 @@ namespace kurumaisu {
 /// What is known at the moment of diagnostics.
 struct LocalizationState {
   bool has_map;
-  std::string bad_map;                ///< why the last map was refused, or empty
-  double silence;                     ///< since the last scan came [s]
-  double silence_limit;               ///< [s]
-  bool waiting;                       ///< scans came since, but without transforms
-  const Localizer::Estimate* estimate;  ///< of the last scan; null before the first
+  std::string bad_map;                         ///< why the last map was refused, or empty
+  double silence;                              ///< since the last scan came [s]
+  double silence_limit;                        ///< [s]
+  bool waiting;                                ///< scans came since, but without transforms
+  const Localizer::Estimate* estimate;         ///< of the last scan; null before the first
   std::uint64_t newly_dropped, newly_skipped;  ///< since the last diagnostics
 };
 

@@ -21,12 +21,13 @@ constexpr int kRelief = 50;           // scans without doubt after which an old 
 constexpr double kNearby = 0.3;       // [m] around a doubted pose is searched first
 constexpr double kNearbyTurn = 0.15;  // [rad]
 constexpr double kSearchAgain = 3;    // found_way after which a search that led to nothing is repeated
-constexpr double kHeadStart = 5;      // log-odds of the place where the chair was believed to be, when doubted
-constexpr double kTurnPerWay = 0.5;   // [m/rad] a turn shows as much as so much way
+constexpr double kHeadStart = 5;     // log-odds of the place where the chair was believed to be, when doubted
+constexpr double kTurnPerWay = 0.5;  // [m/rad] a turn shows as much as so much way
 
 void check(const Scan& scan, const Odometry& start, const Pose2D& end, const std::optional<Odometry>& last) {
   validate(scan);
-  for (const double value : {start.pose.x, start.pose.y, start.pose.theta, end.x, end.y, end.theta, scan.stamp}) {
+  for (const double value :
+       {start.pose.x, start.pose.y, start.pose.theta, end.x, end.y, end.theta, scan.stamp}) {
     if (!std::isfinite(value)) throw std::invalid_argument("odometry and stamp must be finite");
   }
   if (last && !(start.stamp > last->stamp)) {
@@ -135,7 +136,8 @@ class Localizer::Impl {
   /// Particles that are spread wide do not know one place either, nor does who has seen nothing for long.
   Knowledge told(const Gaussian& pose) const {
     const double largest = std::sqrt(std::fmax(pose.covariance(0, 0), pose.covariance(1, 1)));
-    const bool doubtful = largest > settings_.ambiguous_spread || doubted_for_ > 0 || blind_ > settings_.recovery.found_way;
+    const bool doubtful =
+        largest > settings_.ambiguous_spread || doubted_for_ > 0 || blind_ > settings_.recovery.found_way;
     return doubtful && knowledge_ == Knowledge::kTracking ? Knowledge::kAmbiguous : knowledge_;
   }
 
@@ -177,7 +179,8 @@ class Localizer::Impl {
 
   /// A doubted pose may be a little off only: that is tried first.
   void widen(Gaussian pose) {
-    pose.covariance.diagonal() += Eigen::Vector3d(kNearby * kNearby, kNearby * kNearby, kNearbyTurn * kNearbyTurn);
+    pose.covariance.diagonal() +=
+        Eigen::Vector3d(kNearby * kNearby, kNearby * kNearby, kNearbyTurn * kNearbyTurn);
     settle(pose);
     doubted_for_ = 1;
   }
@@ -248,7 +251,8 @@ class Localizer::Impl {
   /// Around the likeliest, as wide as the others are away from it.
   void mix(Estimate& estimate) const {
     for (const auto& [pose, weight] : places_.all()) {
-      const Eigen::Vector3d off(pose.x - pose_.mean.x, pose.y - pose_.mean.y, wrapAngle(pose.theta - pose_.mean.theta));
+      const Eigen::Vector3d off(pose.x - pose_.mean.x, pose.y - pose_.mean.y,
+                                wrapAngle(pose.theta - pose_.mean.theta));
       estimate.map_from_base.covariance += weight * off * off.transpose();
     }
   }
@@ -289,8 +293,8 @@ class Localizer::Impl {
   Places places_;
   Knowledge knowledge_ = Knowledge::kLost;
   Gaussian pose_{{0, 0, 0}, Eigen::Matrix3d::Zero()};  ///< at at_
-  std::optional<Odometry> at_;    ///< of the last update
-  std::optional<Odometry> last_;  ///< of the last scan
+  std::optional<Odometry> at_;                         ///< of the last update
+  std::optional<Odometry> last_;                       ///< of the last scan
   std::optional<Search> search_;
   Beams searched_{};
   Odometry searched_from_{};

@@ -30,8 +30,8 @@ class Localizer {
  public:
   /// map_from_grid: pose of the grid's lower left corner, in place of its x and y. Equal arguments and scans
   /// give equal results, bit by bit. Throws std::invalid_argument.
-  Localizer(const LocalizerSettings& settings, const Chair& chair, std::uint32_t seed, const OccupancyGrid& grid,
-            const Pose2D& map_from_grid);
+  Localizer(const LocalizerSettings& settings, const Chair& chair, std::uint32_t seed,
+            const OccupancyGrid& grid, const Pose2D& map_from_grid);
   ~Localizer();
   Localizer(Localizer&&) noexcept;
   Localizer& operator=(Localizer&&) noexcept;

@@ -43,7 +43,11 @@ std::unique_ptr<Localizer> make(const py::dict& settings, const LaserError& lase
                                 double resolution, const Triple& origin) {
   if (cells.ndim() != 2) throw std::invalid_argument("cells must be two-dimensional");
   const Chair chair{laser, {process[0], process[1], process[2], process[3]}};
-  const OccupancyGrid grid{resolution, 0, 0, static_cast<int>(cells.shape(1)), static_cast<int>(cells.shape(0)),
+  const OccupancyGrid grid{resolution,
+                           0,
+                           0,
+                           static_cast<int>(cells.shape(1)),
+                           static_cast<int>(cells.shape(0)),
                            {cells.data(), cells.data() + cells.size()}};
   return std::make_unique<Localizer>(settingsOf(settings), chair, seed, grid, poseOf(origin));
 }
@@ -87,13 +91,14 @@ void bindLocalizer(py::module_& m) {
       "check_localizer_settings", [](const py::dict& settings) { settingsOf(settings); }, py::arg("settings"),
       "Raise ValueError naming the first key that is missing, unknown or senseless.");
   py::class_<Localizer>(m, "Localizer", "Follows a chair in a known map.")
-      .def(py::init(&make), py::kw_only(), py::arg("settings"), py::arg("laser"), py::arg("process"), py::arg("seed"),
-           py::arg("cells"), py::arg("resolution"), py::arg("origin"))
-      .def("set_pose",
-           [](Localizer& localizer, const Triple& pose, const Eigen::Matrix3d& covariance) {
-             localizer.setPose({poseOf(pose), covariance});
-           },
-           py::arg("pose"), py::arg("covariance"))
+      .def(py::init(&make), py::kw_only(), py::arg("settings"), py::arg("laser"), py::arg("process"),
+           py::arg("seed"), py::arg("cells"), py::arg("resolution"), py::arg("origin"))
+      .def(
+          "set_pose",
+          [](Localizer& localizer, const Triple& pose, const Eigen::Matrix3d& covariance) {
+            localizer.setPose({poseOf(pose), covariance});
+          },
+          py::arg("pose"), py::arg("covariance"))
       .def("forget", &Localizer::forget, "The chair may be anywhere.")
       .def("update_once", &Localizer::updateOnce, "Weigh the next scan though the chair does not move.")
       .def("add", &add, py::arg("stamp"), py::arg("ranges"), py::arg("fan"), py::arg("start"), py::arg("end"),

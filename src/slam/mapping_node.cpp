@@ -56,8 +56,8 @@ class MappingNode {
 
 MappingNode::MappingNode(ros::NodeHandle& nh, k::MappingNodeSettings settings)
     : settings_(std::move(settings)),
-      queue_(buffer_, {settings_.odom_frame, settings_.base_frame, settings_.transform_deadline}, settings_.laser_error,
-             "MAPPING", kQueue) {
+      queue_(buffer_, {settings_.odom_frame, settings_.base_frame, settings_.transform_deadline},
+             settings_.laser_error, "MAPPING", kQueue) {
   mapper_.emplace(settings_.mapper, settings_.seed);
   map_ = nh.advertise<nav_msgs::OccupancyGrid>("map", 1, true);
   metadata_ = nh.advertise<nav_msgs::MapMetaData>("map_metadata", 1, true);
@@ -76,7 +76,8 @@ MappingNode::MappingNode(ros::NodeHandle& nh, k::MappingNodeSettings settings)
 }
 
 void MappingNode::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) {
-  if (scan->header.stamp + ros::Duration(k::kTimeJump) < last_scan_) reset("a scan is older than the last one");
+  if (scan->header.stamp + ros::Duration(k::kTimeJump) < last_scan_)
+    reset("a scan is older than the last one");
   queue_.push(scan);
   work();
 }

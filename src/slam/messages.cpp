@@ -14,7 +14,7 @@ namespace kurumaisu {
 namespace {
 
 constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
-constexpr double kLevel = 0.99;         // cosine of the tilt beyond which a laser does not measure in the plane
+constexpr double kLevel = 0.99;  // cosine of the tilt beyond which a laser does not measure in the plane
 
 }  // namespace
 
@@ -41,8 +41,8 @@ Scan scanOf(const sensor_msgs::LaserScan& message, const Planar& base_from_laser
   if (std::abs(base_from_laser.up) < kLevel) throw std::invalid_argument("the laser is tilted");
   const double turn = base_from_laser.up > 0 ? 1 : -1;
   Scan scan{message.header.stamp.toSec(),
-            {turn * message.angle_min, turn * message.angle_increment, message.time_increment, message.range_max,
-             base_from_laser.pose},
+            {turn * message.angle_min, turn * message.angle_increment, message.time_increment,
+             message.range_max, base_from_laser.pose},
             message.ranges};
   for (float& range : scan.ranges) {
     const bool near = range < message.range_min;
@@ -52,7 +52,8 @@ Scan scanOf(const sensor_msgs::LaserScan& message, const Planar& base_from_laser
 }
 
 ros::Time lastBeam(const sensor_msgs::LaserScan& scan) {
-  return scan.header.stamp + ros::Duration(scan.time_increment * (static_cast<double>(scan.ranges.size()) - 1));
+  return scan.header.stamp +
+         ros::Duration(scan.time_increment * (static_cast<double>(scan.ranges.size()) - 1));
 }
 
 ScanQueue::ScanQueue(const tf2_ros::Buffer& buffer, ScanFrames frames, LaserError error, std::string prefix,
@@ -89,8 +90,9 @@ std::optional<ScanQueue::Ready> ScanQueue::next() {
       if ((ros::SteadyTime::now() - front.since).toSec() < frames_.deadline) return std::nullopt;
       waiting_.pop_front();
       drop(dropped_.no_transform, "NO_TRANSFORM",
-           "none of " + front.scan->header.frame_id + " and " + frames_.base + " to " + frames_.odom + " at " +
-               std::to_string(front.scan->header.stamp.toSec()) + " s within transform_deadline" + why);
+           "none of " + front.scan->header.frame_id + " and " + frames_.base + " to " + frames_.odom +
+               " at " + std::to_string(front.scan->header.stamp.toSec()) + " s within transform_deadline" +
+               why);
     } catch (const tf2::TransformException& error) {
       drop(dropped_.no_transform, "NO_TRANSFORM", error.what());
     } catch (const std::exception& error) {  // std::runtime_error: a time out of ros::Time's range
@@ -126,8 +128,8 @@ void ScanQueue::refuse(const std::string& why) { drop(dropped_.bad_scan, "BAD_SC
 void ScanQueue::drop(std::uint64_t& count, const char* code, const std::string& why) {
   ++count;
   reason_ = prefix_ + "_" + code + ": " + why;
-  ROS_WARN_THROTTLE(kWarningPeriod, "%s_%s: scan: dropped, %lu so far: %s", prefix_.c_str(), code, dropped_.all(),
-                    why.c_str());
+  ROS_WARN_THROTTLE(kWarningPeriod, "%s_%s: scan: dropped, %lu so far: %s", prefix_.c_str(), code,
+                    dropped_.all(), why.c_str());
 }
 
 }  // namespace kurumaisu

@@ -31,8 +31,9 @@ std::optional<Eigen::Matrix3d> growth(const Odometry& first, const Odometry& sec
   const Eigen::Matrix3d turn = turning(-first.pose.theta);
   const Eigen::Matrix3d grown =
       turn * (*second.covariance - carried * *first.covariance * carried.transpose()) * turn.transpose();
-  const bool sound = grown.allFinite() && grown(0, 0) > 0 && grown(2, 2) > 0 &&
-                     Eigen::LLT<Eigen::Matrix3d>(grown + 1e-12 * Eigen::Matrix3d::Identity()).info() == Eigen::Success;
+  const bool sound =
+      grown.allFinite() && grown(0, 0) > 0 && grown(2, 2) > 0 &&
+      Eigen::LLT<Eigen::Matrix3d>(grown + 1e-12 * Eigen::Matrix3d::Identity()).info() == Eigen::Success;
   if (!sound) return std::nullopt;
   return grown;
 }
@@ -64,17 +65,20 @@ Gaussian motionBetween(const Odometry& first, const Odometry& second, const Moti
   const double heading = way > 0 ? std::atan2(motion.y, motion.x) : 0;
   const double time = std::fmax(second.stamp - first.stamp, 0.0);
   const auto odometry = growth(first, second);
-  Eigen::Matrix3d noise = odometry ? *odometry
-                                   : unicycle(way, heading, settings.alpha3 * way * way + settings.alpha4 * turned * turned,
-                                              settings.alpha1 * turned * turned + settings.alpha2 * way * way);
+  Eigen::Matrix3d noise =
+      odometry ? *odometry
+               : unicycle(way, heading, settings.alpha3 * way * way + settings.alpha4 * turned * turned,
+                          settings.alpha1 * turned * turned + settings.alpha2 * way * way);
   if (time > 0 && (way > 0 || turned > 0) && process.tau > 0) {
     constexpr double kUsual = 0.8;  // [m/s, rad/s] rates in whose units the noise grows, as in the effect
     const double size = 1 + process.growth * (way + turned) / time / kUsual;
     const double spread = size * size * integrated(time, process.tau);
-    noise += unicycle(way, heading, spread * process.sd_v * process.sd_v, spread * process.sd_w * process.sd_w);
+    noise +=
+        unicycle(way, heading, spread * process.sd_v * process.sd_v, spread * process.sd_w * process.sd_w);
   }
-  noise.diagonal() += Eigen::Vector3d(settings.way_floor * settings.way_floor, settings.way_floor * settings.way_floor,
-                                      settings.turn_floor * settings.turn_floor);
+  noise.diagonal() +=
+      Eigen::Vector3d(settings.way_floor * settings.way_floor, settings.way_floor * settings.way_floor,
+                      settings.turn_floor * settings.turn_floor);
   return {motion, noise};
 }
 
@@ -82,7 +86,8 @@ Gaussian moved(const Gaussian& pose, const Gaussian& motion) {
   const Pose2D mean = compose(pose.mean, motion.mean);
   const Eigen::Matrix3d carried = lever(pose.mean, mean);
   const Eigen::Matrix3d turn = turning(pose.mean.theta);
-  return {mean, carried * pose.covariance * carried.transpose() + turn * motion.covariance * turn.transpose()};
+  return {mean,
+          carried * pose.covariance * carried.transpose() + turn * motion.covariance * turn.transpose()};
 }
 
 }  // namespace kurumaisu

@@ -20,8 +20,8 @@ struct ProcessNoise {
 
 /// Odometry at one time, with the covariance that it gives of itself, if it does.
 struct Odometry {
-  double stamp;          ///< [s]
-  Pose2D pose;           ///< odom_from_base
+  double stamp;                               ///< [s]
+  Pose2D pose;                                ///< odom_from_base
   std::optional<Eigen::Matrix3d> covariance;  ///< of pose since its start, along odom's axes
 };
 

@@ -11,12 +11,12 @@
 namespace kurumaisu {
 namespace {
 
-constexpr double kHopeless = 20;   // nats behind the best
-constexpr double kSame = 0.3;      // [m] places nearer than this
-constexpr double kSameAngle = 0.2; // [rad] and no more turned than this are one
+constexpr double kHopeless = 20;    // nats behind the best
+constexpr double kSame = 0.3;       // [m] places nearer than this
+constexpr double kSameAngle = 0.2;  // [rad] and no more turned than this are one
 constexpr int kFirstRounds = 12;
 constexpr int kRounds = 4;
-constexpr double kFitGain = 0.3;   // share of a scan in the mean of a place's fit
+constexpr double kFitGain = 0.3;  // share of a scan in the mean of a place's fit
 
 }  // namespace
 

@@ -9,9 +9,9 @@
 namespace kurumaisu {
 namespace {
 
-constexpr std::size_t kBeams = 40;   // tried at every pose
-constexpr std::size_t kSpare = 8;    // candidates kept for every place: most are neighbours
-constexpr int kSkip = 64;            // positions that are not free cost about a 64th of one that is
+constexpr std::size_t kBeams = 40;  // tried at every pose
+constexpr std::size_t kSpare = 8;   // candidates kept for every place: most are neighbours
+constexpr int kSkip = 64;           // positions that are not free cost about a 64th of one that is
 
 }  // namespace
 
@@ -30,7 +30,8 @@ Search::Search(const Sensor& sensor, const RecoverySettings& settings, Beams bea
     std::vector<Offset> offsets;
     for (std::size_t i = 0; i < beams.beams.size(); i += every) {
       const Beam& beam = beams.beams[i];
-      offsets.push_back({static_cast<float>(c * beam.x - s * beam.y), static_cast<float>(s * beam.x + c * beam.y)});
+      offsets.push_back(
+          {static_cast<float>(c * beam.x - s * beam.y), static_cast<float>(s * beam.x + c * beam.y)});
     }
     rotated_.push_back(std::move(offsets));
   }
@@ -38,7 +39,8 @@ Search::Search(const Sensor& sensor, const RecoverySettings& settings, Beams bea
 
 bool Search::step() {
   const Field& field = sensor_->field();
-  for (long budget = static_cast<long>(settings_->positions_per_scan) * kSkip; budget > 0; --budget, ++next_) {
+  for (long budget = static_cast<long>(settings_->positions_per_scan) * kSkip; budget > 0;
+       --budget, ++next_) {
     if (next_ >= columns_ * rows_) return true;
     const int x = std::min(next_ % columns_ * stride_ + stride_ / 2, field.width() - 1);
     const int y = std::min(next_ / columns_ * stride_ + stride_ / 2, field.height() - 1);

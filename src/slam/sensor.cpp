@@ -10,10 +10,11 @@
 namespace kurumaisu {
 namespace {
 
-constexpr double kHit = 3;          // deviations up to which a reading belongs to a wall
-constexpr float kInTheWay = 0.5F;   // share that a reading before a wall counts against the fit
-constexpr double kImpossible = 0.1; // likelihood of a reading through a wall, as a share of one from anywhere
-constexpr double kConverged = 1e-4; // [m, rad] a step this small is the last
+constexpr double kHit = 3;         // deviations up to which a reading belongs to a wall
+constexpr float kInTheWay = 0.5F;  // share that a reading before a wall counts against the fit
+constexpr double kImpossible =
+    0.1;  // likelihood of a reading through a wall, as a share of one from anywhere
+constexpr double kConverged = 1e-4;  // [m, rad] a step this small is the last
 
 /// Places of base's frame in the grid's cells.
 struct Cells {
@@ -38,7 +39,8 @@ double Fit::share() const {
   return hits > 0 ? hits / (hits + against) : 0.0;
 }
 
-Sensor::Sensor(const Field& field, const ReadingSettings& settings, const LaserError& error) : field_(&field) {
+Sensor::Sensor(const Field& field, const ReadingSettings& settings, const LaserError& error)
+    : field_(&field) {
   const double anywhere = settings.z_rand / settings.max_range;
   for (int grade = 0; grade < kGrades; ++grade) {
     const double deviation = deviationOf(grade, settings, error);
@@ -93,7 +95,8 @@ Fit Sensor::look(const Beams& beams, const Pose2D& map_from_base) const {
     const float x = at.x(beam.x, beam.y);
     const float y = at.y(beam.x, beam.y);
     const std::uint8_t code = field_->code(x, y);
-    const bool near = code != Field::kFar && field_->distance(code) < static_cast<double>(tolerance_[beam.grade]);
+    const bool near =
+        code != Field::kFar && field_->distance(code) < static_cast<double>(tolerance_[beam.grade]);
     const Ray ray = trace(x0, y0, x, y, tolerance_[beam.grade]);
     if (ray == Ray::kBlocked || (!near && (ray == Ray::kUnknown || field_->solid(x, y)))) {
       ++fit.through;
@@ -110,7 +113,8 @@ Fit Sensor::look(const Beams& beams, const Pose2D& map_from_base) const {
   return fit;
 }
 
-Aligned Sensor::align(const Beams& beams, const Pose2D& start, const Eigen::Matrix3d& prior, int rounds) const {
+Aligned Sensor::align(const Beams& beams, const Pose2D& start, const Eigen::Matrix3d& prior,
+                      int rounds) const {
   const Pose2D first = between(field_->mapFromGrid(), start);
   // The prior is of the map's axes, the sums are of the grid's.
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
@@ -121,7 +125,8 @@ Aligned Sensor::align(const Beams& beams, const Pose2D& start, const Eigen::Matr
   Eigen::Matrix3d information = known;
   for (int round = 0; round < rounds; ++round) {
     information = known;
-    Eigen::Vector3d gradient = known * Eigen::Vector3d(pose.x - first.x, pose.y - first.y, pose.theta - first.theta);
+    Eigen::Vector3d gradient =
+        known * Eigen::Vector3d(pose.x - first.x, pose.y - first.y, pose.theta - first.theta);
     const double c = std::cos(pose.theta);
     const double s = std::sin(pose.theta);
     const double cell = 1 / field_->resolution();

@@ -51,9 +51,9 @@ class Sensor {
 
   const Field* field_;
   std::array<std::array<float, 256>, kGrades> table_{};
-  std::array<float, kGrades> tolerance_{};  ///< of a hit [m]
+  std::array<float, kGrades> tolerance_{};   ///< of a hit [m]
   std::array<double, kGrades> precision_{};  ///< 1 / variance [1/m^2]
-  float in_the_way_, impossible_;  ///< log-likelihoods of readings that do not end at a wall
+  float in_the_way_, impossible_;            ///< log-likelihoods of readings that do not end at a wall
 };
 
 }  // namespace kurumaisu
