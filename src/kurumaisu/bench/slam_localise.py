@@ -55,18 +55,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--starts", type=int, default=20)
     parser.add_argument("--kidnaps", type=int, default=10)
+    parser.add_argument("--only", choices=("building", "office", "lost"), help="one of the tables")
     options = parser.parse_args(arguments)
+    if options.office is None and options.only in ("office", "lost"):
+        parser.error(f"--only {options.only} needs the folder of the office")
     settings = load_localizer_settings(shipped("launch/localization_node.yaml"))
     columns = ("position [m]     ", "largest [m]     ", "heading [deg]    ", "sure and wrong", "CPU [ms/scan]   ")
-    _building(settings, options.seeds, columns)
-    if options.office is not None:
+    if options.only in (None, "building"):
+        _building(settings, options.seeds, columns)
+    if options.office is not None and options.only != "building":
         error = load_model(shipped("launch/md100.yaml")).laser.error
         grid = read_map(options.office / "truth_map.yaml")
         drives = {n: Drive(log, truth, grid, error) for n, log, truth in office_logs(options.office, options.mount)}
-        table = Table(f"office, {options.seeds} seeds: median (worst)", "odometry", *columns)
-        for name, each in drives.items():
-            table.row(name, *_spread([_follow(each, settings, seed) for seed in range(1, options.seeds + 1)]))
-        _lost(drives, settings, options.starts, options.kidnaps)
+        if options.only != "lost":
+            _office(drives, settings, options.seeds, columns)
+        if options.only != "office":
+            _lost(drives, settings, options.starts, options.kidnaps)
     print(f"\npeak memory of this process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
     return 0
 
@@ -88,6 +92,12 @@ def _building(settings: LocalizerSettings, seeds: int, columns: Sequence[str]) -
     for name, variant in variants.items():
         drives = [variant(Drive(log, truth, grid, error)) for log, truth in rounds]
         table.row(name, *_spread([_follow(each, settings, seed) for seed, each in enumerate(drives, start=1)]))
+
+
+def _office(drives: dict[str, Drive], settings: LocalizerSettings, seeds: int, columns: Sequence[str]) -> None:
+    table = Table(f"office, {seeds} seeds: median (worst)", "odometry", *columns)
+    for name, each in drives.items():
+        table.row(name, *_spread([_follow(each, settings, seed) for seed in range(1, seeds + 1)]))
 
 
 def _without_mean_error(each: Drive) -> Drive:
