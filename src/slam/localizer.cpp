@@ -17,10 +17,9 @@ namespace {
 constexpr int kLeastReadings = 8;     // fewer say nothing of how well they fit
 constexpr int kRounds = 4;            // of the last alignment
 constexpr int kPatience = 8;          // scans before a new pose is doubted
-constexpr int kRelief = 50;           // scans without doubt after which an old doubt is forgotten
 constexpr double kNearby = 0.3;       // [m] around a doubted pose is searched first
 constexpr double kNearbyTurn = 0.15;  // [rad]
-constexpr double kSearchAgain = 3;    // found_way after which a search that led to nothing is repeated
+constexpr double kSearchAgain = 3;    // times found_way after which a search that led to nothing is repeated
 constexpr double kHeadStart = 5;     // log-odds of the place where the chair was believed to be, when doubted
 constexpr double kTurnPerWay = 0.5;  // [m/rad] a turn shows as much as so much way
 
@@ -160,8 +159,9 @@ class Localizer::Impl {
     }
     look(beams, estimate);
     if (doubted_for_ > 0) ++doubted_for_;
-    const bool relieved = doubted_for_ > kPatience && health_.fast >= settings_.recovery.found_fit;
-    if (relieved || doubted_for_ > kRelief) doubted_for_ = 0;
+    const auto& recovery = settings_.recovery;
+    const double enough = (health_.fast >= recovery.found_fit ? 1 : kSearchAgain) * recovery.found_way;
+    if (travelled_ >= enough) doubted_for_ = 0;
     if (!health_.doubtful(settings_.recovery)) return;
     if (doubted_for_ == 0) {
       widen(estimate.map_from_base);

@@ -17,6 +17,7 @@ from kurumaisu.types import FloatArray
 _SCANS = 1200  # two minutes
 _BEFORE = 150  # scans before the chair is carried away
 _WRONG, _RIGHT = 1.0, 0.5  # [m]
+_FAR = 3.0  # [m] it is carried at least; less it may take for a slip
 _FIRST_SEED = 1000
 
 Logs = Sequence[tuple[ScanLog, FloatArray]]
@@ -49,7 +50,8 @@ def carried_away(make: Make, logs: Logs, case: int) -> Found:
     log, truth = logs[case % len(logs)]
     rng = np.random.default_rng(_FIRST_SEED + case)
     there = int(rng.integers(50, len(log.times) - _SCANS - 50))
-    here = int(rng.integers(50, len(log.times) - _BEFORE))
+    far = np.hypot(*(truth[_BEFORE:] - truth[there])[:, :2].T) > _FAR
+    here = int(rng.choice(np.flatnonzero(far)))
     localizer = make(case + 1)
     localizer.set_pose(truth[here].tolist(), np.diag([0.01, 0.01, 0.005]))
     for i in range(here, here + _BEFORE):
