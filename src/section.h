@@ -135,7 +135,7 @@ class BasicSection {
     if (value.kind() != Kind::kList) throw wrongType(key, "a list", value);
     std::vector<BasicSection> result;
     for (const Value& each : value.list()) {
-      result.emplace_back(each, nameOf(key) + "/" + std::to_string(result.size()));
+      result.emplace_back(each, nameOf(key) + "[" + shown(result.size()) + "]");
     }
     return result;
   }

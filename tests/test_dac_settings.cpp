@@ -90,7 +90,7 @@ TEST(Yaml, MessagesNameFileLineKeyAndValue) {
   EXPECT_EQ(read.refusal([](Section& top) { top.section("inner").end(); }),
             place + "7: inner/x: is not a known key; its value is 1.5");
   EXPECT_EQ(read.refusal([](Section& top) { top.sections("steps")[1].number("b"); }),
-            place + "11: steps/1/b: is missing");
+            place + "11: steps[1]/b: is missing");
   EXPECT_EQ(read.refusal([](Section& top) { top.section("list"); }),
             place + "8: list: must be a mapping, not a list");
   EXPECT_EQ(read.refusal([](Section& top) { top.text("count"); }),
@@ -193,7 +193,7 @@ TEST(DacSettings, RefusesWhatIsWrongInASerialDevice) {
       {{{"W{ch}{code:04X}", "W{ch}{code:02X}"}}, "code 4095 does not fit into 2 characters"},
       {{{"OK {ch}{code:04X}", "OK {answer}"}}, "write/expect: placeholder {answer}"},
       {{{"frame: channel", "frame: all"}}, "write/send: placeholder {ch}"},
-      {{{"ID?\"", "ID{ch}\""}}, "start/0/send: placeholder {ch}: there is nothing to fill in here"},
+      {{{"ID?\"", "ID{ch}\""}}, "start[0]/send: placeholder {ch}: there is nothing to fill in here"},
       {{{"ASCII-DAC *", ""}}, "start: must begin with the identification"},
       {{{"bits: 12", "bits: 11"}}, "channels/reference/code/max: must be at most 2047: 4095"},
       {{{"bits: 12", "bits: 31"}}, "bits: must be at most 24"},

@@ -25,6 +25,7 @@ NAMES = (
     "fuzz",
     "base",
     "slam",
+    "slam_localise",
     "predict",
 )
 
