@@ -55,8 +55,8 @@ void Server::run() {
   while (!signals_.next()) {
     beat_();
     wait();
-    acceptClients();
     listen();
+    acceptClients();  // after a client that left: the next one may be its successor
     const double now = monotonic();
     guard_.advance(now);
     write(now);

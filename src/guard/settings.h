@@ -20,4 +20,7 @@ struct Settings {
   double neutral_patience;  ///< [s] for which `guard --neutral` tries
 };
 
+/// Reads the file, and the model file that it names. Throws std::invalid_argument naming file, line, key and value.
+Settings readSettings(const std::string& file);
+
 }  // namespace kurumaisu::guard
