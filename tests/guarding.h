@@ -71,8 +71,21 @@ class Watch {
   /// Something that ends all trust: bytes that are no message, a client gone, a device fault.
   void broken() { neutral_since_.reset(); }
 
-  /// What is wrong with an output at time now; nullptr: nothing.
-  const char* fault(const g::Guard& guard, double now) const {
+  /// The device is lost, or there again.
+  void device(bool lost) {
+    lost_ = lost;
+    if (lost) broken();
+  }
+
+  /// What is wrong with an output at time now; nullptr: nothing. A trip that it sees ends all trust, too.
+  const char* fault(const g::Guard& guard, double now) {
+    if (guard.trips() != trips_) {
+      broken();
+      // the message that showed the trouble may begin the next holding
+      if (guard.state() == g::State::kHolding) neutral_since_ = now;
+    }
+    trips_ = guard.trips();
+    if (lost_ && guard.state() == g::State::kArmed) return "armed without a device";
     const auto out = guard.output();
     if (!in(out.translation, limits_.translation) || !in(out.steering, limits_.steering))
       return "outside its band";
@@ -94,6 +107,8 @@ class Watch {
   std::optional<double> neutral_since_;
   double last_made_ = -1e9;
   bool has_good_ = false;
+  std::uint32_t trips_ = 0;
+  bool lost_ = false;
 };
 
 }  // namespace guarding

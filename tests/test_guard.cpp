@@ -30,7 +30,10 @@ class Story : public testing::Test {
     check();
   }
 
-  void check() { ASSERT_EQ(watch.fault(guard, now), nullptr) << watch.fault(guard, now); }
+  void check() {
+    const char* fault = watch.fault(guard, now);
+    ASSERT_EQ(fault, nullptr) << fault;
+  }
 
   /// Holds neutral until the guard arms, or for so long [s].
   double hold(double patience = 1.0) {
@@ -275,10 +278,12 @@ class RandomStory {
     }
     if (chance(0.002)) {
       guard_.loseDevice();
-      watch_.broken();
-      if (chance(0.5)) guard_.findDevice();
+      watch_.device(true);
     }
-    if (chance(0.05)) guard_.findDevice();
+    if (chance(0.05)) {
+      guard_.findDevice();
+      watch_.device(false);
+    }
     if (chance(0.002)) {
       guard_.receiveGarbage();
       watch_.broken();
