@@ -105,9 +105,10 @@ class Story {
     const auto other = input.take<std::uint64_t>();
     std::memcpy(reinterpret_cast<char*>(&message) + 8 * word, &other, sizeof other);
     // a stamp that is only a little wrong would not come by chance
-    if (word == 2 && other % 2 == 0)
-      message.time =
-          guarding::nanoseconds(now_) + std::int64_t{1'000'000} * static_cast<std::int16_t>(other >> 8U);
+    if (word == 2 && other % 2 == 0) {
+      const std::int64_t off = static_cast<std::int16_t>(other >> 8U);  // [ms]
+      message.time = guarding::nanoseconds(now_) + 1'000'000 * off;
+    }
     bytes(&message, sizeof message);
   }
 

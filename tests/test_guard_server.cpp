@@ -192,8 +192,8 @@ TEST_F(GuardProcess, ASecondClientIsToldThatItIsOne) {
 TEST_F(GuardProcess, BytesThatAreNoMessageTrip) {
   start();
   for (const std::size_t size : {1U, 47U, 48U, 49U, 4000U}) {
-    const g::Descriptor raw = g::connectTo(settings.socket);
-    ASSERT_TRUE(raw);
+    g::Descriptor raw;
+    waitFor([&] { return static_cast<bool>(raw = g::connectTo(settings.socket)); }, "a connection");
     std::uint64_t sequence = 0;
     waitFor(
         [&] {

@@ -2,6 +2,7 @@
 #include "guard/device.h"
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 namespace kurumaisu::guard {
@@ -13,50 +14,40 @@ Device::Device(Open open, dac::Volts neutral, BackOff back_off)
       held_(neutral),
       pause_(back_off.first) {}
 
-std::optional<dac::Volts> Device::put(const dac::Volts& volts, double now) {
+bool Device::put(const dac::Volts& volts, double now) {
   try {
     held_ = converter_->put(volts);
-    return held_;
-  } catch (const dac::Fault& fault) {
+    return true;
+  } catch (const std::exception& fault) {
     problem_ = fault.what();
   }
-  if (!tryNeutral()) {
-    lost_ = true;
-    pause_ = back_off_.first;
-    retry_at_ = now;
-  }
-  return std::nullopt;
+  lost_ = true;
+  retry_at_ = now;
+  return false;
 }
 
 bool Device::recover(double now) {
   try {
+    if (is_open_) {
+      held_ = converter_->put(neutral_);
+      lost_ = false;
+      pause_ = back_off_.first;
+      return true;
+    }
     if (converter_) {
       converter_->reopen();
     } else {
       converter_ = open_();
     }
-  } catch (const dac::Fault& fault) {
+    is_open_ = true;
+    retry_at_ = now;
+  } catch (const std::exception& fault) {
     problem_ = fault.what();
+    is_open_ = false;
     retry_at_ = now + pause_;
     pause_ = std::min(2 * pause_, back_off_.longest);
-    return false;
   }
-  if (tryNeutral()) return true;
-  retry_at_ = now + pause_;
-  pause_ = std::min(2 * pause_, back_off_.longest);
   return false;
-}
-
-bool Device::tryNeutral() {
-  try {
-    held_ = converter_->put(neutral_);
-    lost_ = false;
-    pause_ = back_off_.first;
-    return true;
-  } catch (const dac::Fault& fault) {
-    problem_ = fault.what();
-    return false;
-  }
 }
 
 }  // namespace kurumaisu::guard

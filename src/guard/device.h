@@ -4,7 +4,6 @@
 
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "dac/converter.h"
@@ -24,11 +23,11 @@ class Device {
 
   Device(Open open, dac::Volts neutral, BackOff back_off);
 
-  /// Puts out and returns what the device now holds. After a fault it tries neutral once; none: see problem(), and
-  /// the device is lost if neutral failed, too.
-  std::optional<dac::Volts> put(const dac::Volts& volts, double now);
+  /// Puts out, and says whether the device now holds it. If not, see problem(), and the device is lost.
+  bool put(const dac::Volts& volts, double now);
 
-  /// Opens a lost device and puts neutral. True if it is there.
+  /// The next step to a device that holds neutral: neutral over the line that failed, then opening, then neutral over
+  /// the new line. True if it is there. One step at a time, for each may take as long as the device's timeouts are.
   bool recover(double now);
 
   bool isLost() const { return lost_; }
@@ -39,14 +38,13 @@ class Device {
   std::string name() const { return converter_ ? converter_->name() : "no device yet"; }
 
  private:
-  bool tryNeutral();
-
   Open open_;
   dac::Volts neutral_;
   BackOff back_off_;
   std::unique_ptr<dac::Converter> converter_;
   dac::Volts held_;
   bool lost_ = true;
+  bool is_open_ = false;  ///< there is a line to try
   double retry_at_ = 0;
   double pause_;
   std::string problem_;

@@ -154,9 +154,8 @@ int runSentinel(const Settings& settings, const Device::Open& open) { return Sen
 
 bool forceNeutral(const Settings& settings, const Device::Open& open, double patience) {
   Device device(open, {0, 0, settings.limits.reference}, settings.reopening);
-  const double end = monotonic() + patience;
-  for (;;) {
-    const double now = monotonic();
+  double now = monotonic();
+  for (const double end = now + patience;; now = monotonic()) {
     if (device.recover(now)) {
       say("GUARD_NEUTRAL", device.name() + ": written from outside the guard");
       return true;

@@ -46,7 +46,9 @@ Server::Server(const Settings& settings, Device::Open open, std::function<void()
       beat_(std::move(beat)),
       guard_(settings.limits),
       device_(std::move(open), guard_.output(), settings.reopening) {
-  recover(monotonic());  // neutral comes before anybody can ask for anything
+  // neutral comes before anybody can ask for anything
+  for (double now = monotonic(); device_.isLost() && device_.retryAt() <= now; now = monotonic())
+    recover(now);
   if (device_.isLost()) guard_.loseDevice();
   listener_ = listenAt(settings.socket);
 }
@@ -148,15 +150,10 @@ void Server::put(const dac::Volts& volts, double now) {
   written_at_ = now;
   if (device_.put(volts, now)) return;
   guard_.loseDevice();
-  written_.reset();
-  if (device_.isLost()) {
-    say("GUARD_DEVICE_LOST", device_.problem());
-  } else {
-    say("GUARD_DEVICE_FAULT", device_.problem() + "; neutral since");
-    guard_.findDevice();
-  }
+  say("GUARD_DEVICE_FAULT", device_.problem());
 }
 
+/// Neutral is what a device gets first when it is there again.
 void Server::recover(double now) {
   if (device_.recover(now)) {
     say("GUARD_DEVICE", device_.name() + ": neutral");
