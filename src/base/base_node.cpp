@@ -3,16 +3,15 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <geometry_msgs/Twist.h>
 #include <kurumaisu/Voltages.h>
-#include <nav_msgs/Odometry.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <ros/xmlrpc_manager.h>
-#include <tf2_ros/transform_broadcaster.h>
 
 #include <atomic>
 #include <csignal>
 #include <exception>
 
+#include "base/odometry_output.h"
 #include "base/report.h"
 #include "base/settings.h"
 
@@ -23,7 +22,6 @@ namespace {
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
 constexpr double kWarningPeriod = 1.0;  // [s] of throttled warnings
-constexpr double kUnmeasured = 1.0e6;   // variance of what a planar base does not know: z, roll, pitch
 constexpr int kLastSamples = 5;         // of neutral at the end, with
 constexpr double kLastPause = 0.02;     // [s] after each, time for it to leave the process
 
@@ -88,7 +86,6 @@ class BaseNode {
   void onCommand(const geometry_msgs::Twist& twist);
   void onTick();
   void finish();
-  void publishOdometry();
   static void diagnose(Status& status, const k::Report& report);
 
   k::BaseSettings settings_;
@@ -97,15 +94,14 @@ class BaseNode {
   k::DriveCounts reported_;      ///< at the last diagnostics
   double last_diagnostics_ = 0;  ///< [s]
   diagnostic_updater::Updater diagnostics_;
-  ros::Publisher odom_;
-  tf2_ros::TransformBroadcaster tf_;
+  k::OdometryOutput odom_;
   ros::Subscriber cmd_vel_;
   ros::Timer timer_;
   ros::SteadyTimer steady_timer_;
 };
 
 BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
-    : settings_(settings), dac_(nh), drive_(settings.drive, dac_) {
+    : settings_(settings), dac_(nh), drive_(settings.drive, dac_), odom_(nh, settings.odometry_names) {
   logLaw(settings_.law_name, k::ambiguity(drive_));
   diagnostics_.setHardwareID("none");
   diagnostics_.add("voltage law",
@@ -114,7 +110,6 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     diagnose(status, k::reportCommands(drive_, reported_));
     reported_ = drive_.counts();
   });
-  odom_ = nh.advertise<nav_msgs::Odometry>("odom", 10);
   cmd_vel_ = nh.subscribe("cmd_vel", 10, &BaseNode::onCommand, this, ros::TransportHints().tcpNoDelay());
   const double period = 1.0 / settings_.rate;
   if (ros::Time::isSimTime()) {
@@ -165,45 +160,11 @@ void BaseNode::onTick() {
   if (tick == k::Drive::Tick::kReset) {
     warn("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");
   }
-  if (tick != k::Drive::Tick::kRepeated) publishOdometry();
+  if (tick != k::Drive::Tick::kRepeated) odom_.publish(drive_.odometry(), dac_.stamp);
   if (std::abs(t - last_diagnostics_) >= settings_.diagnostic_period) {
     last_diagnostics_ = t;
     diagnostics_.force_update();  // update() would fall silent when the clock is set back
   }
-}
-
-void BaseNode::publishOdometry() {
-  const k::Odometry& odometry = drive_.odometry();
-  nav_msgs::Odometry message;
-  message.header.stamp = dac_.stamp;
-  message.header.frame_id = settings_.odom_frame;
-  message.child_frame_id = settings_.base_frame;
-  message.pose.pose.position.x = odometry.pose().x;
-  message.pose.pose.position.y = odometry.pose().y;
-  message.pose.pose.orientation.z = std::sin(0.5 * odometry.pose().theta);
-  message.pose.pose.orientation.w = std::cos(0.5 * odometry.pose().theta);
-  message.twist.twist.linear.x = odometry.v();
-  message.twist.twist.angular.z = odometry.w();
-  constexpr std::size_t kAxes[] = {0, 1, 5};  // x, y, yaw of x, y, z, roll, pitch, yaw
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      message.pose.covariance[6 * kAxes[row] + kAxes[column]] = odometry.covariance()(row, column);
-    }
-    message.twist.covariance[7 * kAxes[row]] = odometry.rateVariance()[row];
-  }
-  for (const std::size_t axis : {2, 3, 4}) {
-    message.pose.covariance[7 * axis] = message.twist.covariance[7 * axis] = kUnmeasured;
-  }
-  odom_.publish(message);
-
-  if (!settings_.publish_tf) return;
-  geometry_msgs::TransformStamped odom_from_base;
-  odom_from_base.header = message.header;
-  odom_from_base.child_frame_id = message.child_frame_id;
-  odom_from_base.transform.translation.x = odometry.pose().x;
-  odom_from_base.transform.translation.y = odometry.pose().y;
-  odom_from_base.transform.rotation = message.pose.pose.orientation;
-  tf_.sendTransform(odom_from_base);
 }
 
 void BaseNode::diagnose(Status& status, const k::Report& report) {

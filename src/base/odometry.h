@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 
 #include "model/unicycle.h"
 
@@ -16,6 +17,13 @@ struct OdometryNoise {
   double lateral_per_distance;  ///< [m^2/m]
   double heading_per_distance;  ///< [rad^2/m]
   double heading_per_turn;      ///< [rad^2/rad]
+};
+
+/// Under which names odometry is published.
+struct OdometryNames {
+  std::string frame;        ///< in which the pose is
+  std::string child_frame;  ///< whose pose it is
+  bool publish_tf;          ///< false where a filter publishes frame -> child_frame
 };
 
 /// Pose in the odom frame, with its covariance, from rates held over intervals.

@@ -67,9 +67,8 @@ BaseSettings readBaseSettings(Section node) {
   settings.drive.command_timeout = node.above("command_timeout", 0);
   settings.rate = node.above("rate", 0);
   Section odometry = node.section("odometry");
-  settings.odom_frame = odometry.text("frame");
-  settings.base_frame = odometry.text("child_frame");
-  settings.publish_tf = odometry.flag("publish_tf");
+  settings.odometry_names = {odometry.text("frame"), odometry.text("child_frame"),
+                             odometry.flag("publish_tf")};
   settings.drive.noise = readNoise(odometry.section("noise"));
   odometry.end();
   settings.diagnostic_period = node.above("diagnostic_period", 0);

@@ -13,9 +13,7 @@ struct BaseSettings {
   std::string law_name;
   DriveSettings drive;
   double rate;  ///< of voltages and odometry [Hz]
-  std::string odom_frame;
-  std::string base_frame;
-  bool publish_tf;
+  OdometryNames odometry_names;
   double diagnostic_period;  ///< [s]
 };
 
