@@ -24,6 +24,18 @@ double standsFor(const AxisLaw& law, AxisInverse& inverse, double volts, double 
   return inverse.rate(volts, (rate > 0) - (rate < 0));
 }
 
+/// The voltage to put out for a rate. Where branches overlap, rounding may step over the end of the rate's own,
+/// to where only the opposite rate answers: then it is the next code on its own branch, or rest.
+double voltsFor(const AxisLaw& law, const Channel& channel, double knob, double rate) {
+  const double volts = channel.nearest(law.volts(rate), knob);
+  if (rate == 0) return volts;
+  const auto opposite = rate > 0 ? law.negativeRate(volts) : law.positiveRate(volts);
+  const auto own = rate > 0 ? law.positiveRate(volts) : law.negativeRate(volts);
+  if (own || !opposite) return volts;
+  const double next = volts + std::copysign(channel.resolution, rate * law.positive.slope);
+  return next == channel.nearest(next, knob) ? next : 0;
+}
+
 }  // namespace
 
 std::optional<Band> ambiguousBand(const AxisLaw& law) {
@@ -82,8 +94,8 @@ Outlet::Outlet(const OutletSettings& settings)
 Output Outlet::at(double v, double w) {
   const VoltageLaw& law = settings_.law;
   const double wanted[] = {law.translation.volts(v), law.steering.volts(w)};
-  const double volts[] = {settings_.translation.nearest(wanted[0], settings_.knob),
-                          settings_.steering.nearest(wanted[1], settings_.knob)};
+  const double volts[] = {voltsFor(law.translation, settings_.translation, settings_.knob, v),
+                          voltsFor(law.steering, settings_.steering, settings_.knob, w)};
   ++counts_.samples;
   if (isIn(translation_band_, volts[0]) || isIn(steering_band_, volts[1])) ++counts_.ambiguous;
   const auto beyond = [this](const Channel& channel, double wish) {
