@@ -68,6 +68,13 @@ Value nodeValues() {
                           "heading_per_distance", "heading_per_turn"}) {
     v["odometry"]["noise"][key] = 0.01;
   }
+  v["odometry"]["imu"]["use"] = false;
+  v["odometry"]["imu"]["axis"] = std::string("tf");
+  for (const char* key :
+       {"timeout", "variance", "scale_sd", "bias_walk", "bias_limit", "settle", "window", "still"}) {
+    v["odometry"]["imu"][key] = 0.01;
+  }
+  v["model"]["effects"].setSize(0);
   v["model"]["name"] = std::string("MD-100");
   v["model"]["chassis"]["length"] = 1.0;
   v["model"]["voltage_law"] = std::string("published");

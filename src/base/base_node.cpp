@@ -101,7 +101,7 @@ class BaseNode {
 };
 
 BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
-    : settings_(settings), dac_(nh), drive_(settings.drive, dac_), odom_(nh, settings.odometry_names) {
+    : settings_(settings), dac_(nh), drive_(settings.drive, dac_), odom_(nh, settings.odometry.names) {
   logLaw(settings_.law_name, k::ambiguity(drive_));
   diagnostics_.setHardwareID("none");
   diagnostics_.add("voltage law",

@@ -21,7 +21,7 @@ Drive::Drive(const DriveSettings& settings, Dac& dac)
       dac_(dac),
       translation_band_(ambiguousBand(settings.law.translation)),
       steering_band_(ambiguousBand(settings.law.steering)),
-      odometry_(settings.noise) {
+      reckoning_(settings.noise, settings.gyro) {
   put(0, 0);
 }
 
@@ -61,12 +61,17 @@ Drive::Tick Drive::advanceTo(double t) {
   if (t < *last) {
     ++counts_.time_resets;
     command_.reset();
-    odometry_.reset();
+    reckoning_.restart();
     return Tick::kReset;
   }
   if (t == *last) return Tick::kRepeated;
-  odometry_.advance(output_.v, output_.w, t - *last);
+  reckoning_.advance(output_.v, output_.w, *last, t);
   return Tick::kAdvanced;
+}
+
+void Drive::place(const Pose2D& pose, const Eigen::Matrix3d& covariance, double t) {
+  advanceTo(t);  // or the way since the last tick would count as driven from there
+  reckoning_.place(pose, covariance);
 }
 
 void Drive::put(double v, double w) {

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "base/dac.h"
-#include "base/odometry.h"
+#include "base/reckoning.h"
 #include "model/voltage_law.h"
 
 namespace kurumaisu {
@@ -36,6 +36,7 @@ struct DriveSettings {
   Limits limits;
   double command_timeout;  ///< a command older than this is none [s]
   OdometryNoise noise;
+  std::optional<GyroSettings> gyro{};  ///< nothing: odometry is open loop
 };
 
 /// Events since the start, for diagnostics.
@@ -71,11 +72,16 @@ class Drive {
   /// Integrates the last output up to t [s], then puts out what the command asks for.
   Tick tick(double t);
 
+  /// From now, time t [s], odometry goes on from that pose; what the chair does stays as it is.
+  void place(const Pose2D& pose, const Eigen::Matrix3d& covariance, double t);
+
   /// Drops the command and puts out neutral at time t [s].
   void stop(double t);
 
   const Output& output() const { return output_; }
-  const Odometry& odometry() const { return odometry_; }
+  const Odometry& odometry() const { return reckoning_.odometry(); }
+  Reckoning& reckoning() { return reckoning_; }
+  const Reckoning& reckoning() const { return reckoning_; }
   const DriveCounts& counts() const { return counts_; }
   bool hasCommand() const { return command_.has_value(); }
   const std::optional<Band>& translationBand() const { return translation_band_; }
@@ -95,7 +101,7 @@ class Drive {
   Dac& dac_;
   std::optional<Band> translation_band_;
   std::optional<Band> steering_band_;
-  Odometry odometry_;
+  Reckoning reckoning_;
   DriveCounts counts_;
   Output output_{};
   std::optional<Command> command_;

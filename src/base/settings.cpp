@@ -39,7 +39,8 @@ void readModel(Section model, BaseSettings& settings) {
     if (name == settings.law_name) settings.drive.law = law;
   }
   settings.drive.reference_voltage = model.number("reference_voltage");
-  for (const char* other : {"name", "chassis", "laser", "effects"}) model.ignore(other);
+  for (const char* other : {"name", "chassis", "laser"}) model.ignore(other);
+  settings.effects = readEffects(model);
   model.end();
 }
 
@@ -47,15 +48,6 @@ Limits readLimits(Section section) {
   const Limits limits{section.above("v_forward", 0), section.above("v_reverse", 0), section.above("w", 0)};
   section.end();
   return limits;
-}
-
-OdometryNoise readNoise(Section section) {
-  const OdometryNoise noise{
-      section.atLeast("forward_per_distance", 0), section.atLeast("forward_per_turn", 0),
-      section.atLeast("lateral_per_distance", 0), section.atLeast("heading_per_distance", 0),
-      section.atLeast("heading_per_turn", 0)};
-  section.end();
-  return noise;
 }
 
 }  // namespace
@@ -66,11 +58,9 @@ BaseSettings readBaseSettings(Section node) {
   settings.drive.limits = readLimits(node.section("limits"));
   settings.drive.command_timeout = node.above("command_timeout", 0);
   settings.rate = node.above("rate", 0);
-  Section odometry = node.section("odometry");
-  settings.odometry_names = {odometry.text("frame"), odometry.text("child_frame"),
-                             odometry.flag("publish_tf")};
-  settings.drive.noise = readNoise(odometry.section("noise"));
-  odometry.end();
+  settings.odometry = readOdometry(node.section("odometry"), settings.effects);
+  settings.drive.noise = settings.odometry.noise;
+  if (settings.odometry.imu) settings.drive.gyro = settings.odometry.imu->gyro;
   settings.diagnostic_period = node.above("diagnostic_period", 0);
   node.end();
   return settings;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/drive.h"
+#include "base/odometry_settings.h"
 #include "params.h"
 
 namespace kurumaisu {
@@ -13,7 +14,8 @@ struct BaseSettings {
   std::string law_name;
   DriveSettings drive;
   double rate;  ///< of voltages and odometry [Hz]
-  OdometryNames odometry_names;
+  OdometrySettings odometry;
+  KnownEffects effects;      ///< the model file's, as far as they concern odometry
   double diagnostic_period;  ///< [s]
 };
 
