@@ -11,7 +11,9 @@
 #include <csignal>
 #include <exception>
 
+#include "base/odometry_input.h"
 #include "base/odometry_output.h"
+#include "base/odometry_report.h"
 #include "base/report.h"
 #include "base/settings.h"
 
@@ -86,6 +88,7 @@ class BaseNode {
   void onCommand(const geometry_msgs::Twist& twist);
   void onTick();
   void finish();
+  void reportOdometry(Status& status);
   static void diagnose(Status& status, const k::Report& report);
 
   k::BaseSettings settings_;
@@ -95,14 +98,22 @@ class BaseNode {
   double last_diagnostics_ = 0;  ///< [s]
   diagnostic_updater::Updater diagnostics_;
   k::OdometryOutput odom_;
+  k::OdometryInput odom_input_;
+  k::GyroCounts reported_gyro_;  ///< at the last diagnostics
   ros::Subscriber cmd_vel_;
   ros::Timer timer_;
   ros::SteadyTimer steady_timer_;
 };
 
 BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
-    : settings_(settings), dac_(nh), drive_(settings.drive, dac_), odom_(nh, settings.odometry.names) {
+    : settings_(settings),
+      dac_(nh),
+      drive_(settings.drive, dac_),
+      odom_(nh, settings.odometry.names),
+      odom_input_(nh, drive_, settings.odometry, loopTime) {
   logLaw(settings_.law_name, k::ambiguity(drive_));
+  const std::string unfollowed = k::unfollowedWarning(settings.effects.unfollowed);
+  if (!unfollowed.empty()) warn(unfollowed);
   diagnostics_.setHardwareID("none");
   diagnostics_.add("voltage law",
                    [this](Status& status) { diagnose(status, k::reportLaw(drive_, settings_.law_name)); });
@@ -110,6 +121,7 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     diagnose(status, k::reportCommands(drive_, reported_));
     reported_ = drive_.counts();
   });
+  diagnostics_.add("odometry", [this](Status& status) { reportOdometry(status); });
   cmd_vel_ = nh.subscribe("cmd_vel", 10, &BaseNode::onCommand, this, ros::TransportHints().tcpNoDelay());
   const double period = 1.0 / settings_.rate;
   if (ros::Time::isSimTime()) {
@@ -160,11 +172,20 @@ void BaseNode::onTick() {
   if (tick == k::Drive::Tick::kReset) {
     warn("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");
   }
+  odom_input_.check();
   if (tick != k::Drive::Tick::kRepeated) odom_.publish(drive_.odometry(), dac_.stamp);
   if (std::abs(t - last_diagnostics_) >= settings_.diagnostic_period) {
     last_diagnostics_ = t;
     diagnostics_.force_update();  // update() would fall silent when the clock is set back
   }
+}
+
+void BaseNode::reportOdometry(Status& status) {
+  const k::Reckoning& reckoning = drive_.reckoning();
+  const k::KnownEffects& effects = settings_.effects;
+  diagnose(status,
+           k::reportOdometry(reckoning, effects.unfollowed, effects.noise.has_value(), reported_gyro_));
+  if (reckoning.gyro()) reported_gyro_ = reckoning.gyro()->counts();
 }
 
 void BaseNode::diagnose(Status& status, const k::Report& report) {
