@@ -125,6 +125,15 @@ class Section {
   /// A mapping inside this one.
   Section section(const std::string& key) { return {take(key), path_ + "/" + key}; }
 
+  /// A list of mappings.
+  std::vector<Section> sections(const std::string& key) {
+    const XmlRpc::XmlRpcValue list = take(key);
+    if (list.getType() != XmlRpc::XmlRpcValue::TypeArray) throw wrongType(key, "a list", list);
+    std::vector<Section> result;
+    for (int i = 0; i < list.size(); ++i) result.emplace_back(list[i], path_ + "/" + key + "/" + shown(i));
+    return result;
+  }
+
   /// Leaves a key, if there is one, to another reader of the same file.
   void ignore(const std::string& key) { values_.erase(key); }
 

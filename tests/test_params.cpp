@@ -111,6 +111,13 @@ Value nodeValues() {
                           "heading_per_distance", "heading_per_turn"}) {
     v["odometry"]["noise"][key] = 0.01;
   }
+  v["odometry"]["imu"]["use"] = false;
+  v["odometry"]["imu"]["axis"] = std::string("tf");
+  for (const char* key :
+       {"timeout", "variance", "scale_sd", "bias_walk", "bias_limit", "settle", "window", "still"}) {
+    v["odometry"]["imu"][key] = 0.01;
+  }
+  v["model"]["effects"].setSize(0);
   v["model"]["name"] = std::string("MD-100");
   v["model"]["chassis"]["length"] = 1.0;
   v["model"]["voltage_law"] = std::string("published");
@@ -207,6 +214,76 @@ TEST(BaseSettings, AreReadFromAWholeConfiguration) {
   EXPECT_EQ(settings.drive.arbiter.inputs[1].limits, 1U);
   EXPECT_EQ(settings.drive.arbiter.locks[0].timeout, 0.3);
   EXPECT_EQ(settings.rate, 50.0);
+}
+
+namespace {
+
+Value effect(const std::string& id) {
+  Value v;
+  v["id"] = id;
+  v["parameters"]["k"] = 0.1;
+  return v;
+}
+
+Value processNoise() {
+  Value v = effect("base.process_noise");
+  Value parameters;
+  parameters["sd_v"] = 0.01;
+  parameters["sd_w"] = 0.02;
+  parameters["tau"] = 0.3;
+  parameters["growth"] = 0;
+  v["parameters"] = parameters;
+  return v;
+}
+
+}  // namespace
+
+TEST(BaseSettings, MeasuredNoiseReplacesWhatWasAssumed) {
+  Value v = nodeValues();
+  v["model"]["effects"][0] = effect("laser.scale");
+  v["model"]["effects"][1] = effect("base.marker_x");  // of what measures, not of the chair
+  EXPECT_EQ(k::readBaseSettings({v, "/n"}).drive.noise.heading_per_turn, 0.01);
+  v["model"]["effects"][2] = processNoise();
+  const k::BaseSettings settings = k::readBaseSettings({v, "/n"});
+  EXPECT_EQ(settings.drive.noise.heading_per_turn, 0);
+  EXPECT_EQ(settings.drive.noise.rates.sd_w, 0.02);
+  EXPECT_EQ(settings.drive.noise.rates.tau, 0.3);
+  EXPECT_TRUE(settings.effects.unfollowed.empty());
+}
+
+TEST(BaseSettings, EffectsThatOdometryDoesNotFollowKeepTheAssumedGrowth) {
+  Value v = nodeValues();
+  v["model"]["effects"][0] = processNoise();
+  v["model"]["effects"][1] = effect("base.lag_v");
+  const k::BaseSettings settings = k::readBaseSettings({v, "/n"});
+  EXPECT_EQ(settings.drive.noise.heading_per_turn, 0.01);
+  EXPECT_EQ(settings.drive.noise.rates.sd_w, 0.02);
+  EXPECT_EQ(settings.effects.unfollowed, std::vector<std::string>{"base.lag_v"});
+}
+
+TEST(BaseSettings, AMeasuredNoiseThatMakesNoSenseIsRefused) {
+  Value v = nodeValues();
+  v["model"]["effects"][0] = processNoise();
+  v["model"]["effects"][0]["parameters"]["tau"] = 0.0;
+  EXPECT_EQ(complaintOf(v), "/base_node/model/effects/0/parameters/tau: must be above 0: 0");
+  v["model"]["effects"][0] = processNoise();
+  v["model"]["effects"][1] = processNoise();
+  EXPECT_NE(complaintOf(v).find("/base_node/model/effects/1/id: is given twice"), std::string::npos);
+  v = nodeValues();
+  v["model"]["effects"] = std::string("none");
+  EXPECT_NE(complaintOf(v).find("/base_node/model/effects: must be a list"), std::string::npos);
+}
+
+TEST(BaseSettings, TheImuIsReadButOnlyUsedWhereWanted) {
+  Value v = nodeValues();
+  EXPECT_FALSE(k::readBaseSettings({v, "/n"}).drive.gyro);
+  v["odometry"]["imu"]["use"] = true;
+  v["odometry"]["imu"]["axis"] = std::string("down");
+  const k::BaseSettings settings = k::readBaseSettings({v, "/n"});
+  ASSERT_TRUE(settings.drive.gyro);
+  EXPECT_EQ(settings.odometry.imu->axis, k::ImuSettings::Axis::kDown);
+  v["odometry"]["imu"]["axis"] = std::string("left");
+  EXPECT_EQ(complaintOf(v), "/base_node/odometry/imu/axis: must be one of tf, up, down: left");
 }
 
 TEST(BaseSettings, EveryMistakeIsNamed) {

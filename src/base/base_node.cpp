@@ -14,7 +14,9 @@
 #include "base/command_input.h"
 #include "base/last_word.h"
 #include "base/limits_server.h"
+#include "base/odometry_input.h"
 #include "base/odometry_output.h"
+#include "base/odometry_report.h"
 #include "base/report.h"
 #include "base/settings.h"
 #include "base/topic_dac.h"
@@ -54,6 +56,7 @@ class BaseNode {
   void publish();
   void tell();
   void finish();
+  void reportOdometry(Status& status);
   static void diagnose(Status& status, const k::Report& report);
 
   k::BaseSettings settings_;
@@ -66,6 +69,8 @@ class BaseNode {
   double last_diagnostics_ = 0;  ///< [s]
   diagnostic_updater::Updater diagnostics_;
   k::OdometryOutput odom_;
+  k::OdometryInput odom_input_;
+  k::GyroCounts reported_gyro_;  ///< at the last diagnostics
   ros::Publisher cmd_vel_out_;
   ros::Publisher active_input_;
   k::CommandInput input_;
@@ -79,12 +84,15 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
       dac_(nh),
       drive_(settings.drive, dac_),
       last_word_([this] { finish(); }),
-      odom_(nh, settings.odometry_names),
+      odom_(nh, settings.odometry.names),
+      odom_input_(nh, drive_, settings.odometry, loopTime),
       cmd_vel_out_(nh.advertise<geometry_msgs::TwistStamped>("cmd_vel_out", 10)),
       active_input_(nh.advertise<std_msgs::String>("active_input", 1, true)),
       input_(nh, settings.topics, drive_, [] { return loopTime(ros::Time::now()); }),
       limits_(settings.limit_names, drive_) {
   logLaw(settings_.law_name, k::ambiguity(drive_.outlet()));
+  const std::string unfollowed = k::unfollowedWarning(settings.effects.unfollowed);
+  if (!unfollowed.empty()) warn(unfollowed);
   diagnostics_.setHardwareID("none");
   diagnostics_.add("voltage law", [this](Status& status) {
     diagnose(status, k::reportLaw(drive_.outlet(), settings_.law_name));
@@ -93,6 +101,7 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     diagnose(status, k::reportCommands(drive_, reported_));
     reported_ = k::tally(drive_);
   });
+  diagnostics_.add("odometry", [this](Status& status) { reportOdometry(status); });
   const double period = 1.0 / settings_.rate;
   if (ros::Time::isSimTime()) {
     timer_ = nh.createTimer(ros::Duration(period), [this](const ros::TimerEvent&) { onTick(); });
@@ -129,6 +138,7 @@ void BaseNode::onTick() {
   if (tick == k::Drive::Tick::kReset) {
     warn("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");
   }
+  odom_input_.check();
   if (tick != k::Drive::Tick::kRepeated) publish();
   tell();
   if (std::abs(t - last_diagnostics_) >= settings_.diagnostic_period) {
@@ -141,7 +151,7 @@ void BaseNode::publish() {
   odom_.publish(drive_.odometry(), dac_.stamp);
   geometry_msgs::TwistStamped survived;
   survived.header.stamp = dac_.stamp;
-  survived.header.frame_id = settings_.odometry_names.child_frame;
+  survived.header.frame_id = settings_.odometry.names.child_frame;
   survived.twist.linear.x = drive_.output().v;
   survived.twist.angular.z = drive_.output().w;
   cmd_vel_out_.publish(survived);
@@ -160,9 +170,16 @@ void BaseNode::tell() {
   active_input_.publish(active);
 }
 
+void BaseNode::reportOdometry(Status& status) {
+  const k::Reckoning& reckoning = drive_.reckoning();
+  const k::KnownEffects& effects = settings_.effects;
+  diagnose(status,
+           k::reportOdometry(reckoning, effects.unfollowed, effects.noise.has_value(), reported_gyro_));
+  if (reckoning.gyro()) reported_gyro_ = reckoning.gyro()->counts();
+}
+
 void BaseNode::diagnose(Status& status, const k::Report& report) {
-  constexpr signed char kLevels[] = {Status::OK, Status::WARN, Status::ERROR};
-  status.summary(kLevels[static_cast<int>(report.level)], report.summary);
+  status.summary(report.error ? Status::ERROR : report.warning ? Status::WARN : Status::OK, report.summary);
   for (const auto& [name, value] : report.values) status.add(name, value);
 }
 

@@ -14,7 +14,7 @@ Drive::Drive(const DriveSettings& settings, Dac& dac)
       cap_(settings.cap),
       limiter_(settings.limits.at(0)),
       outlet_(settings.outlet),
-      odometry_(settings.noise),
+      reckoning_(settings.noise, settings.gyro),
       now_cap_(settings.cap.fallback) {
   put({});
 }
@@ -77,12 +77,17 @@ Drive::Tick Drive::advanceTo(double t) {
   if (t < *last) {
     ++counts_.time_resets;
     limiter_.reset();
-    odometry_.reset();
+    reckoning_.restart();
     return Tick::kReset;  // the parts see it for themselves
   }
   if (t == *last) return Tick::kRepeated;
-  odometry_.advance(output_.v, output_.w, t - *last);
+  reckoning_.advance(output_.v, output_.w, *last, t);
   return Tick::kAdvanced;
+}
+
+void Drive::place(const Pose2D& pose, const Eigen::Matrix3d& covariance, double t) {
+  advanceTo(t);  // or the way since the last tick would count as driven from there
+  reckoning_.place(pose, covariance);
 }
 
 void Drive::put(const Rates& rates) {

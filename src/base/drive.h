@@ -12,8 +12,8 @@
 #include "base/dac.h"
 #include "base/estop.h"
 #include "base/limiter.h"
-#include "base/odometry.h"
 #include "base/outlet.h"
+#include "base/reckoning.h"
 #include "base/speed_cap.h"
 
 namespace kurumaisu {
@@ -26,6 +26,7 @@ struct DriveSettings {
   double longest_step;         ///< a tick later than this moves the ramps on by no more [s]
   OutletSettings outlet;
   OdometryNoise noise;
+  std::optional<GyroSettings> gyro{};  ///< nothing: odometry is open loop
 };
 
 /// Events since the start, for diagnostics, beside those of the parts.
@@ -57,6 +58,9 @@ class Drive {
   /// Integrates the last output up to t [s], then puts out what follows from what was heard.
   Tick tick(double t);
 
+  /// From now, time t [s], odometry goes on from that pose; what the chair does stays as it is.
+  void place(const Pose2D& pose, const Eigen::Matrix3d& covariance, double t);
+
   /// Forgets every command and puts out neutral at time t [s].
   void stop(double t);
 
@@ -74,7 +78,9 @@ class Drive {
   const SpeedCap& speedCap() const { return cap_; }
   const Outlet& outlet() const { return outlet_; }
   const Output& output() const { return output_; }
-  const Odometry& odometry() const { return odometry_; }
+  const Odometry& odometry() const { return reckoning_.odometry(); }
+  Reckoning& reckoning() { return reckoning_; }
+  const Reckoning& reckoning() const { return reckoning_; }
   const DriveCounts& counts() const { return counts_; }
   const DriveSettings& settings() const { return settings_; }
   double cap() const { return now_cap_; }  ///< as of the last tick [m/s]
@@ -92,7 +98,7 @@ class Drive {
   Limiter limiter_;
   std::size_t set_ = 0;  ///< of limits in force
   Outlet outlet_;
-  Odometry odometry_;
+  Reckoning reckoning_;
   DriveCounts counts_;
   Output output_{};
   double now_cap_;

@@ -65,7 +65,6 @@ void readVoltages(Section section, OutletSettings& settings) {
 
 }  // namespace
 
-/// The model file also describes the body, the laser and the simulator's effects: those have other readers.
 OutletSettings readOutlet(Section& model, std::string& law_name) {
   OutletSettings settings{};
   Section laws = model.section("voltage_laws");
@@ -76,8 +75,6 @@ OutletSettings readOutlet(Section& model, std::string& law_name) {
   }
   settings.reference_voltage = model.number("reference_voltage");
   readVoltages(model.section("voltages"), settings);
-  for (const char* other : {"name", "chassis", "laser", "effects"}) model.ignore(other);
-  model.end();
   return settings;
 }
 

@@ -49,7 +49,7 @@ std::string ambiguity(const Outlet& outlet) {
 
 Report reportLaw(const Outlet& outlet, const std::string& law_name) {
   const std::string warning = ambiguity(outlet);
-  Report report{warning.empty() ? Level::kOk : Level::kWarning,
+  Report report{!warning.empty(),
                 law_name + ": " + (warning.empty() ? "every voltage stands for one rate" : warning),
                 {{"voltage law", law_name}}};
   const auto add = [&report](const char* name, const std::optional<Band>& band) {
@@ -79,11 +79,8 @@ Report reportCommands(const Drive& drive, const Tally& before) {
   warn(now.drive.time_resets > before.drive.time_resets, "time ran backwards");
   const Reason reason = drive.arbiter().last().reason;
   const bool held = reason != Reason::kDriving && reason != Reason::kIdle;
-  const Level level = drive.eStop().stopped()    ? Level::kError
-                      : held || !warning.empty() ? Level::kWarning
-                                                 : Level::kOk;
   const std::string active = activeInput(drive);
-  return {level,
+  return {held || !warning.empty(),
           stateOf(drive) + (warning.empty() ? "" : "; " + warning),
           {{"state", stateOf(drive)},
            {"active", active.empty() ? "none" : active},
@@ -98,7 +95,8 @@ Report reportCommands(const Drive& drive, const Tally& before) {
            {"not released", std::to_string(now.arbiter.unreleased)},
            {"refused caps", std::to_string(now.cap.refused)},
            {"late ticks", std::to_string(now.drive.late_ticks)},
-           {"time resets", std::to_string(now.drive.time_resets)}}};
+           {"time resets", std::to_string(now.drive.time_resets)}},
+          drive.eStop().stopped()};
 }
 
 std::string stateOf(const Drive& drive) {

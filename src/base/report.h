@@ -10,13 +10,12 @@
 
 namespace kurumaisu {
 
-enum class Level { kOk, kWarning, kError };
-
-/// One line of diagnostics: a level, and values by name.
+/// One line of diagnostics: an error, a warning or all well, and values by name.
 struct Report {
-  Level level;
+  bool warning;
   std::string summary;
   std::vector<std::pair<std::string, std::string>> values;
+  bool error = false;
 };
 
 /// All counts of a drive; what has changed since the last report is a warning.

@@ -21,13 +21,12 @@ void readEach(Section section, Take take) {
   }
 }
 
-OdometryNoise readNoise(Section section) {
-  const OdometryNoise noise{
-      section.atLeast("forward_per_distance", 0), section.atLeast("forward_per_turn", 0),
-      section.atLeast("lateral_per_distance", 0), section.atLeast("heading_per_distance", 0),
-      section.atLeast("heading_per_turn", 0)};
-  section.end();
-  return noise;
+/// The model file also describes the body and the laser: those have other readers.
+void readModel(Section model, BaseSettings& settings) {
+  settings.drive.outlet = readOutlet(model, settings.law_name);
+  for (const char* other : {"name", "chassis", "laser"}) model.ignore(other);
+  settings.effects = readEffects(model);
+  model.end();
 }
 
 void readLimitSets(Section section, BaseSettings& settings) {
@@ -110,8 +109,7 @@ Limits readLimits(Section section) {
 
 BaseSettings readBaseSettings(Section node) {
   BaseSettings settings;
-  Section model = node.section("model");
-  settings.drive.outlet = readOutlet(model, settings.law_name);
+  readModel(node.section("model"), settings);
   readLimitSets(node.section("limits"), settings);
   readInputs(node.section("inputs"), settings);
   readLocks(node.section("locks"), settings);
@@ -123,11 +121,9 @@ BaseSettings readBaseSettings(Section node) {
     throw node.error("longest_step",
                      "must be at least one period of rate: " + std::to_string(settings.drive.longest_step));
   }
-  Section odometry = node.section("odometry");
-  settings.odometry_names = {odometry.text("frame"), odometry.text("child_frame"),
-                             odometry.flag("publish_tf")};
-  settings.drive.noise = readNoise(odometry.section("noise"));
-  odometry.end();
+  settings.odometry = readOdometry(node.section("odometry"), settings.effects);
+  settings.drive.noise = settings.odometry.noise;
+  if (settings.odometry.imu) settings.drive.gyro = settings.odometry.imu->gyro;
   settings.diagnostic_period = node.above("diagnostic_period", 0);
   node.end();
   return settings;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/drive.h"
-#include "base/odometry.h"
+#include "base/odometry_settings.h"
 #include "params.h"
 
 namespace kurumaisu {
@@ -25,7 +25,8 @@ struct BaseSettings {
   BaseTopics topics;
   std::vector<std::string> limit_names;  ///< of DriveSettings::limits
   double rate;                           ///< of voltages and odometry [Hz]
-  OdometryNames odometry_names;
+  OdometrySettings odometry;
+  KnownEffects effects;      ///< the model file's, as far as they concern odometry
   double diagnostic_period;  ///< [s]
 };
 
@@ -33,7 +34,7 @@ struct BaseSettings {
 /// senseless.
 BaseSettings readBaseSettings(Section node);
 
-/// What the model file says of the voltages. The law that is in use, and its name.
+/// Takes what the model file says of the voltages, with the law that is in use, and its name.
 OutletSettings readOutlet(Section& model, std::string& law_name);
 
 /// Takes one set of limits.
