@@ -25,6 +25,7 @@ class YamlValue {
 
   /// "dac.yaml:7: "
   std::string place() const;
+  int line() const { return node_.Mark().line + 1; }
 
   Kind kind() const;
   bool flag() const;

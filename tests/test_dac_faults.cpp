@@ -91,12 +91,14 @@ TEST(DacFaults, AllIsSentThoughTheReferenceFails) {
 /// The board answers every command "OK". One that is answered late must not make the next one, which the board never
 /// heard, look obeyed.
 TEST(DacFaults, ALateReplyIsNotTakenForTheNextCommands) {
-  Rig rig(kMute);
+  d::Edits edits = kOneFrame;
+  edits.push_back(kNoRetry[0]);
+  Rig rig(edits);
   const auto converter = rig.open();
   converter->put(d::kNeutral);
-  rig.board.inject("late@8=0.08");  // 6 to 8 move; then 9 to 11 are told again before anything is trusted
+  rig.board.inject("late@4=0.08");
   EXPECT_TRUE(has(faultOf(*converter, d::kMoving), "DAC_NO_REPLY"));
-  rig.board.inject("deaf@9x6");
+  rig.board.inject("deaf@5x6");
   EXPECT_TRUE(has(faultOf(*converter, d::kNeutral), "DAC_NO_REPLY"));
   EXPECT_FALSE(rig.board.isNeutral(rig.board.volts()));
 }

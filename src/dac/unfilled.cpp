@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dac/unfilled.h"
 
+#include <map>
 #include <stdexcept>
 #include <string>
 
@@ -9,25 +10,28 @@ namespace {
 
 constexpr int kDepthMost = 10;  // an alias can name what it is in
 
-void collect(const YamlValue& value, int depth, std::string& found) {
+using Found = std::multimap<int, std::string>;  // messages by line
+
+void collect(const YamlValue& value, const std::string& key, int depth, Found& found) {
   if (depth > kDepthMost) return;
   if (value.kind() == Kind::kMapping) {
-    for (const auto& item : value.mapping()) collect(item.second, depth + 1, found);
+    for (const auto& item : value.mapping()) collect(item.second, item.first, depth + 1, found);
   } else if (value.kind() == Kind::kList) {
-    for (const YamlValue& each : value.list()) collect(each, depth + 1, found);
+    for (const YamlValue& each : value.list()) collect(each, key, depth + 1, found);
   } else if (value.kind() == Kind::kText && value.text().rfind(kUnfilled, 0) == 0) {
-    found += "\n" + value.place() + value.text();
+    found.emplace(value.line(), value.place() + key + ": " + value.text());
   }
 }
 
 }  // namespace
 
 void refuseUnfilled(const YamlValue& tree) {
-  std::string found;
-  collect(tree, 0, found);
+  Found found;
+  collect(tree, "", 0, found);
   if (found.empty()) return;
-  throw std::invalid_argument("this board cannot be used before its owner has filled in what is not known:" +
-                              found);
+  std::string message = "this board cannot be used before its owner has filled in what is not known:";
+  for (const auto& item : found) message += "\n" + item.second;
+  throw std::invalid_argument(message);
 }
 
 }  // namespace kurumaisu::dac
