@@ -10,8 +10,10 @@
 #include <atomic>
 #include <csignal>
 #include <exception>
+#include <memory>
 
 #include "base/command_input.h"
+#include "base/guard_dac.h"
 #include "base/last_word.h"
 #include "base/limits_server.h"
 #include "base/odometry_input.h"
@@ -20,6 +22,8 @@
 #include "base/report.h"
 #include "base/settings.h"
 #include "base/topic_dac.h"
+#include "guard/clock.h"
+#include "guard/realtime.h"
 
 namespace k = kurumaisu;
 
@@ -57,16 +61,19 @@ class BaseNode {
   void tell();
   void finish();
   void reportOdometry(Status& status);
+  void reportGuard(Status& status);
   static void diagnose(Status& status, const k::Report& report);
 
   k::BaseSettings settings_;
+  std::unique_ptr<k::GuardDac> guard_;  ///< or none
   k::TopicDac dac_;
   k::Drive drive_;
   k::LastWord last_word_;
-  k::Tally told_;                ///< at the last tick
-  k::Tally reported_;            ///< at the last diagnostics
-  std::string state_;            ///< at the last tick
-  double last_diagnostics_ = 0;  ///< [s]
+  k::Tally told_;                    ///< at the last tick
+  k::Tally reported_;                ///< at the last diagnostics
+  std::string state_;                ///< at the last tick
+  k::guard::Status reported_guard_;  ///< at the last diagnostics
+  double last_diagnostics_ = 0;      ///< [s]
   diagnostic_updater::Updater diagnostics_;
   k::OdometryOutput odom_;
   k::OdometryInput odom_input_;
@@ -81,7 +88,10 @@ class BaseNode {
 
 BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     : settings_(settings),
-      dac_(nh),
+      guard_(settings.dac.guard
+                 ? std::make_unique<k::GuardDac>(*settings.dac.guard, settings.drive.outlet.law)
+                 : nullptr),
+      dac_(nh, guard_.get()),
       drive_(settings.drive, dac_),
       last_word_([this] { finish(); }),
       odom_(nh, settings.odometry.names),
@@ -102,6 +112,9 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     reported_ = k::tally(drive_);
   });
   diagnostics_.add("odometry", [this](Status& status) { reportOdometry(status); });
+  const std::string refusal = guard_ ? k::guard::raiseThreads(settings_.dac.priority) : "";
+  if (!refusal.empty()) warn("BASE_NOT_REALTIME: busy cores may delay commands, and neutral: " + refusal);
+  if (guard_) diagnostics_.add("guard", [this](Status& status) { reportGuard(status); });
   const double period = 1.0 / settings_.rate;
   if (ros::Time::isSimTime()) {
     timer_ = nh.createTimer(ros::Duration(period), [this](const ros::TimerEvent&) { onTick(); });
@@ -176,6 +189,11 @@ void BaseNode::reportOdometry(Status& status) {
   diagnose(status,
            k::reportOdometry(reckoning, effects.unfollowed, effects.noise.has_value(), reported_gyro_));
   if (reckoning.gyro()) reported_gyro_ = reckoning.gyro()->counts();
+}
+
+void BaseNode::reportGuard(Status& status) {
+  diagnose(status, k::reportGuard(guard_->status(), reported_guard_, k::guard::monotonic()));
+  reported_guard_ = guard_->status();
 }
 
 void BaseNode::diagnose(Status& status, const k::Report& report) {

@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 
 #include "guard/log.h"
 
@@ -22,6 +23,18 @@ void makeRealtime(int priority) {
     say("GUARD_NOT_REALTIME",
         std::string("busy cores may delay neutral: SCHED_FIFO: ") + std::strerror(errno));
   }
+}
+
+std::string raiseThreads(int priority) {
+  if (priority == 0) return "";
+  sched_param parameters{};
+  parameters.sched_priority = priority;
+  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+    const auto thread = static_cast<pid_t>(std::stol(task.path().filename().string()));
+    if (sched_setscheduler(thread, SCHED_FIFO, &parameters) == 0 || errno == ESRCH) continue;
+    return std::string("SCHED_FIFO: ") + std::strerror(errno);
+  }
+  return "";
 }
 
 }  // namespace kurumaisu::guard

@@ -110,7 +110,14 @@ def _stories() -> Iterator[bytes]:
     """Yield stories for the guard: neutral is held (0), then motion (1), which each of the other events may end."""
     hold, drive = bytes([0, 40]), b"".join(struct.pack("<BBhh", 1, 20, 2000 * k, -1000 * k) for k in range(1, 13))
     message = struct.pack("<IHHQqddd", 0x4B475244, 1, 1, 50, 10**12, 0.1, 0.1, 2.5)
-    ends = [bytes([2]) + message, bytes([4, 200]), bytes([5]), bytes([6, 0, 6, 1]), bytes([6, 0]), bytes([7]) + 50 * b"x"]
+    ends = [
+        bytes([2]) + message,
+        bytes([4, 200]),
+        bytes([5]),
+        bytes([6, 0, 6, 1]),
+        bytes([6, 0]),
+        bytes([7]) + 50 * b"x",
+    ]
     ends += [struct.pack("<BBhhBQ", 3, 20, 20000, 0, word, 0x7FF8 << 48 | 1) for word in range(6)]
     ends += [struct.pack("<BBhhBBhIB", 3, 20, 20000, 0, 2, 0, made, 0, 0) for made in (-200, -30, 200)]
     ends += [struct.pack("<BBhhBIHH", 3, 20, 3000, 0, 0, 0x4B475244, 1, kind) for kind in (2, 9)]

@@ -36,6 +36,7 @@ class Case:
     bound: float | None
     strike: Callable[[Rig, Client], float]
     waits: bool = False  # the bound counts from the guard's timeout
+    first: bool = True  # the client has base_node's priority
 
 
 def _client(number: signal.Signals) -> Callable[[Rig, Client], float]:
@@ -81,6 +82,7 @@ def _unplug(rig: Rig, _client: Client) -> float:
 CASES = (
     Case("client exits", "exit", 0.010, _itself),
     Case("client SIGKILL", "wait", 0.010, _client(signal.SIGKILL)),
+    Case("... of ordinary priority", "wait", None, _client(signal.SIGKILL), first=False),
     Case("client SIGSEGV", "crash", 0.010, _itself),
     Case("client talks nonsense", "nonsense", 0.010, _itself),
     Case("client SIGSTOP", "wait", 0.020, _client(signal.SIGSTOP), waits=True),
@@ -98,7 +100,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="bench guard", description=__doc__)
     parser.add_argument("--times", type=int, default=50, help="repetitions of each")
     parser.add_argument("--only", default="", metavar="TEXT", help="only the cases with that text in their name")
-    parser.add_argument("--load", choices=("idle", "busy", "both"), default="both", help="all cores busy, or as they are")
+    parser.add_argument(
+        "--load", choices=("idle", "busy", "both"), default="both", help="all cores busy, or as they are"
+    )
     parser.add_argument("--seed", type=int, default=1, help="of the moments at which is struck")
     options = parser.parse_args(arguments)
     cases = [case for case in CASES if options.only in case.name]
@@ -159,7 +163,7 @@ def _p99(times: list[float]) -> float:
 def _once(rig: Rig, case: Case, dice: random.Random) -> float:
     """Arm, drive, strike; return the time to neutral [s], nan if it never came."""
     rig.start()
-    client = Client(rig.socket, case.mode)
+    client = Client(rig.socket, case.mode, rig.priority if case.first else 0)
     try:
         client.wait_armed()
         time.sleep(dice.uniform(0, _PHASE))
