@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Arbitrary bytes into the laser's parts and the guard, under sanitizers: what each survived, and how much of it was reached."""
+"""Arbitrary bytes into the laser's parts and the guard, under sanitizers: what each survived, and what was reached."""
 
 from __future__ import annotations
 

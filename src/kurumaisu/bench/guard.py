@@ -137,7 +137,7 @@ def _table(
                 bound = _bound(rig, case)
                 verdict = judge(times, bound, worst)
                 broken += verdict == "BROKEN"
-                figures = [1e3 * f(there) if there else math.nan for f in (min, np.median, _p99, max)]
+                figures = [1e3 * float(f(there)) if there else math.nan for f in (min, np.median, _p99, max)]
                 shown = "-" if bound is None else f"{1e3 * bound:.0f}"
                 table.row(case.name, str(len(times)), *figures, str(len(times) - len(there)), shown, verdict)
     return broken
