@@ -13,6 +13,7 @@
 #include "base/odometry_report.h"
 #include "base/reckoning.h"
 #include "base/yaw_rate.h"
+#include "base_drive.h"
 
 namespace k = kurumaisu;
 
@@ -265,15 +266,13 @@ class NoDac : public k::Dac {
 
 TEST(Placing, WhileItMovesCountsTheWayUpToThen) {
   NoDac dac;
-  const k::AxisLaw law{{1, 0.1}, {1, -0.1}};
-  k::DriveSettings settings{};
-  settings.law = {law, law};
-  settings.reference_voltage = 2.5;
-  settings.limits = {1.5, 1.5, 1.5};
-  settings.command_timeout = 10;
+  k::DriveSettings settings = k::test::driveSettings(k::test::kQuick);
+  settings.noise = {};
+  settings.arbiter.inputs[0].timeout = 10;
   k::Drive drive(settings, dac);
   drive.tick(10.0);
-  drive.command(1.0, 0.0, 10.0);
+  drive.command(0, "/a", {0.0, 0.0}, 10.0);  // released
+  drive.command(0, "/a", {1.0, 0.0}, 10.0);
   for (int i = 1; i <= 50; ++i) drive.tick(10.0 + i * kTick);
   const double v = drive.output().v;
   ASSERT_GT(v, 0);

@@ -1,21 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// cmd_vel in; voltages, odom, tf and diagnostics out. What it does with them is in drive.h.
+// Commands in; voltages, cmd_vel_out, odom, tf and diagnostics out. What it does with them is in drive.h.
 #include <diagnostic_updater/diagnostic_updater.h>
-#include <geometry_msgs/Twist.h>
-#include <kurumaisu/Voltages.h>
+#include <geometry_msgs/TwistStamped.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <ros/xmlrpc_manager.h>
+#include <std_msgs/String.h>
 
 #include <atomic>
 #include <csignal>
 #include <exception>
 
+#include "base/command_input.h"
+#include "base/last_word.h"
+#include "base/limits_server.h"
 #include "base/odometry_input.h"
 #include "base/odometry_output.h"
 #include "base/odometry_report.h"
 #include "base/report.h"
 #include "base/settings.h"
+#include "base/topic_dac.h"
 
 namespace k = kurumaisu;
 
@@ -23,53 +27,16 @@ namespace {
 
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
-constexpr double kWarningPeriod = 1.0;  // [s] of throttled warnings
-constexpr int kLastSamples = 5;         // of neutral at the end, with
-constexpr double kLastPause = 0.02;     // [s] after each, time for it to leave the process
+constexpr int kLastSamples = 5;      // of neutral at the end, with
+constexpr double kLastPause = 0.02;  // [s] after each, time for it to leave the process
 
 std::atomic<bool> stop_requested{false};
-
-/// The D/A converter as a topic: for the simulator and for drivers in other processes.
-class TopicDac : public k::Dac {
- public:
-  explicit TopicDac(ros::NodeHandle& nh) : publisher_(nh.advertise<k::Voltages>("voltages", 10)) {
-    stamp = ros::Time::now();
-  }
-
-  void put(const k::Output& output) override {
-    k::Voltages message;
-    message.header.stamp = stamp;
-    message.translation = output.translation;
-    message.steering = output.steering;
-    message.reference = output.reference;
-    message.v = output.v;
-    message.w = output.w;
-    publisher_.publish(message);
-  }
-
-  ros::Time stamp;  ///< of the next sample
-
- private:
-  ros::Publisher publisher_;
-};
 
 void warn(const std::string& text) { ROS_WARN("%s", text.c_str()); }
 
 void logLaw(const std::string& name, const std::string& ambiguity) {
   ROS_INFO("voltage law: %s", name.c_str());
   if (!ambiguity.empty()) warn("BASE_AMBIGUOUS_LAW: " + name + ": " + ambiguity);
-}
-
-void warnIgnored(const geometry_msgs::Twist& twist) {
-  ROS_WARN_THROTTLE(kWarningPeriod,
-                    "BASE_IGNORED_COMPONENT: cmd_vel: only linear.x and angular.z are obeyed: linear.y %g, "
-                    "linear.z %g, angular.x %g, angular.y %g",
-                    twist.linear.y, twist.linear.z, twist.angular.x, twist.angular.y);
-}
-
-void warnRefused(const geometry_msgs::Twist& twist) {
-  ROS_WARN_THROTTLE(kWarningPeriod, "BASE_BAD_COMMAND: cmd_vel: refused: linear.x %g, angular.z %g",
-                    twist.linear.x, twist.angular.z);
 }
 
 /// Time [s] of the control loop: simulated time, or one that nobody can set.
@@ -85,22 +52,29 @@ class BaseNode {
   void run();
 
  private:
-  void onCommand(const geometry_msgs::Twist& twist);
   void onTick();
+  void publish();
+  void tell();
   void finish();
   void reportOdometry(Status& status);
   static void diagnose(Status& status, const k::Report& report);
 
   k::BaseSettings settings_;
-  TopicDac dac_;
+  k::TopicDac dac_;
   k::Drive drive_;
-  k::DriveCounts reported_;      ///< at the last diagnostics
+  k::LastWord last_word_;
+  k::Tally told_;                ///< at the last tick
+  k::Tally reported_;            ///< at the last diagnostics
+  std::string state_;            ///< at the last tick
   double last_diagnostics_ = 0;  ///< [s]
   diagnostic_updater::Updater diagnostics_;
   k::OdometryOutput odom_;
   k::OdometryInput odom_input_;
   k::GyroCounts reported_gyro_;  ///< at the last diagnostics
-  ros::Subscriber cmd_vel_;
+  ros::Publisher cmd_vel_out_;
+  ros::Publisher active_input_;
+  k::CommandInput input_;
+  k::LimitsServer limits_;
   ros::Timer timer_;
   ros::SteadyTimer steady_timer_;
 };
@@ -109,20 +83,25 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     : settings_(settings),
       dac_(nh),
       drive_(settings.drive, dac_),
+      last_word_([this] { finish(); }),
       odom_(nh, settings.odometry.names),
-      odom_input_(nh, drive_, settings.odometry, loopTime) {
-  logLaw(settings_.law_name, k::ambiguity(drive_));
+      odom_input_(nh, drive_, settings.odometry, loopTime),
+      cmd_vel_out_(nh.advertise<geometry_msgs::TwistStamped>("cmd_vel_out", 10)),
+      active_input_(nh.advertise<std_msgs::String>("active_input", 1, true)),
+      input_(nh, settings.topics, drive_, [] { return loopTime(ros::Time::now()); }),
+      limits_(settings.limit_names, drive_) {
+  logLaw(settings_.law_name, k::ambiguity(drive_.outlet()));
   const std::string unfollowed = k::unfollowedWarning(settings.effects.unfollowed);
   if (!unfollowed.empty()) warn(unfollowed);
   diagnostics_.setHardwareID("none");
-  diagnostics_.add("voltage law",
-                   [this](Status& status) { diagnose(status, k::reportLaw(drive_, settings_.law_name)); });
+  diagnostics_.add("voltage law", [this](Status& status) {
+    diagnose(status, k::reportLaw(drive_.outlet(), settings_.law_name));
+  });
   diagnostics_.add("commands", [this](Status& status) {
     diagnose(status, k::reportCommands(drive_, reported_));
-    reported_ = drive_.counts();
+    reported_ = k::tally(drive_);
   });
   diagnostics_.add("odometry", [this](Status& status) { reportOdometry(status); });
-  cmd_vel_ = nh.subscribe("cmd_vel", 10, &BaseNode::onCommand, this, ros::TransportHints().tcpNoDelay());
   const double period = 1.0 / settings_.rate;
   if (ros::Time::isSimTime()) {
     timer_ = nh.createTimer(ros::Duration(period), [this](const ros::TimerEvent&) { onTick(); });
@@ -152,32 +131,43 @@ void BaseNode::finish() {
   }
 }
 
-void BaseNode::onCommand(const geometry_msgs::Twist& twist) {
-  if (twist.linear.y != 0 || twist.linear.z != 0 || twist.angular.x != 0 || twist.angular.y != 0) {
-    drive_.countIgnored();
-    warnIgnored(twist);
-  }
-  if (!drive_.command(twist.linear.x, twist.angular.z, loopTime(ros::Time::now()))) warnRefused(twist);
-}
-
 void BaseNode::onTick() {
   dac_.stamp = ros::Time::now();
   const double t = loopTime(dac_.stamp);
-  const std::uint64_t timeouts = drive_.counts().timeouts;
   const k::Drive::Tick tick = drive_.tick(t);
-  if (drive_.counts().timeouts > timeouts) {
-    warn("BASE_COMMAND_TIMEOUT: cmd_vel: nothing for " + std::to_string(settings_.drive.command_timeout) +
-         " s: neutral");
-  }
   if (tick == k::Drive::Tick::kReset) {
     warn("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");
   }
   odom_input_.check();
-  if (tick != k::Drive::Tick::kRepeated) odom_.publish(drive_.odometry(), dac_.stamp);
+  if (tick != k::Drive::Tick::kRepeated) publish();
+  tell();
   if (std::abs(t - last_diagnostics_) >= settings_.diagnostic_period) {
     last_diagnostics_ = t;
     diagnostics_.force_update();  // update() would fall silent when the clock is set back
   }
+}
+
+void BaseNode::publish() {
+  odom_.publish(drive_.odometry(), dac_.stamp);
+  geometry_msgs::TwistStamped survived;
+  survived.header.stamp = dac_.stamp;
+  survived.header.frame_id = settings_.odometry.names.child_frame;
+  survived.twist.linear.x = drive_.output().v;
+  survived.twist.angular.z = drive_.output().w;
+  cmd_vel_out_.publish(survived);
+}
+
+/// Says what has changed.
+void BaseNode::tell() {
+  const std::string warning = k::warningOf(drive_, told_, state_);
+  if (!warning.empty()) warn(warning);
+  told_ = k::tally(drive_);
+  const std::string state = k::stateOf(drive_);
+  if (state == state_) return;
+  state_ = state;
+  std_msgs::String active;
+  active.data = k::activeInput(drive_);
+  active_input_.publish(active);
 }
 
 void BaseNode::reportOdometry(Status& status) {
@@ -189,7 +179,7 @@ void BaseNode::reportOdometry(Status& status) {
 }
 
 void BaseNode::diagnose(Status& status, const k::Report& report) {
-  status.summary(report.warning ? Status::WARN : Status::OK, report.summary);
+  status.summary(report.error ? Status::ERROR : report.warning ? Status::WARN : Status::OK, report.summary);
   for (const auto& [name, value] : report.values) status.add(name, value);
 }
 
