@@ -97,6 +97,29 @@ class Commander:
             self.publisher.publish(twist)
 
 
+class Repeated:
+    """Repeats what a function makes at a fixed period [s] of wall time, until it is silenced."""
+
+    def __init__(self, topic: str, kind: type, period: float) -> None:
+        self._publisher = rospy.Publisher(topic, kind, queue_size=10, tcp_nodelay=True)
+        self._make: Callable[[], Any] | None = None
+        self._repeater = _Repeater(period, self._publish)
+
+    def say(self, make: Callable[[], Any] | None) -> None:
+        """From now on publish what `make` returns; None: nothing."""
+        self._make = make
+
+    def close(self) -> None:
+        """End the topic."""
+        self._repeater.close()
+        self._publisher.unregister()
+
+    def _publish(self) -> None:
+        make = self._make
+        if make is not None:
+            self._publisher.publish(make())
+
+
 class SimulatedClock:
     """/clock at so many times the wall's pace, in steps of 20 ms of simulated time."""
 
