@@ -16,14 +16,14 @@ from kurumaisu import settings
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.settings import Section
-from kurumaisu.teleop import REST
+from kurumaisu.teleop import ALLOW, REST
 from kurumaisu.teleop.device import Axis, Joystick
 from kurumaisu.teleop.keys import DIRECTIONS, HELP, Keys, KeySettings, read_keys
 from kurumaisu.teleop.reader import Reader, open_device
 from kurumaisu.teleop.stick import Stick, StickSettings, read_stick
 from kurumaisu.teleop.terminal import Terminal
 
-STICK = StickSettings(axis_v=1, axis_w=0, dead_man=4, v=0.4, w=0.6, fast=5, fast_factor=2.0, timeout=0.3)
+STICK = StickSettings(axis_v=1, axis_w=0, dead_man=4, v=0.4, w=0.6, fast=5, fast_factor=2.0, allow=2, timeout=0.3)
 KEYS = KeySettings(v=0.3, w=0.4, v_max=0.5, w_max=1.0, step=0.1, timeout=0.5)
 HELD, LET_GO = (0, 0, 0, 0, 1, 0), (0,) * 6
 
@@ -40,6 +40,15 @@ def test_the_stick_drives_while_the_dead_man_is_held():
     assert stick.command(10.2) == REST
     stick.hear((0.5, 1.0), (0, 0, 0, 0, 0, 1), 10.3)  # fast alone is no dead-man
     assert stick.command(10.3) == REST
+
+
+def test_under_supervision_others_drive():
+    stick = Stick(STICK)
+    stick.hear((0.5, 1.0), (0, 0, 1, 0, 0, 0), 10.0)
+    assert stick.command(10.0) == ALLOW
+    assert stick.command(10.4) == REST
+    stick.hear((0.5, 1.0), (0, 0, 1, 0, 1, 0), 10.5)
+    assert stick.command(10.5).drives  # who holds both drives himself
 
 
 def test_a_silent_joystick_is_a_dead_man_let_go_for_good():

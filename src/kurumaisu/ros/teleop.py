@@ -17,7 +17,7 @@ from kurumaisu.params import shipped
 from kurumaisu.settings import Section
 from kurumaisu.teleop import REST, Command
 
-_ZEROS = 10  # commands to rest after the dead-man was let go; then silence, so that others may drive
+_LAST_WORDS = 10  # of rest, or of a dead-man that was let go, in case one is not heard
 
 T = TypeVar("T")
 
@@ -36,18 +36,21 @@ def overlaid(name: str, read: Callable[[Section], T]) -> tuple[float, T]:
 
 
 class Hand:
-    """Publishes what somebody asks for on cmd_vel, and on dead_man whether he holds it."""
+    """Publishes what somebody asks for, and on dead_man whether he holds it.
 
-    def __init__(self) -> None:
-        self._commands = rospy.Publisher("cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
+    Both are silent after a while of rest, so that others may drive, or hold a dead-man, too.
+    """
+
+    def __init__(self, topic: str) -> None:
+        self._commands = rospy.Publisher(topic, Twist, queue_size=1, tcp_nodelay=True)
         self._dead_man = rospy.Publisher("dead_man", Bool, queue_size=1, tcp_nodelay=True)
-        self._zeros = 0
+        self._last_words = {"commands": 0, "dead_man": 0}
 
     def say(self, command: Command) -> None:
         """Publish one command; to be called at the rate."""
-        self._dead_man.publish(Bool(command.held))
-        self._zeros = _ZEROS if command.held else max(self._zeros - 1, 0)
-        if command.held or self._zeros:
+        if self._speaks("dead_man", command.held):
+            self._dead_man.publish(Bool(command.held))
+        if self._speaks("commands", command.drives):
             twist = Twist()
             twist.linear.x, twist.angular.z = command.v, command.w
             self._commands.publish(twist)
@@ -57,6 +60,11 @@ class Hand:
         for _ in range(3):
             self.say(REST)
             time.sleep(period)
+
+    def _speaks(self, what: str, active: bool) -> bool:
+        left = _LAST_WORDS if active else max(self._last_words[what] - 1, 0)
+        self._last_words[what] = left
+        return left > 0
 
 
 def run(node: Callable[[], None]) -> int:

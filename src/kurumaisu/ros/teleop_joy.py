@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""teleop_joy: joy to cmd_vel and dead_man."""
+"""teleop_joy: joy to joy_vel and dead_man."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _drive() -> None:
                 f"TELEOP_BAD_JOY: joy: refused: {len(joy.axes)} axes, {len(joy.buttons)} buttons: {list(joy.axes)}",
             )
 
-    hand = Hand()
+    hand = Hand("joy_vel")
     rospy.Subscriber("joy", Joy, on_joy, queue_size=1, tcp_nodelay=True)
     rested = threading.Event()
 

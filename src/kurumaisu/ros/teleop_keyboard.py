@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""teleop_keyboard: keys of a terminal to cmd_vel and dead_man."""
+"""teleop_keyboard: keys of a terminal to key_vel and dead_man."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def main() -> int:
 def _drive() -> None:
     rate, key_settings = overlaid("teleop_keyboard.yaml", read_keys)
     with Terminal(sys.stdin.fileno()) as terminal:
-        hand = Hand()
+        hand = Hand("key_vel")
         try:
             _follow(terminal, hand, key_settings, 1 / rate)
         finally:

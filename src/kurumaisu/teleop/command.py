@@ -8,11 +8,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Command:
-    """v forward [m/s], w to the left [rad/s]; held: somebody holds the dead-man."""
+    """v forward [m/s], w to the left [rad/s]; held: somebody holds the dead-man; drives: and wants to drive himself."""
 
     v: float
     w: float
     held: bool
+    drives: bool = True
 
 
-REST = Command(0.0, 0.0, held=False)
+REST = Command(0.0, 0.0, held=False, drives=False)
+ALLOW = Command(0.0, 0.0, held=True, drives=False)  # others may drive

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kurumaisu.settings import Section
-from kurumaisu.teleop.command import REST, Command
+from kurumaisu.teleop.command import ALLOW, REST, Command
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,7 @@ class StickSettings:
     w: float
     fast: int
     fast_factor: float
+    allow: int
     timeout: float
 
 
@@ -35,6 +36,7 @@ def read_stick(section: Section) -> StickSettings:
         w=section.number("w", above=0),
         fast=section.integer("fast", at_least=-1),
         fast_factor=section.number("fast_factor", at_least=1),
+        allow=section.integer("allow", at_least=-1),
         timeout=section.number("timeout", above=0),
     )
 
@@ -64,12 +66,12 @@ class Stick:
 
     def _read(self, axes: Sequence[float], buttons: Sequence[int]) -> Command | None:
         s = self._settings
-        if max(s.axis_v, s.axis_w) >= len(axes) or max(s.dead_man, s.fast) >= len(buttons):
+        if max(s.axis_v, s.axis_w) >= len(axes) or max(s.dead_man, s.fast, s.allow) >= len(buttons):
             return None
         v, w = axes[s.axis_v], axes[s.axis_w]
         if not (abs(v) <= 1 and abs(w) <= 1):  # NaN, too
             return None
         if not buttons[s.dead_man]:
-            return REST
+            return ALLOW if s.allow >= 0 and buttons[s.allow] else REST
         factor = s.fast_factor if s.fast >= 0 and buttons[s.fast] else 1.0
         return Command(factor * s.v * v, s.w * w, held=True)
