@@ -53,6 +53,7 @@ class BaseNode {
 
  private:
   void onTick();
+  void act();
   void publish();
   void tell();
   void finish();
@@ -88,7 +89,8 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
       odom_input_(nh, drive_, settings.odometry, loopTime),
       cmd_vel_out_(nh.advertise<geometry_msgs::TwistStamped>("cmd_vel_out", 10)),
       active_input_(nh.advertise<std_msgs::String>("active_input", 1, true)),
-      input_(nh, settings.topics, drive_, [] { return loopTime(ros::Time::now()); }),
+      input_(
+          nh, settings.topics, drive_, [] { return loopTime(ros::Time::now()); }, [this] { act(); }),
       limits_(settings.limit_names, drive_) {
   logLaw(settings_.law_name, k::ambiguity(drive_.outlet()));
   const std::string unfollowed = k::unfollowedWarning(settings.effects.unfollowed);
@@ -145,6 +147,13 @@ void BaseNode::onTick() {
     last_diagnostics_ = t;
     diagnostics_.force_update();  // update() would fall silent when the clock is set back
   }
+}
+
+/// A word is obeyed at once, not at the next tick. Simulated time has its ticks only: one seed, one run.
+void BaseNode::act() {
+  if (ros::Time::isSimTime()) return;
+  dac_.stamp = ros::Time::now();
+  drive_.tick(loopTime(dac_.stamp));
 }
 
 void BaseNode::publish() {

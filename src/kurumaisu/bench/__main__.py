@@ -24,6 +24,7 @@ NAMES = (
     "faults",
     "fuzz",
     "base",
+    "drive",
     "slam",
     "predict",
 )
