@@ -44,7 +44,7 @@ def run_drive(
         raise Error(f"{topic} is published already, by {', '.join(others)}")
     if not hearers(topic, care.patience):
         raise Error(f"nobody hears {topic}")
-    recorder = Recorder(bag, tuple({topic, *RECORDED})) if bag is not None else None
+    recorder = Recorder(bag, tuple(dict.fromkeys((topic, *RECORDED)))) if bag is not None else None
     try:
         return _Driver(script, care, model, ground, topic).run(stop)
     finally:

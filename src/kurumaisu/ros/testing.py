@@ -76,6 +76,10 @@ class Commander:
         """From now on command v [m/s], w [rad/s]."""
         twist = Twist()
         twist.linear.x, twist.angular.z = v, w
+        self.repeat(twist)
+
+    def repeat(self, twist: Twist) -> None:
+        """From now on publish this."""
         self._twist = twist
 
     def silence(self) -> None:
