@@ -7,6 +7,7 @@
 #include <ros/xmlrpc_manager.h>
 #include <std_msgs/String.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <exception>
@@ -27,6 +28,7 @@ namespace {
 
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
+constexpr double kGlance = 0.02;     // [s] longest wait for anything
 constexpr int kLastSamples = 5;      // of neutral at the end, with
 constexpr double kLastPause = 0.02;  // [s] after each, time for it to leave the process
 
@@ -53,6 +55,8 @@ class BaseNode {
 
  private:
   void onTick();
+  ros::SteadyTime tickAfter(const ros::SteadyTime& due);
+  static ros::SteadyTime listen(const ros::SteadyTime& until);
   void act();
   void publish();
   void tell();
@@ -76,8 +80,7 @@ class BaseNode {
   ros::Publisher active_input_;
   k::CommandInput input_;
   k::LimitsServer limits_;
-  ros::Timer timer_;
-  ros::SteadyTimer steady_timer_;
+  ros::Timer timer_;  ///< of simulated time
 };
 
 BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
@@ -104,25 +107,38 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     reported_ = k::tally(drive_);
   });
   diagnostics_.add("odometry", [this](Status& status) { reportOdometry(status); });
-  const double period = 1.0 / settings_.rate;
   if (ros::Time::isSimTime()) {
-    timer_ = nh.createTimer(ros::Duration(period), [this](const ros::TimerEvent&) { onTick(); });
-  } else {
-    // A system clock that is set back would stall ros::Timer, and the chair would drive on.
-    steady_timer_ =
-        nh.createSteadyTimer(ros::WallDuration(period), [this](const ros::SteadyTimerEvent&) { onTick(); });
+    timer_ =
+        nh.createTimer(ros::Duration(1.0 / settings_.rate), [this](const ros::TimerEvent&) { onTick(); });
   }
 }
 
 void BaseNode::run() {
-  const ros::WallDuration longest_wait(0.02);
   try {
-    while (ros::ok() && !stop_requested) ros::getGlobalCallbackQueue()->callAvailable(longest_wait);
+    ros::SteadyTime due = ros::SteadyTime::now();
+    while (ros::ok() && !stop_requested) due = ros::Time::isSimTime() ? listen(due) : tickAfter(due);
   } catch (...) {
     finish();
     throw;
   }
   finish();
+}
+
+/// Works on what comes until the tick that is due, and ticks; returns when the next one is due. No ros::Timer: a
+/// system clock that is set back would stall it, and the chair would drive on; and its thread costs more than all this.
+ros::SteadyTime BaseNode::tickAfter(const ros::SteadyTime& due) {
+  const ros::SteadyTime now = listen(due);
+  if (now < due) return due;
+  onTick();
+  const ros::SteadyTime next = due + ros::WallDuration(1.0 / settings_.rate);
+  return next < now ? now : next;  // ticks that were missed are not made up for
+}
+
+/// Works on what comes, waiting for it until a time, but not so long that a signal waits; returns the time.
+ros::SteadyTime BaseNode::listen(const ros::SteadyTime& until) {
+  const double wait = ros::Time::isSimTime() ? kGlance : (until - ros::SteadyTime::now()).toSec();
+  ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(std::clamp(wait, 0.0, kGlance)));
+  return ros::SteadyTime::now();
 }
 
 void BaseNode::finish() {
