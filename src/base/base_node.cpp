@@ -11,8 +11,10 @@
 #include <atomic>
 #include <csignal>
 #include <exception>
+#include <memory>
 
 #include "base/command_input.h"
+#include "base/guard_dac.h"
 #include "base/last_word.h"
 #include "base/limits_server.h"
 #include "base/odometry_input.h"
@@ -21,6 +23,8 @@
 #include "base/report.h"
 #include "base/settings.h"
 #include "base/topic_dac.h"
+#include "guard/clock.h"
+#include "guard/realtime.h"
 
 namespace k = kurumaisu;
 
@@ -62,16 +66,20 @@ class BaseNode {
   void tell();
   void finish();
   void reportOdometry(Status& status);
+  void reportGuard(Status& status);
   static void diagnose(Status& status, const k::Report& report);
 
   k::BaseSettings settings_;
+  std::unique_ptr<k::GuardDac> guard_;  ///< or none
   k::TopicDac dac_;
   k::Drive drive_;
   k::LastWord last_word_;
-  k::Tally told_;                ///< at the last tick
-  k::Tally reported_;            ///< at the last diagnostics
-  std::string state_;            ///< at the last tick
-  double last_diagnostics_ = 0;  ///< [s]
+  k::Tally told_;                    ///< at the last tick
+  k::Tally reported_;                ///< at the last diagnostics
+  std::string state_;                ///< at the last tick
+  k::guard::Status reported_guard_;  ///< at the last diagnostics
+  double last_diagnostics_ = 0;      ///< [s]
+  bool heard_ = false;               ///< a word that may change what is put out
   diagnostic_updater::Updater diagnostics_;
   k::OdometryOutput odom_;
   k::OdometryInput odom_input_;
@@ -85,7 +93,10 @@ class BaseNode {
 
 BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     : settings_(settings),
-      dac_(nh),
+      guard_(settings.dac.guard
+                 ? std::make_unique<k::GuardDac>(*settings.dac.guard, settings.drive.outlet.law)
+                 : nullptr),
+      dac_(nh, guard_.get()),
       drive_(settings.drive, dac_),
       last_word_([this] { finish(); }),
       odom_(nh, settings.odometry.names),
@@ -93,7 +104,7 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
       cmd_vel_out_(nh.advertise<geometry_msgs::TwistStamped>("cmd_vel_out", 10)),
       active_input_(nh.advertise<std_msgs::String>("active_input", 1, true)),
       input_(
-          nh, settings.topics, drive_, [] { return loopTime(ros::Time::now()); }, [this] { act(); }),
+          nh, settings.topics, drive_, [] { return loopTime(ros::Time::now()); }, [this] { heard_ = true; }),
       limits_(settings.limit_names, drive_) {
   logLaw(settings_.law_name, k::ambiguity(drive_.outlet()));
   const std::string unfollowed = k::unfollowedWarning(settings.effects.unfollowed);
@@ -107,6 +118,9 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     reported_ = k::tally(drive_);
   });
   diagnostics_.add("odometry", [this](Status& status) { reportOdometry(status); });
+  const std::string refusal = guard_ ? k::guard::raiseThreads(settings_.dac.priority) : "";
+  if (!refusal.empty()) warn("BASE_NOT_REALTIME: busy cores may delay commands, and neutral: " + refusal);
+  if (guard_) diagnostics_.add("guard", [this](Status& status) { reportGuard(status); });
   if (ros::Time::isSimTime()) {
     timer_ =
         nh.createTimer(ros::Duration(1.0 / settings_.rate), [this](const ros::TimerEvent&) { onTick(); });
@@ -124,11 +138,16 @@ void BaseNode::run() {
   finish();
 }
 
-/// Works on what comes until the tick that is due, and ticks; returns when the next one is due. No ros::Timer: a
-/// system clock that is set back would stall it, and the chair would drive on; and its thread costs more than all this.
+/// Works on what comes until the tick that is due, and ticks; returns when the next one is due. No ros::Timer:
+/// a system clock that is set back would stall it, and the chair would drive on; and its thread costs as much
+/// as all this.
 ros::SteadyTime BaseNode::tickAfter(const ros::SteadyTime& due) {
   const ros::SteadyTime now = listen(due);
-  if (now < due) return due;
+  if (now < due) {
+    if (heard_) act();
+    return due;
+  }
+  heard_ = false;
   onTick();
   const ros::SteadyTime next = due + ros::WallDuration(1.0 / settings_.rate);
   return next < now ? now : next;  // ticks that were missed are not made up for
@@ -165,9 +184,10 @@ void BaseNode::onTick() {
   }
 }
 
-/// A word is obeyed at once, not at the next tick. Simulated time has its ticks only: one seed, one run.
+/// Words are obeyed at once, not at the next tick; those that came together, together. In simulated time there
+/// are ticks only: one seed, one run.
 void BaseNode::act() {
-  if (ros::Time::isSimTime()) return;
+  heard_ = false;
   dac_.stamp = ros::Time::now();
   drive_.tick(loopTime(dac_.stamp));
 }
@@ -201,6 +221,11 @@ void BaseNode::reportOdometry(Status& status) {
   diagnose(status,
            k::reportOdometry(reckoning, effects.unfollowed, effects.noise.has_value(), reported_gyro_));
   if (reckoning.gyro()) reported_gyro_ = reckoning.gyro()->counts();
+}
+
+void BaseNode::reportGuard(Status& status) {
+  diagnose(status, k::reportGuard(guard_->status(), reported_guard_, k::guard::monotonic()));
+  reported_guard_ = guard_->status();
 }
 
 void BaseNode::diagnose(Status& status, const k::Report& report) {

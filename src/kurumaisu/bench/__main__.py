@@ -23,6 +23,7 @@ NAMES = (
     "laser_clock",
     "faults",
     "fuzz",
+    "guard",
     "base",
     "drive",
     "slam",
