@@ -40,7 +40,10 @@ inline DriveSettings driveSettings(const Limits& limits) {
 
 class Recorder : public Dac {
  public:
-  void put(const Output& output) override { outputs.push_back(output); }
+  Output put(const Output& output) override {
+    outputs.push_back(output);
+    return output;
+  }
   const Output& last() const { return outputs.back(); }
   std::vector<Output> outputs;
 };

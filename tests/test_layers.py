@@ -70,7 +70,10 @@ CPP_RULES = [
     Rule(r"follow/", r'"(?!follow/|bindings\.h)', "following rests on nothing"),
     Rule(r"scip/", r'"(?!scip/)', "the protocol rests on nothing"),
     Rule(r"virtual_urg/", r'"(?!scip/|virtual_urg/|bindings\.h)', "the virtual sensor shares the protocol only"),
-    Rule(r"laser/", r'"(?!scip/|laser/|params\.h)', "the driver rests on the protocol only"),
+    Rule(r"laser/", r'"(?!scip/|serial/|laser/|params\.h)', "the driver rests on the protocol and the port only"),
+    Rule(r"serial/", r'"(?!serial/)', "a port rests on nothing"),
+    # a virtual board is plugged in and out as a virtual sensor is
+    Rule(r"dac/(?!virtual_)", r'"(?!dac/|serial/|yaml\.h)', "what moves the chair rests on the port only"),
     Rule(r"(kalman|raycast)/", r'"(?!model/|kalman/|raycast/|bindings\.h)', "numerics rest on the equations at most"),
 ]
 

@@ -112,6 +112,12 @@ Value nodeValues() {
                           "heading_per_distance", "heading_per_turn"}) {
     v["odometry"]["noise"][key] = 0.01;
   }
+  v["dac"]["kind"] = std::string("topic");
+  v["dac"]["reply_wait"] = 0.01;
+  v["dac"]["retry_pause"] = 0.1;
+  v["dac"]["priority"] = 20;
+  v["guard"]["socket"] = std::string("/somewhere");
+  v["guard"]["what_is_the_guards_own"] = true;
   v["odometry"]["imu"]["use"] = false;
   v["odometry"]["imu"]["axis"] = std::string("tf");
   for (const char* key :
@@ -215,6 +221,21 @@ TEST(BaseSettings, AreReadFromAWholeConfiguration) {
   EXPECT_EQ(settings.drive.arbiter.inputs[1].limits, 1U);
   EXPECT_EQ(settings.drive.arbiter.locks[0].timeout, 0.3);
   EXPECT_EQ(settings.rate, 50.0);
+}
+
+TEST(BaseSettings, AGuardIsChosenByItsName) {
+  Value v = nodeValues();
+  EXPECT_FALSE(k::readBaseSettings({v, "/n"}).dac.guard);
+  v["dac"]["kind"] = std::string("guard");
+  const k::DacSettings dac = k::readBaseSettings({v, "/n"}).dac;
+  EXPECT_EQ(dac.guard->socket, "/somewhere");
+  EXPECT_EQ(dac.guard->reply_wait, 0.01);
+  EXPECT_EQ(dac.priority, 20);
+  v["dac"]["kind"] = std::string("serial");
+  EXPECT_EQ(complaint([&v] {
+              k::readBaseSettings({v, "/n"});
+            }),
+            "/n/dac/kind: must be one of topic, guard: serial");
 }
 
 namespace {

@@ -153,6 +153,18 @@ def test_world_loads(path):
     call("kurumaisu.world:load_world", path)
 
 
+def test_unit_names_what_is_installed():
+    """A service starts without any environment: its paths are whole ones."""
+    unit = SHARE / "launch/systemd/kurumaisu-guard.service"
+    prefix = SHARE.parents[1]
+    if not (prefix / "lib/kurumaisu/guard").exists():
+        pytest.skip("the unit is made by installing")
+    paths = re.findall(rf"{re.escape(str(prefix))}/[\w./]+", unit.read_text())
+    assert f"ExecStart={prefix}/lib/kurumaisu/guard" in unit.read_text()
+    assert len(paths) >= 5
+    assert [path for path in paths if not Path(path).exists()] == []
+
+
 def test_model_loads():
     call("kurumaisu.params:load_model", SHARE / "launch/md100.yaml")
 

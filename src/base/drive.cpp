@@ -92,8 +92,7 @@ void Drive::place(const Pose2D& pose, const Eigen::Matrix3d& covariance, double 
 }
 
 void Drive::put(const Rates& rates) {
-  output_ = outlet_.at(rates.v, rates.w);
-  dac_.put(output_);
+  output_ = dac_.put(outlet_.at(rates.v, rates.w));
 }
 
 }  // namespace kurumaisu

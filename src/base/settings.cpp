@@ -121,6 +121,7 @@ BaseSettings readBaseSettings(Section node) {
     throw node.error("longest_step",
                      "must be at least one period of rate: " + std::to_string(settings.drive.longest_step));
   }
+  settings.dac = readDac(node.section("dac"), node.section("guard"));
   settings.odometry = readOdometry(node.section("odometry"), settings.effects);
   settings.drive.noise = settings.odometry.noise;
   if (settings.odometry.imu) settings.drive.gyro = settings.odometry.imu->gyro;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/dac_settings.h"
 #include "base/drive.h"
 #include "base/odometry_settings.h"
 #include "params.h"
@@ -22,6 +23,7 @@ struct BaseTopics {
 struct BaseSettings {
   std::string law_name;
   DriveSettings drive;
+  DacSettings dac;
   BaseTopics topics;
   std::vector<std::string> limit_names;  ///< of DriveSettings::limits
   double rate;                           ///< of voltages and odometry [Hz]

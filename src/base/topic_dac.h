@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The D/A converter as a topic: for the simulator and for drivers in other processes.
+// The D/A converter as a topic: for the simulator, for drivers in other processes, and for the record.
 #pragma once
 
 #include <kurumaisu/Voltages.h>
@@ -11,10 +11,12 @@ namespace kurumaisu {
 
 class TopicDac : public Dac {
  public:
-  explicit TopicDac(ros::NodeHandle& nh)
-      : stamp(ros::Time::now()), publisher_(nh.advertise<Voltages>("voltages", 10)) {}
+  /// converter: gets every sample first, and what it really holds is published; or none.
+  TopicDac(ros::NodeHandle& nh, Dac* converter)
+      : stamp(ros::Time::now()), converter_(converter), publisher_(nh.advertise<Voltages>("voltages", 10)) {}
 
-  void put(const Output& output) override {
+  Output put(const Output& asked) override {
+    const Output output = converter_ != nullptr ? converter_->put(asked) : asked;
     Voltages message;
     message.header.stamp = stamp;
     message.translation = output.translation;
@@ -23,11 +25,13 @@ class TopicDac : public Dac {
     message.v = output.v;
     message.w = output.w;
     publisher_.publish(message);
+    return output;
   }
 
   ros::Time stamp;  ///< of the next sample
 
  private:
+  Dac* converter_;
   ros::Publisher publisher_;
 };
 

@@ -2,53 +2,16 @@
 // A line to a sensor, whatever it is made of.
 #pragma once
 
-#include <chrono>
-#include <cstddef>
-#include <stdexcept>
-#include <string>
-#include <string_view>
+#include "serial/port.h"
 
 namespace kurumaisu::laser {
 
-/// The sensor cannot be reached, or no longer.
-struct LinkLost : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
+using serial::LinkLost;
+using serial::NoAnswer;
+using serial::Port;
+using serial::PortInUse;
+using serial::steadyTime;
 
-/// It is there, but does not answer.
-struct NoAnswer : LinkLost {
-  using LinkLost::LinkLost;
-};
-
-/// Another program holds the port.
-struct PortInUse : LinkLost {
-  using LinkLost::LinkLost;
-};
-
-/// Bytes to and from a sensor. Every call returns in a bounded time.
-class Port {
- public:
-  Port() = default;
-  Port(const Port&) = delete;
-  Port& operator=(const Port&) = delete;
-  virtual ~Port() = default;
-
-  /// Waits for bytes at most so long [s] and puts them into the buffer; 0 if none came. Throws LinkLost.
-  virtual std::size_t read(char* buffer, std::size_t size, double timeout) = 0;
-
-  /// Sends all of it. Throws LinkLost, also if that takes longer than so long [s].
-  virtual void write(std::string_view bytes, double timeout) = 0;
-
-  /// Has it a rate that both ends must agree on?
-  virtual bool hasBaud() const = 0;
-
-  /// Changes the rate [baud]; what was under way is lost.
-  virtual void setBaud(int baud) = 0;
-};
-
-/// Time that no one sets [s], for deadlines and latencies.
-inline double steadyTime() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+constexpr const char* kWho = "LASER";  // the codes of errors begin so: LASER_NO_PORT
 
 }  // namespace kurumaisu::laser

@@ -32,14 +32,14 @@ Address addressOf(const std::string& address, int port) {
 
 int openSocket(const addrinfo& address) {
   const int fd = socket(address.ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (fd < 0) throw LinkLost("LASER_NO_PORT: " + systemError(errno));
+  if (fd < 0) throw LinkLost("LASER_NO_PORT: " + serial::systemError(errno));
   return fd;
 }
 
 }  // namespace
 
 Tcp::Tcp(const std::string& address, int port, double timeout, const std::function<bool()>& interrupted)
-    : socket_(openSocket(*addressOf(address, port))) {
+    : socket_(openSocket(*addressOf(address, port)), kWho) {
   const std::string name = "LASER_NO_PORT: " + address + ":" + std::to_string(port) + ": ";
   const Address target = addressOf(address, port);
   int code = connect(socket_.fd(), target->ai_addr, target->ai_addrlen) == 0 ? 0 : errno;
@@ -52,7 +52,7 @@ Tcp::Tcp(const std::string& address, int port, double timeout, const std::functi
     socklen_t size = sizeof(code);
     getsockopt(socket_.fd(), SOL_SOCKET, SO_ERROR, &code, &size);
   }
-  if (code != 0) throw LinkLost(name + systemError(code));
+  if (code != 0) throw LinkLost(name + serial::systemError(code));
   const int yes = 1;
   setsockopt(socket_.fd(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof(yes));
 }

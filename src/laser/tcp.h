@@ -5,8 +5,8 @@
 #include <functional>
 #include <string>
 
-#include "laser/descriptor.h"
 #include "laser/port.h"
+#include "serial/descriptor.h"
 
 namespace kurumaisu::laser {
 
@@ -21,7 +21,7 @@ class Tcp : public Port {
   void setBaud(int /*baud*/) override {}
 
  private:
-  Descriptor socket_;
+  serial::Descriptor socket_;
 };
 
 }  // namespace kurumaisu::laser

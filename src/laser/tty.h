@@ -4,25 +4,14 @@
 
 #include <string>
 
-#include "laser/descriptor.h"
 #include "laser/port.h"
+#include "serial/tty.h"
 
 namespace kurumaisu::laser {
 
-class Tty : public Port {
+class Tty : public serial::Tty {
  public:
-  /// Opens a tty for this program alone: raw, 8N1, without flow control. Throws PortInUse, LinkLost.
-  Tty(const std::string& path, int baud);
-  ~Tty() override;
-
-  std::size_t read(char* buffer, std::size_t size, double timeout) override;
-  void write(std::string_view bytes, double timeout) override;
-  bool hasBaud() const override { return true; }
-  void setBaud(int baud) override;
-
- private:
-  std::string path_;
-  Descriptor tty_;
+  Tty(const std::string& path, int baud) : serial::Tty(path, baud, kWho) {}
 };
 
 }  // namespace kurumaisu::laser

@@ -23,7 +23,9 @@ NAMES = (
     "laser_clock",
     "faults",
     "fuzz",
+    "guard",
     "base",
+    "drive",
     "slam",
     "predict",
 )

@@ -5,8 +5,9 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <utility>
 
-namespace kurumaisu::laser {
+namespace kurumaisu::serial {
 
 /// What the system says of the last error: "No such file or directory".
 std::string systemError(int code);
@@ -14,7 +15,8 @@ std::string systemError(int code);
 /// Owns a non-blocking descriptor, of a tty or a socket.
 class Descriptor {
  public:
-  explicit Descriptor(int fd) : fd_(fd) {}
+  /// who: what the codes of its errors begin with.
+  Descriptor(int fd, std::string who) : fd_(fd), who_(std::move(who)) {}
   ~Descriptor();
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
@@ -30,6 +32,7 @@ class Descriptor {
 
  private:
   int fd_;
+  std::string who_;
 };
 
-}  // namespace kurumaisu::laser
+}  // namespace kurumaisu::serial

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "laser/descriptor.h"
+#include "serial/descriptor.h"
 
 #include <poll.h>
 #include <sys/socket.h>
@@ -10,9 +10,9 @@
 #include <cmath>
 #include <system_error>
 
-#include "laser/port.h"
+#include "serial/port.h"
 
-namespace kurumaisu::laser {
+namespace kurumaisu::serial {
 namespace {
 
 bool isTemporary(int code) { return code == EAGAIN || code == EWOULDBLOCK || code == EINTR; }
@@ -36,21 +36,21 @@ std::size_t Descriptor::read(char* buffer, std::size_t size, double timeout) con
   if (!wait(POLLIN, timeout)) return 0;
   const ssize_t count = ::read(fd_, buffer, size);
   if (count > 0) return static_cast<std::size_t>(count);
-  if (count == 0) throw LinkLost("LASER_CLOSED: the other end has closed the connection");
+  if (count == 0) throw LinkLost(who_ + "_CLOSED: the other end has closed the connection");
   if (isTemporary(errno)) return 0;
-  throw LinkLost("LASER_CLOSED: " + systemError(errno));
+  throw LinkLost(who_ + "_CLOSED: " + systemError(errno));
 }
 
 void Descriptor::write(std::string_view bytes, double timeout, bool is_socket) const {
   for (const double until = steadyTime() + timeout; !bytes.empty();) {
     if (!wait(POLLOUT, until - steadyTime())) {
-      throw LinkLost("LASER_BLOCKED: nothing can be sent for " + std::to_string(timeout) + " s");
+      throw LinkLost(who_ + "_BLOCKED: nothing can be sent for " + std::to_string(timeout) + " s");
     }
     const ssize_t count = is_socket ? send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL)
                                     : ::write(fd_, bytes.data(), bytes.size());
-    if (count < 0 && !isTemporary(errno)) throw LinkLost("LASER_CLOSED: " + systemError(errno));
+    if (count < 0 && !isTemporary(errno)) throw LinkLost(who_ + "_CLOSED: " + systemError(errno));
     if (count > 0) bytes.remove_prefix(static_cast<std::size_t>(count));
   }
 }
 
-}  // namespace kurumaisu::laser
+}  // namespace kurumaisu::serial

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "laser/tty.h"
+#include "serial/tty.h"
 
 #include <asm/termbits.h>  // termios2, for rates that have no name; excludes <termios.h>
 #include <fcntl.h>
@@ -9,9 +9,9 @@
 #include <array>
 #include <cerrno>
 
-#include "laser/lock.h"
+#include "serial/lock.h"
 
-namespace kurumaisu::laser {
+namespace kurumaisu::serial {
 namespace {
 
 struct Rate {
@@ -31,11 +31,11 @@ tcflag_t nameOf(int baud) {
   return found == kNamed.end() ? BOTHER : found->name;
 }
 
-int openTty(const std::string& path) {
+int openTty(const std::string& path, const std::string& who) {
   const int fd = open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (fd >= 0) return fd;
-  if (errno == EBUSY) throw PortInUse("LASER_IN_USE: another program holds " + path);
-  throw LinkLost("LASER_NO_PORT: " + path + ": " + systemError(errno));
+  if (errno == EBUSY) throw PortInUse(who + "_IN_USE: another program holds " + path);
+  throw LinkLost(who + "_NO_PORT: " + path + ": " + systemError(errno));
 }
 
 /// Gives the last command time to leave. What a dead device does not take goes: closing would wait for it.
@@ -50,8 +50,9 @@ void drain(const Descriptor& tty) {
 
 }  // namespace
 
-Tty::Tty(const std::string& path, int baud) : path_(path), tty_(openTty(path)) {
-  lock(tty_.fd(), path);
+Tty::Tty(const std::string& path, int baud, const std::string& who)
+    : path_(path), who_(who), tty_(openTty(path, who), who) {
+  lock(tty_.fd(), path, who);
   Tty::setBaud(baud);
 }
 
@@ -72,10 +73,10 @@ void Tty::setBaud(int baud) {
   mode.c_ispeed = mode.c_ospeed = static_cast<speed_t>(baud);
   mode.c_cc[VMIN] = 1;
   if (ioctl(tty_.fd(), TCSETS2, &mode) != 0) {
-    throw LinkLost("LASER_NO_PORT: " + path_ + " cannot be set to " + std::to_string(baud) +
+    throw LinkLost(who_ + "_NO_PORT: " + path_ + " cannot be set to " + std::to_string(baud) +
                    " baud: " + systemError(errno));
   }
   ioctl(tty_.fd(), TCFLSH, TCIFLUSH);
 }
 
-}  // namespace kurumaisu::laser
+}  // namespace kurumaisu::serial

@@ -4,14 +4,14 @@
 
 #include <string>
 
-namespace kurumaisu::laser {
+namespace kurumaisu::serial {
 
-/// Takes an open tty for this program alone, until it is closed. Throws PortInUse naming the tty.
+/// Takes an open tty for this program alone, until it is closed. Throws PortInUse naming the tty; codes begin with who.
 ///
 /// Against those that ask (flock, root too), and against those that do not (TIOCEXCL, which does not stop root).
-void lock(int fd, const std::string& path);
+void lock(int fd, const std::string& path, const std::string& who);
 
 /// Lets others open it again, which the driver of some ttys does not do by itself.
 void unlock(int fd);
 
-}  // namespace kurumaisu::laser
+}  // namespace kurumaisu::serial

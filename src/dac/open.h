@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A converter from a device's file: open(readDevice("serial_ascii.yaml")).
+#pragma once
+
+#include <memory>
+
+#include "dac/converter.h"
+#include "dac/settings.h"
+
+namespace kurumaisu::dac {
+
+/// Opens a device for this program alone. No voltage is written before the first put().
+///
+/// Throws Fault; std::invalid_argument for a device that is not what its file says.
+std::unique_ptr<Converter> open(const Device& device);
+
+}  // namespace kurumaisu::dac

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dac/serial_converter.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "serial/tty.h"
+
+namespace kurumaisu::dac {
+namespace {
+
+constexpr const char* kWho = "DAC";  // the codes of errors begin so
+
+}  // namespace
+
+SerialConverter::SerialConverter(Channels channels, SerialSettings settings, OpenPort open_port)
+    : channels_(channels), settings_(std::move(settings)), open_port_(std::move(open_port)) {
+  if (!open_port_) {
+    open_port_ = [this] { return std::make_unique<serial::Tty>(settings_.port, settings_.baud, kWho); };
+  }
+  start();
+}
+
+std::string SerialConverter::name() const {
+  return "serial " + settings_.port + (identity_.empty() ? "" : ": " + identity_);
+}
+
+/// Gives the port up: after it was lost nothing is known of what is behind it.
+Fault SerialConverter::lost(const std::string& what, const std::string& why) {
+  dialogue_.reset();
+  return Fault(why + " (" + what + " of " + settings_.port + ")");
+}
+
+void SerialConverter::start() {
+  try {
+    dialogue_ = std::make_unique<Dialogue>(
+        open_port_(), Manner{settings_.terminator, settings_.reply_terminator, settings_.reply_timeout,
+                             settings_.late_reply, settings_.retries});
+    bool first = true;
+    for (const Exchange& each : settings_.start) {
+      if (each.answered) {
+        const std::string reply = dialogue_->ask(each.send.plain(), each.expect.plain());
+        if (first && settings_.identifies) identity_ = reply;
+      } else {
+        dialogue_->tell(each.send.plain(), "");
+      }
+      first = false;
+    }
+  } catch (const serial::LinkLost& error) {
+    throw lost("start", error.what());
+  } catch (const Fault& error) {
+    settle();
+    throw lost("start", error.what());
+  }
+}
+
+/// Waits for what may still come, or it would be met by whoever opens the port next.
+void SerialConverter::settle() {
+  try {
+    if (dialogue_) dialogue_->settle();
+  } catch (const serial::LinkLost&) {
+    dialogue_.reset();
+  }
+}
+
+void SerialConverter::reopen() {
+  settle();
+  dialogue_.reset();
+  start();
+}
+
+SerialConverter::Frames SerialConverter::framesOf(const Levels& levels) const {
+  Fillings fillings;
+  for (const Signal signal : kWriteOrder) fillings[signal] = {settings_.ch[signal], levels[signal]};
+  const Exchange& write = settings_.write;
+  if (settings_.one_frame) return {{"all channels", write.send.fill(fillings), write.expect.fill(fillings)}};
+  Frames frames;
+  for (const Signal signal : kWriteOrder) {
+    const Filling& one = fillings[signal];
+    frames.push_back({kSignalNames[signal], write.send.fill(one), write.expect.fill(one)});
+  }
+  return frames;
+}
+
+void SerialConverter::ask(const Frame& frame) {
+  if (settings_.write.answered) {
+    dialogue_->ask(frame.command, frame.expect);
+  } else {
+    dialogue_->tell(frame.command, "");
+  }
+}
+
+/// Sends frames without waiting: what stops the chair must not.
+void SerialConverter::tell(Frames::const_iterator frame, Frames::const_iterator end) {
+  for (; frame != end; ++frame) dialogue_->tell(frame->command, frame->expect);
+}
+
+void SerialConverter::converse(Frames::const_iterator frame, Frames::const_iterator end) {
+  const auto in_doubt = [this](const Frame& each) { return dialogue_->inDoubt(each.expect); };
+  for (; frame != end; ++frame) {
+    if (std::any_of(frame, end, in_doubt)) {
+      tell(frame, end);
+      dialogue_->settle();
+    }
+    try {
+      ask(*frame);
+    } catch (const Fault& error) {
+      tell(std::next(frame), end);
+      throw Fault(std::string(error.what()) + " (" + frame->what + " of " + settings_.port + ")");
+    }
+  }
+}
+
+Volts SerialConverter::put(const Volts& volts) {
+  const Levels levels = levelsOf(volts, channels_, settings_.codings);
+  if (!dialogue_) throw Fault("DAC_CLOSED: " + settings_.port + " must be opened anew");
+  const Frames frames = framesOf(levels);
+  try {
+    converse(frames.begin(), frames.end());
+  } catch (const serial::LinkLost& error) {
+    throw lost("voltages", error.what());
+  }
+  return voltsOf(levels);
+}
+
+}  // namespace kurumaisu::dac

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A D/A board that is told by text over a tty.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dac/converter.h"
+#include "dac/dialogue.h"
+#include "dac/settings.h"
+
+namespace kurumaisu::dac {
+
+/// put() sends every frame even if one before it was not confirmed, for it may be the one that stops the chair.
+///
+/// A frame goes out when the one before is confirmed, or found not to be, after (1 + retries) * reply_timeout. After a
+/// fault all of them go out at once. It returns within that and late_reply, for each frame.
+class SerialConverter : public Converter {
+ public:
+  using OpenPort = std::function<std::unique_ptr<serial::Port>()>;
+
+  /// Opens the port for this program alone, identifies the board and sends what comes before the first voltage, but no
+  /// voltage. open_port: a tty by default. Throws Fault.
+  SerialConverter(Channels channels, SerialSettings settings, OpenPort open_port = {});
+
+  Volts put(const Volts& volts) override;
+  void reopen() override;
+  std::string name() const override;
+
+ private:
+  struct Frame {
+    std::string what;  // for messages
+    std::string command;
+    std::string expect;
+  };
+
+  using Frames = std::vector<Frame>;
+
+  Frames framesOf(const Levels& levels) const;
+  void start();
+  void settle();
+  void converse(Frames::const_iterator frame, Frames::const_iterator end);
+  void tell(Frames::const_iterator frame, Frames::const_iterator end);
+  void ask(const Frame& frame);
+  Fault lost(const std::string& what, const std::string& why);
+
+  Channels channels_;
+  SerialSettings settings_;
+  OpenPort open_port_;
+  std::unique_ptr<Dialogue> dialogue_;  // none while the port is lost
+  std::string identity_;
+};
+
+}  // namespace kurumaisu::dac

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// rosrun kurumaisu set_voltages DEVICE.yaml V_F V_S V_REF: try a device's file with a voltmeter, without a chair.
+#include <charconv>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "dac/open.h"
+
+namespace {
+
+namespace dac = kurumaisu::dac;
+
+constexpr const char* kUsage =
+    "set_voltages DEVICE.yaml V_F V_S V_REF\n\n"
+    "Puts out three voltages [V], V_F and V_S as they are counted from the reference, tells what the device "
+    "holds, waits\n"
+    "for the end of a line or of its input, and puts out neutral. For a bench: nothing watches over it. No "
+    "chair!\n";
+
+double numberOf(const std::string& text) {
+  double value = 0;
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (result.ec == std::errc() && result.ptr == text.data() + text.size()) return value;
+  throw std::invalid_argument("not a number: " + text);
+}
+
+void put(dac::Converter& converter, const dac::Volts& volts) {
+  const dac::Volts held = converter.put(volts);
+  std::printf("%.6f %.6f %.6f\n", held.translation, held.steering, held.reference);
+  std::fflush(stdout);
+}
+
+void run(const std::vector<std::string>& arguments) {
+  const dac::Volts volts{numberOf(arguments[1]), numberOf(arguments[2]), numberOf(arguments[3])};
+  const auto converter = dac::open(dac::readDevice(arguments[0]));
+  std::fprintf(stderr, "%s\n", converter->name().c_str());
+  put(*converter, {0, 0, volts.reference});
+  put(*converter, volts);
+  std::string line;
+  std::getline(std::cin, line);
+  put(*converter, {0, 0, volts.reference});
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> arguments(argv + 1, argv + argc);
+  if (arguments.size() != 4) {
+    std::fputs(kUsage, stderr);
+    return 2;
+  }
+  try {
+    run(arguments);
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "set_voltages: %s\n", error.what());
+    return 1;
+  }
+}

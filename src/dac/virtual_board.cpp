@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dac/virtual_board.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+#include <stdexcept>
+
+#include "virtual_urg/steady.h"
+
+namespace kurumaisu::dac {
+namespace {
+
+using virtual_urg::steady;
+
+constexpr double kNap = 0.2;  // [s] at most between two looks
+
+std::int64_t nanoseconds() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{1000000000} * now.tv_sec + now.tv_nsec;
+}
+
+const SerialSettings& serialOf(const Device& device) {
+  const auto* serial = std::get_if<SerialSettings>(&device.back_end);
+  if (serial != nullptr) return *serial;
+  throw std::invalid_argument(device.file + ": kind must be serial: a virtual board has no other port");
+}
+
+virtual_urg::Descriptor openLog(const std::string& file) {
+  if (file.empty()) return {};
+  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  return virtual_urg::Descriptor(virtual_urg::checked(fd, file));
+}
+
+}  // namespace
+
+VirtualBoard::VirtualBoard(const Device& device, const std::string& link, const std::string& log)
+    : channels_(device.channels),
+      settings_(serialOf(device)),
+      reader_(settings_),
+      log_(openLog(log)),
+      pty_(link),
+      thread_(&VirtualBoard::run, this) {}
+
+VirtualBoard::~VirtualBoard() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.set();
+  thread_.join();
+}
+
+void VirtualBoard::inject(const std::string& fault) {
+  const std::lock_guard lock(mutex_);
+  const BoardFault read = boardFault(fault, commands_);
+  const bool at_once = fault.find('@') == std::string::npos;
+  if (read.what == BoardFault::kUnplug && at_once) return unplug(read.value);
+  if (read.what == BoardFault::kStall && at_once) {
+    stalled_until_ = steady() + read.value;
+  } else {
+    faults_.push_back(read);
+  }
+  wake_.set();
+}
+
+std::vector<Change> VirtualBoard::history() const {
+  const std::lock_guard lock(mutex_);
+  return history_;
+}
+
+Volts VirtualBoard::volts() const {
+  const std::lock_guard lock(mutex_);
+  return voltsNow();
+}
+
+std::array<int, kSignals> VirtualBoard::codes() const {
+  const std::lock_guard lock(mutex_);
+  return codes_;
+}
+
+bool VirtualBoard::isNeutral(const Volts& volts) const {
+  const Band& reference = channels_[kReference].volt;
+  const auto near = [this](double volt, Signal signal) {
+    return std::abs(volt * settings_.codings[signal].per_volt) < 0.501;
+  };
+  return near(volts.translation, kTranslation) && near(volts.steering, kSteering) &&
+         volts.reference >= reference.min && volts.reference <= reference.max;
+}
+
+std::uint64_t VirtualBoard::commands() const {
+  const std::lock_guard lock(mutex_);
+  return commands_;
+}
+
+std::uint64_t VirtualBoard::misheard() const {
+  const std::lock_guard lock(mutex_);
+  return misheard_;
+}
+
+std::vector<std::string> VirtualBoard::heard() const {
+  const std::lock_guard lock(mutex_);
+  return heard_;
+}
+
+bool VirtualBoard::wait(const std::function<bool()>& so, double timeout) const {
+  const double until = steady() + timeout;
+  while (!so()) {
+    std::unique_lock lock(mutex_);
+    if (steady() >= until) return false;
+    changed_.wait_for(lock, std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+void VirtualBoard::run() {
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);  // they are for the program, not for this thread
+  std::unique_lock lock(mutex_);
+  while (!stopping_) serve(lock);
+}
+
+void VirtualBoard::serve(std::unique_lock<std::mutex>& lock) {
+  const double now = steady();
+  if (back_at_ > 0 && now >= back_at_) {
+    back_at_ = 0;
+    pty_.plug();
+    log("plugged");
+  }
+  flush(now);
+  double until = now + kNap;
+  for (const Reply& reply : replies_) until = std::min(until, reply.at);
+  if (back_at_ > 0) until = std::min(until, back_at_);
+  const bool deaf = back_at_ > 0 || now < stalled_until_;
+  if (deaf && stalled_until_ > now) until = std::min(until, stalled_until_);
+  std::array<pollfd, 2> ready{{{wake_.descriptor(), POLLIN, 0}, {deaf ? -1 : pty_.descriptor(), POLLIN, 0}}};
+  const double seconds = std::max(0.0, until - now);
+  const timespec timeout{static_cast<std::time_t>(seconds),
+                         static_cast<long>(1e9 * (seconds - std::floor(seconds)))};
+  lock.unlock();
+  ppoll(ready.data(), ready.size(), &timeout, nullptr);
+  lock.lock();
+  if (ready[0].revents != 0) wake_.clear();
+  if (ready[1].revents != 0 && back_at_ == 0) receive();
+  changed_.notify_all();
+}
+
+void VirtualBoard::receive() {
+  if (!pty_.connected()) {
+    pty_.accept();
+    return;
+  }
+  const std::optional<std::string> bytes = pty_.read();
+  if (!bytes) {  // whoever comes next does not get the end of a line begun by another
+    input_.clear();
+    replies_.clear();
+    return;
+  }
+  input_ += *bytes;
+  for (std::size_t end = input_.find(settings_.terminator); end != std::string::npos;
+       end = input_.find(settings_.terminator)) {
+    const std::string line = input_.substr(0, end);
+    input_.erase(0, end + settings_.terminator.size());
+    obey(line);
+  }
+}
+
+const BoardFault* VirtualBoard::faultNow() const {
+  const auto found = std::find_if(faults_.begin(), faults_.end(), [this](const BoardFault& fault) {
+    return fault.at <= commands_ && commands_ < fault.at + fault.count;
+  });
+  return found == faults_.end() ? nullptr : &*found;
+}
+
+void VirtualBoard::obey(const std::string& line) {
+  ++commands_;
+  heard_.push_back(line);
+  const BoardFault* const fault = faultNow();
+  if (fault != nullptr && fault->what == BoardFault::kUnplug) return unplug(fault->value);
+  if (fault != nullptr && fault->what == BoardFault::kStall) stalled_until_ = steady() + fault->value;
+  const std::optional<BoardReader::Heard> heard = reader_.hear(line);
+  if (!heard) ++misheard_;
+  const bool obeys = fault == nullptr || fault->what != BoardFault::kDeaf;
+  if (obeys && heard) putOut(heard->codes);
+  if (fault != nullptr && (!obeys || fault->what == BoardFault::kSilent)) return;
+  if (heard && heard->reply.empty()) return;
+  std::string reply = (heard ? heard->reply : "?") + settings_.reply_terminator;
+  if (fault != nullptr && fault->what == BoardFault::kWrong) reply = "?" + settings_.reply_terminator;
+  if (fault != nullptr && fault->what == BoardFault::kCut) reply.resize((reply.size() - 1) / 2);
+  const double delay = fault != nullptr && fault->what == BoardFault::kLate ? fault->value : 0;
+  replies_.push_back({steady() + delay, reply});
+  flush(steady());
+}
+
+Volts VirtualBoard::voltsNow() const {
+  std::array<double, kSignals> pins{};
+  for (const Signal signal : kWriteOrder) {
+    const Coding& coding = settings_.codings[signal];
+    pins[signal] = (codes_[signal] - coding.at_zero) / coding.per_volt;
+    if (signal != kReference && channels_[signal].add_reference) pins[signal] -= pins[kReference];
+  }
+  return {pins[kTranslation], pins[kSteering], pins[kReference]};
+}
+
+void VirtualBoard::putOut(const std::vector<std::pair<Signal, int>>& codes) {
+  const std::int64_t time = nanoseconds();
+  const std::array<int, kSignals> before = codes_;
+  for (const auto& [signal, code] : codes) codes_[signal] = code;
+  if (codes_ == before) return;
+  history_.push_back({time, voltsNow()});
+  const Volts& volts = history_.back().volts;
+  std::array<char, 100> text{};
+  std::snprintf(text.data(), text.size(), "volts %.6f %.6f %.6f", volts.translation, volts.steering,
+                volts.reference);
+  log(text.data());
+}
+
+void VirtualBoard::unplug(double seconds) {
+  pty_.unplug();
+  input_.clear();
+  replies_.clear();
+  back_at_ = steady() + seconds;
+  log("unplugged");
+  wake_.set();
+}
+
+void VirtualBoard::flush(double now) {
+  for (auto reply = replies_.begin(); reply != replies_.end();) {
+    if (reply->at > now) {
+      ++reply;
+      continue;
+    }
+    if (back_at_ == 0) pty_.write(reply->bytes);
+    reply = replies_.erase(reply);
+  }
+}
+
+void VirtualBoard::log(const std::string& line) const {
+  if (!log_) return;
+  const std::int64_t time = line.rfind("volts", 0) == 0 ? history_.back().time : nanoseconds();
+  const std::string text = std::to_string(time) + " " + line + "\n";
+  if (::write(log_.get(), text.data(), text.size()) < 0) std::perror("the virtual board's log");
+}
+
+}  // namespace kurumaisu::dac
