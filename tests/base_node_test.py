@@ -231,6 +231,8 @@ class BaseNode(unittest.TestCase):
         assert is_neutral(self.voltages.last)
         self.commander.say(0.0, 0.0)
         wait_for(lambda: reset().success, "a reset")
+        old = len(self.diagnostics.messages)  # they may tell of the time before the stop
+        wait_for(lambda: len(self.diagnostics.messages) > old, "news")
         wait_for(lambda: self.value("commands", "state") == "driving: navigation", "released by its zeros")
         self.commander.say(0.5, 0.3)
         self.voltages.wait(lambda m: m.v == 0.5, "motion")

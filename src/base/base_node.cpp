@@ -7,6 +7,7 @@
 #include <ros/xmlrpc_manager.h>
 #include <std_msgs/String.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <exception>
@@ -33,6 +34,7 @@ namespace {
 
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
+constexpr double kGlance = 0.02;     // [s] longest wait for anything
 constexpr int kLastSamples = 5;      // of neutral at the end, with
 constexpr double kLastPause = 0.02;  // [s] after each, time for it to leave the process
 
@@ -59,6 +61,9 @@ class BaseNode {
 
  private:
   void onTick();
+  ros::SteadyTime tickAfter(const ros::SteadyTime& due);
+  static ros::SteadyTime listen(const ros::SteadyTime& until);
+  void act();
   void publish();
   void tell();
   bool isForgotten();
@@ -77,6 +82,7 @@ class BaseNode {
   std::string state_;                ///< at the last tick
   k::guard::Status reported_guard_;  ///< at the last diagnostics
   double last_diagnostics_ = 0;      ///< [s]
+  bool heard_ = false;               ///< a word that may change what is put out
   diagnostic_updater::Updater diagnostics_;
   k::OdometryOutput odom_;
   k::OdometryInput odom_input_;
@@ -86,8 +92,7 @@ class BaseNode {
   k::CommandInput input_;
   k::LimitsServer limits_;
   k::MasterWatch master_;
-  ros::Timer timer_;
-  ros::SteadyTimer steady_timer_;
+  ros::Timer timer_;  ///< of simulated time
 };
 
 BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
@@ -102,7 +107,8 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
       odom_input_(nh, drive_, settings.odometry, loopTime),
       cmd_vel_out_(nh.advertise<geometry_msgs::TwistStamped>("cmd_vel_out", 10)),
       active_input_(nh.advertise<std_msgs::String>("active_input", 1, true)),
-      input_(nh, settings.topics, drive_, [] { return loopTime(ros::Time::now()); }),
+      input_(
+          nh, settings.topics, drive_, [] { return loopTime(ros::Time::now()); }, [this] { heard_ = true; }),
       limits_(settings.limit_names, drive_),
       master_(settings.master_timeout) {
   logLaw(settings_.law_name, k::ambiguity(drive_.outlet()));
@@ -120,21 +126,17 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
   const std::string refusal = guard_ ? k::guard::raiseThreads(settings_.dac.priority) : "";
   if (!refusal.empty()) warn("BASE_NOT_REALTIME: busy cores may delay commands, and neutral: " + refusal);
   if (guard_) diagnostics_.add("guard", [this](Status& status) { reportGuard(status); });
-  const double period = 1.0 / settings_.rate;
   if (ros::Time::isSimTime()) {
-    timer_ = nh.createTimer(ros::Duration(period), [this](const ros::TimerEvent&) { onTick(); });
-  } else {
-    // A system clock that is set back would stall ros::Timer, and the chair would drive on.
-    steady_timer_ =
-        nh.createSteadyTimer(ros::WallDuration(period), [this](const ros::SteadyTimerEvent&) { onTick(); });
+    timer_ =
+        nh.createTimer(ros::Duration(1.0 / settings_.rate), [this](const ros::TimerEvent&) { onTick(); });
   }
 }
 
 void BaseNode::run() {
-  const ros::WallDuration longest_wait(0.02);
   try {
+    ros::SteadyTime due = ros::SteadyTime::now();
     while (ros::ok() && !stop_requested && !isForgotten()) {
-      ros::getGlobalCallbackQueue()->callAvailable(longest_wait);
+      due = ros::Time::isSimTime() ? listen(due) : tickAfter(due);
     }
   } catch (...) {
     finish();
@@ -150,6 +152,28 @@ void BaseNode::run() {
 /// Whether it is time to end, for somebody to start it anew: nobody finds this node any more, and it stands.
 bool BaseNode::isForgotten() {
   return master_.forgotten() && drive_.output().v == 0 && drive_.output().w == 0;
+}
+
+/// Works on what comes until the tick that is due, and ticks; returns when the next one is due. No ros::Timer:
+/// a system clock that is set back would stall it, and the chair would drive on; and its thread costs as much
+/// as all this.
+ros::SteadyTime BaseNode::tickAfter(const ros::SteadyTime& due) {
+  const ros::SteadyTime now = listen(due);
+  if (now < due) {
+    if (heard_) act();
+    return due;
+  }
+  heard_ = false;
+  onTick();
+  const ros::SteadyTime next = due + ros::WallDuration(1.0 / settings_.rate);
+  return next < now ? now : next;  // ticks that were missed are not made up for
+}
+
+/// Works on what comes, waiting for it until a time, but not so long that a signal waits; returns the time.
+ros::SteadyTime BaseNode::listen(const ros::SteadyTime& until) {
+  const double wait = ros::Time::isSimTime() ? kGlance : (until - ros::SteadyTime::now()).toSec();
+  ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(std::clamp(wait, 0.0, kGlance)));
+  return ros::SteadyTime::now();
 }
 
 void BaseNode::finish() {
@@ -175,6 +199,14 @@ void BaseNode::onTick() {
     last_diagnostics_ = t;
     diagnostics_.force_update();  // update() would fall silent when the clock is set back
   }
+}
+
+/// Words are obeyed at once, not at the next tick; those that came together, together. In simulated time there
+/// are ticks only: one seed, one run.
+void BaseNode::act() {
+  heard_ = false;
+  dac_.stamp = ros::Time::now();
+  drive_.tick(loopTime(dac_.stamp));
 }
 
 void BaseNode::publish() {

@@ -25,13 +25,15 @@ void warnRefused(const std::string& topic, const geometry_msgs::Twist& twist) {
 
 }  // namespace
 
-CommandInput::CommandInput(ros::NodeHandle& nh, const BaseTopics& topics, Drive& drive, Clock clock)
-    : drive_(drive), clock_(std::move(clock)) {
+CommandInput::CommandInput(ros::NodeHandle& nh, const BaseTopics& topics, Drive& drive, Clock clock,
+                           Action act)
+    : drive_(drive), clock_(std::move(clock)), act_(std::move(act)) {
   for (std::size_t i = 0; i < topics.inputs.size(); ++i) hearInput(nh, i, topics.inputs[i]);
   hearOthers(nh, topics);
   ros::NodeHandle own("~");
   serve(own, "e_stop", [this](Answer& answer) {
     drive_.eStop().press();
+    act_();
     answer.success = 1U;
   });
   serve(own, "reset", [this](Answer& answer) { onReset(answer); });
@@ -40,6 +42,7 @@ CommandInput::CommandInput(ros::NodeHandle& nh, const BaseTopics& topics, Drive&
 void CommandInput::hearInput(ros::NodeHandle& nh, std::size_t input, const std::string& topic) {
   const boost::function<void(const Command&)> hear = [this, input, topic](const Command& event) {
     onCommand(input, topic, event);
+    act_();
   };
   subscribers_.push_back(nh.subscribe<geometry_msgs::Twist, const Command&>(
       topic, kQueue, hear, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
@@ -51,11 +54,13 @@ void CommandInput::hearOthers(ros::NodeHandle& nh, const BaseTopics& topics) {
   for (std::size_t i = 0; i < topics.locks.size(); ++i) {
     const boost::function<void(const Bool&)> lock = [this, i](const Bool& word) {
       drive_.arbiter().lock(i, word->data != 0, clock_());
+      act_();
     };
     subscribers_.push_back(nh.subscribe<std_msgs::Bool>(topics.locks[i], kQueue, lock, {}, soon));
   }
   const boost::function<void(const Bool&)> stop = [this](const Bool& word) {
     drive_.eStop().hear(word->data != 0, clock_());
+    act_();
   };
   subscribers_.push_back(nh.subscribe<std_msgs::Bool>(topics.estop, kQueue, stop, {}, soon));
   const boost::function<void(const std_msgs::Float64::ConstPtr&)> cap =

@@ -22,8 +22,10 @@ class CommandInput {
  public:
   using Clock = std::function<double()>;  ///< time of the control loop [s]
 
-  /// drive must outlive this object.
-  CommandInput(ros::NodeHandle& nh, const BaseTopics& topics, Drive& drive, Clock clock);
+  using Action = std::function<void()>;
+
+  /// act: called after every word that may change what is put out. drive must outlive this object.
+  CommandInput(ros::NodeHandle& nh, const BaseTopics& topics, Drive& drive, Clock clock, Action act);
 
  private:
   using Command = ros::MessageEvent<const geometry_msgs::Twist>;
@@ -37,6 +39,7 @@ class CommandInput {
 
   Drive& drive_;
   Clock clock_;
+  Action act_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
 };

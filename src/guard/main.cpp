@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // guard: owns the D/A converter. A sentinel and its child; or, with --neutral, one write when both are dead.
+#include <algorithm>
 #include <exception>
 #include <iostream>
 #include <stdexcept>
@@ -34,6 +35,8 @@ int run(const std::string& device_file, const std::string& guard_file, bool only
 
 int main(int argc, char** argv) {
   std::vector<std::string> words(argv + 1, argv + argc);
+  const auto given = [](const std::string& word) { return word.find(":=") != std::string::npos; };
+  words.erase(std::remove_if(words.begin(), words.end(), given), words.end());  // roslaunch names every node
   if (words.size() == 1 && (words[0] == "--help" || words[0] == "-h")) {
     std::cout << kUsage;
     return 0;

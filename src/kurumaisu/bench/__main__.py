@@ -25,6 +25,7 @@ NAMES = (
     "fuzz",
     "guard",
     "base",
+    "drive",
     "slam",
     "predict",
 )
