@@ -89,7 +89,9 @@ struct Rig {
   std::unique_ptr<Converter> open() const { return dac::open(device); }
 
   Device deviceOf(const Edits& edits) const {
-    Edits all{{"port: /dev/kurumaisu_dac", "port: " + (folder / "port")}};
+    Edits all{{"port: /dev/kurumaisu_dac", "port: " + (folder / "port")},
+              {"reply_timeout: 0.05", "reply_timeout: 0.4"},  // this computer may be busy
+              {"late_reply: 0.2", "late_reply: 0.8"}};
     all.insert(all.end(), edits.begin(), edits.end());
     return readDevice(written(folder, "device.yaml", edited(textOf(shipped("serial_ascii.yaml")), all)));
   }
@@ -102,6 +104,12 @@ struct Rig {
   Device device;
   VirtualBoard board;
 };
+
+/// One command for all three, and all replies alike.
+inline const Edits kOneFrame{
+    {"frame: channel ", "frame: all "},
+    {R"("W{ch}{code:04X}")", R"("S{reference.code:03X}{translation.code:03X}{steering.code:03X}")"},
+    {R"("OK {ch}{code:04X}")", R"("OK")"}};
 
 constexpr Volts kNeutral{0, 0, 2.5};
 constexpr Volts kMoving{0.5, -0.25, 2.5};
