@@ -27,6 +27,7 @@ NAMES = (
     "base",
     "drive",
     "slam",
+    "slam_localise",
     "predict",
 )
 
