@@ -150,6 +150,7 @@ PYBIND11_MODULE(_core, m) {
   bindModel(m);
   bindKalman(m);
   k::bindContact(m);
+  k::bindBase(m);
   k::bindFollow(m);
   k::bindRaycast(m);
   k::bindCamera(m);

@@ -9,6 +9,7 @@ namespace kurumaisu {
 
 using Array = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
 
+void bindBase(pybind11::module_& m);
 void bindFollow(pybind11::module_& m);
 void bindRaycast(pybind11::module_& m);
 void bindArena(pybind11::module_& m);

@@ -64,7 +64,11 @@ class Alone(unittest.TestCase):
         root = "/refused/base_node"
         laws = "model/voltage_laws/published/steering/positive"
         cases: list[tuple[dict[str, Any], str]] = [
-            ({"comand_timeout": 0.3}, f"{root}/comand_timeout: is not a known key"),
+            ({"longest_stepp": 0.3}, f"{root}/longest_stepp: is not a known key"),
+            ({"limits": [1, 2]}, f"{root}/limits: must be a mapping"),
+            ({"inputs/navigation/limits": "fast"}, f"{root}/inputs/navigation/limits: must be one of ride, script"),
+            ({"model/voltages/steering/min": 0.1}, f"{root}/model/voltages/steering: neutral, 0 V, must lie inside"),
+            ({"model/reference_voltage": 7.0}, f"{root}/model/voltages/reference: reference_voltage 7"),
             ({"model/voltage_law": "publshed"}, f"{root}/model/voltage_law: must be one of"),
             ({f"{laws}/slope": 0.0}, f"{root}/{laws}/slope: must not be 0"),
             ({f"{laws}/intercept": "1e-3"}, f"{root}/{laws}/intercept: must be a number, not 1e-3"),
@@ -80,12 +84,21 @@ class Alone(unittest.TestCase):
         process = start(name, {"odometry/publish_tf": False})
         try:
             commander.say(0.5, 0.3)
+            wait_for(lambda: len(voltages.messages) > 50, "voltages")
+            assert all(is_neutral(m) for m in voltages.messages)  # commanded from the start: not released
+            commander.say(0.0, 0.0)
+            voltages.wait(is_neutral, "a zero heard")
+            wait_for(lambda: commander.publisher.get_num_connections(), "it listens")
+            count = len(voltages.messages)
+            wait_for(lambda: len(voltages.messages) > count + 10, "a zero heard")
+            commander.say(0.5, 0.3)
             voltages.wait(lambda m: m.v == 0.5, "motion")
             end(process)
             output, _ = process.communicate(timeout=PATIENCE)
             assert process.returncode == 0, output
             assert "voltage law: published" in output
             assert "V_s in (-0.169476, 0.104181) V stands for two rates" in output
+            assert "BASE_NOT_RELEASED: navigation" in output
             # What was sent before the process ended has arrived or is lost: nothing comes after neutral.
             wait_for(lambda: is_neutral(voltages.last), "neutral as the last word")
         finally:
@@ -104,13 +117,19 @@ class Alone(unittest.TestCase):
         clock = SimulatedClock(start=50.0, factor=5.0)
         voltages, odom = Topic("/simulated/voltages", Voltages), Topic("/simulated/odom", Odometry)
         commander = Commander("/simulated/cmd_vel")
-        process = start("simulated", {"command_timeout": 5.0, "odometry/publish_tf": False})
+        process = start("simulated", {"inputs/navigation/timeout": 5.0, "odometry/publish_tf": False})
         try:
+            commander.say(0.0, 0.0)
+            voltages.wait(is_neutral, "the node")
+            wait_for(lambda: commander.publisher.get_num_connections(), "it listens")
+            count = len(voltages.messages)
+            wait_for(lambda: len(voltages.messages) > count + 50, "a zero heard")
             commander.say(0.5, 0.0)
-            first = voltages.wait(lambda m: m.v == 0.5, "motion").header.stamp.to_sec()
-            later = odom.wait(lambda m: m.header.stamp.to_sec() > first + 20.0, "20 s of motion")
-            driven = 0.5 * (later.header.stamp.to_sec() - first)
-            assert abs(later.pose.pose.position.x - driven) < 1e-6
+            first = voltages.wait(lambda m: m.v == 0.5, "motion").header.stamp
+            later = odom.wait(lambda m: (m.header.stamp - first).to_sec() > 20.0, "20 s of motion")
+            begun = next(m for m in odom.messages if m.header.stamp == first)
+            driven = later.pose.pose.position.x - begun.pose.pose.position.x
+            assert abs(driven - 0.5 * (later.header.stamp - first).to_sec()) < 1e-6
             self.check_pace(odom, clock)
             self.check_reset(clock, commander, voltages, odom)
         finally:

@@ -5,17 +5,23 @@
 from __future__ import annotations
 
 import math
+import signal
+import subprocess
 import sys
 import unittest
+from typing import Any
 
 import numpy as np
 import rospy
 import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist
+from dynamic_reconfigure.client import Client
+from geometry_msgs.msg import Twist, TwistStamped
 from kurumaisu.msg import Voltages
 from nav_msgs.msg import Odometry
+from std_msgs.msg import Bool, Float64, String
+from std_srvs.srv import Trigger
 
 from kurumaisu import _core
 from kurumaisu.ros.testing import Commander, Topic, wait_for
@@ -61,27 +67,26 @@ class BaseNode(unittest.TestCase):
 
     def test_command_becomes_voltages(self) -> None:
         self.commander.say(0.5, 0.3)
-        message = self.voltages.wait(lambda m: m.v != 0, "an answer to the command")
+        message = self.voltages.wait(lambda m: (m.v, m.w) == (0.5, 0.3), "the command put out")
         assert abs(message.translation - 0.789916) < 1e-12
         assert abs(message.steering + 0.0455823) < 1e-12
         assert (message.v, message.w, message.reference) == (0.5, 0.3, 2.5)
 
     def test_silence_is_neutral(self) -> None:
         timeouts = self.count("timeouts")
-        self.commander.say(0.2, 0.0)
-        self.voltages.wait(lambda m: m.v == 0.2, "motion")
+        self.commander.say(0.6, 0.0)
+        self.voltages.wait(lambda m: m.v == 0.6, "motion")
         self.commander.silence()
-        self.voltages.wait(is_neutral, "neutral")
-        last_motion = max(m.header.stamp.to_sec() for m in self.voltages.messages if m.v)
-        first_rest = min(
-            m.header.stamp.to_sec() for m in self.voltages.messages if not m.v and m.header.stamp.to_sec() > last_motion
-        )
-        assert first_rest - last_motion < 0.25
+        silent = rospy.get_time()
+        rest = self.voltages.wait(is_neutral, "neutral").header.stamp.to_sec()
+        assert rest - silent < 0.25 + 0.6 / 1.2 + 0.1  # timeout, v / deceleration, and two ticks late
+        v = [m.v for m in self.voltages.messages if m.header.stamp.to_sec() >= silent]
+        assert max(-np.diff(v)) < 1.2 * 0.1  # a ramp, a tick of 0.1 s at most
         wait_for(lambda: self.count("timeouts") == timeouts + 1, "the timeout is counted")
 
     def test_nan_is_refused(self) -> None:
         start, here = len(self.voltages.messages), self.odom.last.pose
-        for v, w in ((math.nan, 0.3), (0.3, math.inf)):
+        for v, w in ((math.nan, 0.3), (0.3, math.inf), (-50.0, 0.1)):
             refused = self.count("refused commands")
             self.commander.say(v, w)
             wait_for(lambda n=refused: self.count("refused commands") > n + 10, "refusals are counted")
@@ -90,19 +95,21 @@ class BaseNode(unittest.TestCase):
 
     def test_clamps(self) -> None:
         clamped = self.count("clamped commands")
-        self.commander.say(-50.0, 50.0)
-        message = self.voltages.wait(lambda m: m.v != 0, "motion")
-        assert (message.v, message.w) == (-0.8, 1.5)
+        self.commander.say(-5.0, 1.0)
+        self.voltages.wait(lambda m: (m.v, m.w) == (-0.8, 1.0), "what the limits let pass")
+        self.commander.say(0.0, 5.0)
+        self.voltages.wait(lambda m: (m.v, m.w) == (0.0, 1.5), "what the limits let pass")
+        assert all(abs(m.v * m.w) <= 1.0 + 1e-9 for m in self.voltages.messages)
         wait_for(lambda: self.count("clamped commands") > clamped, "the clamp is counted")
 
     def test_sideways_is_not_obeyed(self) -> None:
         ignored = self.count("commands with ignored components")
         twist = Twist()
         twist.linear.x, twist.linear.y = 0.1, 0.5
-        self.commander.publisher.publish(twist)
-        message = self.voltages.wait(lambda m: m.v != 0, "motion")
-        assert (message.v, message.w) == (0.1, 0.0)
-        wait_for(lambda: self.count("commands with ignored components") == ignored + 1, "it is counted")
+        self.commander.repeat(twist)
+        message = self.voltages.wait(lambda m: m.v == 0.1, "motion")
+        assert message.w == 0.0
+        wait_for(lambda: self.count("commands with ignored components") > ignored, "it is counted")
 
     def test_odometry_and_tf_are_what_was_put_out(self) -> None:
         buffer = tf2_ros.Buffer()
@@ -156,6 +163,99 @@ class BaseNode(unittest.TestCase):
         before = int(self.value("voltage law", "ambiguous samples") or 0)
         self.commander.say(0.0, 0.1)
         wait_for(lambda: int(self.value("voltage law", "ambiguous samples") or 0) > before, "samples counted")
+
+    def heard(self, topic: Topic, data: Any) -> None:
+        topic.wait(lambda m: m.data == data, f"{data!r} on its topic")
+
+    def test_who_has_the_higher_priority_drives(self) -> None:
+        active, survived = Topic("/active_input", String), Topic("/cmd_vel_out", TwistStamped)
+        self.commander.say(0.2, 0.0)
+        self.heard(active, "navigation")
+        survived.wait(lambda m: m.twist.linear.x == 0.2, "what survived")
+        hand = Commander("/joy_vel")
+        hand.say(-0.1, 0.0)
+        self.heard(active, "joystick")
+        survived.wait(lambda m: m.twist.linear.x == -0.1, "what survived")
+        hand.close()
+        self.heard(active, "navigation")
+        survived.wait(lambda m: m.twist.linear.x == 0.2, "what survived")
+        assert survived.last.header.frame_id == "base_link"
+        self.commander.silence()
+        self.heard(active, "")
+
+    def test_a_second_publisher_brakes(self) -> None:
+        self.commander.say(0.3, 0.0)
+        self.voltages.wait(lambda m: m.v == 0.3, "motion")
+        conflicts = self.count("conflicts")
+        command = ["rostopic", "pub", "-r", "20", "/cmd_vel", "geometry_msgs/Twist", "{linear: {x: 0.3}}"]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as other:
+            try:
+                self.voltages.wait(is_neutral, "rest")
+                wait_for(lambda: self.count("conflicts") == conflicts + 1, "it is counted")
+                assert (self.value("commands", "state") or "").startswith("several publishers: navigation")
+            finally:
+                other.send_signal(signal.SIGINT)
+        self.voltages.wait(lambda m: m.v == 0.3, "motion, when it is alone again")
+
+    def test_locks_and_caps(self) -> None:
+        hold = rospy.Publisher("/hold", Bool, queue_size=1, latch=True)
+        self.commander.say(0.4, 0.0)
+        self.voltages.wait(lambda m: m.v == 0.4, "motion")
+        hold.publish(True)
+        self.voltages.wait(is_neutral, "rest")
+        hold.publish(False)
+        self.voltages.wait(lambda m: m.v == 0.4, "motion")
+        cap = rospy.Publisher("/speed_cap", Float64, queue_size=1)
+
+        def capped() -> bool:
+            cap.publish(0.15)
+            return self.voltages.last.v == 0.15
+
+        wait_for(capped, "a slower chair")
+        self.voltages.wait(lambda m: m.v == 0.4, "the cap forgotten")
+        hold.unregister()
+
+    def test_an_emergency_stop_needs_a_reset(self) -> None:
+        stop = rospy.Publisher("/e_stop", Bool, queue_size=1)
+        wait_for(stop.get_num_connections, "it listens")
+        reset = rospy.ServiceProxy("/base_node/reset", Trigger)
+        self.commander.say(0.5, 0.3)
+        self.voltages.wait(lambda m: m.v == 0.5, "motion")
+        stop.publish(True)
+        self.voltages.wait(is_neutral, "rest")
+        before = next(m for m in reversed(self.voltages.messages) if not is_neutral(m))
+        assert before.v == 0.5  # at once, without a ramp
+        assert "still pressed" in reset().message
+        stop.publish(False)
+        wait_for(lambda: "let go first" in reset().message, "the cause is gone, the command is not")
+        assert is_neutral(self.voltages.last)
+        self.commander.say(0.0, 0.0)
+        wait_for(lambda: reset().success, "a reset")
+        old = len(self.diagnostics.messages)  # they may tell of the time before the stop
+        wait_for(lambda: len(self.diagnostics.messages) > old, "news")
+        wait_for(lambda: self.value("commands", "state") == "driving: navigation", "released by its zeros")
+        self.commander.say(0.5, 0.3)
+        self.voltages.wait(lambda m: m.v == 0.5, "motion")
+        assert rospy.ServiceProxy("/base_node/e_stop", Trigger)().success
+        self.voltages.wait(is_neutral, "rest")
+        self.commander.silence()
+        wait_for(lambda: reset().success, "a reset")
+
+    def test_limits_change_while_it_drives(self) -> None:
+        client = Client("/base_node/limits/ride", timeout=20)
+        shipped = client.get_configuration()
+        self.commander.say(0.6, 0.0)
+        self.voltages.wait(lambda m: m.v == 0.6, "motion")
+        start = len(self.voltages.messages)
+        assert client.update_configuration({"v_forward": 0.25, "v_deceleration": 0.5})["v_forward"] == 0.25
+        self.voltages.wait(lambda m: m.v == 0.25, "the new limit")
+        v = [m.v for m in self.voltages.messages[start:]]
+        assert max(-np.diff(v)) < 0.5 * 0.1
+        assert client.update_configuration({"v_jerk": math.nan})["v_jerk"] == shipped["v_jerk"]
+        assert client.update_configuration({"v_jerk": -1.0})["v_jerk"] > 0
+        client.update_configuration(shipped)
+        self.voltages.wait(lambda m: m.v == 0.6, "the old limit")
+        client.close()
 
 
 if __name__ == "__main__":

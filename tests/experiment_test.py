@@ -48,7 +48,7 @@ PLACES = {
 class Experiment(unittest.TestCase):
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        self.truth, self.commands = Topic("ground_truth", Odometry), Topic("cmd_vel", Twist)
+        self.truth, self.commands = Topic("ground_truth", Odometry), Topic("experiment_vel", Twist)
         self.addCleanup(self.truth.close)
         self.addCleanup(self.commands.close)
         self.put(0.0, 0.0, 0.0)
@@ -140,21 +140,31 @@ class Experiment(unittest.TestCase):
     def test_who_commands_too_stops_it_and_keeps_it_from_starting(self):
         process = self.start("slow", script=SLOW)
         self.driving()
-        other = Commander("cmd_vel")
+        other = Commander("experiment_vel")
         self.addCleanup(other.close)
         other.say(0.0, 0.0)
         assert "commands the chair, too" in self.end(process, 1)
         other.silence()
-        assert "cmd_vel is published already, by /experiment_test" in self.end(self.start("slow", script=SLOW), 1)
+        assert "experiment_vel is published already" in self.end(self.start("slow", script=SLOW), 1)
 
     def test_a_chair_that_drives_is_left_alone(self):
-        program = "from kurumaisu.ros.testing import *; rospy.init_node('pusher'); Commander('cmd_vel').say(0.2, 0.1)"
+        program = "from kurumaisu.ros.testing import *; rospy.init_node('pusher'); Commander('cmd_vel').say(0.1, 0.2)"
         with subprocess.Popen([sys.executable, "-c", f"{program}; rospy.spin()"]) as pusher:
             try:
-                self.driving()
-                assert "cmd_vel is published already, by /pusher" in self.end(self.start("slow", script=SLOW), 1)
+                self.truth.wait(lambda m: m.twist.twist.linear.x > 0, "the chair to move")
+                assert "navigation commands the chair, too" in self.end(self.start("slow", script=SLOW), 1)
             finally:
                 pusher.terminate()  # a killed one would stay on the books of the master
+
+    def test_the_joystick_takes_over(self):
+        process = self.start("slow", script=SLOW)
+        self.driving()
+        hand = Commander("joy_vel")
+        self.addCleanup(hand.close)
+        hand.say(0.0, 0.1)
+        assert "joystick commands the chair, too" in self.end(process, 1)
+        hand.silence()
+        self.stopped_properly()
 
     def test_a_wall_in_the_way_is_seen_beforehand(self):
         self.put(27.0, 0.0, 0.0)

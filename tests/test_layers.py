@@ -64,15 +64,16 @@ PYTHON_RULES = [
 ]
 CPP_RULES = [
     Rule(
-        r"(?!.*_node\.cpp|.*/messages\.(cpp|h)|params\.h)",
+        r"(?!.*_node\.cpp|.*/messages\.(cpp|h)|base/((command|odometry)_(in|out)put|limits_server|master_watch|topic_dac)\.(cpp|h)|params\.h)",
         ROS_CPP,
-        "ROS headers only in *_node.cpp, its messages.h and params.h",
+        "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, and params.h",
     ),
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
     Rule(r"(?!.*bindings\.(cpp|h))", r"<pybind11/", "pybind11 only in bindings"),
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
     Rule(r"follow/", r'"(?!follow/|bindings\.h)', "following rests on nothing"),
     Rule(r"scip/", r'"(?!scip/)', "the protocol rests on nothing"),
+    Rule(r"guard/", r'"(?!dac/|guard/|yaml\.h)', "the guard rests on the D/A converter only"),
     Rule(r"virtual_urg/", r'"(?!scip/|virtual_urg/|bindings\.h)', "the virtual sensor shares the protocol only"),
     Rule(r"laser/", r'"(?!scip/|serial/|laser/|params\.h)', "the driver rests on the protocol and the port only"),
     Rule(r"serial/", r'"(?!serial/)', "a port rests on nothing"),

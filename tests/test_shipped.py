@@ -129,12 +129,15 @@ def test_launch_file_gives_its_nodes_what_they_read(path):
     config = load(path)
     sources = [path for kind in ("cpp", "h", "py") for path in (TREE / "src").rglob(f"*.{kind}")]
     text = "".join(source.read_text() for source in sources)
-    laws = yaml.safe_load((SHARE / "launch/md100.yaml").read_text())["voltage_laws"]  # their names are the user's
+    # names that are the user's
+    base = yaml.safe_load((SHARE / "launch/base_node.yaml").read_text())
+    laws = yaml.safe_load((SHARE / "launch/md100.yaml").read_text())["voltage_laws"]
+    own = {*laws, *base["inputs"], *base["locks"], *base["limits"]}
     for node in config.nodes:
         if node.package == "kurumaisu":
             tree = parameters(config, node)
             # a key that is in no source is misspelt, or no longer read
-            assert [key for key in leaves(tree) if key not in laws and f'"{key}"' not in text] == []
+            assert [key for key in leaves(tree) if key not in own and f'"{key}"' not in text] == []
             if node.type in READERS:
                 call(READERS[node.type], tree, path.name)
 
@@ -149,6 +152,18 @@ def test_files_that_a_launch_file_names_exist(path):
 @pytest.mark.parametrize("path", WORLDS, ids=name)
 def test_world_loads(path):
     call("kurumaisu.world:load_world", path)
+
+
+def test_unit_names_what_is_installed():
+    """A service starts without any environment: its paths are whole ones."""
+    unit = SHARE / "launch/systemd/kurumaisu-guard.service"
+    prefix = SHARE.parents[1]
+    if not (prefix / "lib/kurumaisu/guard").exists():
+        pytest.skip("the unit is made by installing")
+    paths = re.findall(rf"{re.escape(str(prefix))}/[\w./]+", unit.read_text())
+    assert f"ExecStart={prefix}/lib/kurumaisu/guard" in unit.read_text()
+    assert len(paths) >= 5
+    assert [path for path in paths if not Path(path).exists()] == []
 
 
 def test_model_loads():

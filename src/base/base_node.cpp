@@ -1,20 +1,32 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// cmd_vel in; voltages, odom, tf and diagnostics out. What it does with them is in drive.h.
+// Commands in; voltages, cmd_vel_out, odom, tf and diagnostics out. What it does with them is in drive.h.
 #include <diagnostic_updater/diagnostic_updater.h>
-#include <geometry_msgs/Twist.h>
-#include <kurumaisu/Voltages.h>
-#include <nav_msgs/Odometry.h>
+#include <geometry_msgs/TwistStamped.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <ros/xmlrpc_manager.h>
-#include <tf2_ros/transform_broadcaster.h>
+#include <std_msgs/String.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <exception>
+#include <memory>
+#include <stdexcept>
 
+#include "base/command_input.h"
+#include "base/guard_dac.h"
+#include "base/last_word.h"
+#include "base/limits_server.h"
+#include "base/master_watch.h"
+#include "base/odometry_input.h"
+#include "base/odometry_output.h"
+#include "base/odometry_report.h"
 #include "base/report.h"
 #include "base/settings.h"
+#include "base/topic_dac.h"
+#include "guard/clock.h"
+#include "guard/realtime.h"
 
 namespace k = kurumaisu;
 
@@ -22,54 +34,17 @@ namespace {
 
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
-constexpr double kWarningPeriod = 1.0;  // [s] of throttled warnings
-constexpr double kUnmeasured = 1.0e6;   // variance of what a planar base does not know: z, roll, pitch
-constexpr int kLastSamples = 5;         // of neutral at the end, with
-constexpr double kLastPause = 0.02;     // [s] after each, time for it to leave the process
+constexpr double kGlance = 0.02;     // [s] longest wait for anything
+constexpr int kLastSamples = 5;      // of neutral at the end, with
+constexpr double kLastPause = 0.02;  // [s] after each, time for it to leave the process
 
 std::atomic<bool> stop_requested{false};
-
-/// The D/A converter as a topic: for the simulator and for drivers in other processes.
-class TopicDac : public k::Dac {
- public:
-  explicit TopicDac(ros::NodeHandle& nh) : publisher_(nh.advertise<k::Voltages>("voltages", 10)) {
-    stamp = ros::Time::now();
-  }
-
-  void put(const k::Output& output) override {
-    k::Voltages message;
-    message.header.stamp = stamp;
-    message.translation = output.translation;
-    message.steering = output.steering;
-    message.reference = output.reference;
-    message.v = output.v;
-    message.w = output.w;
-    publisher_.publish(message);
-  }
-
-  ros::Time stamp;  ///< of the next sample
-
- private:
-  ros::Publisher publisher_;
-};
 
 void warn(const std::string& text) { ROS_WARN("%s", text.c_str()); }
 
 void logLaw(const std::string& name, const std::string& ambiguity) {
   ROS_INFO("voltage law: %s", name.c_str());
   if (!ambiguity.empty()) warn("BASE_AMBIGUOUS_LAW: " + name + ": " + ambiguity);
-}
-
-void warnIgnored(const geometry_msgs::Twist& twist) {
-  ROS_WARN_THROTTLE(kWarningPeriod,
-                    "BASE_IGNORED_COMPONENT: cmd_vel: only linear.x and angular.z are obeyed: linear.y %g, "
-                    "linear.z %g, angular.x %g, angular.y %g",
-                    twist.linear.y, twist.linear.z, twist.angular.x, twist.angular.y);
-}
-
-void warnRefused(const geometry_msgs::Twist& twist) {
-  ROS_WARN_THROTTLE(kWarningPeriod, "BASE_BAD_COMMAND: cmd_vel: refused: linear.x %g, angular.z %g",
-                    twist.linear.x, twist.angular.z);
 }
 
 /// Time [s] of the control loop: simulated time, or one that nobody can set.
@@ -85,56 +60,120 @@ class BaseNode {
   void run();
 
  private:
-  void onCommand(const geometry_msgs::Twist& twist);
   void onTick();
+  ros::SteadyTime tickAfter(const ros::SteadyTime& due);
+  static ros::SteadyTime listen(const ros::SteadyTime& until);
+  void act();
+  void publish();
+  void tell();
+  bool isForgotten();
   void finish();
-  void publishOdometry();
+  void reportOdometry(Status& status);
+  void reportGuard(Status& status);
   static void diagnose(Status& status, const k::Report& report);
 
   k::BaseSettings settings_;
-  TopicDac dac_;
+  std::unique_ptr<k::GuardDac> guard_;  ///< or none
+  k::TopicDac dac_;
   k::Drive drive_;
-  k::DriveCounts reported_;      ///< at the last diagnostics
-  double last_diagnostics_ = 0;  ///< [s]
+  k::LastWord last_word_;
+  k::Tally told_;                    ///< at the last tick
+  k::Tally reported_;                ///< at the last diagnostics
+  std::string state_;                ///< at the last tick
+  k::guard::Status reported_guard_;  ///< at the last diagnostics
+  double last_diagnostics_ = 0;      ///< [s]
+  bool heard_ = false;               ///< a word that may change what is put out
   diagnostic_updater::Updater diagnostics_;
-  ros::Publisher odom_;
-  tf2_ros::TransformBroadcaster tf_;
-  ros::Subscriber cmd_vel_;
-  ros::Timer timer_;
-  ros::SteadyTimer steady_timer_;
+  k::OdometryOutput odom_;
+  k::OdometryInput odom_input_;
+  k::GyroCounts reported_gyro_;  ///< at the last diagnostics
+  ros::Publisher cmd_vel_out_;
+  ros::Publisher active_input_;
+  k::CommandInput input_;
+  k::LimitsServer limits_;
+  k::MasterWatch master_;
+  ros::Timer timer_;  ///< of simulated time
 };
 
 BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
-    : settings_(settings), dac_(nh), drive_(settings.drive, dac_) {
-  logLaw(settings_.law_name, k::ambiguity(drive_));
+    : settings_(settings),
+      guard_(settings.dac.guard
+                 ? std::make_unique<k::GuardDac>(*settings.dac.guard, settings.drive.outlet.law)
+                 : nullptr),
+      dac_(nh, guard_.get()),
+      drive_(settings.drive, dac_),
+      last_word_([this] { finish(); }),
+      odom_(nh, settings.odometry.names),
+      odom_input_(nh, drive_, settings.odometry, loopTime),
+      cmd_vel_out_(nh.advertise<geometry_msgs::TwistStamped>("cmd_vel_out", 10)),
+      active_input_(nh.advertise<std_msgs::String>("active_input", 1, true)),
+      input_(
+          nh, settings.topics, drive_, [] { return loopTime(ros::Time::now()); }, [this] { heard_ = true; }),
+      limits_(settings.limit_names, drive_),
+      master_(settings.master_timeout) {
+  logLaw(settings_.law_name, k::ambiguity(drive_.outlet()));
+  const std::string unfollowed = k::unfollowedWarning(settings.effects.unfollowed);
+  if (!unfollowed.empty()) warn(unfollowed);
   diagnostics_.setHardwareID("none");
-  diagnostics_.add("voltage law",
-                   [this](Status& status) { diagnose(status, k::reportLaw(drive_, settings_.law_name)); });
+  diagnostics_.add("voltage law", [this](Status& status) {
+    diagnose(status, k::reportLaw(drive_.outlet(), settings_.law_name));
+  });
   diagnostics_.add("commands", [this](Status& status) {
     diagnose(status, k::reportCommands(drive_, reported_));
-    reported_ = drive_.counts();
+    reported_ = k::tally(drive_);
   });
-  odom_ = nh.advertise<nav_msgs::Odometry>("odom", 10);
-  cmd_vel_ = nh.subscribe("cmd_vel", 10, &BaseNode::onCommand, this, ros::TransportHints().tcpNoDelay());
-  const double period = 1.0 / settings_.rate;
+  diagnostics_.add("odometry", [this](Status& status) { reportOdometry(status); });
+  const std::string refusal = guard_ ? k::guard::favourThreads(settings_.dac.nice) : "";
+  if (!refusal.empty()) warn("BASE_NOT_FAVOURED: busy cores may delay commands, and neutral: " + refusal);
+  if (guard_) diagnostics_.add("guard", [this](Status& status) { reportGuard(status); });
   if (ros::Time::isSimTime()) {
-    timer_ = nh.createTimer(ros::Duration(period), [this](const ros::TimerEvent&) { onTick(); });
-  } else {
-    // A system clock that is set back would stall ros::Timer, and the chair would drive on.
-    steady_timer_ =
-        nh.createSteadyTimer(ros::WallDuration(period), [this](const ros::SteadyTimerEvent&) { onTick(); });
+    timer_ =
+        nh.createTimer(ros::Duration(1.0 / settings_.rate), [this](const ros::TimerEvent&) { onTick(); });
   }
 }
 
 void BaseNode::run() {
-  const ros::WallDuration longest_wait(0.02);
   try {
-    while (ros::ok() && !stop_requested) ros::getGlobalCallbackQueue()->callAvailable(longest_wait);
+    ros::SteadyTime due = ros::SteadyTime::now();
+    while (ros::ok() && !stop_requested && !isForgotten()) {
+      due = ros::Time::isSimTime() ? listen(due) : tickAfter(due);
+    }
   } catch (...) {
     finish();
     throw;
   }
   finish();
+  if (isForgotten()) {
+    throw std::runtime_error(
+        "BASE_MASTER_FORGOT: another ROS master has taken the place of the one that knew this node");
+  }
+}
+
+/// Whether it is time to end, for somebody to start it anew: nobody finds this node any more, and it stands.
+bool BaseNode::isForgotten() {
+  return master_.forgotten() && drive_.output().v == 0 && drive_.output().w == 0;
+}
+
+/// Works on what comes until the tick that is due, and ticks; returns when the next one is due. No ros::Timer:
+/// a system clock that is set back would stall it, and the chair would drive on; and its thread costs as much
+/// as all this.
+ros::SteadyTime BaseNode::tickAfter(const ros::SteadyTime& due) {
+  const ros::SteadyTime now = listen(due);
+  if (now < due) {
+    if (heard_) act();
+    return due;
+  }
+  heard_ = false;
+  onTick();
+  const ros::SteadyTime next = due + ros::WallDuration(1.0 / settings_.rate);
+  return next < now ? now : next;  // ticks that were missed are not made up for
+}
+
+/// Works on what comes, waiting for it until a time, but not so long that a signal waits; returns the time.
+ros::SteadyTime BaseNode::listen(const ros::SteadyTime& until) {
+  const double wait = ros::Time::isSimTime() ? kGlance : (until - ros::SteadyTime::now()).toSec();
+  ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(std::clamp(wait, 0.0, kGlance)));
+  return ros::SteadyTime::now();
 }
 
 void BaseNode::finish() {
@@ -145,69 +184,69 @@ void BaseNode::finish() {
   }
 }
 
-void BaseNode::onCommand(const geometry_msgs::Twist& twist) {
-  if (twist.linear.y != 0 || twist.linear.z != 0 || twist.angular.x != 0 || twist.angular.y != 0) {
-    drive_.countIgnored();
-    warnIgnored(twist);
-  }
-  if (!drive_.command(twist.linear.x, twist.angular.z, loopTime(ros::Time::now()))) warnRefused(twist);
-}
-
 void BaseNode::onTick() {
   dac_.stamp = ros::Time::now();
   const double t = loopTime(dac_.stamp);
-  const std::uint64_t timeouts = drive_.counts().timeouts;
+  drive_.cutOff(master_.lost() || master_.forgotten());
   const k::Drive::Tick tick = drive_.tick(t);
-  if (drive_.counts().timeouts > timeouts) {
-    warn("BASE_COMMAND_TIMEOUT: cmd_vel: nothing for " + std::to_string(settings_.drive.command_timeout) +
-         " s: neutral");
-  }
   if (tick == k::Drive::Tick::kReset) {
     warn("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");
   }
-  if (tick != k::Drive::Tick::kRepeated) publishOdometry();
+  odom_input_.check();
+  if (tick != k::Drive::Tick::kRepeated) publish();
+  tell();
   if (std::abs(t - last_diagnostics_) >= settings_.diagnostic_period) {
     last_diagnostics_ = t;
     diagnostics_.force_update();  // update() would fall silent when the clock is set back
   }
 }
 
-void BaseNode::publishOdometry() {
-  const k::Odometry& odometry = drive_.odometry();
-  nav_msgs::Odometry message;
-  message.header.stamp = dac_.stamp;
-  message.header.frame_id = settings_.odom_frame;
-  message.child_frame_id = settings_.base_frame;
-  message.pose.pose.position.x = odometry.pose().x;
-  message.pose.pose.position.y = odometry.pose().y;
-  message.pose.pose.orientation.z = std::sin(0.5 * odometry.pose().theta);
-  message.pose.pose.orientation.w = std::cos(0.5 * odometry.pose().theta);
-  message.twist.twist.linear.x = odometry.v();
-  message.twist.twist.angular.z = odometry.w();
-  constexpr std::size_t kAxes[] = {0, 1, 5};  // x, y, yaw of x, y, z, roll, pitch, yaw
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      message.pose.covariance[6 * kAxes[row] + kAxes[column]] = odometry.covariance()(row, column);
-    }
-    message.twist.covariance[7 * kAxes[row]] = odometry.rateVariance()[row];
-  }
-  for (const std::size_t axis : {2, 3, 4}) {
-    message.pose.covariance[7 * axis] = message.twist.covariance[7 * axis] = kUnmeasured;
-  }
-  odom_.publish(message);
+/// Words are obeyed at once, not at the next tick; those that came together, together. In simulated time there
+/// are ticks only: one seed, one run.
+void BaseNode::act() {
+  heard_ = false;
+  dac_.stamp = ros::Time::now();
+  drive_.tick(loopTime(dac_.stamp));
+}
 
-  if (!settings_.publish_tf) return;
-  geometry_msgs::TransformStamped odom_from_base;
-  odom_from_base.header = message.header;
-  odom_from_base.child_frame_id = message.child_frame_id;
-  odom_from_base.transform.translation.x = odometry.pose().x;
-  odom_from_base.transform.translation.y = odometry.pose().y;
-  odom_from_base.transform.rotation = message.pose.pose.orientation;
-  tf_.sendTransform(odom_from_base);
+void BaseNode::publish() {
+  odom_.publish(drive_.odometry(), dac_.stamp);
+  geometry_msgs::TwistStamped survived;
+  survived.header.stamp = dac_.stamp;
+  survived.header.frame_id = settings_.odometry.names.child_frame;
+  survived.twist.linear.x = drive_.output().v;
+  survived.twist.angular.z = drive_.output().w;
+  cmd_vel_out_.publish(survived);
+}
+
+/// Says what has changed.
+void BaseNode::tell() {
+  const std::string warning = k::warningOf(drive_, told_, state_);
+  if (!warning.empty()) warn(warning);
+  told_ = k::tally(drive_);
+  const std::string state = k::stateOf(drive_);
+  if (state == state_) return;
+  state_ = state;
+  std_msgs::String active;
+  active.data = k::activeInput(drive_);
+  active_input_.publish(active);
+}
+
+void BaseNode::reportOdometry(Status& status) {
+  const k::Reckoning& reckoning = drive_.reckoning();
+  const k::KnownEffects& effects = settings_.effects;
+  diagnose(status,
+           k::reportOdometry(reckoning, effects.unfollowed, effects.noise.has_value(), reported_gyro_));
+  if (reckoning.gyro()) reported_gyro_ = reckoning.gyro()->counts();
+}
+
+void BaseNode::reportGuard(Status& status) {
+  diagnose(status, k::reportGuard(guard_->status(), reported_guard_, k::guard::monotonic()));
+  reported_guard_ = guard_->status();
 }
 
 void BaseNode::diagnose(Status& status, const k::Report& report) {
-  status.summary(report.warning ? Status::WARN : Status::OK, report.summary);
+  status.summary(report.error ? Status::ERROR : report.warning ? Status::WARN : Status::OK, report.summary);
   for (const auto& [name, value] : report.values) status.add(name, value);
 }
 

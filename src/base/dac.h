@@ -18,8 +18,8 @@ class Dac {
  public:
   virtual ~Dac() = default;
 
-  /// Holds these voltages until the next call.
-  virtual void put(const Output& output) = 0;
+  /// Holds these voltages until the next call. Returns what it really holds, and the rates that this stands for.
+  virtual Output put(const Output& output) = 0;
 };
 
 }  // namespace kurumaisu

@@ -2,57 +2,74 @@
 #include "base/drive.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace kurumaisu {
 
-std::optional<Band> ambiguousBand(const AxisLaw& law) {
-  // A branch reaches from its intercept to infinity, on the side that its slope and its sign of the rate
-  // give.
-  const bool rising = law.positive.slope > 0;
-  const Band band{rising ? law.positive.intercept : law.negative.intercept,
-                  rising ? law.negative.intercept : law.positive.intercept};
-  return band.low < band.high ? std::optional(band) : std::nullopt;
-}
-
 Drive::Drive(const DriveSettings& settings, Dac& dac)
     : settings_(settings),
       dac_(dac),
-      translation_band_(ambiguousBand(settings.law.translation)),
-      steering_band_(ambiguousBand(settings.law.steering)),
-      odometry_(settings.noise) {
-  put(0, 0);
+      arbiter_(settings.arbiter),
+      estop_(settings.estop_timeout),
+      cap_(settings.cap),
+      limiter_(settings.limits.at(0)),
+      outlet_(settings.outlet),
+      reckoning_(settings.noise, settings.gyro),
+      now_cap_(settings.cap.fallback) {
+  put({});
 }
 
-bool Drive::command(double v, double w, double t) {
-  ++counts_.commands;
-  if (!std::isfinite(v) || !std::isfinite(w)) {
-    ++counts_.refused;
-    return false;
-  }
-  const Limits& limits = settings_.limits;
-  const Command clamped{std::clamp(v, -limits.v_reverse, limits.v_forward),
-                        std::clamp(w, -limits.w, limits.w), t};
-  if (clamped.v != v || clamped.w != w) ++counts_.clamped;
-  command_ = clamped;
+bool Drive::command(std::size_t input, const std::string& publisher, const Rates& rates, double t) {
+  if (!arbiter_.command(input, publisher, rates, t)) return false;
+  const Limits& limits = settings_.limits[settings_.arbiter.inputs[input].limits];
+  const Rates allowed = shaped(limits, rates, Limiter::kNoCap);
+  if (allowed.v != rates.v || allowed.w != rates.w) ++counts_.clamped;
   return true;
 }
 
 Drive::Tick Drive::tick(double t) {
+  const double dt = last_tick_ ? t - *last_tick_ : 0;
   const Tick result = advanceTo(t);
-  if (command_ && t - command_->t > settings_.command_timeout) {
-    if (command_->v != 0 || command_->w != 0) ++counts_.timeouts;
-    command_.reset();
-  }
-  put(command_ ? command_->v : 0, command_ ? command_->w : 0);
+  if (dt > settings_.longest_step) ++counts_.late_ticks;
+  move(t, std::clamp(dt, 0.0, settings_.longest_step));
   return result;
 }
 
+void Drive::move(double t, double dt) {
+  estop_.tick(t);
+  now_cap_ = cap_.at(t);
+  if (estop_.latched() || cut_off_)
+    arbiter_.disarm();  // whoever commands must let go before it is obeyed again
+  const Choice choice = arbiter_.choose(t);
+  if (choice.input && settings_.arbiter.inputs[*choice.input].limits != set_) {
+    set_ = settings_.arbiter.inputs[*choice.input].limits;
+    limiter_.configure(settings_.limits[set_]);
+  }
+  if (estop_.stopped()) {
+    limiter_.reset();
+  } else if (choice.reason == Reason::kDriving && !cut_off_) {
+    limiter_.advance(choice.command, now_cap_, dt);
+  } else {
+    limiter_.brake(dt);
+  }
+  put(limiter_.rates());
+}
+
 void Drive::stop(double t) {
-  command_.reset();
+  arbiter_.reset();
+  limiter_.reset();
   advanceTo(t);
-  put(0, 0);
+  put({});
+}
+
+std::string Drive::resetEStop(double t) {
+  estop_.tick(t);
+  return estop_.reset(arbiter_.moving(t));
+}
+
+void Drive::configure(std::size_t set, const Limits& limits) {
+  settings_.limits.at(set) = limits;
+  if (set == set_) limiter_.configure(limits);
 }
 
 Drive::Tick Drive::advanceTo(double t) {
@@ -60,26 +77,20 @@ Drive::Tick Drive::advanceTo(double t) {
   if (!last) return Tick::kFirst;
   if (t < *last) {
     ++counts_.time_resets;
-    command_.reset();
-    odometry_.reset();
-    return Tick::kReset;
+    limiter_.reset();
+    reckoning_.restart();
+    return Tick::kReset;  // the parts see it for themselves
   }
   if (t == *last) return Tick::kRepeated;
-  odometry_.advance(output_.v, output_.w, t - *last);
+  reckoning_.advance(output_.v, output_.w, *last, t);
   return Tick::kAdvanced;
 }
 
-void Drive::put(double v, double w) {
-  output_ = {settings_.law.translation.volts(v), settings_.law.steering.volts(w), settings_.reference_voltage,
-             v, w};
-  ++counts_.samples;
-  const auto isIn = [](const std::optional<Band>& band, double volts) {
-    return band && band->contains(volts);
-  };
-  if (isIn(translation_band_, output_.translation) || isIn(steering_band_, output_.steering)) {
-    ++counts_.ambiguous;
-  }
-  dac_.put(output_);
+void Drive::place(const Pose2D& pose, const Eigen::Matrix3d& covariance, double t) {
+  advanceTo(t);  // or the way since the last tick would count as driven from there
+  reckoning_.place(pose, covariance);
 }
+
+void Drive::put(const Rates& rates) { output_ = dac_.put(outlet_.at(rates.v, rates.w)); }
 
 }  // namespace kurumaisu

@@ -2,58 +2,46 @@
 // Commands in, voltages and odometry out. No ROS: time is an argument, the D/A converter an interface.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <vector>
 
+#include "base/arbiter.h"
 #include "base/dac.h"
-#include "base/odometry.h"
-#include "model/voltage_law.h"
+#include "base/estop.h"
+#include "base/limiter.h"
+#include "base/outlet.h"
+#include "base/reckoning.h"
+#include "base/speed_cap.h"
 
 namespace kurumaisu {
 
-/// Voltages between which two rates answer.
-struct Band {
-  double low;   ///< [V]
-  double high;  ///< [V]
-
-  /// True for a voltage that stands for two rates; 0 V never does, it is rest.
-  bool contains(double volts) const { return volts > low && volts < high && volts != 0; }
-};
-
-/// Where the branches of a law overlap; empty for a law with an ordinary dead zone.
-std::optional<Band> ambiguousBand(const AxisLaw& law);
-
-/// Largest rates that are put out; all positive.
-struct Limits {
-  double v_forward;  ///< [m/s]
-  double v_reverse;  ///< [m/s]
-  double w;          ///< [rad/s], to either side
-};
-
 struct DriveSettings {
-  VoltageLaw law;
-  double reference_voltage;  ///< [V]
-  Limits limits;
-  double command_timeout;  ///< a command older than this is none [s]
+  ArbiterSettings arbiter;
+  double estop_timeout;  ///< EStop's [s]
+  SpeedCapSettings cap;
+  std::vector<Limits> limits;  ///< sets that the inputs choose from
+  double longest_step;         ///< a tick later than this moves the ramps on by no more [s]
+  OutletSettings outlet;
   OdometryNoise noise;
+  std::optional<GyroSettings> gyro{};  ///< nothing: odometry is open loop
 };
 
-/// Events since the start, for diagnostics.
+/// Events since the start, for diagnostics, beside those of the parts.
 struct DriveCounts {
-  std::uint64_t samples = 0;      ///< put out
-  std::uint64_t ambiguous = 0;    ///< of those, with a voltage that stands for two rates
-  std::uint64_t commands = 0;     ///< received
-  std::uint64_t refused = 0;      ///< of those, not finite
-  std::uint64_t clamped = 0;      ///< of those, beyond a limit
-  std::uint64_t ignored = 0;      ///< of those, with components that a chair cannot obey
-  std::uint64_t timeouts = 0;     ///< commands to move that ran out: the chair was stopped
+  std::uint64_t clamped = 0;      ///< commands beyond a limit
+  std::uint64_t ignored = 0;      ///< commands with components that a chair cannot obey
+  std::uint64_t late_ticks = 0;   ///< later than longest_step
   std::uint64_t time_resets = 0;  ///< times that the clock ran backwards
 };
 
 /// Turns commands into voltages and keeps the odometry of what was really put out.
 ///
-/// Neutral is 0 V on both axes. It is put out at the start, without a valid command, and after the clock ran
-/// backwards, when command and odometry start afresh.
+/// Each tick: who drives (Arbiter), how fast at most (SpeedCap), how soon (Limiter), by which voltages (Outlet).
+/// Without anybody to obey the chair brakes to neutral, 0 V on both axes; at an emergency stop, and after the
+/// clock ran backwards, it is neutral at once.
 class Drive {
  public:
   enum class Tick { kFirst, kRepeated, kAdvanced, kReset };
@@ -61,44 +49,64 @@ class Drive {
   /// Puts out neutral. The converter must outlive this object.
   Drive(const DriveSettings& settings, Dac& dac);
 
-  /// Takes the command v [m/s], w [rad/s] at time t [s]. A command that is not finite is refused (false): it
-  /// neither moves the chair nor keeps the last command alive.
-  bool command(double v, double w, double t);
+  /// Takes a command of a publisher on an input at time t [s]; Arbiter::command says when it is refused (false).
+  bool command(std::size_t input, const std::string& publisher, const Rates& rates, double t);
 
   /// Counts a command that also asks for what a chair cannot do, such as driving sideways.
   void countIgnored() { ++counts_.ignored; }
 
-  /// Integrates the last output up to t [s], then puts out what the command asks for.
+  /// Integrates the last output up to t [s], then puts out what follows from what was heard.
   Tick tick(double t);
 
-  /// Drops the command and puts out neutral at time t [s].
+  /// From now, time t [s], odometry goes on from that pose; what the chair does stays as it is.
+  void place(const Pose2D& pose, const Eigen::Matrix3d& covariance, double t);
+
+  /// Forgets every command and puts out neutral at time t [s].
   void stop(double t);
 
+  /// Brakes, and obeys nobody, as long as this is on; then every input must be released anew.
+  void cutOff(bool on) { cut_off_ = on; }
+
+  /// Releases the emergency stop at time t [s], or says why not. Every input must be released anew.
+  std::string resetEStop(double t);
+
+  /// Other limits for those inputs that use this set, from the next tick on.
+  void configure(std::size_t set, const Limits& limits);
+
+  Arbiter& arbiter() { return arbiter_; }
+  EStop& eStop() { return estop_; }
+  SpeedCap& speedCap() { return cap_; }
+  const Arbiter& arbiter() const { return arbiter_; }
+  const EStop& eStop() const { return estop_; }
+  const SpeedCap& speedCap() const { return cap_; }
+  const Outlet& outlet() const { return outlet_; }
   const Output& output() const { return output_; }
-  const Odometry& odometry() const { return odometry_; }
+  const Odometry& odometry() const { return reckoning_.odometry(); }
+  Reckoning& reckoning() { return reckoning_; }
+  const Reckoning& reckoning() const { return reckoning_; }
   const DriveCounts& counts() const { return counts_; }
-  bool hasCommand() const { return command_.has_value(); }
-  const std::optional<Band>& translationBand() const { return translation_band_; }
-  const std::optional<Band>& steeringBand() const { return steering_band_; }
+  const DriveSettings& settings() const { return settings_; }
+  bool isCutOff() const { return cut_off_; }
+  double cap() const { return now_cap_; }  ///< as of the last tick [m/s]
 
  private:
-  struct Command {
-    double v;
-    double w;
-    double t;
-  };
-
   Tick advanceTo(double t);
-  void put(double v, double w);
+  void move(double t, double dt);
+  void put(const Rates& rates);
 
   DriveSettings settings_;
   Dac& dac_;
-  std::optional<Band> translation_band_;
-  std::optional<Band> steering_band_;
-  Odometry odometry_;
+  Arbiter arbiter_;
+  EStop estop_;
+  SpeedCap cap_;
+  Limiter limiter_;
+  std::size_t set_ = 0;  ///< of limits in force
+  Outlet outlet_;
+  Reckoning reckoning_;
   DriveCounts counts_;
   Output output_{};
-  std::optional<Command> command_;
+  bool cut_off_ = false;
+  double now_cap_;
   std::optional<double> last_tick_;
 };
 

@@ -12,54 +12,138 @@ std::string shown(const Band& band) {
   return out.str();
 }
 
+std::string shown(double value) {
+  std::ostringstream out;
+  out << value;
+  return out.str();
+}
+
+const std::string& nameOf(const Drive& drive) {
+  const Arbiter& arbiter = drive.arbiter();
+  return arbiter.settings().inputs[*arbiter.last().input].name;
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
 }  // namespace
 
-std::string ambiguity(const Drive& drive) {
+Tally tally(const Drive& drive) {
+  return {drive.counts(), drive.arbiter().counts(), drive.speedCap().counts(),
+          drive.outlet().counts().clamped};
+}
+
+std::string ambiguity(const Outlet& outlet) {
   std::string text;
   const auto say = [&text](const std::string& name, const std::optional<Band>& band) {
     if (!band) return;
     text += (text.empty() ? "" : "; ") + name + " in " + shown(*band) + " V stands for two rates";
   };
-  say("V_f", drive.translationBand());
-  say("V_s", drive.steeringBand());
+  say("V_f", outlet.translationBand());
+  say("V_s", outlet.steeringBand());
   return text;
 }
 
-Report reportLaw(const Drive& drive, const std::string& law_name) {
-  const std::string warning = ambiguity(drive);
+Report reportLaw(const Outlet& outlet, const std::string& law_name) {
+  const std::string warning = ambiguity(outlet);
   Report report{!warning.empty(),
                 law_name + ": " + (warning.empty() ? "every voltage stands for one rate" : warning),
                 {{"voltage law", law_name}}};
   const auto add = [&report](const char* name, const std::optional<Band>& band) {
     report.values.emplace_back(name, band ? shown(*band) : "none");
   };
-  add("ambiguous V_f [V]", drive.translationBand());
-  add("ambiguous V_s [V]", drive.steeringBand());
-  report.values.emplace_back("samples", std::to_string(drive.counts().samples));
-  report.values.emplace_back("ambiguous samples", std::to_string(drive.counts().ambiguous));
+  add("ambiguous V_f [V]", outlet.translationBand());
+  add("ambiguous V_s [V]", outlet.steeringBand());
+  report.values.emplace_back("samples", std::to_string(outlet.counts().samples));
+  report.values.emplace_back("ambiguous samples", std::to_string(outlet.counts().ambiguous));
+  report.values.emplace_back("samples cut by the band", std::to_string(outlet.counts().clamped));
   return report;
 }
 
-Report reportCommands(const Drive& drive, const DriveCounts& before) {
-  const DriveCounts& now = drive.counts();
+Report reportCommands(const Drive& drive, const Tally& before) {
+  const Tally now = tally(drive);
   std::string warning;
   const auto warn = [&warning](bool happened, const char* words) {
     if (happened) warning += (warning.empty() ? "" : "; ") + std::string(words);
   };
-  warn(now.refused > before.refused, "command refused");
-  warn(now.clamped > before.clamped, "command beyond a limit");
-  warn(now.ignored > before.ignored, "command with components that are not obeyed");
-  warn(now.timeouts > before.timeouts, "command ran out");
-  warn(now.time_resets > before.time_resets, "time ran backwards");
-  const char* state = drive.hasCommand() ? "driving by command" : "neutral: no command";
-  return {!warning.empty(),
-          warning.empty() ? state : warning,
-          {{"commands", std::to_string(now.commands)},
-           {"refused commands", std::to_string(now.refused)},
-           {"clamped commands", std::to_string(now.clamped)},
-           {"commands with ignored components", std::to_string(now.ignored)},
-           {"timeouts", std::to_string(now.timeouts)},
-           {"time resets", std::to_string(now.time_resets)}}};
+  warn(now.arbiter.refused > before.arbiter.refused, "command refused");
+  warn(now.drive.clamped > before.drive.clamped, "command beyond a limit");
+  warn(now.drive.ignored > before.drive.ignored, "command with components that are not obeyed");
+  warn(now.arbiter.timeouts > before.arbiter.timeouts, "command ran out");
+  warn(now.cap.refused > before.cap.refused, "speed cap refused");
+  warn(now.cut > before.cut, "voltage cut by its band");
+  warn(now.drive.late_ticks > before.drive.late_ticks, "late");
+  warn(now.drive.time_resets > before.drive.time_resets, "time ran backwards");
+  const Reason reason = drive.arbiter().last().reason;
+  const bool held = drive.isCutOff() || (reason != Reason::kDriving && reason != Reason::kIdle);
+  const std::string active = activeInput(drive);
+  return {held || !warning.empty(),
+          stateOf(drive) + (warning.empty() ? "" : "; " + warning),
+          {{"state", stateOf(drive)},
+           {"active", active.empty() ? "none" : active},
+           {"speed cap [m/s]", shown(drive.cap())},
+           {"commands", std::to_string(now.arbiter.commands)},
+           {"refused commands", std::to_string(now.arbiter.refused)},
+           {"clamped commands", std::to_string(now.drive.clamped)},
+           {"commands with ignored components", std::to_string(now.drive.ignored)},
+           {"timeouts", std::to_string(now.arbiter.timeouts)},
+           {"locked", std::to_string(now.arbiter.locked)},
+           {"conflicts", std::to_string(now.arbiter.conflicts)},
+           {"not released", std::to_string(now.arbiter.unreleased)},
+           {"refused caps", std::to_string(now.cap.refused)},
+           {"late ticks", std::to_string(now.drive.late_ticks)},
+           {"time resets", std::to_string(now.drive.time_resets)}},
+          drive.eStop().stopped()};
+}
+
+std::string stateOf(const Drive& drive) {
+  if (drive.eStop().latched()) return "emergency stop";
+  if (drive.eStop().stopped()) return "waiting for the emergency stop's first word";
+  if (drive.isCutOff()) return "cut off: the ROS master is gone";
+  const Choice& choice = drive.arbiter().last();
+  switch (choice.reason) {
+    case Reason::kDriving:
+      return "driving: " + nameOf(drive);
+    case Reason::kLocked:
+      return "locked: " + drive.arbiter().settings().locks[*choice.lock].name;
+    case Reason::kSeveral:
+      return "several publishers: " + nameOf(drive);
+    case Reason::kUnreleased:
+      return "not released: " + nameOf(drive);
+    default:
+      return "idle";
+  }
+}
+
+std::string activeInput(const Drive& drive) {
+  const bool driving =
+      !drive.eStop().stopped() && !drive.isCutOff() && drive.arbiter().last().reason == Reason::kDriving;
+  return driving ? nameOf(drive) : "";
+}
+
+std::string warningOf(const Drive& drive, const Tally& before, const std::string& state) {
+  const Arbiter& arbiter = drive.arbiter();
+  if (arbiter.counts().timeouts > before.arbiter.timeouts)
+    return "BASE_COMMAND_TIMEOUT: nothing more: brakes";
+  if (stateOf(drive) == state) return "";
+  if (drive.eStop().stopped()) return "BASE_EMERGENCY_STOP: neutral at once, until ~reset is called";
+  if (drive.isCutOff()) return "BASE_MASTER_LOST: the ROS master does not answer: brakes";
+  const Choice& choice = arbiter.last();
+  switch (choice.reason) {
+    case Reason::kLocked:
+      return "BASE_LOCKED: " + arbiter.settings().locks[*choice.lock].name + " stops " + nameOf(drive) +
+             ": brakes";
+    case Reason::kSeveral:
+      return "BASE_SEVERAL_PUBLISHERS: " + nameOf(drive) + ": " + joined(arbiter.publishers(*choice.input)) +
+             ": brakes until only one is left";
+    case Reason::kUnreleased:
+      return "BASE_NOT_RELEASED: " + nameOf(drive) + " must say zero, or let go, before it is obeyed";
+    default:
+      return "";
+  }
 }
 
 }  // namespace kurumaisu

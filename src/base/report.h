@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What diagnostics say of the base, in words.
+// What diagnostics and the log say of the base, in words.
 #pragma once
 
 #include <string>
@@ -10,19 +10,39 @@
 
 namespace kurumaisu {
 
-/// One line of diagnostics: a warning or all well, and values by name.
+/// One line of diagnostics: an error, a warning or all well, and values by name.
 struct Report {
   bool warning;
   std::string summary;
   std::vector<std::pair<std::string, std::string>> values;
+  bool error = false;
 };
 
+/// All counts of a drive; what has changed since the last report is a warning.
+struct Tally {
+  DriveCounts drive;
+  ArbiterCounts arbiter;
+  SpeedCap::Counts cap;
+  std::uint64_t cut = 0;  ///< samples that the band of the voltages cut
+};
+
+Tally tally(const Drive& drive);
+
 /// Says between which voltages a law has two rates; empty for a law that is unambiguous.
-std::string ambiguity(const Drive& drive);
+std::string ambiguity(const Outlet& outlet);
 
-Report reportLaw(const Drive& drive, const std::string& law_name);
+Report reportLaw(const Outlet& outlet, const std::string& law_name);
 
-/// before: the counts at the last report; what has happened since then is a warning.
-Report reportCommands(const Drive& drive, const DriveCounts& before);
+/// before: the counts at the last report.
+Report reportCommands(const Drive& drive, const Tally& before);
+
+/// What the chair does, in a word that stays the same: "driving: joystick", "idle", "locked: dead_man", ...
+std::string stateOf(const Drive& drive);
+
+/// What changed from one state to the next and is worth a warning, beginning with a stable code; or "".
+std::string warningOf(const Drive& drive, const Tally& before, const std::string& state);
+
+/// Name of the input that drives, or "".
+std::string activeInput(const Drive& drive);
 
 }  // namespace kurumaisu

@@ -58,6 +58,24 @@ class Laser:
 
 
 @dataclass(frozen=True)
+class Channel:
+    """What a channel of the D/A converter can put out: volts, and volts per code (0: not rounded)."""
+
+    min: float
+    max: float
+    resolution: float
+
+
+@dataclass(frozen=True)
+class Voltages:
+    """What the joystick's plug can carry; V_f and V_s from neutral. knob: share of their bands that is left."""
+
+    knob: float
+    translation: Channel
+    steering: Channel
+
+
+@dataclass(frozen=True)
 class EffectSetting:
     """One effect beyond equations (1)-(4): its id and parameters."""
 
@@ -74,6 +92,7 @@ class Model:
     translation: AxisLaw
     steering: AxisLaw
     reference_voltage: float
+    voltages: Voltages
     chassis: Chassis
     laser: Laser
     effects: tuple[EffectSetting, ...]
@@ -98,12 +117,14 @@ def load_model(path: Path) -> Model:
     laws = top.section("voltage_laws")
     law_name = top.text("voltage_law", choices=laws.names())
     parsed = {name: _voltage_law(laws.section(name)) for name in laws.names()}
+    reference = top.number("reference_voltage")
     model = Model(
         name=top.text("name"),
         law_name=law_name,
         translation=parsed[law_name][0],
         steering=parsed[law_name][1],
-        reference_voltage=top.number("reference_voltage"),
+        reference_voltage=reference,
+        voltages=_voltages(top.section("voltages"), reference),
         chassis=_chassis(top.section("chassis")),
         laser=_laser(top.section("laser")),
         effects=effects_of(top),
@@ -141,6 +162,28 @@ def _axis(axis: settings.Section) -> AxisLaw:
         return AxisLaw(*branches)
     except ValueError as error:
         raise axis.error("", str(error)) from error
+
+
+def _voltages(section: settings.Section, reference: float) -> Voltages:
+    knob = section.number("knob", above=0)
+    voltages = Voltages(knob, _channel(section.section("translation")), _channel(section.section("steering")))
+    band = section.section("reference")
+    low, high = band.number("min"), band.number("max")
+    for part in (band, section):
+        part.end()
+    if knob > 1:
+        raise section.error("knob", f"must be at most 1: {knob}")
+    if not low <= reference <= high:
+        raise section.error("reference", f"reference_voltage {reference} V must lie from {low} to {high} V")
+    return voltages
+
+
+def _channel(section: settings.Section) -> Channel:
+    channel = Channel(section.number("min"), section.number("max"), section.number("resolution", at_least=0))
+    section.end()
+    if not channel.min < 0 < channel.max:
+        raise section.error("", f"neutral, 0 V, must lie inside its band: min {channel.min}, max {channel.max}")
+    return channel
 
 
 def _chassis(section: settings.Section) -> Chassis:

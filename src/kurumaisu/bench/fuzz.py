@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Arbitrary bytes into the laser's parts, under sanitizers: what each survived, and how much of it was reached."""
+"""Arbitrary bytes into the laser's parts and the guard, under sanitizers: what each survived, and what was reached."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kurumaisu.bench.fuzz_seeds import seeds
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 
-TARGETS = {"scip": 1024, "stream": 2048, "device": 128, "dac": 512}  # longest input [bytes]
+TARGETS = {"scip": 1024, "stream": 2048, "device": 128, "dac": 512, "guard": 512}  # longest input [bytes]
 _ONE_INPUT = 5  # [s] one that takes longer is a failure
 _MEMORY = 512  # [MB] with the sanitizers' own
 _TAIL = 40  # lines of a failed target's output that are shown

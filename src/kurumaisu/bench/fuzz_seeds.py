@@ -16,8 +16,8 @@ _RECORD = struct.Struct(">III")  # of Player's log: seconds, microseconds, bytes
 
 def seeds(target: str, log: Path | None) -> Iterator[bytes]:
     """Yield a target's first inputs. Raise Error for a log that cannot be read."""
-    if target == "device":
-        yield from _commands()
+    if target in ("device", "guard"):
+        yield from _commands() if target == "device" else _stories()
         return
     if target == "dac":
         yield from _boards()
@@ -114,3 +114,22 @@ def _commands() -> list[bytes]:
     ]
     asked += [b"MD0003004001000;a\n\1\1\1QT\n", b"MS0010003003103\n" + 8 * b"\1", b"ME0003004007000\n\1\2\6\1RS\n\3\1"]
     return [bytes([kind, fault]) + b"SCIP2.0\n" + asked[fault % len(asked)] for fault in range(28) for kind in (1, 12)]
+
+
+def _stories() -> Iterator[bytes]:
+    """Yield stories for the guard: neutral is held (0), then motion (1), which each of the other events may end."""
+    hold, drive = bytes([0, 40]), b"".join(struct.pack("<BBhh", 1, 20, 2000 * k, -1000 * k) for k in range(1, 13))
+    message = struct.pack("<IHHQqddd", 0x4B475244, 1, 1, 50, 10**12, 0.1, 0.1, 2.5)
+    ends = [
+        bytes([2]) + message,
+        bytes([4, 200]),
+        bytes([5]),
+        bytes([6, 0, 6, 1]),
+        bytes([6, 0]),
+        bytes([7]) + 50 * b"x",
+    ]
+    ends += [struct.pack("<BBhhBQ", 3, 20, 20000, 0, word, 0x7FF8 << 48 | 1) for word in range(6)]
+    ends += [struct.pack("<BBhhBBhIB", 3, 20, 20000, 0, 2, 0, made, 0, 0) for made in (-200, -30, 200)]
+    ends += [struct.pack("<BBhhBIHH", 3, 20, 3000, 0, 0, 0x4B475244, 1, kind) for kind in (2, 9)]
+    for end in ends:
+        yield hold + drive + end + drive + hold + drive

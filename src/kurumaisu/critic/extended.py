@@ -14,6 +14,8 @@ from kurumaisu.critic.evidence import Problem
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model, load_model
 
+_WIDE = {"min": -100.0, "max": 100.0, "resolution": 0.0}  # [V]
+
 
 def process_noise(problem: Problem) -> EffectSetting:
     """Return the estimated noise of the rates as the effect that the simulator draws it from.
@@ -47,6 +49,8 @@ def write_extended(path: Path, original: Path, model: Model, settings: Sequence[
                 "translation": _axis(model.translation),
                 "steering": _axis(model.steering),
             }
+            # The bands are in the volts of the file's own law.
+            content["voltages"] |= {"translation": dict(_WIDE), "steering": dict(_WIDE)}
         text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
         path.write_text(f"# {original.name} and what the critic found in {recording}.\n{text}", encoding="utf-8")
     except OSError as error:

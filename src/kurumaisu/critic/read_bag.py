@@ -24,6 +24,7 @@ TOPICS = {
     "battery": "battery",
     "temperature": "temperature",
 }
+SCRIPTED = "/experiment_vel"  # the command where there is no cmd_vel: critic experiment's
 PARTS = messages.PARTS
 # Stamps and times of receipt further apart than this do not come from one clock [s].
 CLOCK_TOLERANCE = 1.0
@@ -40,6 +41,8 @@ def read_bag_run(path: Path, topics: dict[str, str], faults: Faults) -> Run:
     if shared:
         raise Error(f"topics: {shared[0]} is given to two parts of a run")
     found = read_topics(path, {topic: part for part, topic in wanted.items()})
+    if "command" not in found:
+        found |= read_topics(path, {SCRIPTED: "command"})
     for part in sorted(set(_parts(topics)) - set(found)):
         faults.add(f"{path.name}: there is no topic {wanted[part]}")
     _check_clocks(path.name, found, faults)

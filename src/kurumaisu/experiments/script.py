@@ -127,14 +127,20 @@ def _box(section: settings.Section) -> Box:
 
 
 def base_limits() -> Limits:
-    """Return what base_node lets pass, launch/base_node.yaml."""
-    return _limits(settings.load(shipped("launch/base_node.yaml")).section("limits"))
+    """Return what base_node lets scripts pass, launch/base_node.yaml: its ramps are too steep to matter."""
+    node = settings.load(shipped("launch/base_node.yaml"))
+    name = node.section("inputs").section("experiments").text("limits")
+    return _rates(node.section("limits").section(name))
 
 
 def _limits(section: settings.Section) -> Limits:
-    limits = Limits(**{name: section.number(name, above=0) for name in ("v_forward", "v_reverse", "w")})
+    limits = _rates(section)
     section.end()
     return limits
+
+
+def _rates(section: settings.Section) -> Limits:
+    return Limits(**{name: section.number(name, above=0) for name in ("v_forward", "v_reverse", "w")})
 
 
 def _phases(top: settings.Section, rates: tuple[str, ...]) -> tuple[Phase, ...]:

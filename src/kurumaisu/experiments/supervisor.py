@@ -21,6 +21,7 @@ _SAME = 1e-9  # [s] less than any clock resolves
 class Care:
     """launch/experiment_node.yaml, where units and meaning are."""
 
+    command_topic: str
     rate: float
     rest_time: float
     rest_distance: float
@@ -36,7 +37,8 @@ class Care:
 
 def read_care(section: settings.Section) -> Care:
     """Return the settings of a section. Raise Error naming file and key."""
-    care = Care(**{field.name: section.number(field.name, above=0) for field in fields(Care)})
+    topic, *numbers = (field.name for field in fields(Care))
+    care = Care(section.text(topic), **{name: section.number(name, above=0) for name in numbers})
     section.end()
     return care
 

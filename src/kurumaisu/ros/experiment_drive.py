@@ -13,7 +13,7 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 
 from kurumaisu.errors import Error
 from kurumaisu.experiments import Script, base_limits
@@ -25,8 +25,9 @@ from kurumaisu.ros.recorder import Recorder
 from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.types import FloatArray
 
-COMMAND, VOLTAGE = "cmd_vel", "voltages"
-RECORDED = ("cmd_vel", "voltages", "odom", "scan", "ground_truth")
+VOLTAGE, ACTIVE = "voltages", "active_input"
+RECORDED = (VOLTAGE, "odom", "scan", "ground_truth")
+INPUT = "experiments"  # as base_node.yaml calls the input that scripts have
 _GLANCE = 0.002  # [s] of wall time between looks at the clock
 _LEAVE = 0.2  # [s] of wall time for a message to leave
 _LATE = 3.0  # [s] of wall time after Ctrl-C for zero to be published; time may stand
@@ -36,14 +37,14 @@ def run_drive(
     script: Script, care: Care, model: Model, ground: Ground, stop: Callable[[], bool], bag: Path | None
 ) -> str:
     """Return why it was stopped, '' when it is done. Raise Error when it is refused."""
-    topic = COMMAND if script.kind == "drive" else VOLTAGE
+    topic = care.command_topic if script.kind == "drive" else VOLTAGE
     _check_limits(script)
     others = publishers(topic)
     if others:
         raise Error(f"{topic} is published already, by {', '.join(others)}")
     if not hearers(topic, care.patience):
         raise Error(f"nobody hears {topic}")
-    recorder = Recorder(bag, RECORDED) if bag is not None else None
+    recorder = Recorder(bag, tuple(dict.fromkeys((topic, *RECORDED)))) if bag is not None else None
     try:
         return _Driver(script, care, model, ground, topic).run(stop)
     finally:
@@ -66,13 +67,14 @@ class _Driver:
         self._supervisor = Supervisor(script, care, ground.sources(), ground.refusal)
         self._lock = threading.Lock()  # over the supervisor, whom ROS's threads tell what they hear
         self._reference = model.reference_voltage
-        kind = Twist if topic == COMMAND else Voltages
+        kind = Voltages if topic == VOLTAGE else Twist
         self._publisher = rospy.Publisher(topic, kind, queue_size=1, tcp_nodelay=True)
         self._message: Callable[[tuple[float, ...]], Twist | Voltages] = _twist if kind is Twist else self._voltages
         for source in ground.sources():
             rospy.Subscriber(source, Odometry, partial(self._see, source), queue_size=10, tcp_nodelay=True)
         rospy.Subscriber("collision", Bool, self._touch, queue_size=10)
         rospy.Subscriber(topic, kind, self._overhear, queue_size=10)
+        rospy.Subscriber(ACTIVE, String, self._yield, queue_size=10)
 
     def run(self, stop: Callable[[], bool]) -> str:
         """Publish until the supervisor has ended; return its outcome."""
@@ -106,6 +108,10 @@ class _Driver:
         caller = message._connection_header["callerid"]  # rospy says nowhere else who it was
         if caller != rospy.get_name():
             self._stop(f"{caller} commands the chair, too")
+
+    def _yield(self, message: String) -> None:
+        if message.data not in ("", INPUT):
+            self._stop(f"{message.data} commands the chair, too")
 
     def _stop(self, why: str) -> None:
         with self._lock:

@@ -76,6 +76,10 @@ class Commander:
         """From now on command v [m/s], w [rad/s]."""
         twist = Twist()
         twist.linear.x, twist.angular.z = v, w
+        self.repeat(twist)
+
+    def repeat(self, twist: Twist) -> None:
+        """From now on publish this."""
         self._twist = twist
 
     def silence(self) -> None:
@@ -91,6 +95,29 @@ class Commander:
         twist = self._twist
         if twist is not None:
             self.publisher.publish(twist)
+
+
+class Repeated:
+    """Repeats what a function makes at a fixed period [s] of wall time, until it is silenced."""
+
+    def __init__(self, topic: str, kind: type, period: float) -> None:
+        self._publisher = rospy.Publisher(topic, kind, queue_size=10, tcp_nodelay=True)
+        self._make: Callable[[], Any] | None = None
+        self._repeater = _Repeater(period, self._publish)
+
+    def say(self, make: Callable[[], Any] | None) -> None:
+        """From now on publish what `make` returns; None: nothing."""
+        self._make = make
+
+    def close(self) -> None:
+        """End the topic."""
+        self._repeater.close()
+        self._publisher.unregister()
+
+    def _publish(self) -> None:
+        make = self._make
+        if make is not None:
+            self._publisher.publish(make())
 
 
 class SimulatedClock:

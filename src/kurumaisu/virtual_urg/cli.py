@@ -38,6 +38,8 @@ _COUNTED = {
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; return 0, or 2 for bad input, which is told on stderr."""
     parser = _parser()
+    if arguments is None:
+        arguments = [word for word in sys.argv[1:] if ":=" not in word]  # roslaunch gives every node its name
     options = parser.parse_args(arguments)
     if options.faults:
         print(urg_fault_help())

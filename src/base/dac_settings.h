@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Which D/A converter base_node has: the section dac of its settings.
+#pragma once
+
+#include <optional>
+
+#include "guard/client.h"
+#include "params.h"
+
+namespace kurumaisu {
+
+struct DacSettings {
+  std::optional<guard::ClientSettings> guard;  ///< none: the topic alone
+  int nice;                                    ///< of all threads, with a guard; 0: as they are
+};
+
+/// guard: launch/guard.yaml, of which only the socket is ours. Throws std::invalid_argument naming the parameter.
+DacSettings readDac(Section dac, Section guard);
+
+}  // namespace kurumaisu

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "guard/sentinel.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <exception>
+#include <optional>
+#include <system_error>
+
+#include "guard/clock.h"
+#include "guard/log.h"
+#include "guard/notify.h"
+#include "guard/realtime.h"
+#include "guard/server.h"
+
+namespace kurumaisu::guard {
+namespace {
+
+constexpr double kNotifyPeriod = 0.1;  // [s] of signs of life to systemd; its WatchdogSec is longer
+
+/// In the child: a guard, whose parent's death is a SIGTERM.
+int runGuard(const Settings& settings, const Device::Open& open, int beats, pid_t parent) {
+  try {
+    makeRealtime(settings.priority);
+    Server server(settings, open, [beats] { [[maybe_unused]] const ssize_t written = write(beats, "", 1); });
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() == parent) server.run();  // or it died before the line above
+    return 0;
+  } catch (const std::exception& error) {
+    say("GUARD_FAILED", error.what());
+    return 1;
+  }
+}
+
+std::string wordsFor(int status) {
+  if (WIFSIGNALED(status)) return std::string("killed: ") + strsignal(WTERMSIG(status));
+  return "exit status " + std::to_string(WEXITSTATUS(status));
+}
+
+class Sentinel {
+ public:
+  Sentinel(const Settings& settings, const Device::Open& open) : settings_(settings), open_(open) {}
+
+  int run();
+
+ private:
+  void start();
+  int watch();
+  bool hear();
+  void pass(int signal);
+  bool rest();
+
+  const Settings& settings_;
+  const Device::Open& open_;
+  Signals signals_{SIGTERM, SIGINT, SIGCHLD};
+  Descriptor beats_;
+  pid_t guard_ = -1;
+  double last_beat_ = 0;  ///< [s]
+  double notified_ = 0;   ///< [s]
+  bool has_begun_ = false;
+  bool is_leaving_ = false;
+};
+
+int Sentinel::run() {
+  makeRealtime(settings_.priority);
+  for (;;) {
+    start();
+    const int status = watch();
+    const bool is_clean = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    if (is_leaving_ && is_clean) return 0;
+    forceNeutral(settings_, open_, 0);
+    say("GUARD_DEAD", wordsFor(status));
+    if (is_leaving_) return 0;
+    if (!has_begun_) return 1;
+    if (!rest()) return 0;
+  }
+}
+
+void Sentinel::start() {
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_NONBLOCK | O_CLOEXEC) != 0)
+    throw std::system_error(errno, std::generic_category(), "pipe");
+  beats_ = Descriptor(ends[0]);
+  Descriptor beating(ends[1]);
+  last_beat_ = monotonic();
+  const pid_t parent = getpid();
+  guard_ = fork();
+  if (guard_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
+  if (guard_ == 0) _exit(runGuard(settings_, open_, beating.fd(), parent));
+}
+
+/// Returns the guard's wait status once it is dead.
+int Sentinel::watch() {
+  for (;;) {
+    const double left = std::max(0.0, last_beat_ + settings_.sentinel_silence - monotonic());
+    std::array<pollfd, 2> ready = {{{signals_.fd(), POLLIN, 0}, {beats_.fd(), POLLIN, 0}}};
+    poll(ready.data(), ready.size(), static_cast<int>(std::ceil(1e3 * left)));
+    while (const auto signal = signals_.next()) pass(*signal);
+    int status = 0;
+    if (waitpid(guard_, &status, WNOHANG) == guard_) return status;
+    if (hear() || monotonic() < last_beat_ + settings_.sentinel_silence) continue;
+    kill(guard_, SIGKILL);
+    waitpid(guard_, &status, 0);
+    return status;
+  }
+}
+
+bool Sentinel::hear() {
+  std::array<char, 64> bytes{};
+  bool heard = false;
+  while (read(beats_.fd(), bytes.data(), bytes.size()) > 0) heard = true;
+  if (!heard) return false;
+  last_beat_ = monotonic();
+  if (!has_begun_) notify("READY=1");
+  has_begun_ = true;
+  if (last_beat_ >= notified_ + kNotifyPeriod) {
+    notified_ = last_beat_;
+    notify("WATCHDOG=1");
+  }
+  return true;
+}
+
+void Sentinel::pass(int signal) {
+  if (signal == SIGCHLD) return;
+  if (!is_leaving_) notify("STOPPING=1");
+  is_leaving_ = true;
+  kill(guard_, SIGTERM);
+}
+
+/// Waits before the next start. False if told to leave.
+bool Sentinel::rest() {
+  const double until = monotonic() + settings_.restart_pause;
+  while (!is_leaving_ && monotonic() < until) {
+    pollfd ready{signals_.fd(), POLLIN, 0};
+    poll(&ready, 1, static_cast<int>(std::ceil(1e3 * std::max(0.0, until - monotonic()))));
+    while (const auto signal = signals_.next()) is_leaving_ |= *signal != SIGCHLD;
+  }
+  return !is_leaving_;
+}
+
+}  // namespace
+
+int runSentinel(const Settings& settings, const Device::Open& open) { return Sentinel(settings, open).run(); }
+
+bool forceNeutral(const Settings& settings, const Device::Open& open, double patience) {
+  Device device(open, neutralOf(settings.limits), settings.reopening);
+  double now = monotonic();
+  for (const double end = now + patience;; now = monotonic()) {
+    if (device.recover(now)) {
+      say("GUARD_NEUTRAL", device.name() + ": written from outside the guard");
+      return true;
+    }
+    if (device.retryAt() > end) {
+      say("GUARD_NO_NEUTRAL", device.problem());
+      return false;
+    }
+    poll(nullptr, 0, static_cast<int>(std::ceil(1e3 * (device.retryAt() - now))));
+  }
+}
+
+}  // namespace kurumaisu::guard

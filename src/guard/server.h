@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The guard's process: one device, one client, and the time in between.
+#pragma once
+
+#include <csignal>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "guard/descriptor.h"
+#include "guard/device.h"
+#include "guard/guard.h"
+#include "guard/settings.h"
+#include "guard/signals.h"
+
+namespace kurumaisu::guard {
+
+/// Puts out what the guard allows: neutral until a client has armed it, and again when anything is wrong. It waits
+/// for nothing but the device, which answers or fails within its own timeout.
+class Server {
+ public:
+  /// beat: called in every round, as a sign of life. Throws where the socket cannot be had.
+  Server(const Settings& settings, Device::Open open, std::function<void()> beat);
+
+  /// Works until SIGTERM or SIGINT; neutral is the last thing put out.
+  void run();
+
+ private:
+  void wait();
+  void acceptClients();
+  void listen();
+  void take(const void* bytes, std::size_t size, double now);
+  void drop();
+  void write(double now);
+  void put(const dac::Volts& volts, double now);
+  void recover(double now);
+  void answer();
+  void report();
+
+  Settings settings_;
+  std::function<void()> beat_;
+  Signals signals_{SIGTERM, SIGINT};
+  Guard guard_;
+  Device device_;
+  Descriptor listener_;
+  Descriptor client_;
+  bool client_left_ = false;            ///< says poll(): what it still sent is not to be read
+  std::optional<std::uint64_t> asked_;  ///< sequence of a message that is not answered yet
+  std::optional<dac::Volts> written_;   ///< what the device was last asked for; none: write at once
+  double written_at_ = 0;               ///< [s]
+  State reported_ = State::kIdle;
+  std::string reported_problem_;
+};
+
+}  // namespace kurumaisu::guard

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A guard in front of a virtual board, a client that drives, and when the board was neutral."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from kurumaisu.bench.processes import PATIENCE, program
+from kurumaisu.errors import Error
+from kurumaisu.params import shipped
+
+NS = 1e-9  # [s]
+_ARMING = 0.2  # [s] in place of what ships, to save time; nothing else differs
+_LOOK = 0.0005  # [s] between two looks at the board's log
+_ENDING = 5.0  # [s]
+_BUSY = "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    sum(range(10000))"
+
+
+@dataclass(frozen=True)
+class Change:
+    """A line of the board's log: what its outputs became, or None when it was plugged in again."""
+
+    time: float  # [s, monotonic]
+    neutral: bool | None
+
+
+class Rig:
+    """Board, sentinel and guard, in a folder of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        """Write the files that they read. Start with board()."""
+        self.folder = folder
+        self.socket = folder / "guard.sock"
+        self._log = folder / "board.log"
+        self.messages = folder / "guard.log"
+        device = yaml.safe_load(shipped("launch/dac/serial_ascii.yaml").read_text())
+        self._code = 1 / min(device["channels"][name]["code"]["per_volt"] for name in ("translation", "steering"))
+        self.device = self._write("device.yaml", device | {"port": str(folder / "dac")})
+        settings = yaml.safe_load(shipped("launch/guard.yaml").read_text())
+        settings["limits"]["arming"] = _ARMING
+        self.silence = float(settings["limits"]["silence"])
+        base = yaml.safe_load(shipped("launch/base_node.yaml").read_text())
+        self.nice = int(base["dac"]["nice"])
+        model = str(shipped(f"launch/{settings['model']}").resolve())
+        self.settings = self._write("guard.yaml", settings | {"model": model, "socket": str(self.socket)})
+        self._sentinel: subprocess.Popen[bytes] | None = None
+        self._board: subprocess.Popen[str] | None = None
+
+    def _write(self, name: str, tree: dict[str, object]) -> Path:
+        path = self.folder / name
+        path.write_text(yaml.safe_dump(tree))
+        return path
+
+    @contextlib.contextmanager
+    def board(self) -> Iterator[None]:
+        """Run the board, before all others: hardware waits for no scheduler. At the end nothing is left."""
+        command = [program("virtual_dac"), str(self.device), str(self.folder / "dac"), "--log", str(self._log)]
+        self._board = subprocess.Popen(
+            [*command, "--realtime"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        try:
+            assert self._board.stdout
+            if "virtual board" not in self._board.stdout.readline():
+                raise Error("virtual_dac: does not start")
+            yield
+        finally:
+            self.end()
+            self._board.communicate(timeout=PATIENCE)
+
+    def start(self) -> None:
+        """Start sentinel and guard, unless they run."""
+        if self._sentinel and self._sentinel.poll() is None:
+            return
+        self._sentinel = subprocess.Popen(
+            [program("guard"), str(self.device), str(self.settings)], stderr=self.messages.open("ab")
+        )
+
+    def end(self) -> None:
+        """End sentinel and guard as systemd does."""
+        if self._sentinel:
+            self._sentinel.terminate()
+            self._sentinel.wait(_ENDING)
+
+    def sentinel(self) -> int:
+        """Return the sentinel's process id."""
+        assert self._sentinel
+        return self._sentinel.pid
+
+    def guard(self) -> int:
+        """Return the guard's process id."""
+        pid = self.sentinel()
+        return int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
+
+    def reap(self) -> None:
+        """Wait for the end of a sentinel that was killed."""
+        assert self._sentinel
+        self._sentinel.wait(_ENDING)
+
+    def force(self) -> None:
+        """Write neutral as ExecStopPost does."""
+        subprocess.run(
+            [program("guard"), "--neutral", str(self.device), str(self.settings)],
+            check=True,
+            stderr=self.messages.open("ab"),
+        )
+
+    def inject(self, fault: str) -> None:
+        """Give the board a fault."""
+        assert self._board
+        assert self._board.stdin
+        self._board.stdin.write(fault + "\n")
+        self._board.stdin.flush()
+
+    def changes(self) -> list[Change]:
+        """Return what the board's outputs became so far."""
+        found = []
+        for line in self._log.read_text().splitlines(keepends=True):
+            match = re.fullmatch(r"(\d+) (?:volts (\S+) (\S+) \S+|plugged)\n", line)  # the last may be half a line
+            if match:
+                volts = [abs(float(word)) for word in match.groups()[1:] if word]
+                found.append(Change(NS * int(match[1]), max(volts) < self._code / 2 if volts else None))
+        return found
+
+    def neutral(self, patience: float, after: float = math.inf) -> float | None:
+        """Wait until the board is neutral; return since when [s, monotonic], or None if it is not in so long [s].
+
+        after: neutral from then on [s] counts even if motion followed, of a client that armed anew meanwhile.
+        """
+        deadline = time.monotonic() + patience
+        while time.monotonic() < deadline:
+            tail = list(itertools.takewhile(lambda change: change.neutral is not False, reversed(self.changes())))
+            since = [change.time for change in tail if change.neutral][-1:]
+            since += [change.time for change in self.changes() if change.neutral and change.time >= after][:1]
+            if since:
+                return since[-1]
+            time.sleep(_LOOK)
+        return None
+
+
+class Client:
+    """A process that drives through the guard; see tests/guard_client.cpp."""
+
+    def __init__(self, socket: Path, mode: str, nice: int) -> None:
+        """Start it. nice: as base_node has it; 0: as it is."""
+        command = [program("guard_client"), str(socket), mode, str(nice)]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+
+    def line(self) -> str:
+        """Return its next line. Raise Error if none comes."""
+        assert self.process.stdout
+        if not select.select([self.process.stdout], [], [], PATIENCE)[0]:
+            raise Error("guard_client: says nothing; is the guard armed?")
+        return self.process.stdout.readline().strip()
+
+    def wait_armed(self) -> None:
+        """Wait until its voltage is put out."""
+        while self.line() != "armed":
+            pass
+
+    def fail(self) -> float:
+        """Let it break as its mode says; return when it did [s, monotonic]."""
+        assert self.process.stdin
+        self.process.stdin.write("now\n")
+        line = self.line()
+        while not line.isdigit():
+            line = self.line()
+        return NS * int(line)
+
+    def end(self) -> None:
+        """Kill it, whatever state it is in."""
+        self.process.kill()
+        self.process.wait(_ENDING)
+        for stream in (self.process.stdin, self.process.stdout):
+            with contextlib.suppress(BrokenPipeError):
+                stream.close()  # type: ignore[union-attr]
+
+
+def strike(pids: Callable[[], list[int]], number: signal.Signals) -> float:
+    """Send a signal to processes; return the time just before [s, monotonic]."""
+    chosen = pids()
+    begin = time.monotonic()
+    for pid in chosen:
+        os.kill(pid, number)
+    return begin
+
+
+@contextlib.contextmanager
+def busy(count: int) -> Iterator[None]:
+    """Keep so many processes busy; they end with this one, too."""
+    loops = [subprocess.Popen([sys.executable, "-c", _BUSY]) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for loop in loops:
+            loop.kill()
+            loop.wait(_ENDING)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""teleop_keyboard: keys of a terminal to key_vel and dead_man."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import rospy
+
+from kurumaisu.ros.teleop import Hand, overlaid, run
+from kurumaisu.teleop.keys import HELP, Keys, KeySettings, read_keys
+from kurumaisu.teleop.terminal import Terminal
+
+
+def main() -> int:
+    """Drive by keys until Ctrl-C or the terminal's end; rest is the last command. Return 1 without a terminal."""
+    rospy.init_node("teleop_keyboard", disable_signals=True)  # Ctrl-C: rest first, then the end
+    return run(_drive)
+
+
+def _drive() -> None:
+    rate, key_settings = overlaid("teleop_keyboard.yaml", read_keys)
+    with Terminal(sys.stdin.fileno()) as terminal:
+        hand = Hand("key_vel")
+        try:
+            _follow(terminal, hand, key_settings, 1 / rate)
+        finally:
+            hand.rest(1 / rate)
+            print()
+
+
+def _follow(terminal: Terminal, hand: Hand, key_settings: KeySettings, period: float) -> None:
+    print(HELP.format(timeout=key_settings.timeout, percent=100 * key_settings.step))
+    keys = Keys(key_settings)
+    due = time.monotonic()
+    while not rospy.is_shutdown():
+        typed = terminal.keys(max(due - time.monotonic(), 0.0))
+        if typed is None:
+            return
+        now = time.monotonic()
+        for key in typed:
+            keys.press(key, now)
+        command = keys.command(now)
+        if now >= due or (typed and not command.held):  # a stop does not wait for its turn
+            due = now + period
+            hand.say(command)
+            what = f"v {command.v:+.2f} m/s  w {command.w:+.2f} rad/s" if command.held else "stop"
+            print(f"\rspeeds {keys.v:.2f} m/s {keys.w:.2f} rad/s   {what:30}", end="", flush=True)

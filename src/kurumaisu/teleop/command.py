@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What somebody who drives by hand asks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Command:
+    """v forward [m/s], w to the left [rad/s]; held: somebody holds the dead-man; drives: and wants to drive himself."""
+
+    v: float
+    w: float
+    held: bool
+    drives: bool = True
+
+
+REST = Command(0.0, 0.0, held=False, drives=False)
+ALLOW = Command(0.0, 0.0, held=True, drives=False)  # others may drive

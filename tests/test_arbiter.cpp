@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Who drives: priorities, timeouts, locks, several publishers, release; the emergency stop; the cap.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <exception>
+#include <stdexcept>
+#include <thread>
+
+#include "base/last_word.h"
+#include "base_drive.h"
+
+namespace k = kurumaisu;
+using namespace kurumaisu::test;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+k::ArbiterSettings withDeadMan() {
+  k::ArbiterSettings settings = kArbiter;
+  settings.locks.push_back({"dead man", 150, 0.3, false});
+  return settings;
+}
+
+class ArbiterTest : public testing::Test {
+ protected:
+  ArbiterTest() { arbiter.choose(0); }
+
+  k::Choice hear(Input input, double v, double t, const std::string& publisher = "/a") {
+    arbiter.command(input, publisher, {v, 0}, t);
+    return arbiter.choose(t);
+  }
+
+  k::Arbiter arbiter{kArbiter};
+};
+
+}  // namespace
+
+TEST_F(ArbiterTest, TheHighestPriorityThatSpeaksDrives) {
+  EXPECT_EQ(hear(kShared, 0.1, 1.0).command.v, 0.1);
+  EXPECT_EQ(hear(kJoystick, 0.2, 1.1).command.v, 0.2);
+  EXPECT_EQ(hear(kNavigation, 0.3, 1.2).command.v, 0.2);
+  EXPECT_EQ(*arbiter.choose(1.34).input, kJoystick);
+  EXPECT_EQ(arbiter.choose(1.36).command.v, 0.3);  // the joystick has been silent for 0.25 s
+  EXPECT_EQ(arbiter.choose(1.46).reason, k::Reason::kIdle);
+  EXPECT_EQ(arbiter.counts().timeouts, 2U);
+}
+
+TEST_F(ArbiterTest, AZeroOfTheHighestHoldsTheOthersOff) {
+  hear(kNavigation, 0.3, 1.0);
+  EXPECT_EQ(hear(kJoystick, 0.0, 1.1).command.v, 0.0);
+  EXPECT_EQ(*arbiter.last().input, kJoystick);
+}
+
+TEST_F(ArbiterTest, ALockBlocksWhatIsBelowItsPriority) {
+  hear(kNavigation, 0.3, 1.0);
+  arbiter.lock(kHold, true, 1.0);
+  const k::Choice choice = arbiter.choose(1.1);
+  EXPECT_EQ(choice.reason, k::Reason::kLocked);
+  EXPECT_EQ(*choice.lock, kHold);
+  EXPECT_EQ(hear(kJoystick, 0.2, 1.1).reason, k::Reason::kDriving);
+  arbiter.lock(kHold, false, 1.2);
+  EXPECT_EQ(hear(kNavigation, 0.3, 9.0).reason, k::Reason::kDriving);  // its silence means nothing
+}
+
+TEST(Arbiter, ADeadManThatFallsSilentOrWasNeverHeardBlocks) {
+  k::Arbiter arbiter(withDeadMan());
+  arbiter.choose(0);
+  const auto reason = [&arbiter](double t) {
+    arbiter.command(kNavigation, "/a", {0.3, 0}, t);
+    return arbiter.choose(t).reason;
+  };
+  EXPECT_EQ(reason(1.0), k::Reason::kLocked);
+  arbiter.lock(kDeadMan, true, 1.1);  // held
+  EXPECT_EQ(reason(1.1), k::Reason::kDriving);
+  EXPECT_EQ(reason(1.39), k::Reason::kDriving);
+  EXPECT_EQ(reason(1.41), k::Reason::kLocked);
+  arbiter.lock(kDeadMan, true, 1.5);
+  EXPECT_EQ(reason(1.5), k::Reason::kDriving);
+  arbiter.lock(kDeadMan, false, 1.6);  // let go
+  EXPECT_EQ(reason(1.6), k::Reason::kLocked);
+  arbiter.lock(kDeadMan, true, 1.7);
+  EXPECT_EQ(reason(1.7), k::Reason::kDriving);
+  EXPECT_EQ(reason(0.5), k::Reason::kIdle);  // the clock was set back: nobody knows how old a word is
+  EXPECT_EQ(reason(0.6), k::Reason::kLocked);
+}
+
+TEST_F(ArbiterTest, TwoPublishersStopAnInputUnlessItAllowsSeveral) {
+  hear(kNavigation, 0.3, 1.0, "/a");
+  EXPECT_EQ(hear(kNavigation, 0.0, 1.1, "/b").reason, k::Reason::kSeveral);
+  EXPECT_EQ(arbiter.publishers(kNavigation), (std::vector<std::string>{"/a", "/b"}));
+  EXPECT_EQ(hear(kJoystick, 0.2, 1.1).reason, k::Reason::kDriving);  // who stands above it is free
+  hear(kNavigation, 0.3, 1.36, "/b");
+  EXPECT_EQ(arbiter.choose(1.37).command.v, 0.3);  // /a is gone
+  hear(kShared, 0.3, 3.0, "/a");
+  EXPECT_EQ(hear(kShared, 0.1, 3.1, "/b").command.v, 0.1);
+  EXPECT_EQ(arbiter.counts().conflicts, 1U);
+}
+
+TEST_F(ArbiterTest, AfterDisarmingEveryInputMustBeReleasedAnew) {
+  EXPECT_EQ(hear(kNavigation, 0.3, 1.0).reason, k::Reason::kDriving);
+  arbiter.disarm();
+  EXPECT_EQ(hear(kNavigation, 0.3, 1.1).reason, k::Reason::kUnreleased);
+  EXPECT_TRUE(arbiter.moving(1.1));
+  EXPECT_FALSE(arbiter.moving(1.4));
+  EXPECT_EQ(hear(kNavigation, 0.3, 1.4).reason, k::Reason::kDriving);  // it was silent
+}
+
+TEST(EStop, IsReleasedByNothingButAReset) {
+  k::EStop stop(0);
+  stop.tick(1);
+  EXPECT_FALSE(stop.stopped());
+  stop.hear(true, 2);
+  stop.hear(false, 3);
+  stop.tick(4);
+  EXPECT_TRUE(stop.latched());
+  EXPECT_EQ(stop.reset(true), "somebody commands motion: let go first");
+  EXPECT_EQ(stop.reset(false), "");
+  stop.tick(1000);
+  EXPECT_FALSE(stop.stopped());  // without a timeout silence means nothing
+  stop.press();
+  EXPECT_TRUE(stop.latched());
+  stop.hear(true, 1001);
+  EXPECT_EQ(stop.reset(false), "the emergency stop is still pressed");
+}
+
+TEST(EStop, WithATimeoutSomebodyMustSayThatAllIsWell) {
+  k::EStop stop(0.3);
+  stop.tick(1.0);
+  EXPECT_TRUE(stop.stopped());
+  EXPECT_FALSE(stop.latched());
+  stop.hear(false, 1.2);
+  stop.tick(1.4);
+  EXPECT_FALSE(stop.stopped());
+  stop.tick(1.51);
+  EXPECT_TRUE(stop.latched());
+  EXPECT_EQ(stop.reset(false), "nobody says that the emergency stop is not pressed");
+  stop.hear(false, 1.6);
+  stop.tick(1.6);
+  EXPECT_EQ(stop.reset(false), "");
+  stop.tick(0.1);  // the clock was set back
+  EXPECT_TRUE(stop.stopped());
+  EXPECT_FALSE(stop.latched());
+  stop.tick(0.41);
+  EXPECT_TRUE(stop.latched());
+}
+
+TEST(SpeedCap, HoldsForItsTimeout) {
+  k::SpeedCap cap({0.5, 1.2});
+  EXPECT_EQ(cap.at(0), 1.2);
+  EXPECT_TRUE(cap.hear(0.0, 1.0));
+  EXPECT_EQ(cap.at(1.5), 0.0);
+  EXPECT_EQ(cap.at(1.51), 1.2);
+  cap.hear(0.2, 9.0);
+  EXPECT_EQ(cap.at(3.0), 1.2);  // the clock was set back
+}
+
+TEST(LastWordDeathTest, ATerminateSaysItAndAborts) {
+  EXPECT_DEATH(
+      {
+        const k::LastWord word([] { std::fputs("neutral\n", stderr); });
+        std::terminate();
+      },
+      "neutral");
+  EXPECT_DEATH(  // an exception that nobody catches, in another thread; the word fails, too
+      {
+        const k::LastWord word([] {
+          std::fputs("neutral\n", stderr);
+          throw std::runtime_error("no converter");
+        });
+        std::thread([] { throw std::runtime_error("lost"); }).join();
+      },
+      "neutral");
+}
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}

@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Guard and sentinel as processes that are really killed, in front of a board in shared memory.
+#include <gtest/gtest.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <thread>
+
+#include "guard/client.h"
+#include "guard/sentinel.h"
+#include "guard/socket.h"
+#include "guarding.h"
+#include "shared_board.h"
+
+using namespace guarding;  // NOLINT: a test
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double kPatience = 10;  // [s] for what must happen
+constexpr double kSoon =
+    1;  // [s] for what must not wait, on a busy machine; how soon, scripts/bench guard tells
+constexpr double kPeriod = 0.01;     // [s] of the client
+constexpr double kReplyWait = 0.05;  // [s]
+
+void pause(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
+
+bool isNeutral(const d::Volts& volts) {
+  return volts.translation == 0 && volts.steering == 0 && volts.reference == 2.5;
+}
+
+class GuardProcess : public testing::Test {
+ protected:
+  GuardProcess() {
+    std::string name = (fs::temp_directory_path() / "guard_XXXXXX").string();
+    folder = mkdtemp(name.data());
+    settings.limits = limits();
+    settings.socket = folder / "socket";
+    settings.period = 0.01;
+    settings.priority = 0;
+    settings.reopening = {0.01, 0.05};
+    settings.sentinel_silence = 0.3;
+    settings.restart_pause = 0.02;
+    settings.neutral_patience = 0.5;
+  }
+
+  ~GuardProcess() override {
+    if (sentinel > 0) end(SIGTERM);
+    fs::remove_all(folder);
+  }
+
+  void start() {
+    sentinel = fork();
+    if (sentinel == 0) {
+      prctl(PR_SET_PDEATHSIG, SIGKILL);  // of a test that is killed nothing remains
+      _exit(g::runSentinel(settings, board.opener()));
+    }
+    waitFor([this] { return fs::exists(settings.socket); }, "the socket");
+  }
+
+  /// Ends the sentinel; returns its wait status.
+  int end(int signal) {
+    int status = 0;
+    kill(sentinel, signal);
+    waitpid(sentinel, &status, 0);
+    sentinel = -1;
+    return status;
+  }
+
+  static void waitFor(const std::function<bool()>& condition, const char* what) {
+    for (const double until = g::monotonic() + kPatience; !condition(); pause(0.001)) {
+      if (g::monotonic() > until) FAIL() << "waited in vain for " << what;
+    }
+  }
+
+  /// Puts until the status is as wished.
+  void putUntil(g::Client& client, double translation, const std::function<bool(const g::Status&)>& wish) {
+    waitFor(
+        [&] {
+          pause(kPeriod);
+          return wish(client.put({translation, 0, 2.5}));
+        },
+        "a status");
+  }
+
+  void arm(g::Client& client) {
+    putUntil(client, 0, [](const g::Status& s) { return s.state == g::State::kArmed; });
+  }
+
+  void drive(g::Client& client) {
+    arm(client);
+    putUntil(client, 0.4, [](const g::Status& s) { return s.volts.translation == 0.4; });
+    ASSERT_EQ(board->last().volts.translation, 0.4);
+  }
+
+  /// How long after `begin` [s] the board was neutral, for good.
+  double neutralAfter(double begin) {
+    waitFor([this] { return isNeutral(board->last().volts); }, "neutral");
+    std::size_t i = board->count - 1;
+    while (isNeutral(board->written[i - 1].volts)) --i;
+    return board->written[i].time - begin;
+  }
+
+  pid_t guardPid() { return board->last().by; }
+
+  g::Client client() const { return g::Client({settings.socket, kReplyWait, 0.01}); }
+
+  fs::path folder;
+  g::Settings settings{};
+  SharedBoard board;
+  pid_t sentinel = -1;
+};
+
+TEST_F(GuardProcess, WritesNeutralAndReferenceFirstAndAllTheTimeWithoutAClient) {
+  start();
+  EXPECT_TRUE(isNeutral(board->written[0].volts));
+  const std::size_t before = board->count;
+  waitFor([&] { return board->count > before + 20; }, "the output to be written again");
+  for (std::size_t i = 0; i < board->count; ++i) EXPECT_TRUE(isNeutral(board->written[i].volts));
+}
+
+TEST_F(GuardProcess, ArmsAndTellsWhatIsPutOut) {
+  start();
+  g::Client driver = client();
+  drive(driver);
+  EXPECT_TRUE(driver.status().has_device);
+  EXPECT_EQ(driver.status().volts.reference, 2.5);
+  EXPECT_EQ(driver.status().connections, 1U);
+}
+
+TEST_F(GuardProcess, AStartWithACommandStaysNeutral) {
+  start();
+  g::Client driver = client();
+  for (const double until = g::monotonic() + 0.8; g::monotonic() < until; pause(kPeriod))
+    driver.put({0.4, 0, 2.5});
+  EXPECT_EQ(driver.status().reason, g::Reason::kNotNeutral);
+  for (std::size_t i = 0; i < board->count; ++i) EXPECT_TRUE(isNeutral(board->written[i].volts));
+}
+
+TEST_F(GuardProcess, AClientThatGoesIsFollowedByNeutral) {
+  start();
+  {
+    g::Client driver = client();
+    drive(driver);
+  }
+  EXPECT_LT(neutralAfter(g::monotonic()), kSoon);
+  EXPECT_TRUE(isNeutral(board->last().volts));
+}
+
+TEST_F(GuardProcess, AClientThatFallsSilentIsFollowedByNeutral) {
+  start();
+  g::Client driver = client();
+  drive(driver);
+  const double begin = g::monotonic();
+  const double after = neutralAfter(begin);
+  EXPECT_GT(after, 0.05);
+  EXPECT_LT(after, 0.15 + kSoon);
+  putUntil(driver, 0.4, [](const g::Status& s) { return s.reason == g::Reason::kSilent; });
+  drive(driver);  // after neutral was held again
+}
+
+TEST_F(GuardProcess, StopIsNeutralAtOnce) {
+  start();
+  g::Client driver = client();
+  drive(driver);
+  const double begin = g::monotonic();
+  EXPECT_EQ(driver.stop().reason, g::Reason::kStopped);
+  EXPECT_LT(neutralAfter(begin), kSoon);
+}
+
+TEST_F(GuardProcess, ASecondClientIsToldThatItIsOne) {
+  start();
+  g::Client driver = client();
+  drive(driver);
+  g::Client second = client();
+  waitFor(
+      [&] {
+        driver.put({0.4, 0, 2.5});
+        return second.put({0, 0, 2.5}).reason == g::Reason::kBusy;
+      },
+      "the refusal");
+  waitFor([&] { return !second.put({0, 0, 2.5}).connected; }, "the end of the connection");
+  EXPECT_EQ(driver.put({0.4, 0, 2.5}).state, g::State::kArmed);
+}
+
+TEST_F(GuardProcess, BytesThatAreNoMessageTrip) {
+  start();
+  for (const std::size_t size : {1U, 47U, 48U, 49U, 4000U}) {
+    g::Descriptor raw;
+    waitFor([&] { return static_cast<bool>(raw = g::connectTo(settings.socket)); }, "a connection");
+    std::uint64_t sequence = 0;
+    waitFor(
+        [&] {
+          pause(kPeriod);
+          const g::Request neutral = request(++sequence, g::monotonic());
+          g::send(raw, &neutral, sizeof neutral);
+          g::Reply reply{};
+          std::size_t length = sizeof reply;
+          while (g::receive(raw, &reply, length) == g::Heard::kMessage) length = sizeof reply;
+          return g::stateOf(reply.state) == g::State::kArmed;
+        },
+        "arming");
+    const std::string garbage(size, 'x');
+    EXPECT_EQ(g::send(raw, garbage.data(), garbage.size()), g::Sent::kYes);
+    g::Reply reply{};
+    waitFor(
+        [&] {
+          std::size_t length = sizeof reply;
+          return g::receive(raw, &reply, length) == g::Heard::kMessage &&
+                 g::reasonOf(reply.reason) == g::Reason::kGarbage;
+        },
+        "the reason");
+    EXPECT_EQ(g::stateOf(reply.state), g::State::kTripped);
+  }
+}
+
+TEST_F(GuardProcess, ADeviceThatFailsAndComesBackIsNeutralUntilArmedAnew) {
+  start();
+  g::Client driver = client();
+  for (std::atomic<bool> Board::*fault : {&Board::broken, &Board::unplugged}) {
+    drive(driver);
+    (*board.operator->()).*fault = true;
+    putUntil(driver, 0.4, [](const g::Status& s) { return !s.has_device && s.reason == g::Reason::kDevice; });
+    const std::size_t before = board->count;
+    (*board.operator->()).*fault = false;
+    putUntil(driver, 0.4, [](const g::Status& s) { return s.has_device; });
+    EXPECT_TRUE(isNeutral(board->written[before].volts));
+    EXPECT_EQ(driver.status().state, g::State::kTripped);
+    EXPECT_TRUE(isNeutral(board->last().volts));
+  }
+}
+
+TEST_F(GuardProcess, ADeviceThatHoldsAnotherReferenceOrNoNeutralDoesNotCount) {
+  start();
+  g::Client driver = client();
+  for (std::atomic<double> Board::*fault : {&Board::offset, &Board::residue}) {
+    drive(driver);
+    (*board.operator->()).*fault = 0.02;  // more than either tolerance
+    putUntil(driver, 0, [](const g::Status& s) { return !s.has_device && s.reason == g::Reason::kDevice; });
+    const double until = g::monotonic() + 0.8;
+    putUntil(driver, 0,
+             [until](const g::Status& s) { return s.state == g::State::kArmed || g::monotonic() > until; });
+    EXPECT_EQ(driver.status().state, g::State::kTripped);
+    (*board.operator->()).*fault = 0.0;
+  }
+  drive(driver);
+}
+
+TEST_F(GuardProcess, AMissingDeviceIsWaitedFor) {
+  board->unplugged = true;
+  start();
+  g::Client driver = client();
+  putUntil(driver, 0, [](const g::Status& s) { return s.connected && s.reason == g::Reason::kDevice; });
+  board->unplugged = false;
+  drive(driver);
+}
+
+TEST_F(GuardProcess, TheSentinelWritesNeutralForAKilledGuardAndStartsAnother) {
+  start();
+  g::Client driver = client();
+  for (const int signal : {SIGKILL, SIGSEGV}) {
+    drive(driver);
+    const pid_t killed = guardPid();
+    ASSERT_NE(killed, sentinel);
+    const double begin = g::monotonic();
+    kill(killed, signal);
+    EXPECT_LT(neutralAfter(begin), kSoon);
+    waitFor([&] { return guardPid() != killed && guardPid() != sentinel; }, "another guard");
+    bool by_sentinel = false;
+    for (std::size_t i = 0; i < board->count; ++i) by_sentinel |= board->written[i].by == sentinel;
+    EXPECT_TRUE(by_sentinel);
+    putUntil(driver, 0.4, [](const g::Status& s) { return s.connected && s.state == g::State::kTripped; });
+    EXPECT_TRUE(isNeutral(board->last().volts));
+  }
+}
+
+TEST_F(GuardProcess, TheSentinelEndsAGuardThatHangs) {
+  start();
+  g::Client driver = client();
+  drive(driver);
+  const pid_t stopped = guardPid();
+  const double begin = g::monotonic();
+  kill(stopped, SIGSTOP);
+  // the client is never held up longer than it allows
+  const double before = g::monotonic();
+  const g::Status& status = driver.put({0.4, 0, 2.5});
+  EXPECT_LT(g::monotonic() - before, kReplyWait + kSoon);
+  EXPECT_GE(status.late, 1U);
+  EXPECT_LT(neutralAfter(begin), 0.3 + kSoon);
+  waitFor([&] { return guardPid() != stopped && guardPid() != sentinel; }, "another guard");
+}
+
+TEST_F(GuardProcess, AGuardWhoseSentinelDiesEndsNeutral) {
+  start();
+  g::Client driver = client();
+  drive(driver);
+  const pid_t guard = guardPid();
+  const double begin = g::monotonic();
+  end(SIGKILL);
+  EXPECT_LT(neutralAfter(begin), kSoon);
+  EXPECT_EQ(guardPid(), guard);
+  waitFor([&] { return !driver.put({0.4, 0, 2.5}).connected; }, "the client to notice");
+  EXPECT_TRUE(isNeutral(driver.status().volts) || driver.status().volts.reference == 2.5);
+}
+
+TEST_F(GuardProcess, ASignalToEndIsFollowedByNeutral) {
+  for (const int signal : {SIGTERM, SIGINT}) {
+    start();
+    g::Client driver = client();
+    drive(driver);
+    const double begin = g::monotonic();
+    const int status = end(signal);
+    EXPECT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 0);
+    EXPECT_LT(neutralAfter(begin), kSoon);
+    EXPECT_TRUE(isNeutral(board->last().volts));
+  }
+}
+
+TEST_F(GuardProcess, TheSocketIsForOwnerAndGroupAndForOneGuard) {
+  start();
+  struct stat status {};
+  ASSERT_EQ(stat(settings.socket.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777U, 0660U);
+  EXPECT_THROW(g::listenAt(settings.socket), std::system_error);
+  EXPECT_THROW(g::listenAt(""), std::invalid_argument);
+  EXPECT_THROW(g::listenAt(std::string(108, 'a')), std::invalid_argument);
+  end(SIGKILL);
+  waitFor([&] { return !g::connectTo(settings.socket); }, "the guard's end");
+  start();  // in place of the socket that was left behind
+  g::Client driver = client();
+  putUntil(driver, 0, [](const g::Status& s) { return s.connected; });
+}
+
+TEST_F(GuardProcess, NeutralCanBeForcedWhenNobodyIsLeft) {
+  EXPECT_TRUE(g::forceNeutral(settings, board.opener(), 0));
+  EXPECT_TRUE(isNeutral(board->last().volts));
+  board->unplugged = true;
+  const double begin = g::monotonic();
+  EXPECT_FALSE(g::forceNeutral(settings, board.opener(), 0.2));
+  EXPECT_LT(g::monotonic() - begin, 0.2 + kSoon);
+  EXPECT_GT(g::monotonic() - begin, 0.1);
+}
+
+TEST_F(GuardProcess, TellsSystemdThatItIsReadyAndAlive) {
+  const std::string path = folder / "notify";
+  const g::Descriptor systemd(socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0));
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.copy(address.sun_path, path.size());
+  ASSERT_EQ(bind(systemd.fd(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  setenv("NOTIFY_SOCKET", path.c_str(), 1);
+  start();
+  unsetenv("NOTIFY_SOCKET");
+  for (const std::string expected : {"READY=1", "WATCHDOG=1", "WATCHDOG=1"}) {
+    std::string heard;
+    waitFor(
+        [&] {
+          heard.resize(100);
+          const ssize_t size = recv(systemd.fd(), heard.data(), heard.size(), 0);
+          heard.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
+          return size > 0;
+        },
+        "a word to systemd");
+    EXPECT_EQ(heard, expected);
+  }
+}
+
+TEST(GuardClient, WithoutAGuardItDoesNotWait) {
+  g::Client client({"/nowhere/at/all", 1.0, 0.01});
+  const double begin = g::monotonic();
+  for (int i = 0; i < 100; ++i) EXPECT_FALSE(client.put({0.4, 0, 2.5}).connected);
+  EXPECT_LT(g::monotonic() - begin, kSoon);
+  EXPECT_EQ(client.status().volts.translation, 0);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}
