@@ -12,11 +12,13 @@
 #include <csignal>
 #include <exception>
 #include <memory>
+#include <stdexcept>
 
 #include "base/command_input.h"
 #include "base/guard_dac.h"
 #include "base/last_word.h"
 #include "base/limits_server.h"
+#include "base/master_watch.h"
 #include "base/odometry_input.h"
 #include "base/odometry_output.h"
 #include "base/odometry_report.h"
@@ -64,6 +66,7 @@ class BaseNode {
   void act();
   void publish();
   void tell();
+  bool isForgotten();
   void finish();
   void reportOdometry(Status& status);
   void reportGuard(Status& status);
@@ -88,6 +91,7 @@ class BaseNode {
   ros::Publisher active_input_;
   k::CommandInput input_;
   k::LimitsServer limits_;
+  k::MasterWatch master_;
   ros::Timer timer_;  ///< of simulated time
 };
 
@@ -105,7 +109,8 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
       active_input_(nh.advertise<std_msgs::String>("active_input", 1, true)),
       input_(
           nh, settings.topics, drive_, [] { return loopTime(ros::Time::now()); }, [this] { heard_ = true; }),
-      limits_(settings.limit_names, drive_) {
+      limits_(settings.limit_names, drive_),
+      master_(settings.master_timeout) {
   logLaw(settings_.law_name, k::ambiguity(drive_.outlet()));
   const std::string unfollowed = k::unfollowedWarning(settings.effects.unfollowed);
   if (!unfollowed.empty()) warn(unfollowed);
@@ -130,12 +135,23 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
 void BaseNode::run() {
   try {
     ros::SteadyTime due = ros::SteadyTime::now();
-    while (ros::ok() && !stop_requested) due = ros::Time::isSimTime() ? listen(due) : tickAfter(due);
+    while (ros::ok() && !stop_requested && !isForgotten()) {
+      due = ros::Time::isSimTime() ? listen(due) : tickAfter(due);
+    }
   } catch (...) {
     finish();
     throw;
   }
   finish();
+  if (isForgotten()) {
+    throw std::runtime_error(
+        "BASE_MASTER_FORGOT: another ROS master has taken the place of the one that knew this node");
+  }
+}
+
+/// Whether it is time to end, for somebody to start it anew: nobody finds this node any more, and it stands.
+bool BaseNode::isForgotten() {
+  return master_.forgotten() && drive_.output().v == 0 && drive_.output().w == 0;
 }
 
 /// Works on what comes until the tick that is due, and ticks; returns when the next one is due. No ros::Timer:
@@ -171,6 +187,7 @@ void BaseNode::finish() {
 void BaseNode::onTick() {
   dac_.stamp = ros::Time::now();
   const double t = loopTime(dac_.stamp);
+  drive_.cutOff(master_.lost() || master_.forgotten());
   const k::Drive::Tick tick = drive_.tick(t);
   if (tick == k::Drive::Tick::kReset) {
     warn("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");

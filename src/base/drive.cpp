@@ -38,7 +38,8 @@ Drive::Tick Drive::tick(double t) {
 void Drive::move(double t, double dt) {
   estop_.tick(t);
   now_cap_ = cap_.at(t);
-  if (estop_.latched()) arbiter_.disarm();  // whoever commands must let go before it is obeyed again
+  if (estop_.latched() || cut_off_)
+    arbiter_.disarm();  // whoever commands must let go before it is obeyed again
   const Choice choice = arbiter_.choose(t);
   if (choice.input && settings_.arbiter.inputs[*choice.input].limits != set_) {
     set_ = settings_.arbiter.inputs[*choice.input].limits;
@@ -46,7 +47,7 @@ void Drive::move(double t, double dt) {
   }
   if (estop_.stopped()) {
     limiter_.reset();
-  } else if (choice.reason == Reason::kDriving) {
+  } else if (choice.reason == Reason::kDriving && !cut_off_) {
     limiter_.advance(choice.command, now_cap_, dt);
   } else {
     limiter_.brake(dt);

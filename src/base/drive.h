@@ -64,6 +64,9 @@ class Drive {
   /// Forgets every command and puts out neutral at time t [s].
   void stop(double t);
 
+  /// Brakes, and obeys nobody, as long as this is on; then every input must be released anew.
+  void cutOff(bool on) { cut_off_ = on; }
+
   /// Releases the emergency stop at time t [s], or says why not. Every input must be released anew.
   std::string resetEStop(double t);
 
@@ -83,6 +86,7 @@ class Drive {
   const Reckoning& reckoning() const { return reckoning_; }
   const DriveCounts& counts() const { return counts_; }
   const DriveSettings& settings() const { return settings_; }
+  bool isCutOff() const { return cut_off_; }
   double cap() const { return now_cap_; }  ///< as of the last tick [m/s]
 
  private:
@@ -101,6 +105,7 @@ class Drive {
   Reckoning reckoning_;
   DriveCounts counts_;
   Output output_{};
+  bool cut_off_ = false;
   double now_cap_;
   std::optional<double> last_tick_;
 };

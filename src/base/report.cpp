@@ -78,7 +78,7 @@ Report reportCommands(const Drive& drive, const Tally& before) {
   warn(now.drive.late_ticks > before.drive.late_ticks, "late");
   warn(now.drive.time_resets > before.drive.time_resets, "time ran backwards");
   const Reason reason = drive.arbiter().last().reason;
-  const bool held = reason != Reason::kDriving && reason != Reason::kIdle;
+  const bool held = drive.isCutOff() || (reason != Reason::kDriving && reason != Reason::kIdle);
   const std::string active = activeInput(drive);
   return {held || !warning.empty(),
           stateOf(drive) + (warning.empty() ? "" : "; " + warning),
@@ -102,6 +102,7 @@ Report reportCommands(const Drive& drive, const Tally& before) {
 std::string stateOf(const Drive& drive) {
   if (drive.eStop().latched()) return "emergency stop";
   if (drive.eStop().stopped()) return "waiting for the emergency stop's first word";
+  if (drive.isCutOff()) return "cut off: the ROS master is gone";
   const Choice& choice = drive.arbiter().last();
   switch (choice.reason) {
     case Reason::kDriving:
@@ -118,7 +119,8 @@ std::string stateOf(const Drive& drive) {
 }
 
 std::string activeInput(const Drive& drive) {
-  const bool driving = !drive.eStop().stopped() && drive.arbiter().last().reason == Reason::kDriving;
+  const bool driving =
+      !drive.eStop().stopped() && !drive.isCutOff() && drive.arbiter().last().reason == Reason::kDriving;
   return driving ? nameOf(drive) : "";
 }
 
@@ -128,6 +130,7 @@ std::string warningOf(const Drive& drive, const Tally& before, const std::string
     return "BASE_COMMAND_TIMEOUT: nothing more: brakes";
   if (stateOf(drive) == state) return "";
   if (drive.eStop().stopped()) return "BASE_EMERGENCY_STOP: neutral at once, until ~reset is called";
+  if (drive.isCutOff()) return "BASE_MASTER_LOST: the ROS master does not answer: brakes";
   const Choice& choice = arbiter.last();
   switch (choice.reason) {
     case Reason::kLocked:

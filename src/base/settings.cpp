@@ -125,6 +125,7 @@ BaseSettings readBaseSettings(Section node) {
   settings.odometry = readOdometry(node.section("odometry"), settings.effects);
   settings.drive.noise = settings.odometry.noise;
   if (settings.odometry.imu) settings.drive.gyro = settings.odometry.imu->gyro;
+  settings.master_timeout = node.atLeast("master_timeout", 0);
   settings.diagnostic_period = node.above("diagnostic_period", 0);
   node.end();
   return settings;

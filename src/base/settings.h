@@ -30,6 +30,7 @@ struct BaseSettings {
   OdometrySettings odometry;
   KnownEffects effects;      ///< the model file's, as far as they concern odometry
   double diagnostic_period;  ///< [s]
+  double master_timeout;     ///< the chair brakes when the ROS master is silent for longer [s]; 0: never
 };
 
 /// Throws std::invalid_argument naming parameter and value for anything missing, unknown, mistyped or
