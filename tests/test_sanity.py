@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from kurumaisu.bench import drives, sanity, wrong_data, wrong_scans
-from kurumaisu.critic import sanity_fit, sanity_rates, sanity_rows
+from kurumaisu.critic import sanity_fit, sanity_rates, sanity_rows, sanity_stamps
 from kurumaisu.critic.reading import read_recording
 from kurumaisu.critic.recording import Series
 from kurumaisu.critic.sanity import examine
 from kurumaisu.params import load_model, shipped
+from kurumaisu.real import warthog
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -37,6 +38,26 @@ def test_a_large_effect_is_not_wrong_data(effect):
 def test_nothing_is_wrong_with_a_good_drive_of_any_style(style):
     tables = drives.make(case(None, 0.0, style), np.random.default_rng(4))
     assert sanity.said_of_tables(tables, ["command", "voltage", "pose"], None) == []
+
+
+def test_poses_that_are_missing_are_not_late():
+    rng = np.random.default_rng(8)
+    tables = drives.make(case(None, 0.0), rng)
+    kept = rng.random(len(tables["pose"])) < 0.6
+    tables["pose"] = tables["pose"][kept]
+    assert sanity.said_of_tables(tables, ["command", "voltage", "pose"], None) == []
+
+
+def test_the_warthogs_poses_wait_and_the_rest_of_them_do_not():
+    if not (DATA / "norlab_drive").exists():
+        pytest.skip("no recordings of norlab_drive")
+    log = warthog.load(DATA)
+    told = {}
+    for name, poses in (("all", log.all_poses), ("kept", log.pose)):
+        rows = warthog.between(poses, 134.0, 218.0)
+        told[name] = sanity_stamps.words(Series(rows[:, 0], rows[:, 1:], ("x", "y", "theta")))
+    assert told["kept"] is None
+    assert "times of arrival" in told["all"]
 
 
 QUICK = (

@@ -154,6 +154,7 @@ def drawn(law, sd):
         (lambda t: 0.02 * (t > 2.2), "step", 2.3, 0.02),
         (lambda t: -0.02 * max(t - 2.0, 0), "threshold", 2.0, -0.04),
         (lambda t: 0.03 * np.exp(-(((t - 1.5) / 0.6) ** 2)), "bump", 1.5, 0.03),
+        (lambda t: 0.01 * np.sin(np.pi * (t - 2) * 1.75), "irregular", 2.0, 0.02),
     ],
 )
 def test_shapes_are_told_with_place_and_size(law, kind, place, size):

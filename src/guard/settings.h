@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the guard reads: launch/guard.yaml, and the reference voltage of the model file beside it.
+// What the guard reads: launch/guard.yaml, and of the model file beside it the bands of the voltages and the reference.
 #pragma once
 
 #include <string>

@@ -89,6 +89,18 @@ def _coarse(tables: Tables, rng: np.random.Generator) -> Tables:
     return {**tables, "pose": pose}
 
 
+def _queued(tables: Tables, rng: np.random.Generator) -> Tables:
+    """Poses that wait where the matching of scans falls behind, stamped when they come: in quick succession."""
+    t = tables["pose"][:, 0].copy()
+    apart = 0.2 * float(np.median(np.diff(t)))
+    until = t[0]
+    for i in range(1, len(t)):
+        if rng.random() < (t[i] - t[i - 1]) / 3.0:
+            until = max(until, t[i]) + rng.uniform(0.5, 1.0)
+        t[i] = max(t[i], until, t[i - 1] + apart)
+    return {**tables, "pose": np.column_stack([t, tables["pose"][:, 1:]])}
+
+
 def _counts(tables: Tables, rng: np.random.Generator) -> Tables:
     volts = tables["voltage"].copy()
     volts[:, 1:] = np.round(2048 + volts[:, 1:] * rng.choice([204.8, 409.6]))
@@ -126,6 +138,7 @@ SPOILT: dict[str, tuple[_Spoil, str]] = {
     "heading without its sign": (_heading(lambda a: abs(_wrapped(a))), "folded"),
     "clock shifted": (_shifted, "clocks differ"),
     "clock 1-2 s early": (_early, "clocks differ"),
+    "poses stamped on arrival": (_queued, "times of arrival"),
     "clock scaled": (_stretched, "different speeds"),
     "relocalised": (_relocalised, "jumps"),
     "frozen": (_frozen, "stand"),

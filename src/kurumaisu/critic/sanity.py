@@ -15,6 +15,7 @@ from kurumaisu.critic import (
     sanity_rates,
     sanity_rows,
     sanity_scan,
+    sanity_stamps,
     sanity_times,
     sanity_volts,
 )
@@ -76,7 +77,7 @@ def _of_run(run: Run, model: Model) -> list[str]:
         known.append((name, sanity_input.compare(asked, rates[1], name), _number(*rates)))
     words = _one(sanity_pose.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
     words += [*sanity_jumps.words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
-    words += _one(sanity_pose.folded(run.pose))
+    words += [*_one(sanity_pose.folded(run.pose)), *_one(sanity_stamps.words(run.pose))]
     told = [line for name, part, rates in inputs for line in _against(name, part, pose, rates, model)]
     for name, match, number in known:
         told += [*match.words, *sanity_input.sign_and_unit(match, number, name)]

@@ -36,10 +36,11 @@ class Described(Protocol):
 
 @dataclass(frozen=True)
 class Shape:
-    """kind: a key of TEMPLATES, or periodic; place, size: estimate and 90 % interval, (3,) each.
+    """kind: a key of TEMPLATES, periodic or irregular; place, size: estimate and 90 % interval, (3,) each.
 
     The place is that of a step, threshold or bump, the period of an oscillation, and the middle of a straight line;
-    size: from end to end of a line or beyond a threshold, height of a step or bump, amplitude of an oscillation.
+    size: from end to end of a line or beyond a threshold, height of a step or bump, amplitude of an oscillation, and
+    from the lowest to the highest value of what is irregular.
     """
 
     kind: str
@@ -110,6 +111,8 @@ def shape_of(described: Described) -> Shape:
     kind = min(TEMPLATES, key=lambda name: _cost(name, x, curves[0], noise))
     fitted = [_best(kind, x, curve) for curve in curves]
     sizes = np.array([size for _, size, _ in fitted])
+    if kind == "line" and np.diff(np.sign(_interval(sizes)[1:])):  # neither rises nor falls: none of the templates
+        kind, sizes = "irregular", np.ptp(curves, axis=1)
     places = np.array([place for place, _, _ in fitted])
     return Shape(kind, at[0] + (at[-1] - at[0]) * _interval(places), _interval(sizes))
 

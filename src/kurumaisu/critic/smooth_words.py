@@ -68,6 +68,8 @@ def shape(extension: Extension, *, intervals: bool = True) -> str:
     span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}".rstrip()
     if found.kind == "line":
         return f"monotone, {'rises' if found.size[0] > 0 else 'falls'} by {size} {span}"
+    if found.kind == "irregular":
+        return f"irregular, within {size} {span}"
     place = _quantity(found, "place", unit, intervals)
     what = {"step": f"of {size}", "bump": f"of {size}", "threshold": f"; beyond it a change of up to {size}"}
     return f"{found.kind} at {place} {what[found.kind]}".replace(" ;", ";")

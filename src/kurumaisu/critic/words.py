@@ -94,20 +94,26 @@ def details(
         size = with_interval(e.estimate, e.lo90, e.hi90, e.unit)
         fitted.setdefault(term.id, []).append(f"{term.parameter.name} {size}")
     for name, sizes in fitted.items():
-        weight = ""
-        if name not in matters:
-            small = shares[name] < MATERIAL
-            weight = ": detectable, but it does not matter" if small else ": not confirmed on data held out"
         moved = f"within {HORIZON:g} s it moves the chair by {100 * shares[name]:.1f} % of its way or turn"
-        said.append(f"{name}: {', '.join(sizes)}; {moved}{weight}.")
+        said.append(f"{name}: {', '.join(sizes)}; {moved}{_weight(name, found, shares, matters)}.")
     n = problem.noise
     wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
     said.append(
         f"The yaw rate fluctuates at random: in a minute the heading strays by {wander:.0f}° or so, whatever the model."
     )
-    alarm = f"{100 * found.false_alarm:.1f} %" if found.false_alarm > 0 else f"less than {100 / naming.NULLS:.2f} %"
-    said.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
+    if found.p:  # else no effect was looked for
+        alarm = f"{100 * found.false_alarm:.1f} %" if found.false_alarm > 0 else f"less than {100 / naming.NULLS:.2f} %"
+        said.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
     return tuple(said)
+
+
+def _weight(name: str, found: Naming, shares: dict[str, float], matters: set[str]) -> str:
+    if name not in matters:
+        small = shares[name] < MATERIAL
+        return ": detectable, but it does not matter" if small else ": not confirmed on data held out"
+    if any(name in group for group in found.confounded):
+        return ": others that look alike may act in its place"
+    return "" if found.p[name] >= naming.NAMED else ": not certain enough to be named"
 
 
 def suspects(found: Naming) -> tuple[str, ...]:

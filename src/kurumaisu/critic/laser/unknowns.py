@@ -50,8 +50,9 @@ def shape(rival: Rival, basis: Basis, gram: FloatArray) -> str:
     unit = _UNITS.get(basis.covariate, "rad")
     size, low, high = 1e3 * (np.abs(found.size) if found.kind == "line" else found.size)
     told = f"{size:.3g} mm (90 %: {min(low, high):.3g} to {max(low, high):.3g})"
+    span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}"
     if found.kind == "line":
-        return (
-            f"monotone, {'rises' if found.size[0] > 0 else 'falls'} by {told} from {at[0]:.3g} to {at[-1]:.3g} {unit}"
-        )
+        return f"monotone, {'rises' if found.size[0] > 0 else 'falls'} by {told} {span}"
+    if found.kind == "irregular":
+        return f"irregular, within {told} {span}"
     return f"{found.kind} of {told} at {found.place[0]:.3g} {unit}"
