@@ -277,6 +277,27 @@ TEST(Drive, AnEmergencyStopThatFallsSilentIsALatchedStop) {
   EXPECT_TRUE(chair.neutral());
 }
 
+// Fault 14
+TEST_F(RideTest, CutOffItBrakesAndObeysOnlyWhoLetGoAfterwards) {
+  chair.say(0.8, 0.0);
+  chair.run(3.0);
+  chair.drive.cutOff(true);
+  const double before = chair.dac.last().v;
+  chair.run(kPeriod);
+  EXPECT_NEAR(before - chair.dac.last().v, 1.0 * kPeriod, 1e-12);
+  chair.run(1.0);
+  EXPECT_TRUE(chair.neutral());
+  EXPECT_EQ(k::stateOf(chair.drive), "cut off: the ROS master is gone");
+  chair.drive.cutOff(false);
+  chair.run(1.0);
+  EXPECT_TRUE(chair.neutral());
+  chair.say(0.0, 0.0);
+  chair.run(kPeriod);
+  chair.say(0.8, 0.0);
+  chair.run(3.0);
+  EXPECT_EQ(chair.dac.last().v, 0.8);
+}
+
 TEST_F(RideTest, ACapSlowsDownByTheRampAndForgetsItself) {
   chair.say(1.0, 0.6);
   chair.run(3.0);

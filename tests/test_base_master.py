@@ -55,6 +55,7 @@ class Graph:
     def start_base(self, folder):
         values = yaml.safe_load(shipped("launch/base_node.yaml").read_text())
         values["model"] = yaml.safe_load(shipped("launch/md100.yaml").read_text())
+        values["guard"] = yaml.safe_load(shipped("launch/guard.yaml").read_text())
         path = folder / "base_node.yaml"
         path.write_text(yaml.safe_dump({**values, "master_timeout": TIMEOUT}))
         assert self.run("rosparam", "load", str(path), "/base_node").wait(PATIENCE) == 0

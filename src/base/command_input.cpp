@@ -23,6 +23,12 @@ void warnRefused(const std::string& topic, const geometry_msgs::Twist& twist) {
                     twist.linear.x, twist.angular.z);
 }
 
+void tellReset(const std::string& refusal) {
+  const bool refused = !refusal.empty();
+  ROS_LOG(refused ? ros::console::levels::Warn : ros::console::levels::Info, ROSCONSOLE_DEFAULT_NAME, "%s",
+          refused ? ("BASE_RESET_REFUSED: " + refusal).c_str() : "the emergency stop is released");
+}
+
 }  // namespace
 
 CommandInput::CommandInput(ros::NodeHandle& nh, const BaseTopics& topics, Drive& drive, Clock clock,
@@ -94,11 +100,7 @@ void CommandInput::onCommand(std::size_t input, const std::string& topic, const 
 void CommandInput::onReset(Answer& answer) {
   answer.message = drive_.resetEStop(clock_());
   answer.success = static_cast<unsigned char>(answer.message.empty());
-  if (answer.message.empty()) {
-    ROS_INFO("the emergency stop is released");
-  } else {
-    ROS_WARN("BASE_RESET_REFUSED: %s", answer.message.c_str());
-  }
+  tellReset(answer.message);
 }
 
 }  // namespace kurumaisu
