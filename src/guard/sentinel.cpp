@@ -153,7 +153,7 @@ bool Sentinel::rest() {
 int runSentinel(const Settings& settings, const Device::Open& open) { return Sentinel(settings, open).run(); }
 
 bool forceNeutral(const Settings& settings, const Device::Open& open, double patience) {
-  Device device(open, {0, 0, settings.limits.reference}, settings.reopening);
+  Device device(open, neutralOf(settings.limits), settings.reopening);
   double now = monotonic();
   for (const double end = now + patience;; now = monotonic()) {
     if (device.recover(now)) {

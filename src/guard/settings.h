@@ -20,6 +20,10 @@ struct Settings {
   double neutral_patience;  ///< [s] for which `guard --neutral` tries
 };
 
+inline Neutral neutralOf(const Limits& limits) {
+  return {limits.reference, limits.reference_tolerance, limits.neutral};
+}
+
 /// Reads the file, and the model file that it names. Throws std::invalid_argument naming file, line, key and value.
 Settings readSettings(const std::string& file);
 
