@@ -37,10 +37,14 @@ def start(tmp_path):
             process.kill()
 
 
-def set_voltages(tmp_path, *volts):
+def set_voltages_at(tmp_path, *volts):
     file = tmp_path / "device.yaml"
     file.write_text(EXAMPLE.read_text().replace("port: /dev/kurumaisu_dac", f"port: {tmp_path / 'dac'}"))
-    command = [program("set_voltages"), str(file), *map(str, volts)]
+    return [program("set_voltages"), str(file), *map(str, volts)]
+
+
+def set_voltages(tmp_path, *volts):
+    command = set_voltages_at(tmp_path, *volts)
     return subprocess.run(command, input="\n", capture_output=True, text=True, timeout=DEADLINE, check=False)
 
 
@@ -60,6 +64,19 @@ def test_the_log_tells_when(start, tmp_path):
     board.stdin.write("volts\n")
     board.stdin.flush()
     assert board.stdout.readline() == done.stdout.splitlines()[2] + "\n"
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_in_neutral(start, tmp_path, end):
+    start()
+    command = set_voltages_at(tmp_path, 0.5, -0.2, 2.5)
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as running:
+        for _ in range(2):
+            running.stdout.readline()
+        assert (tmp_path / "log").read_text().splitlines()[-1].split()[2] != "0.000000"
+        running.send_signal(end)
+        assert running.wait(DEADLINE) == 0
+    assert (tmp_path / "log").read_text().splitlines()[-1].split()[2:4] == ["0.000000", "0.000000"]
 
 
 def test_faults_come_from_the_input_and_the_command_line(start, tmp_path):
@@ -83,7 +100,7 @@ def test_it_ends_with_its_input_and_takes_its_link_along(start, tmp_path):
 
 
 def test_without_an_input_it_goes_on_until_it_is_told(start, tmp_path):
-    board = start(stdin=subprocess.DEVNULL)
+    board = start("__name:=board", stdin=subprocess.DEVNULL)  # as roslaunch starts it
     assert set_voltages(tmp_path, 0, 0, 2.5).returncode == 0
     board.send_signal(signal.SIGTERM)
     assert board.wait(DEADLINE) == 0

@@ -40,6 +40,7 @@ struct Options {
 Options optionsOf(const std::vector<std::string>& arguments) {
   Options options;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
+    if (arguments[i].find(":=") != std::string::npos) continue;  // roslaunch names every node
     if (arguments[i] == "--realtime") {
       options.realtime = true;
     } else if (arguments[i] == "--log" && i + 1 < arguments.size()) {
