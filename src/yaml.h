@@ -17,7 +17,7 @@ namespace kurumaisu {
 /// forms: 0x1F, 0o17, 1_000, yes and off are strings here.
 class YamlValue {
  public:
-  YamlValue(YAML::Node node, std::string file) : node_(std::move(node)), file_(std::move(file)) {}
+  YamlValue(const YAML::Node& node, std::string file) : node_(node), file_(std::move(file)) {}
 
   /// The only document of a file. Throws std::invalid_argument naming the file and, if it can, the line.
   static YamlValue load(const std::string& file);

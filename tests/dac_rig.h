@@ -103,6 +103,12 @@ struct Rig {
   VirtualBoard board;
 };
 
+/// One command for all three, and all replies alike.
+inline const Edits kOneFrame{
+    {"frame: channel ", "frame: all "},
+    {R"("W{ch}{code:04X}")", R"("S{reference.code:03X}{translation.code:03X}{steering.code:03X}")"},
+    {R"("OK {ch}{code:04X}")", R"("OK")"}};
+
 constexpr Volts kNeutral{0, 0, 2.5};
 constexpr Volts kMoving{0.5, -0.25, 2.5};
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// guard_client SOCKET MODE PRIORITY: drives through the guard as base_node does, and breaks in one of many ways when its standard
+// guard_client SOCKET MODE NICE: drives through the guard as base_node does, and breaks in one of many ways when its standard
 // input says so; for scripts/bench guard. It prints "armed" when its voltage is out, and the time of the break.
 #include <fcntl.h>
 #include <poll.h>
@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
   if (argc != 4) return 2;
   const std::string mode = argv[2];
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  g::raiseThreads(std::stoi(argv[3]));
+  g::favourThreads(std::stoi(argv[3]));
   g::Client client({argv[1], kReplyWait, kRetryPause});
   bool was_out = false;
   for (double next = g::monotonic();; next += 1 / kRate) {

@@ -31,7 +31,8 @@ struct Board {
   std::atomic<std::size_t> count{0};
   std::atomic<bool> broken{false};     ///< does not answer
   std::atomic<bool> unplugged{false};  ///< cannot be opened either
-  std::atomic<int> openings{0};
+  std::atomic<double> offset{0};       ///< [V] of the reference
+  std::atomic<double> residue{0};      ///< [V] that neutral has
   std::array<Written, kMost> written;
 
   const Written& last() const { return written[count - 1]; }
@@ -65,7 +66,7 @@ class SharedBoard {
       if (board_.broken || board_.unplugged) throw d::Fault("the board: no answer");
       board_.written.at(board_.count) = {kurumaisu::guard::monotonic(), getpid(), volts};
       ++board_.count;
-      return volts;
+      return {volts.translation + board_.residue, volts.steering, volts.reference + board_.offset};
     }
     void reopen() override { open(); }
     std::string name() const override { return "the board"; }
@@ -73,7 +74,6 @@ class SharedBoard {
    private:
     void open() {
       if (board_.unplugged) throw d::Fault("the board: not there");
-      ++board_.openings;
     }
 
     Board& board_;

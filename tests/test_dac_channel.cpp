@@ -67,6 +67,21 @@ Wiring anyWiring(std::mt19937& random) {
   }
 }
 
+void compareWithPrintf(const std::string& code_form, const std::string& volt_form, std::mt19937& random) {
+  const std::string format = "<{%" + code_form + "|A7|%" + volt_form + "}>";
+  const d::Template frame("<{{{code:" + code_form + "}|{ch}|{volt:" + volt_form + "}}}>",
+                          d::Template::Kind::kChannel);
+  const bool is_hex = code_form.find_first_of("xX") != std::string::npos;
+  for (int i = 0; i < 400; ++i) {
+    const int lowest = is_hex ? 0 : -70000;  // printf takes a negative one for something else
+    const int code = std::uniform_int_distribution<int>(lowest, 70000)(random);
+    const double volt = between(random, -12, 12) * (i % 9 == 0 ? 1e6 : 1);
+    std::array<char, 200> expected{};
+    std::snprintf(expected.data(), expected.size(), format.c_str(), code, volt);
+    EXPECT_EQ(frame.fill(d::Filling{"A7", {code, volt, 0}}), expected.data());
+  }
+}
+
 }  // namespace
 
 TEST(DacChannel, NeverBeyondTheClamp) {
@@ -137,21 +152,9 @@ TEST(DacChannel, Misfits) {
 
 TEST(DacTemplate, FillsInAsPrintfDoes) {
   std::mt19937 random(4);
-  const std::array<const char*, 8> codes{"d", "4d", "04d", "x", "X", "04X", "6x", "012d"};
-  const std::array<const char*, 6> volts{".0f", ".3f", "+.3f", "8.2f", "+010.4f", "06.1f"};
-  for (int i = 0; i < 20000; ++i) {
-    const int code = static_cast<int>(random() % 70000) - (random() % 4 == 0 ? 70000 : 0);
-    const double volt = between(random, -12, 12) * (random() % 9 == 0 ? 1e6 : 1);
-    const std::string one = codes.at(random() % codes.size());
-    const std::string other = volts.at(random() % volts.size());
-    const bool is_hex = one.find_first_of("xX") != std::string::npos;
-    const int shown = is_hex ? std::abs(code) : code;  // printf takes a negative one for something else
-    std::array<char, 200> expected{};
-    std::snprintf(expected.data(), expected.size(), ("<{%" + one + "|A7|%" + other + "}>").c_str(), shown,
-                  volt);
-    const d::Template frame("<{{{code:" + one + "}|{ch}|{volt:" + other + "}}}>",
-                            d::Template::Kind::kChannel);
-    EXPECT_EQ(frame.fill(d::Filling{"A7", {shown, volt, 0}}), expected.data());
+  for (const char* code : {"d", "4d", "04d", "x", "X", "04X", "6x", "012d"}) {
+    for (const char* volt : {".0f", ".3f", "+.3f", "8.2f", "+010.4f", "06.1f"})
+      compareWithPrintf(code, volt, random);
   }
 }
 

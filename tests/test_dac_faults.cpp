@@ -19,11 +19,6 @@ namespace {
 
 const d::Edits kNoRetry{{"retries: 1", "retries: 0"}};
 const d::Edits kMute{{R"(expect: "OK {ch}{code:04X}")", R"(expect: "OK")"}, {"retries: 1", "retries: 0"}};
-const d::Edits kOneFrame{
-    {"frame: channel ", "frame: all "},
-    {R"("W{ch}{code:04X}")", R"("S{reference.code:03X}{translation.code:03X}{steering.code:03X}")"},
-    {R"("OK {ch}{code:04X}")", R"("OK")"}};
-
 std::string faultOf(d::Converter& converter, const d::Volts& volts) {
   return complaint<d::Fault>([&] { converter.put(volts); });
 }
@@ -91,7 +86,7 @@ TEST(DacFaults, AllIsSentThoughTheReferenceFails) {
 /// The board answers every command "OK". One that is answered late must not make the next one, which the board never
 /// heard, look obeyed.
 TEST(DacFaults, ALateReplyIsNotTakenForTheNextCommands) {
-  d::Edits edits = kOneFrame;
+  d::Edits edits = d::kOneFrame;
   edits.push_back(kNoRetry[0]);
   Rig rig(edits);
   const auto converter = rig.open();
@@ -207,89 +202,6 @@ TEST(DacFaults, NotANumberIsRefusedAndNothingIsSent) {
     EXPECT_THROW(converter->put({0, 0, bad}), std::invalid_argument);
   }
   EXPECT_EQ(rig.board.commands(), 2U);
-}
-
-TEST(DacSerial, ReferenceFirstAndNothingBeforeTheFirstPut) {
-  Rig rig;
-  const auto converter = rig.open();
-  EXPECT_EQ(rig.board.heard(), (std::vector<std::string>{"ID?", "RANGE 5"}));
-  EXPECT_EQ(converter->name(), "serial " + (rig.folder / "port") + ": ASCII-DAC ");
-  const d::Volts held = converter->put(d::kNeutral);
-  // 819 / V: 2.5 V is 2047.5; half away from zero. V_f and V_s are counted from what the reference then is
-  EXPECT_EQ(rig.board.heard(), (std::vector<std::string>{"ID?", "RANGE 5", "WC0800", "WA0800", "WB0800"}));
-  EXPECT_DOUBLE_EQ(held.translation, 0);
-  EXPECT_DOUBLE_EQ(held.reference, 2048 / 819.0);
-}
-
-TEST(DacSerial, SaysWhatIsReallyHeld) {
-  Rig rig;
-  const auto converter = rig.open();
-  for (const d::Volts& volts : {d::kMoving, d::Volts{99, -99, 99}, d::Volts{0.1234, 0.0001, 2.41}}) {
-    const d::Volts held = converter->put(volts);
-    const d::Volts board = rig.board.volts();
-    EXPECT_DOUBLE_EQ(held.translation, board.translation);
-    EXPECT_DOUBLE_EQ(held.steering, board.steering);
-    EXPECT_DOUBLE_EQ(held.reference, board.reference);
-  }
-  EXPECT_NEAR(converter->put({99, -99, 99}).translation, 2.2, 1 / 819.0);
-  EXPECT_NEAR(converter->put({99, -99, 99}).steering, -1, 1 / 819.0);
-}
-
-TEST(DacSerial, OneFrameForAll) {
-  Rig rig(kOneFrame);
-  const auto converter = rig.open();
-  converter->put(d::kMoving);
-  EXPECT_EQ(rig.board.heard().back(),
-            "S80099A733");  // 2048; 2048 + 409.5 -> 2457.5 -> 2458; 2048 - 204.75 -> 1843
-  EXPECT_EQ(rig.board.history().size(), 1U) << "all at once";
-}
-
-TEST(DacSerial, ABoardThatNeverAnswersIsTold) {
-  Rig rig({{R"("OK {ch}{code:04X}")", R"("")"},
-           {R"(send: "RANGE 5", expect: "OK")", R"(send: "RANGE 5", expect: "")"}});
-  const auto converter = rig.open();
-  converter->put(d::kMoving);
-  ASSERT_TRUE(rig.heardAll(5));
-  EXPECT_NEAR(rig.board.volts().steering, -0.25, 1e-3);
-}
-
-TEST(DacVirtualBoard, LogsEveryChangeInNanoseconds) {
-  Rig rig;
-  const auto converter = rig.open();
-  converter->put(d::kNeutral);
-  converter->put(d::kNeutral);
-  converter->put(d::kMoving);
-  const std::vector<d::Change> history = rig.board.history();
-  ASSERT_EQ(history.size(), 5U);  // three, none, and all but the reference
-  EXPECT_FALSE(rig.board.isNeutral(history[1].volts));
-  EXPECT_TRUE(rig.board.isNeutral(history[2].volts));
-  EXPECT_FALSE(rig.board.isNeutral(history[3].volts));
-  std::istringstream log(d::textOf(rig.folder / "log"));
-  std::int64_t last = 0;
-  for (const d::Change& change : history) {
-    std::int64_t time = 0;
-    std::string what;
-    d::Volts volts{};
-    ASSERT_TRUE(log >> time >> what >> volts.translation >> volts.steering >> volts.reference);
-    EXPECT_EQ(time, change.time);
-    EXPECT_EQ(what, "volts");
-    EXPECT_NEAR(volts.translation, change.volts.translation, 1e-6);
-    EXPECT_GT(time, last);
-    last = time;
-  }
-}
-
-TEST(DacVirtualBoard, RefusesFaultsThatAreNone) {
-  for (const char* text :
-       {"", "late", "silent=1", "sulk", "late@0=1", "late@1x0=1", "late=-1", "late=1e3", "deaf@x2"}) {
-    EXPECT_THROW(d::boardFault(text, 0), std::invalid_argument) << text;
-  }
-  const d::BoardFault fault = d::boardFault("late@5x3=0.25", 1);
-  EXPECT_EQ(fault.what, d::BoardFault::kLate);
-  EXPECT_EQ(fault.at, 5U);
-  EXPECT_EQ(fault.count, 3U);
-  EXPECT_DOUBLE_EQ(fault.value, 0.25);
-  EXPECT_EQ(d::boardFault("deaf", 7).at, 8U);
 }
 
 int main(int argc, char** argv) {

@@ -2,7 +2,9 @@
 // The strict reader of YAML files, and devices' files through it: what is shipped is read, what is wrong is refused.
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <algorithm>
+#include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -149,6 +151,14 @@ TEST(DacSettings, WhatIsShippedIsRead) {
   for (const char* name : {"mcp4728.yaml", "ad5592r.yaml"}) {
     EXPECT_EQ(std::get<d::IioSettings>(d::readDevice(d::shipped(name)).back_end).bits, 12) << name;
   }
+}
+
+TEST(DacSettings, NothingElseIsShipped) {
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(d::shipped("")))
+    names.insert(entry.path().filename());
+  EXPECT_EQ(names, (std::set<std::string>{"serial_ascii.yaml", "mcp4728.yaml", "ad5592r.yaml",
+                                          "dacs_82ada_unverified.yaml"}));
 }
 
 TEST(DacSettings, WhatNobodyKnowsIsNotGuessed) {

@@ -69,6 +69,7 @@ CPP_RULES = [
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
     Rule(r"follow/", r'"(?!follow/|bindings\.h)', "following rests on nothing"),
     Rule(r"scip/", r'"(?!scip/)', "the protocol rests on nothing"),
+    Rule(r"guard/", r'"(?!dac/|guard/|yaml\.h)', "the guard rests on the D/A converter only"),
     Rule(r"virtual_urg/", r'"(?!scip/|virtual_urg/|bindings\.h)', "the virtual sensor shares the protocol only"),
     Rule(r"laser/", r'"(?!scip/|serial/|laser/|params\.h)', "the driver rests on the protocol and the port only"),
     Rule(r"serial/", r'"(?!serial/)', "a port rests on nothing"),

@@ -115,7 +115,7 @@ Value nodeValues() {
   v["dac"]["kind"] = std::string("topic");
   v["dac"]["reply_wait"] = 0.01;
   v["dac"]["retry_pause"] = 0.1;
-  v["dac"]["priority"] = 20;
+  v["dac"]["nice"] = -20;
   v["guard"]["socket"] = std::string("/somewhere");
   v["guard"]["what_is_the_guards_own"] = true;
   v["odometry"]["imu"]["use"] = false;
@@ -230,7 +230,7 @@ TEST(BaseSettings, AGuardIsChosenByItsName) {
   const k::DacSettings dac = k::readBaseSettings({v, "/n"}).dac;
   EXPECT_EQ(dac.guard->socket, "/somewhere");
   EXPECT_EQ(dac.guard->reply_wait, 0.01);
-  EXPECT_EQ(dac.priority, 20);
+  EXPECT_EQ(dac.nice, -20);
   v["dac"]["kind"] = std::string("serial");
   EXPECT_EQ(complaint([&v] {
               k::readBaseSettings({v, "/n"});

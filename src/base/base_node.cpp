@@ -123,8 +123,8 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     reported_ = k::tally(drive_);
   });
   diagnostics_.add("odometry", [this](Status& status) { reportOdometry(status); });
-  const std::string refusal = guard_ ? k::guard::raiseThreads(settings_.dac.priority) : "";
-  if (!refusal.empty()) warn("BASE_NOT_REALTIME: busy cores may delay commands, and neutral: " + refusal);
+  const std::string refusal = guard_ ? k::guard::favourThreads(settings_.dac.nice) : "";
+  if (!refusal.empty()) warn("BASE_NOT_FAVOURED: busy cores may delay commands, and neutral: " + refusal);
   if (guard_) diagnostics_.add("guard", [this](Status& status) { reportGuard(status); });
   if (ros::Time::isSimTime()) {
     timer_ =

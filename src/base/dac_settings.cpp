@@ -4,7 +4,7 @@
 namespace kurumaisu {
 namespace {
 
-constexpr int kHighestPriority = 99;  // sched(7)
+constexpr int kFirst = -20;  // setpriority(2)
 
 }  // namespace
 
@@ -12,9 +12,9 @@ DacSettings readDac(Section dac, Section guard) {
   const bool has_guard = dac.choice("kind", {"topic", "guard"}) == "guard";
   const guard::ClientSettings client{guard.text("socket"), dac.above("reply_wait", 0),
                                      dac.above("retry_pause", 0)};
-  const int priority = dac.integer("priority", 0, kHighestPriority);
+  const int nice = dac.integer("nice", kFirst, 0);
   dac.end();
-  return {has_guard ? std::optional(client) : std::nullopt, priority};
+  return {has_guard ? std::optional(client) : std::nullopt, nice};
 }
 
 }  // namespace kurumaisu

@@ -11,7 +11,7 @@ namespace kurumaisu {
 
 struct DacSettings {
   std::optional<guard::ClientSettings> guard;  ///< none: the topic alone
-  int priority;                                ///< SCHED_FIFO's, of all threads, with a guard; 0: none
+  int nice;                                    ///< of all threads, with a guard; 0: as they are
 };
 
 /// guard: launch/guard.yaml, of which only the socket is ours. Throws std::invalid_argument naming the parameter.

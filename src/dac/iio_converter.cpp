@@ -38,6 +38,14 @@ std::string findDevice(const std::string& root, const std::string& name) {
               ": give the folder as device");
 }
 
+std::optional<double> numberOf(const std::string& text) {
+  const char* const end = text.data() + text.size();
+  double value = 0;
+  const auto result = std::from_chars(text.data(), end, value);
+  if (result.ec != std::errc() || result.ptr != end || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
 }  // namespace
 
 IioConverter::IioConverter(const Device& device)
@@ -60,10 +68,7 @@ double IioConverter::number(Signal signal, const std::string& suffix, std::optio
   if (!text && otherwise) return *otherwise;
   const std::string name = attributes_->folder() + "/" + attribute(signal, suffix);
   if (!text) throw Fault("DAC_NO_PORT: " + name + " is not there: " + kSignalNames[signal] + " is no output");
-  double value = 0;
-  const auto result = std::from_chars(text->data(), text->data() + text->size(), value);
-  if (result.ec == std::errc() && result.ptr == text->data() + text->size() && std::isfinite(value))
-    return value;
+  if (const std::optional<double> value = numberOf(*text)) return *value;
   throw Fault("DAC_REFUSED: " + name + " is no number: " + *text);
 }
 

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // rosrun kurumaisu set_voltages DEVICE.yaml V_F V_S V_REF: try a device's file with a voltmeter, without a chair.
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <array>
 #include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <exception>
-#include <iostream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -18,8 +23,8 @@ constexpr const char* kUsage =
     "set_voltages DEVICE.yaml V_F V_S V_REF\n\n"
     "Puts out three voltages [V], V_F and V_S as they are counted from the reference, tells what the device "
     "holds, waits\n"
-    "for the end of a line or of its input, and puts out neutral. For a bench: nothing watches over it. No "
-    "chair!\n";
+    "for a line, the end of its input or Ctrl-C, and puts out neutral. For a bench: nothing watches over it. "
+    "No chair!\n";
 
 double numberOf(const std::string& text) {
   double value = 0;
@@ -34,14 +39,23 @@ void put(dac::Converter& converter, const dac::Volts& volts) {
   std::fflush(stdout);
 }
 
+/// From now on Ctrl-C and its like end no program, but a wait. Returns what becomes readable then.
+int holdSignals() {
+  sigset_t ends;
+  sigemptyset(&ends);
+  for (const int end : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, end);
+  sigprocmask(SIG_BLOCK, &ends, nullptr);
+  return signalfd(-1, &ends, SFD_CLOEXEC);
+}
+
 void run(const std::vector<std::string>& arguments) {
   const dac::Volts volts{numberOf(arguments[1]), numberOf(arguments[2]), numberOf(arguments[3])};
+  std::array<pollfd, 2> ends{{{holdSignals(), POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}}};
   const auto converter = dac::open(dac::readDevice(arguments[0]));
   std::fprintf(stderr, "%s\n", converter->name().c_str());
   put(*converter, {0, 0, volts.reference});
   put(*converter, volts);
-  std::string line;
-  std::getline(std::cin, line);
+  poll(ends.data(), ends.size(), -1);
   put(*converter, {0, 0, volts.reference});
 }
 

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dac/virtual_board.h"
 
-#include <fcntl.h>
 #include <poll.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
-#include <cstdio>
 #include <ctime>
 #include <stdexcept>
 
@@ -22,31 +19,18 @@ using virtual_urg::steady;
 
 constexpr double kNap = 0.2;  // [s] at most between two looks
 
-std::int64_t nanoseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{1000000000} * now.tv_sec + now.tv_nsec;
-}
-
 const SerialSettings& serialOf(const Device& device) {
   const auto* serial = std::get_if<SerialSettings>(&device.back_end);
   if (serial != nullptr) return *serial;
   throw std::invalid_argument(device.file + ": kind must be serial: a virtual board has no other port");
 }
 
-virtual_urg::Descriptor openLog(const std::string& file) {
-  if (file.empty()) return {};
-  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  return virtual_urg::Descriptor(virtual_urg::checked(fd, file));
-}
-
 }  // namespace
 
 VirtualBoard::VirtualBoard(const Device& device, const std::string& link, const std::string& log)
-    : channels_(device.channels),
-      settings_(serialOf(device)),
+    : settings_(serialOf(device)),
       reader_(settings_),
-      log_(openLog(log)),
+      outputs_(device.channels, settings_.codings, log),
       pty_(link),
       thread_(&VirtualBoard::run, this) {}
 
@@ -74,26 +58,17 @@ void VirtualBoard::inject(const std::string& fault) {
 
 std::vector<Change> VirtualBoard::history() const {
   const std::lock_guard lock(mutex_);
-  return history_;
+  return outputs_.history();
 }
 
 Volts VirtualBoard::volts() const {
   const std::lock_guard lock(mutex_);
-  return voltsNow();
+  return outputs_.volts();
 }
 
 std::array<int, kSignals> VirtualBoard::codes() const {
   const std::lock_guard lock(mutex_);
-  return codes_;
-}
-
-bool VirtualBoard::isNeutral(const Volts& volts) const {
-  const Band& reference = channels_[kReference].volt;
-  const auto near = [this](double volt, Signal signal) {
-    return std::abs(volt * settings_.codings[signal].per_volt) < 0.501;
-  };
-  return near(volts.translation, kTranslation) && near(volts.steering, kSteering) &&
-         volts.reference >= reference.min && volts.reference <= reference.max;
+  return outputs_.codes();
 }
 
 std::uint64_t VirtualBoard::commands() const {
@@ -134,7 +109,7 @@ void VirtualBoard::serve(std::unique_lock<std::mutex>& lock) {
   if (back_at_ > 0 && now >= back_at_) {
     back_at_ = 0;
     pty_.plug();
-    log("plugged");
+    outputs_.note("plugged");
   }
   flush(now);
   double until = now + kNap;
@@ -190,7 +165,7 @@ void VirtualBoard::obey(const std::string& line) {
   const std::optional<BoardReader::Heard> heard = reader_.hear(line);
   if (!heard) ++misheard_;
   const bool obeys = fault == nullptr || fault->what != BoardFault::kDeaf;
-  if (obeys && heard) putOut(heard->codes);
+  if (obeys && heard) outputs_.put(heard->codes);
   if (fault != nullptr && (!obeys || fault->what == BoardFault::kSilent)) return;
   if (heard && heard->reply.empty()) return;
   std::string reply = (heard ? heard->reply : "?") + settings_.reply_terminator;
@@ -201,35 +176,12 @@ void VirtualBoard::obey(const std::string& line) {
   flush(steady());
 }
 
-Volts VirtualBoard::voltsNow() const {
-  std::array<double, kSignals> pins{};
-  for (const Signal signal : kWriteOrder) {
-    const Coding& coding = settings_.codings[signal];
-    pins[signal] = (codes_[signal] - coding.at_zero) / coding.per_volt;
-    if (signal != kReference && channels_[signal].add_reference) pins[signal] -= pins[kReference];
-  }
-  return {pins[kTranslation], pins[kSteering], pins[kReference]};
-}
-
-void VirtualBoard::putOut(const std::vector<std::pair<Signal, int>>& codes) {
-  const std::int64_t time = nanoseconds();
-  const std::array<int, kSignals> before = codes_;
-  for (const auto& [signal, code] : codes) codes_[signal] = code;
-  if (codes_ == before) return;
-  history_.push_back({time, voltsNow()});
-  const Volts& volts = history_.back().volts;
-  std::array<char, 100> text{};
-  std::snprintf(text.data(), text.size(), "volts %.6f %.6f %.6f", volts.translation, volts.steering,
-                volts.reference);
-  log(text.data());
-}
-
 void VirtualBoard::unplug(double seconds) {
   pty_.unplug();
   input_.clear();
   replies_.clear();
   back_at_ = steady() + seconds;
-  log("unplugged");
+  outputs_.note("unplugged");
   wake_.set();
 }
 
@@ -242,13 +194,6 @@ void VirtualBoard::flush(double now) {
     if (back_at_ == 0) pty_.write(reply->bytes);
     reply = replies_.erase(reply);
   }
-}
-
-void VirtualBoard::log(const std::string& line) const {
-  if (!log_) return;
-  const std::int64_t time = line.rfind("volts", 0) == 0 ? history_.back().time : nanoseconds();
-  const std::string text = std::to_string(time) + " " + line + "\n";
-  if (::write(log_.get(), text.data(), text.size()) < 0) std::perror("the virtual board's log");
 }
 
 }  // namespace kurumaisu::dac

@@ -13,17 +13,12 @@
 
 #include "dac/settings.h"
 #include "dac/virtual_faults.h"
+#include "dac/virtual_outputs.h"
 #include "dac/virtual_reader.h"
 #include "virtual_urg/pty.h"
 #include "virtual_urg/wake.h"
 
 namespace kurumaisu::dac {
-
-/// What its outputs became, and when.
-struct Change {
-  std::int64_t time;  ///< [ns] CLOCK_MONOTONIC, when the command had been read
-  Volts volts;        ///< the reference as the pin has it, the others as they are counted
-};
 
 /// Runs from its construction to its end, in a thread of its own. Holds its voltages whatever happens to its owner.
 class VirtualBoard {
@@ -47,7 +42,7 @@ class VirtualBoard {
   std::array<int, kSignals> codes() const;
 
   /// Are V_f and V_s 0 V to the nearest code, and is the reference within its clamp?
-  bool isNeutral(const Volts& volts) const;
+  bool isNeutral(const Volts& volts) const { return outputs_.isNeutral(volts); }
 
   std::uint64_t commands() const;          ///< heard
   std::uint64_t misheard() const;          ///< of those, not understood
@@ -66,23 +61,17 @@ class VirtualBoard {
   void serve(std::unique_lock<std::mutex>& lock);
   void receive();
   void obey(const std::string& line);
-  void putOut(const std::vector<std::pair<Signal, int>>& codes);
   void unplug(double seconds);
   void flush(double now);
   const BoardFault* faultNow() const;
-  void log(const std::string& line) const;
-  Volts voltsNow() const;
 
-  const Channels channels_;
   const SerialSettings settings_;
   const BoardReader reader_;
-  virtual_urg::Descriptor log_;
+  Outputs outputs_;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   virtual_urg::Pty pty_;
   virtual_urg::Wake wake_;
-  std::array<int, kSignals> codes_{};
-  std::vector<Change> history_;
   std::vector<std::string> heard_;
   std::vector<BoardFault> faults_;
   std::vector<Reply> replies_;  // not yet sent

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // rosrun kurumaisu virtual_dac DEVICE.yaml LINK: be the board that a device's file describes.
+#include <poll.h>
 #include <sched.h>
 #include <sys/mman.h>
+#include <sys/signalfd.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <array>
+#include <csignal>
 #include <cstdio>
 #include <exception>
-#include <iostream>
 #include <string>
 #include <vector>
 
@@ -18,8 +23,9 @@ using kurumaisu::dac::VirtualBoard;
 constexpr const char* kUsage =
     "virtual_dac DEVICE.yaml LINK [--log FILE] [--realtime] [FAULT]...\n\n"
     "A serial D/A board at a terminal to which LINK leads, as the file describes it (its `port` is not "
-    "read), until its\n"
-    "standard input ends. It reads faults from there, one per line, and answers `volts`.\n\n"
+    "read), until Ctrl-C\n"
+    "or the end of its standard input, unless that is /dev/null. It reads faults from there, one per line, "
+    "and `volts`.\n\n"
     "  --log FILE   every change of voltage: TIME volts V_f V_s V_ref, TIME in ns of CLOCK_MONOTONIC\n"
     "  --realtime   before all others, where the system allows it\n"
     "  FAULT        NAME[@COMMAND][xCOUNT][=SECONDS]; without COMMAND it begins at once\n\n";
@@ -34,6 +40,7 @@ struct Options {
 Options optionsOf(const std::vector<std::string>& arguments) {
   Options options;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
+    if (arguments[i].find(":=") != std::string::npos) continue;  // roslaunch names every node
     if (arguments[i] == "--realtime") {
       options.realtime = true;
     } else if (arguments[i] == "--log" && i + 1 < arguments.size()) {
@@ -69,13 +76,47 @@ void obey(VirtualBoard& board, const std::string& line) {
   std::fflush(stdout);
 }
 
+/// Obeys the lines that have come; false at the end of the input.
+bool obeyInput(VirtualBoard& board, std::string& input) {
+  std::array<char, 512> bytes;
+  const ssize_t count = ::read(STDIN_FILENO, bytes.data(), bytes.size());
+  if (count <= 0) return false;
+  input.append(bytes.data(), static_cast<std::size_t>(count));
+  for (std::size_t end = input.find('\n'); end != std::string::npos; end = input.find('\n')) {
+    obey(board, input.substr(0, end));
+    input.erase(0, end + 1);
+  }
+  return true;
+}
+
+/// Launched by another program it has no input, and goes on.
+bool hasInput() {
+  struct stat status {};
+  return fstat(STDIN_FILENO, &status) == 0 && (!S_ISCHR(status.st_mode) || isatty(STDIN_FILENO) == 1);
+}
+
+void serve(VirtualBoard& board, int signals) {
+  std::array<pollfd, 2> ready{{{signals, POLLIN, 0}, {hasInput() ? STDIN_FILENO : -1, POLLIN, 0}}};
+  std::string input;
+  while (poll(ready.data(), ready.size(), -1) > 0) {
+    if (ready[0].revents != 0) return;
+    if (ready[1].revents != 0 && !obeyInput(board, input)) return;
+  }
+}
+
 int run(const Options& options) {
+  sigset_t ends;
+  sigemptyset(&ends);
+  sigaddset(&ends, SIGINT);
+  sigaddset(&ends, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &ends, nullptr);
+  const kurumaisu::virtual_urg::Descriptor signals(signalfd(-1, &ends, SFD_CLOEXEC));
   if (options.realtime) goFirst();
   VirtualBoard board(kurumaisu::dac::readDevice(options.places[0]), options.places[1], options.log);
   for (const std::string& fault : options.faults) board.inject(fault);
   std::printf("a virtual board at %s\n", options.places[1].c_str());
   std::fflush(stdout);
-  for (std::string line; std::getline(std::cin, line);) obey(board, line);
+  serve(board, signals.get());
   std::printf("%zu changes, %lu commands, %lu not understood\n", board.history().size(),
               static_cast<unsigned long>(board.commands()), static_cast<unsigned long>(board.misheard()));
   return 0;

@@ -22,8 +22,13 @@ std::string escaped(const std::string& text) {
 }
 
 std::string formOf(const Field& field, const SerialSettings& settings) {
-  if (field.what == Field::kVolt) return "([ 0-9.+-]+)";
-  if (field.what == Field::kCode) return field.form == 'd' ? "([ 0-9-]+)" : "([ 0-9a-fA-F-]+)";
+  if (field.what == Field::kVolt) {
+    return R"(( *[-+]?[0-9]+)" + (field.digits > 0 ? "\\.[0-9]{" + std::to_string(field.digits) + "})" : ")");
+  }
+  if (field.what == Field::kCode) {  // one of a fixed width has no more: Template::checkWidth()
+    const std::string digits = field.form == 'd' ? "[ 0-9-]" : "[ 0-9a-fA-F-]";
+    return "(" + digits + (field.width > 0 ? "{" + std::to_string(field.width) + "})" : "+)");
+  }
   if (field.signal != Template::kThis) return escaped(settings.ch.at(static_cast<std::size_t>(field.signal)));
   std::string choices;
   for (const std::string& ch : settings.ch) choices += (choices.empty() ? "" : "|") + escaped(ch);
@@ -97,6 +102,7 @@ std::optional<BoardReader::Heard> BoardReader::hearWrite(const std::string& line
     const auto signal = static_cast<Signal>(field->signal == Template::kThis ? current : field->signal);
     const Coding& coding = settings_.codings[signal];
     const int code = codeOf(text, *field, coding);
+    if (code < coding.min || code > coding.max) return std::nullopt;
     heard.codes.emplace_back(signal, code);
     fillings[signal].level = {code, (code - coding.at_zero) / coding.per_volt, 0};
   }

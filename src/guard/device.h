@@ -16,12 +16,19 @@ struct BackOff {
   double longest;
 };
 
+/// What must be held in place of motion. A converter that holds something else is not neutral, and so as good as lost.
+struct Neutral {
+  double reference;            ///< [V]
+  double reference_tolerance;  ///< [V]
+  double tolerance;            ///< [V] of the other two, from 0
+};
+
 /// The converter, opened when it can be. Neutral is the first thing that it is given after each opening.
 class Device {
  public:
   using Open = std::function<std::unique_ptr<dac::Converter>()>;
 
-  Device(Open open, dac::Volts neutral, BackOff back_off);
+  Device(Open open, const Neutral& neutral, BackOff back_off);
 
   /// Puts out, and says whether the device now holds it. If not, see problem(), and the device is lost.
   bool put(const dac::Volts& volts, double now);
@@ -38,8 +45,10 @@ class Device {
   std::string name() const { return converter_ ? converter_->name() : "no device yet"; }
 
  private:
+  void hold(const dac::Volts& volts);
+
   Open open_;
-  dac::Volts neutral_;
+  Neutral neutral_;
   BackOff back_off_;
   std::unique_ptr<dac::Converter> converter_;
   dac::Volts held_;

@@ -3,6 +3,7 @@
 
 #include <sched.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 
 #include <cerrno>
 #include <cstring>
@@ -25,14 +26,12 @@ void makeRealtime(int priority) {
   }
 }
 
-std::string raiseThreads(int priority) {
-  if (priority == 0) return "";
-  sched_param parameters{};
-  parameters.sched_priority = priority;
+std::string favourThreads(int nice) {
+  if (nice == 0) return "";
   for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
-    const auto thread = static_cast<pid_t>(std::stol(task.path().filename().string()));
-    if (sched_setscheduler(thread, SCHED_FIFO, &parameters) == 0 || errno == ESRCH) continue;
-    return std::string("SCHED_FIFO: ") + std::strerror(errno);
+    const auto thread = static_cast<id_t>(std::stoul(task.path().filename().string()));
+    if (setpriority(PRIO_PROCESS, thread, nice) == 0 || errno == ESRCH) continue;
+    return "nice " + std::to_string(nice) + ": " + std::strerror(errno);
   }
   return "";
 }

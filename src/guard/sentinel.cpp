@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cmath>
@@ -139,13 +140,12 @@ void Sentinel::pass(int signal) {
 /// Waits before the next start. False if told to leave.
 bool Sentinel::rest() {
   const double until = monotonic() + settings_.restart_pause;
-  for (double left = settings_.restart_pause; left > 0; left = until - monotonic()) {
+  while (!is_leaving_ && monotonic() < until) {
     pollfd ready{signals_.fd(), POLLIN, 0};
-    poll(&ready, 1, static_cast<int>(std::ceil(1e3 * left)));
+    poll(&ready, 1, static_cast<int>(std::ceil(1e3 * std::max(0.0, until - monotonic()))));
     while (const auto signal = signals_.next()) is_leaving_ |= *signal != SIGCHLD;
-    if (is_leaving_) return false;
   }
-  return true;
+  return !is_leaving_;
 }
 
 }  // namespace
@@ -153,7 +153,7 @@ bool Sentinel::rest() {
 int runSentinel(const Settings& settings, const Device::Open& open) { return Sentinel(settings, open).run(); }
 
 bool forceNeutral(const Settings& settings, const Device::Open& open, double patience) {
-  Device device(open, {0, 0, settings.limits.reference}, settings.reopening);
+  Device device(open, neutralOf(settings.limits), settings.reopening);
   double now = monotonic();
   for (const double end = now + patience;; now = monotonic()) {
     if (device.recover(now)) {

@@ -45,7 +45,7 @@ Server::Server(const Settings& settings, Device::Open open, std::function<void()
     : settings_(settings),
       beat_(std::move(beat)),
       guard_(settings.limits),
-      device_(std::move(open), guard_.output(), settings.reopening) {
+      device_(std::move(open), neutralOf(settings.limits), settings.reopening) {
   // neutral comes before anybody can ask for anything
   for (double now = monotonic(); device_.isLost() && device_.retryAt() <= now; now = monotonic())
     recover(now);

@@ -11,23 +11,34 @@ namespace {
 
 constexpr int kHighestPriority = 99;  // sched(7)
 
+constexpr double kRounding = 1e-9;  // [V] by which codes at the end of a band may go beyond it
+
+/// How far the model file lets a voltage go; what else it says of it is base_node's.
 Band readBand(YamlSection section) {
-  const Band band{section.number("low"), section.number("high"), section.above("step", 0)};
-  section.end();
+  const Band band{section.number("min") - kRounding, section.number("max") + kRounding, 0};
   return band;
 }
 
-/// The reference is the chair's: the model file, of which all else has other readers.
-double readReference(const std::string& file) {
-  YamlSection model = YamlSection::load(file);
-  return model.number("reference_voltage");
+double readStep(YamlSection section) {
+  const double step = section.above("step", 0);
+  section.end();
+  return step;
 }
 
-Limits readLimits(YamlSection section, double reference) {
+/// Of the model file, which has other readers for all else.
+void readModel(const std::string& file, Limits& limits) {
+  YamlSection model = YamlSection::load(file);
+  YamlSection voltages = model.section("voltages");
+  limits.translation = readBand(voltages.section("translation"));
+  limits.steering = readBand(voltages.section("steering"));
+  limits.reference = model.number("reference_voltage");
+}
+
+Limits readLimits(YamlSection section, const std::string& model_file) {
   Limits limits{};
-  limits.translation = readBand(section.section("translation"));
-  limits.steering = readBand(section.section("steering"));
-  limits.reference = reference;
+  readModel(model_file, limits);
+  limits.translation.step = readStep(section.section("translation"));
+  limits.steering.step = readStep(section.section("steering"));
   limits.reference_tolerance = section.atLeast("reference_tolerance", 0);
   limits.neutral = section.atLeast("neutral", 0);
   limits.arming = section.above("arming", 0);
@@ -55,7 +66,7 @@ Settings readSettings(const std::string& file) {
   YamlSection top = YamlSection::load(file);
   Settings settings{};
   const std::filesystem::path folder = std::filesystem::path(file).parent_path();
-  settings.limits = readLimits(top.section("limits"), readReference(folder / top.text("model")));
+  settings.limits = readLimits(top.section("limits"), folder / top.text("model"));
   settings.socket = top.text("socket");
   settings.period = top.above("period", 0);
   settings.priority = top.integer("priority", 0, kHighestPriority);

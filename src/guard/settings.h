@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the guard reads: launch/guard.yaml, and the reference voltage of the model file beside it.
+// What the guard reads: launch/guard.yaml, and of the model file beside it the bands of the voltages and the reference.
 #pragma once
 
 #include <string>
@@ -19,6 +19,10 @@ struct Settings {
   double restart_pause;     ///< [s] before a guard that died is started again
   double neutral_patience;  ///< [s] for which `guard --neutral` tries
 };
+
+inline Neutral neutralOf(const Limits& limits) {
+  return {limits.reference, limits.reference_tolerance, limits.neutral};
+}
 
 /// Reads the file, and the model file that it names. Throws std::invalid_argument naming file, line, key and value.
 Settings readSettings(const std::string& file);

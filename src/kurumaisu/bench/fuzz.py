@@ -18,7 +18,7 @@ from kurumaisu.bench.fuzz_seeds import seeds
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 
-TARGETS = {"scip": 1024, "stream": 2048, "device": 128, "guard": 512}  # longest input [bytes]
+TARGETS = {"scip": 1024, "stream": 2048, "device": 128, "dac": 512, "guard": 512}  # longest input [bytes]
 _ONE_INPUT = 5  # [s] one that takes longer is a failure
 _MEMORY = 512  # [MB] with the sanitizers' own
 _TAIL = 40  # lines of a failed target's output that are shown

@@ -19,6 +19,9 @@ def seeds(target: str, log: Path | None) -> Iterator[bytes]:
     if target in ("device", "guard"):
         yield from _commands() if target == "device" else _stories()
         return
+    if target == "dac":
+        yield from _boards()
+        return
     replies = [*_made(), *(_recorded(log) if log else [])]
     if target == "stream":
         yield from _dialogues()
@@ -54,6 +57,13 @@ def _dialogues() -> Iterator[bytes]:
         scans = [_scan(command, width, beams, clock) for clock in (b"0001", b"001d", b"001d", b"0031")]
         yield bytes([number]) + b"".join([*words, _reply(command, b"00", []), *scans])
         yield bytes([number]) + b"QT\nE\n\nSCIP2.0\n0\n\n" + b"".join([*words, _reply(command, b"00", []), *scans])
+
+
+def _boards() -> Iterator[bytes]:
+    """Yield what a D/A board says after each command: replies, late and wrong ones, none."""
+    yield b"\x3fOK 1\n\xffOK 2\n\xffOK 3\n"
+    yield b"\0\xffOK 1\nOK 2\n\xff\xffOK 3\nOK 4\nOK 5\n\xffOK 5\n"
+    yield b"\7?\n\xffOK 1\nOK\xff 2\nOK 3\n\xff" + 300 * b"x" + b"\n\xffOK 5"
 
 
 def _scan(command: bytes, width: int, beams: int, clock: bytes = b"m2@0") -> bytes:

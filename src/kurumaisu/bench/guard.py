@@ -36,7 +36,7 @@ class Case:
     bound: float | None
     strike: Callable[[Rig, Client], float]
     waits: bool = False  # the bound counts from the guard's timeout
-    first: bool = True  # the client has base_node's priority
+    favoured: bool = True  # the client has base_node's nice value
 
 
 def _client(number: signal.Signals) -> Callable[[Rig, Client], float]:
@@ -82,7 +82,7 @@ def _unplug(rig: Rig, _client: Client) -> float:
 CASES = (
     Case("client exits", "exit", 0.010, _itself),
     Case("client SIGKILL", "wait", 0.010, _client(signal.SIGKILL)),
-    Case("... of ordinary priority", "wait", None, _client(signal.SIGKILL), first=False),
+    Case("... as nice as all others", "wait", None, _client(signal.SIGKILL), favoured=False),
     Case("client SIGSEGV", "crash", 0.010, _itself),
     Case("client talks nonsense", "nonsense", 0.010, _itself),
     Case("client SIGSTOP", "wait", 0.020, _client(signal.SIGSTOP), waits=True),
@@ -163,7 +163,7 @@ def _p99(times: list[float]) -> float:
 def _once(rig: Rig, case: Case, dice: random.Random) -> float:
     """Arm, drive, strike; return the time to neutral [s], nan if it never came."""
     rig.start()
-    client = Client(rig.socket, case.mode, rig.priority if case.first else 0)
+    client = Client(rig.socket, case.mode, rig.nice if case.favoured else 0)
     try:
         client.wait_armed()
         time.sleep(dice.uniform(0, _PHASE))

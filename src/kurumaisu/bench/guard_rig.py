@@ -53,7 +53,7 @@ class Rig:
         settings["limits"]["arming"] = _ARMING
         self.silence = float(settings["limits"]["silence"])
         base = yaml.safe_load(shipped("launch/base_node.yaml").read_text())
-        self.priority = int(base["dac"]["priority"])
+        self.nice = int(base["dac"]["nice"])
         model = str(shipped(f"launch/{settings['model']}").resolve())
         self.settings = self._write("guard.yaml", settings | {"model": model, "socket": str(self.socket)})
         self._sentinel: subprocess.Popen[bytes] | None = None
@@ -149,9 +149,9 @@ class Rig:
 class Client:
     """A process that drives through the guard; see tests/guard_client.cpp."""
 
-    def __init__(self, socket: Path, mode: str, priority: int) -> None:
-        """Start it. priority: SCHED_FIFO's, 0 for none, as base_node has it."""
-        command = [program("guard_client"), str(socket), mode, str(priority)]
+    def __init__(self, socket: Path, mode: str, nice: int) -> None:
+        """Start it. nice: as base_node has it; 0: as it is."""
+        command = [program("guard_client"), str(socket), mode, str(nice)]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
 
     def line(self) -> str:
