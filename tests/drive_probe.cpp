@@ -18,7 +18,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kSpeed = 0.3;     // [m/s]
+constexpr double kSpeed = 0.1;     // [m/s]
 constexpr double kStep = 0.005;    // [m/s] up and down
 constexpr double kMoved = 1.0e-6;  // [m/s] is an answer: limits may keep it from going all the way at once
 constexpr double kSettling = 2.0;  // [s] that do not count: connections, and the ramp up to the speed

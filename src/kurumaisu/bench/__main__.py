@@ -26,6 +26,7 @@ NAMES = (
     "guard",
     "base",
     "drive",
+    "odometry",
     "slam",
     "slam_localise",
     "predict",

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import rospy
 from sensor_msgs.msg import Joy
 
 from kurumaisu.errors import Error
-from kurumaisu.ros.teleop import overlaid, run
+from kurumaisu.ros.teleop import Ending, overlaid, run
 from kurumaisu.settings import Section
 from kurumaisu.teleop.reader import Reader, open_device
 
@@ -25,8 +24,7 @@ class _Settings:
 
 def main() -> int:
     """Publish joy until shut down; nothing while the device is away. Return 1 for settings that make no sense."""
-    rospy.init_node("joystick")
-    return run(_serve)
+    return run("joystick", _serve)
 
 
 def _read(section: Section) -> _Settings:
@@ -37,26 +35,28 @@ def _read(section: Section) -> _Settings:
     )
 
 
-def _serve() -> None:
+def _serve(ending: Ending) -> None:
     rate, known = overlaid("joystick.yaml", _read)
     publisher = rospy.Publisher("joy", Joy, queue_size=1, tcp_nodelay=True)
-    while not rospy.is_shutdown():
+    while not ending.asked.is_set():
         try:
             reader = Reader(open_device(known.device), known.dead_zone)
         except Error as error:
             rospy.logwarn_throttle(10.0, f"JOYSTICK_AWAY: {known.device}: {error}")
-            time.sleep(known.retry)
+            ending.asked.wait(known.retry)
             continue
         rospy.loginfo("%s: here", known.device)
-        _publish_while_here(reader, publisher, known.device, 1 / rate)
+        _publish_while_here(reader, publisher, known.device, 1 / rate, ending)
 
 
-def _publish_while_here(reader: Reader, publisher: rospy.Publisher, device: Path, period: float) -> None:
+def _publish_while_here(
+    reader: Reader, publisher: rospy.Publisher, device: Path, period: float, ending: Ending
+) -> None:
     try:
-        while not rospy.is_shutdown():
+        while not ending.asked.is_set():
             reader.poll()
             publisher.publish(_message(reader.joystick.axes, reader.joystick.buttons))
-            time.sleep(period)
+            ending.asked.wait(period)
     except Error as error:
         rospy.logwarn("JOYSTICK_LOST: %s: %s", device, error)
         released = _message([0.0] * len(reader.joystick.axes), [0] * len(reader.joystick.buttons))

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -18,6 +20,8 @@ from kurumaisu.settings import Section
 from kurumaisu.teleop import REST, Command
 
 _LAST_WORDS = 10  # of rest, or of a dead-man that was let go, in case one is not heard
+
+_LAST_PATIENCE = 1.0  # [s] for the last words
 
 T = TypeVar("T")
 
@@ -67,13 +71,36 @@ class Hand:
         return left > 0
 
 
-def run(node: Callable[[], None]) -> int:
+class Ending:
+    """Lets a node say its last words however it is told to end: rospy would close the topics first, or go on."""
+
+    def __init__(self) -> None:
+        """Take over the signals; the node was made with disable_signals."""
+        self.asked = threading.Event()
+        self._done = threading.Event()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, lambda *_: self.asked.set())
+        rospy.on_shutdown(self._wait)
+
+    def done(self) -> None:
+        """Close the topics: the last word is said."""
+        self._done.set()
+        rospy.signal_shutdown("the end")
+
+    def _wait(self) -> None:
+        self.asked.set()
+        self._done.wait(_LAST_PATIENCE)
+
+
+def run(name: str, node: Callable[[Ending], None]) -> int:
     """Run a node until it returns. Return 1 after an Error, which is logged."""
+    rospy.init_node(name, disable_signals=True)
+    ending = Ending()
     try:
-        node()
+        node(ending)
     except Error as error:
         rospy.logfatal("%s", error)
         return 1
-    except KeyboardInterrupt:
-        pass
+    finally:
+        ending.done()
     return 0

@@ -9,7 +9,7 @@ import time
 import rospy
 from sensor_msgs.msg import Joy
 
-from kurumaisu.ros.teleop import Hand, overlaid, run
+from kurumaisu.ros.teleop import Ending, Hand, overlaid, run
 from kurumaisu.teleop.stick import Stick, read_stick
 
 _WARNING_PERIOD = 5.0  # [s]
@@ -17,11 +17,10 @@ _WARNING_PERIOD = 5.0  # [s]
 
 def main() -> int:
     """Drive by a joystick until shut down; rest is the last command. Return 1 for settings that make no sense."""
-    rospy.init_node("teleop_joy")
-    return run(_drive)
+    return run("teleop_joy", _drive)
 
 
-def _drive() -> None:
+def _drive(ending: Ending) -> None:
     rate, stick_settings = overlaid("teleop_joy.yaml", read_stick)
     stick, lock = Stick(stick_settings), threading.Lock()
 
@@ -36,16 +35,8 @@ def _drive() -> None:
 
     hand = Hand("joy_vel")
     rospy.Subscriber("joy", Joy, on_joy, queue_size=1, tcp_nodelay=True)
-    rested = threading.Event()
-
-    def rest() -> None:
-        hand.rest(1 / rate)
-        rested.set()
-
-    rospy.on_shutdown(rest)  # before the topics are closed
-    while not rospy.is_shutdown():
+    while not ending.asked.wait(1 / rate):
         with lock:
             command = stick.command(time.monotonic())
         hand.say(command)
-        time.sleep(1 / rate)
-    rested.wait(1.0)  # a node that is told to end by the master rests in another thread
+    hand.rest(1 / rate)

@@ -3,38 +3,36 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
 
-import rospy
-
-from kurumaisu.ros.teleop import Hand, overlaid, run
+from kurumaisu.ros.teleop import Ending, Hand, overlaid, run
 from kurumaisu.teleop.keys import HELP, Keys, KeySettings, read_keys
 from kurumaisu.teleop.terminal import Terminal
 
 
 def main() -> int:
     """Drive by keys until Ctrl-C or the terminal's end; rest is the last command. Return 1 without a terminal."""
-    rospy.init_node("teleop_keyboard", disable_signals=True)  # Ctrl-C: rest first, then the end
-    return run(_drive)
+    return run("teleop_keyboard", _drive)
 
 
-def _drive() -> None:
+def _drive(ending: Ending) -> None:
     rate, key_settings = overlaid("teleop_keyboard.yaml", read_keys)
     with Terminal(sys.stdin.fileno()) as terminal:
         hand = Hand("key_vel")
         try:
-            _follow(terminal, hand, key_settings, 1 / rate)
+            _follow(terminal, hand, key_settings, 1 / rate, ending)
         finally:
             hand.rest(1 / rate)
-            print()
+            _show("\n")
 
 
-def _follow(terminal: Terminal, hand: Hand, key_settings: KeySettings, period: float) -> None:
-    print(HELP.format(timeout=key_settings.timeout, percent=100 * key_settings.step))
+def _follow(terminal: Terminal, hand: Hand, key_settings: KeySettings, period: float, ending: Ending) -> None:
+    _show(HELP.format(timeout=key_settings.timeout, percent=100 * key_settings.step) + "\n")
     keys = Keys(key_settings)
     due = time.monotonic()
-    while not rospy.is_shutdown():
+    while not ending.asked.is_set():
         typed = terminal.keys(max(due - time.monotonic(), 0.0))
         if typed is None:
             return
@@ -46,4 +44,9 @@ def _follow(terminal: Terminal, hand: Hand, key_settings: KeySettings, period: f
             due = now + period
             hand.say(command)
             what = f"v {command.v:+.2f} m/s  w {command.w:+.2f} rad/s" if command.held else "stop"
-            print(f"\rspeeds {keys.v:.2f} m/s {keys.w:.2f} rad/s   {what:30}", end="", flush=True)
+            _show(f"\rspeeds {keys.v:.2f} m/s {keys.w:.2f} rad/s   {what:30}")
+
+
+def _show(text: str) -> None:
+    with contextlib.suppress(OSError):  # the terminal is gone: rest is published all the same
+        print(text, end="", flush=True)
