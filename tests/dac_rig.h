@@ -89,7 +89,9 @@ struct Rig {
   std::unique_ptr<Converter> open() const { return dac::open(device); }
 
   Device deviceOf(const Edits& edits) const {
-    Edits all{{"port: /dev/kurumaisu_dac", "port: " + (folder / "port")}};
+    Edits all{{"port: /dev/kurumaisu_dac", "port: " + (folder / "port")},
+              {"reply_timeout: 0.05", "reply_timeout: 0.4"},  // this computer may be busy
+              {"late_reply: 0.2", "late_reply: 0.8"}};
     all.insert(all.end(), edits.begin(), edits.end());
     return readDevice(written(folder, "device.yaml", edited(textOf(shipped("serial_ascii.yaml")), all)));
   }

@@ -20,6 +20,7 @@ namespace {
 
 constexpr double kTimeout = 0.003;  // [s]
 constexpr double kLate = 0.012;     // [s]
+constexpr double kForever = 1000;   // [s]
 
 /// A board at the other end. Where several commands are under way, it answers them in any order that delays give.
 class Peer : public s::Port {
@@ -75,11 +76,11 @@ class Peer : public s::Port {
 };
 
 struct Talk {
-  explicit Talk(int retries) {
+  explicit Talk(int retries, double late = kLate) {
     auto owned = std::make_unique<Peer>();
     peer = owned.get();
     dialogue =
-        std::make_unique<d::Dialogue>(std::move(owned), d::Manner{"\r", "\n", kTimeout, kLate, retries});
+        std::make_unique<d::Dialogue>(std::move(owned), d::Manner{"\r", "\n", kTimeout, late, retries});
   }
   Peer* peer;
   std::unique_ptr<d::Dialogue> dialogue;
@@ -117,8 +118,8 @@ TEST(DacDialogue, SuccessMeansObeyed) {
 }
 
 TEST(DacDialogue, RepliesThatCannotBeMixedUpAreNotWaitedFor) {
-  Talk talk(0);
-  talk.peer->habits = {{true, kLate / 2, "OK 1"}};
+  Talk talk(0, kForever);
+  talk.peer->habits = {{true, -1, ""}};
   EXPECT_THROW(talk.dialogue->ask("1", "OK 1"), d::Fault);
   EXPECT_FALSE(talk.dialogue->inDoubt("OK 2"));
   EXPECT_TRUE(talk.dialogue->inDoubt("OK 1"));
@@ -129,7 +130,7 @@ TEST(DacDialogue, RepliesThatCannotBeMixedUpAreNotWaitedFor) {
 }
 
 TEST(DacDialogue, ALateReplyBeforeTheRightOneIsSkipped) {
-  Talk talk(0);
+  Talk talk(0, kForever);
   talk.peer->habits = {{true, -1, ""}, {true, 0, "OK 1\nOK 2"}, {true, 0, "OK 1\nOK 3"}};
   talk.dialogue->tell("1", "OK 1");
   EXPECT_EQ(talk.dialogue->ask("2", "OK 2"), "OK 2");

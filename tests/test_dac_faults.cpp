@@ -91,7 +91,7 @@ TEST(DacFaults, ALateReplyIsNotTakenForTheNextCommands) {
   Rig rig(edits);
   const auto converter = rig.open();
   converter->put(d::kNeutral);
-  rig.board.inject("late@4=0.08");
+  rig.board.inject("late@4=0.5");
   EXPECT_TRUE(has(faultOf(*converter, d::kMoving), "DAC_NO_REPLY"));
   rig.board.inject("deaf@5x6");
   EXPECT_TRUE(has(faultOf(*converter, d::kNeutral), "DAC_NO_REPLY"));
@@ -101,7 +101,7 @@ TEST(DacFaults, ALateReplyIsNotTakenForTheNextCommands) {
 TEST(DacFaults, AfterALateReplyAllIsWellAgain) {
   Rig rig(kMute);
   const auto converter = rig.open();
-  rig.board.inject("late@5=0.08");
+  rig.board.inject("late@5=0.5");
   EXPECT_FALSE(faultOf(*converter, d::kMoving).empty());
   EXPECT_NEAR(converter->put(d::kNeutral).translation, 0, 1e-3);
   EXPECT_TRUE(rig.board.isNeutral(rig.board.volts()));
@@ -109,17 +109,17 @@ TEST(DacFaults, AfterALateReplyAllIsWellAgain) {
 
 /// Nobody knows whether a reply is still to come. What stops the chair goes out all the same, at once.
 TEST(DacFaults, NeutralIsSentAtOnceWhereRepliesAreInDoubt) {
-  Rig rig({kMute[0], kMute[1], {"late_reply: 0.2", "late_reply: 1.0"}});
+  Rig rig({kMute[0], kMute[1], {"late_reply: 0.8", "late_reply: 2.0"}});
   const auto converter = rig.open();
   converter->put(d::kMoving);
   rig.board.inject("silent@6x1");
   EXPECT_FALSE(faultOf(*converter, {0.6, -0.25, 2.5}).empty());
   const double time = seconds([&] {
     std::thread later([&] { converter->put(d::kNeutral); });
-    EXPECT_TRUE(rig.board.wait([&] { return rig.board.isNeutral(rig.board.volts()); }, 0.5));
+    EXPECT_TRUE(rig.board.wait([&] { return rig.board.isNeutral(rig.board.volts()); }, 1.5));
     later.join();
   });
-  EXPECT_GT(time, 0.8) << "and the doubt was waited for";
+  EXPECT_GT(time, 1.6) << "and the doubt was waited for";
   const d::Change last = rig.board.history().back();
   EXPECT_TRUE(rig.board.isNeutral(last.volts));
 }
@@ -127,8 +127,8 @@ TEST(DacFaults, NeutralIsSentAtOnceWhereRepliesAreInDoubt) {
 TEST(DacFaults, ABoardThatReadsNothingIsAFaultAndNoHang) {
   const std::string padding(200, ' ');
   Rig rig({{R"("W{ch}{code:04X}")", "\"" + padding + R"(W{ch}{code:04X}")"},
-           kNoRetry[0],
-           {"late_reply: 0.2", "late_reply: 0.05"}});
+           {"reply_timeout: 0.4", "reply_timeout: 0.05"},
+           {"late_reply: 0.8", "late_reply: 0.05"}});
   const auto converter = rig.open();
   rig.board.inject("stall=60");
   std::string last;

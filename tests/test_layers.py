@@ -38,7 +38,11 @@ class Rule:
 PYTHON_RULES = [
     Rule(r"kurumaisu/(?!ros/)", ROS_PYTHON, "only kurumaisu/ros knows ROS"),
     Rule(r"kurumaisu/(?!sim/)", r"pymunk(\.|$)", "only kurumaisu/sim knows pymunk"),
-    Rule(r"kurumaisu/(?!slam\.py|critic/|ros/)", r"kurumaisu\._slam$", "MRPT is reached through kurumaisu.slam"),
+    Rule(
+        r"kurumaisu/(?!slam\.py|localization\.py|critic/|ros/)",
+        r"kurumaisu\._slam$",
+        "MRPT is reached through kurumaisu.slam",
+    ),
     Rule(r"kurumaisu/(?!ros/|bench/|demo/)", r"kurumaisu\.ros(\.|$)", "only entry points come before kurumaisu/ros"),
     # map_command is an entry point, too: it reads recordings as the critic does
     Rule(

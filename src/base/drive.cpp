@@ -91,8 +91,6 @@ void Drive::place(const Pose2D& pose, const Eigen::Matrix3d& covariance, double 
   reckoning_.place(pose, covariance);
 }
 
-void Drive::put(const Rates& rates) {
-  output_ = dac_.put(outlet_.at(rates.v, rates.w));
-}
+void Drive::put(const Rates& rates) { output_ = dac_.put(outlet_.at(rates.v, rates.w)); }
 
 }  // namespace kurumaisu

@@ -9,6 +9,7 @@
 
 #include "dac/open.h"
 #include "guard/log.h"
+#include "guard/realtime.h"
 #include "guard/sentinel.h"
 #include "guard/settings.h"
 
@@ -28,6 +29,7 @@ int run(const std::string& device_file, const std::string& guard_file, bool only
   const k::guard::Settings settings = k::guard::readSettings(guard_file);
   const auto open = [&device] { return k::dac::open(device); };
   if (!only_neutral) return k::guard::runSentinel(settings, open);
+  k::guard::makeRealtime(settings.priority);
   return k::guard::forceNeutral(settings, open, settings.neutral_patience) ? 0 : 1;
 }
 

@@ -2,10 +2,12 @@
 """Types of the C++ module (src/slam/bindings.cpp); its docstrings are there."""
 
 from collections.abc import Mapping, Sequence
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kurumaisu._core import LaserError
 from kurumaisu.types import FloatArray
 
 Floats = NDArray[np.float32] | FloatArray
@@ -43,3 +45,41 @@ class Mapper:
     def grid(self) -> tuple[NDArray[np.int8], float, list[float]]: ...
 
 def read_rawlog(path: str) -> tuple[FloatArray, FloatArray, NDArray[np.float32], Fan]: ...
+
+class Estimate(TypedDict):
+    pose: list[float]
+    covariance: FloatArray
+    knowledge: str
+    fit: float
+    fit_usual: float
+    particles: int
+    updated: bool
+
+def localizer_setting_names() -> list[str]: ...
+def check_localizer_settings(settings: Mapping[str, float]) -> None: ...
+
+class Localizer:
+    def __init__(
+        self,
+        *,
+        settings: Mapping[str, float],
+        laser: LaserError,
+        process: Sequence[float],
+        seed: int,
+        cells: NDArray[np.int8],
+        resolution: float,
+        origin: Sequence[float],
+    ) -> None: ...
+    def set_pose(self, pose: Sequence[float], covariance: FloatArray) -> None: ...
+    def forget(self) -> None: ...
+    def update_once(self) -> None: ...
+    def add(
+        self,
+        stamp: float,
+        ranges: Floats,
+        fan: Fan,
+        start: Sequence[float],
+        end: Sequence[float],
+        covariance: FloatArray | None = None,
+    ) -> Estimate: ...
+    def particles(self) -> FloatArray: ...

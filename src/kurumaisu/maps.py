@@ -8,14 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from kurumaisu.errors import Error
+from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, MapFile, write_map
 from kurumaisu.types import FloatArray
-
-# map_server's own convention: shades, and the occupancy above or below which a cell counts [%].
-_OCCUPIED, _FREE, _UNKNOWN = 0, 254, 205
-_OCCUPIED_ABOVE, _FREE_BELOW = 65, 19.6
 
 
 @dataclass(frozen=True)
@@ -42,21 +38,8 @@ def save_map(grid: Grid, path: Path, suffix: str = ".pgm") -> tuple[Path, Path]:
 
     Raise Error naming the file that cannot be written.
     """
-    shades = np.full(grid.cells.shape, _UNKNOWN, dtype=np.uint8)
-    shades[grid.cells > _OCCUPIED_ABOVE] = _OCCUPIED
-    shades[(grid.cells >= 0) & (grid.cells < _FREE_BELOW)] = _FREE
-    image, text = path.with_name(path.name + suffix), path.with_name(path.name + ".yaml")
-    try:
-        Image.fromarray(np.ascontiguousarray(shades[::-1])).save(image)
-        text.write_text(
-            f"image: {image.name}\nresolution: {grid.resolution:.6f}\n"
-            f"origin: [{grid.x:.6f}, {grid.y:.6f}, 0.0]\nnegate: 0\n"
-            f"occupied_thresh: {_OCCUPIED_ABOVE / 100}\nfree_thresh: {_FREE_BELOW / 100}\n",
-            encoding="utf-8",
-        )
-    except OSError as error:
-        raise Error(f"{error.filename}: {error.strerror}") from error
-    return image, text
+    written = MapFile(grid.cells, grid.resolution, (grid.x, grid.y, 0.0))
+    return write_map(written, path, suffix, OCCUPIED_ABOVE, FREE_BELOW)
 
 
 def draw_map(

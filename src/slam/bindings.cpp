@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "slam/localizer_bindings.h"
 #include "slam/mapper.h"
 #include "slam/rawlog.h"
 
@@ -133,4 +134,6 @@ PYBIND11_MODULE(_slam, m) {
         "Times (n,) [s], odom_from_base (n, 3) at the scans, ranges (n, beams) [m], the fan. Raise "
         "RuntimeError "
         "naming the file and what is wrong.");
+
+  k::bindLocalizer(m);
 }

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "slam/settings.h"
 
-#include <cmath>
-#include <limits>
-#include <sstream>
-#include <stdexcept>
+#include "slam/bounded.h"
 
 namespace kurumaisu {
 namespace {
@@ -46,12 +43,6 @@ void visitSettings(MapperSettings& s, Visit&& visit) {
   visit("resample_below", s.resample_below, 0, 1);
 }
 
-void assign(double value, double& member) { member = value; }
-void assign(double value, int& member) {
-  if (value != std::nearbyint(value)) throw std::invalid_argument("must be a whole number");
-  member = static_cast<int>(value);
-}
-
 }  // namespace
 
 std::vector<std::string> settingNames() {
@@ -65,19 +56,8 @@ std::vector<std::string> settingNames() {
 
 MapperSettings makeSettings(const std::function<double(const std::string&)>& value_of) {
   MapperSettings settings{};
-  visitSettings(settings, [&value_of](const std::string& name, auto& member, double lower, double upper) {
-    const double value = value_of(name);
-    std::ostringstream text;
-    if (!(value >= lower && value <= upper)) {
-      text << name << ": must be " << lower << " to " << upper << ": " << value;
-      throw std::invalid_argument(text.str());
-    }
-    try {
-      assign(value, member);
-    } catch (const std::invalid_argument& error) {
-      text << name << ": " << error.what() << ": " << value;
-      throw std::invalid_argument(text.str());
-    }
+  visitSettings(settings, [&value_of](const char* name, auto& member, double lower, double upper) {
+    setBounded(value_of, name, member, lower, upper);
   });
   return settings;
 }

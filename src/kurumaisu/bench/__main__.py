@@ -28,6 +28,7 @@ NAMES = (
     "drive",
     "odometry",
     "slam",
+    "slam_localise",
     "predict",
 )
 

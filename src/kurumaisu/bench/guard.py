@@ -168,7 +168,7 @@ def _once(rig: Rig, case: Case, dice: random.Random) -> float:
         client.wait_armed()
         time.sleep(dice.uniform(0, _PHASE))
         begin = case.strike(rig, client)
-        end = rig.neutral(PATIENCE)
+        end = rig.neutral(PATIENCE, begin if case.strike is _unplug else math.inf)
         if case.strike in (_sentinel, _both):
             rig.reap()
         return math.nan if end is None else end - begin

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 import os
 import re
 import select
@@ -134,12 +135,16 @@ class Rig:
                 found.append(Change(NS * int(match[1]), max(volts) < self._code / 2 if volts else None))
         return found
 
-    def neutral(self, patience: float) -> float | None:
-        """Wait until the board is neutral; return since when [s, monotonic], or None if it is not in so long [s]."""
+    def neutral(self, patience: float, after: float = math.inf) -> float | None:
+        """Wait until the board is neutral; return since when [s, monotonic], or None if it is not in so long [s].
+
+        after: neutral from then on [s] counts even if motion followed, of a client that armed anew meanwhile.
+        """
         deadline = time.monotonic() + patience
         while time.monotonic() < deadline:
             tail = list(itertools.takewhile(lambda change: change.neutral is not False, reversed(self.changes())))
-            since = [change.time for change in tail if change.neutral]
+            since = [change.time for change in tail if change.neutral][-1:]
+            since += [change.time for change in self.changes() if change.neutral and change.time >= after][:1]
             if since:
                 return since[-1]
             time.sleep(_LOOK)

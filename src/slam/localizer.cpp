@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "slam/localizer.h"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "slam/places.h"
+#include "slam/pose.h"
+#include "slam/search.h"
+
+namespace kurumaisu {
+namespace {
+
+constexpr int kLeastReadings = 8;     // fewer say nothing of how well they fit
+constexpr int kRounds = 4;            // of the last alignment
+constexpr int kPatience = 8;          // scans before a new pose is doubted
+constexpr double kNearby = 0.3;       // [m] around a doubted pose is searched first
+constexpr double kNearbyTurn = 0.15;  // [rad]
+constexpr double kSearchAgain = 3;    // times found_way after which a search that led to nothing is repeated
+constexpr double kHeadStart = 5;     // log-odds of the place where the chair was believed to be, when doubted
+constexpr double kTurnPerWay = 0.5;  // [m/rad] a turn shows as much as so much way
+
+void check(const Scan& scan, const Odometry& start, const Pose2D& end, const std::optional<Odometry>& last) {
+  validate(scan);
+  for (const double value :
+       {start.pose.x, start.pose.y, start.pose.theta, end.x, end.y, end.theta, scan.stamp}) {
+    if (!std::isfinite(value)) throw std::invalid_argument("odometry and stamp must be finite");
+  }
+  if (last && !(start.stamp > last->stamp)) {
+    throw std::invalid_argument("a scan of " + std::to_string(start.stamp) + " s after one of " +
+                                std::to_string(last->stamp) + " s");
+  }
+}
+
+/// How well the map fits, lately and usually.
+struct Health {
+  double fast = 0, slow = 0;
+  int scans = 0;
+
+  void take(double fit, const RecoverySettings& settings) {
+    ++scans;
+    fast += std::fmax(settings.alpha_fast, 1.0 / scans) * (fit - fast);
+    slow += std::fmax(settings.alpha_slow, 1.0 / scans) * (fit - slow);
+  }
+  bool doubtful(const RecoverySettings& settings) const {
+    return scans > kPatience && (fast < settings.lost_fit || fast < settings.lost_drop * slow);
+  }
+};
+
+}  // namespace
+
+class Localizer::Impl {
+ public:
+  Impl(const LocalizerSettings& settings, const Chair& chair, std::uint32_t seed, const OccupancyGrid& grid,
+       const Pose2D& map_from_grid)
+      : settings_(settings),
+        process_(chair.process),
+        field_(grid, map_from_grid, settings.reading.max_distance),
+        sensor_(field_, settings_.reading, chair.laser),
+        particles_(settings_, seed),
+        places_(sensor_, settings_.recovery) {}
+
+  void setPose(const Gaussian& map_from_base) {
+    settle(map_from_base);
+    doubted_for_ = 0;
+    health_ = {};
+  }
+
+  void forget() {
+    start(Knowledge::kLost);
+    known_ = false;
+  }
+
+  void updateOnce() { once_ = true; }
+
+  Estimate add(const Scan& scan, const Odometry& start, const Pose2D& end) {
+    check(scan, start, end, last_);
+    Pose2D sweep = between(start.pose, end);
+    sweep.theta = wrapAngle(sweep.theta);
+    const Beams beams = pick(scan, sweep, settings_.reading);
+    if (!at_) at_ = start;
+    const Gaussian motion = motionBetween(*at_, start, settings_.motion, process_);
+    const double way = last_ ? wayOf(between(last_->pose, start.pose)) : 0;
+    travelled_ += way;
+    blind_ = beams.beams.size() < kLeastReadings ? blind_ + way : 0;
+    last_ = start;
+    const bool moves = std::hypot(motion.mean.x, motion.mean.y) >= settings_.update_min_d ||
+                       std::abs(motion.mean.theta) >= settings_.update_min_a;
+    const bool update = moves || once_;
+    Estimate estimate{moved(pose_, motion), knowledge_, 0, 0, 0, 0, update};
+    if (knowledge_ == Knowledge::kTracking) {
+      track(beams, motion, update, estimate);
+    } else if (knowledge_ == Knowledge::kLost) {
+      lose(beams, estimate);
+    } else {
+      follow(beams, motion, update, estimate);
+    }
+    if (update) once_ = false;
+    estimate.knowledge = told(estimate.map_from_base);
+    if (estimate.knowledge == Knowledge::kAmbiguous) blur(estimate.map_from_base.covariance);
+    estimate.fit = health_.fast;
+    estimate.fit_usual = health_.slow;
+    return estimate;
+  }
+
+  std::vector<Weighted> particles() const {
+    return knowledge_ == Knowledge::kTracking ? particles_.all() : places_.all();
+  }
+
+ private:
+  static double wayOf(const Pose2D& motion) {
+    return std::hypot(motion.x, motion.y) + kTurnPerWay * std::abs(wrapAngle(motion.theta));
+  }
+
+  void start(Knowledge knowledge) {
+    knowledge_ = knowledge;
+    places_ = Places(sensor_, settings_.recovery);
+    search_.reset();
+    travelled_ = 0;
+    verified_ = false;
+  }
+
+  /// At one place from now on.
+  void settle(const Gaussian& pose) {
+    particles_.reset(pose);
+    pose_ = pose;
+    at_ = last_;
+    start(Knowledge::kTracking);
+    once_ = true;
+  }
+
+  /// Particles that are spread wide do not know one place either, nor does who has seen nothing for long.
+  Knowledge told(const Gaussian& pose) const {
+    const double largest = std::sqrt(std::fmax(pose.covariance(0, 0), pose.covariance(1, 1)));
+    const bool doubtful =
+        largest > settings_.ambiguous_spread || doubted_for_ > 0 || blind_ > settings_.recovery.found_way;
+    return doubtful && knowledge_ == Knowledge::kTracking ? Knowledge::kAmbiguous : knowledge_;
+  }
+
+  void setBase(const Gaussian& pose) {
+    pose_ = pose;
+    at_ = last_;
+  }
+
+  void track(const Beams& beams, const Gaussian& motion, bool update, Estimate& estimate) {
+    if (update) {
+      const double power = settings_.reading.power;
+      particles_.update(motion, [&](const Pose2D& pose) { return power * sensor_.weigh(beams, pose); });
+      const auto all = particles_.all();
+      estimate.particles = static_cast<int>(all.size());
+      Gaussian mean = spread(all);
+      mean.covariance.diagonal().array() += 1e-8;  // all particles may be one
+      estimate.map_from_base = {sensor_.align(beams, mean.mean, mean.covariance.inverse(), kRounds).pose,
+                                mean.covariance};
+      setBase(estimate.map_from_base);
+    }
+    look(beams, estimate);
+    if (doubted_for_ > 0) ++doubted_for_;
+    const auto& recovery = settings_.recovery;
+    const double enough = (health_.fast >= recovery.found_fit ? 1 : kSearchAgain) * recovery.found_way;
+    if (travelled_ >= enough) doubted_for_ = 0;
+    if (!health_.doubtful(settings_.recovery)) return;
+    if (doubted_for_ == 0) {
+      widen(estimate.map_from_base);
+    } else if (doubted_for_ > kPatience) {
+      known_ = true;
+      start(Knowledge::kLost);
+      lose(beams, estimate);
+    }
+  }
+
+  void look(const Beams& beams, const Estimate& estimate) {
+    const Fit fit = sensor_.look(beams, estimate.map_from_base.mean);
+    if (fit.readings() >= kLeastReadings) health_.take(fit.share(), settings_.recovery);
+  }
+
+  /// A doubted pose may be a little off only: that is tried first.
+  void widen(Gaussian pose) {
+    pose.covariance.diagonal() +=
+        Eigen::Vector3d(kNearby * kNearby, kNearby * kNearby, kNearbyTurn * kNearbyTurn);
+    settle(pose);
+    doubted_for_ = 1;
+  }
+
+  /// Goes on with the search for the places of one scan; when done, they are moved to where they would be by now.
+  std::optional<Places> search(const Beams& beams, const Pose2D* doubted) {
+    if (!search_) {
+      if (beams.beams.size() < kLeastReadings) return std::nullopt;
+      search_.emplace(sensor_, settings_.recovery, beams);
+      searched_ = beams;
+      searched_from_ = *last_;
+      if (doubted != nullptr) doubted_ = *doubted;
+    }
+    if (!search_->step()) return std::nullopt;
+    Places found(sensor_, settings_.recovery);
+    found.add(search_->poses(), searched_, 0);
+    if (doubted != nullptr) found.add({doubted_}, searched_, kHeadStart);
+    search_.reset();
+    found.update(motionBetween(searched_from_, *last_, settings_.motion, process_), beams);
+    return found;
+  }
+
+  void lose(const Beams& beams, Estimate& estimate) {
+    const Pose2D doubted = estimate.map_from_base.mean;
+    estimate.map_from_base.covariance = anywhere();
+    const auto found = search(beams, known_ ? &doubted : nullptr);
+    estimate.searched = search_ ? search_->progress() : 1;
+    if (!found || found->empty()) return;
+    places_ = *found;
+    knowledge_ = Knowledge::kAmbiguous;
+    health_ = {};
+    estimate.updated = true;
+    show(estimate);
+    mix(estimate);
+  }
+
+  void follow(const Beams& beams, const Gaussian& motion, bool update, Estimate& estimate) {
+    if (update || search_) {
+      places_.update(motion, beams);
+      show(estimate);
+    }
+    if (search_ || travelled_ >= kSearchAgain * settings_.recovery.found_way) searchAgain(beams);
+    look(beams, estimate);
+    decide(estimate);
+    if (knowledge_ == Knowledge::kAmbiguous) mix(estimate);
+  }
+
+  void searchAgain(const Beams& beams) {
+    const auto found = search(beams, nullptr);
+    if (!found) return;
+    places_.merge(*found);
+    verified_ = true;
+    travelled_ = 0;
+  }
+
+  void show(Estimate& estimate) {
+    setBase(places_.best());
+    estimate.map_from_base = pose_;
+    estimate.particles = static_cast<int>(places_.size());
+  }
+
+  /// Never so narrow that it looks certain.
+  void blur(Eigen::Matrix3d& covariance) const {
+    const double least = settings_.ambiguous_spread * settings_.ambiguous_spread;
+    for (int i = 0; i < 2; ++i) covariance(i, i) = std::fmax(covariance(i, i), least);
+  }
+
+  /// Around the likeliest, as wide as the others are away from it.
+  void mix(Estimate& estimate) const {
+    for (const auto& [pose, weight] : places_.all()) {
+      const Eigen::Vector3d off(pose.x - pose_.mean.x, pose.y - pose_.mean.y,
+                                wrapAngle(pose.theta - pose_.mean.theta));
+      estimate.map_from_base.covariance += weight * off * off.transpose();
+    }
+  }
+
+  /// One place is taken when it has held against all others over some way, those of a second search among them.
+  void decide(Estimate& estimate) {
+    const auto& s = settings_.recovery;
+    if (search_ || travelled_ < s.found_way) return;
+    if (health_.doubtful(s)) {
+      known_ = false;
+      start(Knowledge::kLost);
+      estimate.map_from_base.covariance = anywhere();
+    } else if (places_.odds() >= s.found_odds && places_.bestFit() >= s.found_fit) {
+      if (!verified_) {
+        travelled_ = kSearchAgain * s.found_way;  // now
+      } else {
+        Gaussian wide = estimate.map_from_base;
+        wide.covariance.diagonal() += Eigen::Vector3d(0.01, 0.01, 0.0025);  // 0.1 m, 3 degrees
+        setPose(wide);
+        estimate.map_from_base = wide;
+      }
+    }
+  }
+
+  /// The whole map, any heading.
+  Eigen::Matrix3d anywhere() const {
+    Eigen::Matrix3d out = Eigen::Matrix3d::Zero();
+    const double edge = field_.resolution() * std::hypot(field_.width(), field_.height());
+    out.diagonal() << edge * edge / 12, edge * edge / 12, M_PI * M_PI / 3;
+    return out;
+  }
+
+  LocalizerSettings settings_;
+  ProcessNoise process_;
+  Field field_;
+  Sensor sensor_;
+  Particles particles_;
+  Places places_;
+  Knowledge knowledge_ = Knowledge::kLost;
+  Gaussian pose_{{0, 0, 0}, Eigen::Matrix3d::Zero()};  ///< at at_
+  std::optional<Odometry> at_;                         ///< of the last update
+  std::optional<Odometry> last_;                       ///< of the last scan
+  std::optional<Search> search_;
+  Beams searched_{};
+  Odometry searched_from_{};
+  Pose2D doubted_{0, 0, 0};
+  bool known_ = false;     ///< there was a pose before the search
+  bool verified_ = false;  ///< the places have held against those of a second search
+  int doubted_for_ = 0;    ///< scans since the pose was first doubted; 0 = it is not
+  bool once_ = false;
+  double blind_ = 0;      ///< driven since a scan had readings [m]
+  double travelled_ = 0;  ///< since all places were in question [m]
+  Health health_;
+};
+
+Localizer::Localizer(const LocalizerSettings& settings, const Chair& chair, std::uint32_t seed,
+                     const OccupancyGrid& grid, const Pose2D& map_from_grid)
+    : impl_(std::make_unique<Impl>(settings, chair, seed, grid, map_from_grid)) {}
+Localizer::~Localizer() = default;
+Localizer::Localizer(Localizer&&) noexcept = default;
+Localizer& Localizer::operator=(Localizer&&) noexcept = default;
+
+void Localizer::setPose(const Gaussian& map_from_base) { impl_->setPose(map_from_base); }
+void Localizer::forget() { impl_->forget(); }
+void Localizer::updateOnce() { impl_->updateOnce(); }
+Localizer::Estimate Localizer::add(const Scan& scan, const Odometry& start, const Pose2D& end) {
+  return impl_->add(scan, start, end);
+}
+std::vector<Weighted> Localizer::particles() const { return impl_->particles(); }
+
+}  // namespace kurumaisu

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "slam/places.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "slam/pose.h"
+
+namespace kurumaisu {
+namespace {
+
+constexpr double kHopeless = 20;    // nats behind the best
+constexpr double kSame = 0.3;       // [m] places nearer than this
+constexpr double kSameAngle = 0.2;  // [rad] and no more turned than this are one
+constexpr int kFirstRounds = 12;
+constexpr int kRounds = 4;
+constexpr double kFitGain = 0.3;  // share of a scan in the mean of a place's fit
+
+}  // namespace
+
+void Places::align(Place& place, const Beams& beams, int rounds) const {
+  const Aligned found = sensor_->align(beams, place.pose.mean, place.pose.covariance.inverse(), rounds);
+  place.pose = {found.pose, found.information.inverse()};
+}
+
+void Places::add(const std::vector<Pose2D>& poses, const Beams& beams, double head_start) {
+  Eigen::Matrix3d start = Eigen::Matrix3d::Zero();
+  start.diagonal() << settings_->step * settings_->step, settings_->step * settings_->step,
+      settings_->angle_step * settings_->angle_step;
+  for (const Pose2D& pose : poses) {
+    Place place{{pose, start}, head_start, 0};
+    align(place, beams, kFirstRounds);
+    const Fit fit = sensor_->look(beams, place.pose.mean);
+    place.fit = fit.share();
+    place.log_weight += settings_->power * fit.log_likelihood;
+    places_.push_back(place);
+  }
+  tidy();
+}
+
+void Places::update(const Gaussian& motion, const Beams& beams) {
+  for (Place& place : places_) {
+    place.pose = moved(place.pose, motion);
+    align(place, beams, kRounds);
+    const Fit fit = sensor_->look(beams, place.pose.mean);
+    place.fit += kFitGain * (fit.share() - place.fit);
+    place.log_weight += settings_->power * fit.log_likelihood;
+  }
+  tidy();
+}
+
+void Places::merge(const Places& others) {
+  places_.insert(places_.end(), others.places_.begin(), others.places_.end());
+  tidy();
+}
+
+void Places::tidy() {
+  std::stable_sort(places_.begin(), places_.end(),
+                   [](const Place& a, const Place& b) { return a.log_weight > b.log_weight; });
+  std::vector<Place> kept;
+  for (const Place& place : places_) {
+    if (!kept.empty() && place.log_weight < kept.front().log_weight - kHopeless) break;
+    if (kept.size() >= static_cast<std::size_t>(settings_->places)) break;
+    const auto same = [&place](const Place& other) {
+      const Pose2D off = between(place.pose.mean, other.pose.mean);
+      return std::hypot(off.x, off.y) < kSame && std::abs(wrapAngle(off.theta)) < kSameAngle;
+    };
+    if (std::none_of(kept.begin(), kept.end(), same)) kept.push_back(place);
+  }
+  places_ = std::move(kept);
+  const double best = places_.empty() ? 0 : places_.front().log_weight;
+  for (Place& place : places_) place.log_weight -= best;
+}
+
+Gaussian Places::best() const { return places_.front().pose; }
+
+double Places::bestFit() const { return places_.empty() ? 0 : places_.front().fit; }
+
+double Places::odds() const {
+  double others = 0;
+  for (std::size_t i = 1; i < places_.size(); ++i) others += std::exp(places_[i].log_weight);
+  return others > 0 ? 1 / others : std::numeric_limits<double>::infinity();
+}
+
+std::vector<Weighted> Places::all() const {
+  std::vector<Weighted> out;
+  double total = 0;
+  for (const Place& place : places_) {
+    out.push_back({place.pose.mean, std::exp(place.log_weight)});
+    total += out.back().weight;
+  }
+  for (Weighted& each : out) each.weight /= total;
+  return out;
+}
+
+}  // namespace kurumaisu
