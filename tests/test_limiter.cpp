@@ -220,6 +220,25 @@ TEST(Ramp, OtherLimitsOnTheWayJumpNothingAndOvershootNothing) {
   }
 }
 
+TEST(Ramp, OtherLimitsInTheMiddleOfAReversalHoldBeyondRest) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<> uniform(0.2, 1.5);
+  for (int run = 0; run < 1000; ++run) {
+    k::Ramp ramp(drawLimits(random));
+    ramp.put(uniform(random));
+    while (ramp.rate() > 0.1) ramp.advance(-1.0, 0.01);
+    const k::RampLimits limits = drawLimits(random);
+    ramp.configure(limits);
+    std::vector<Sample> samples{{0, ramp.rate()}};
+    for (int i = 0; i < 200; ++i) {
+      ramp.advance(-1.0, 0.02);
+      samples.push_back({samples.back().t + 0.02, ramp.rate()});
+    }
+    expectBounded(samples, limits);
+    if (HasFatalFailure()) FAIL() << "run " << run;
+  }
+}
+
 TEST(Limiter, BothAxesTogetherKeepEveryBoundForAnyCommands) {
   std::mt19937_64 random(6);
   std::uniform_real_distribution<> uniform(-2.0, 2.0);

@@ -406,12 +406,12 @@ Value garbage(std::mt19937_64& random) {
       return static_cast<bool>(random() % 2);
     case 5: {
       Value list;
-      for (int i = random() % 3; i >= 0; --i) list[i] = garbage(random);
+      for (int i = static_cast<int>(random() % 3); i >= 0; --i) list[i] = garbage(random);
       return list;
     }
     case 6: {
       Value tree;
-      for (int i = random() % 3; i >= 0; --i)
+      for (int i = static_cast<int>(random() % 3); i >= 0; --i)
         tree[std::string(1, static_cast<char>('a' + i))] = garbage(random);
       return tree;
     }
@@ -441,9 +441,9 @@ void spoil(Value& value, std::mt19937_64& random) {
 TEST(BaseSettings, GarbageOnTheParameterServerIsRefusedOrHarmless) {
   std::mt19937_64 random(16);
   int refused = 0;
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < 4000; ++i) {
     Value v = nodeValues();
-    for (int n = random() % 3; n >= 0; --n) spoil(v, random);
+    for (int n = static_cast<int>(random() % 3); n >= 0; --n) spoil(v, random);
     try {
       const k::BaseSettings settings = k::readBaseSettings({v, "/base_node"});
       ASSERT_TRUE(settings.rate > 0 && std::isfinite(settings.rate));
@@ -455,7 +455,7 @@ TEST(BaseSettings, GarbageOnTheParameterServerIsRefusedOrHarmless) {
       ASSERT_EQ(std::string(problem.what()).rfind("/base_node", 0), 0U) << problem.what();
     }
   }
-  EXPECT_GT(refused, 10000);
+  EXPECT_GT(refused, 2000);
 }
 
 int main(int argc, char** argv) {
