@@ -30,6 +30,14 @@ def running(*command: str, environment: dict[str, str]) -> Iterator[subprocess.P
         process.wait(PATIENCE)
 
 
+def wait_for_file(path: Path) -> None:
+    """The program `rosbag` is a wrapper, which may end before the recorder itself has named the bag."""
+    deadline = time.monotonic() + PATIENCE
+    while not path.exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert path.exists()
+
+
 def wait_for_message(topic: str, environment: dict[str, str]) -> None:
     command = ["rostopic", "echo", "-n", "1", "--noarr", topic]
     subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
@@ -40,9 +48,7 @@ def record(bag: Path) -> None:
     with master() as environment, running("roslaunch", "kurumaisu", "sim.launch", environment=environment):
         wait_for_message("/odom", environment)
         with running("roslaunch", "kurumaisu", "record.launch", f"bag:={bag}", environment=environment):
-            deadline = time.monotonic() + PATIENCE
-            while not Path(f"{bag}.active").exists() and time.monotonic() < deadline:
-                time.sleep(0.05)
+            wait_for_file(Path(f"{bag}.active"))
             wait_for_message("/scan", environment)
             for v, w in DRIVES:
                 twist = f"{{linear: {{x: {v}}}, angular: {{z: {w}}}}}"
@@ -55,18 +61,17 @@ def record(bag: Path) -> None:
                         check=True,
                     )
             wait_for_message("/scan", environment)
-    assert bag.exists()
+        wait_for_file(bag)
 
 
 def replay(bag: Path, out: Path) -> None:
     """Replay it and record what the re-run base says beside what was recorded."""
     topics = ["/odom", "/recorded/odom", "/voltages", "/recorded/voltages", "/scan", "/tf", "/recorded/tf"]
     with master() as environment, running("rosbag", "record", "-O", str(out), *topics, environment=environment):
-        deadline = time.monotonic() + PATIENCE
-        while not Path(f"{out}.active").exists() and time.monotonic() < deadline:
-            time.sleep(0.05)
+        wait_for_file(Path(f"{out}.active"))
         command = ["roslaunch", "kurumaisu", "replay.launch", f"bag:={bag}"]
         subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
+    wait_for_file(out)
 
 
 def poses(bag: rosbag.Bag, topic: str) -> np.ndarray:
