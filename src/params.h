@@ -56,7 +56,9 @@ class RosValue {
 
   std::vector<RosValue> list() const {
     std::vector<RosValue> result;
-    for (int i = 0; i < value_.size(); ++i) result.emplace_back(value_[i]);
+    result.reserve(value_.size());
+    // An XmlRpcValue has no iterators of a list.
+    for (int i = 0; i < value_.size(); ++i) result.emplace_back(value_[i]);  // NOLINT(modernize-loop-convert)
     return result;
   }
 

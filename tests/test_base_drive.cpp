@@ -359,7 +359,7 @@ TEST(Drive, WhateverIsHeardItKeepsTheLimitsAndTheBands) {
   double t = 100;
   int moved = 0;
   for (int i = 0; i < 100000; ++i) {
-    t += random() % 2000 == 0 ? uniform(random) : 0.02 * (random() % 3);
+    t += random() % 2000 == 0 ? uniform(random) : 0.02 * static_cast<double>(random() % 3);
     const bool rest = i % 1000 < 100;  // now and then everybody lets go, or nothing would ever be released
     const k::Rates rates = rest ? k::Rates{} : k::Rates{number(), number()};
     if (random() % 2) chair.drive.command(random() % 3, random() % 200 ? "/a" : "/b", rates, t);

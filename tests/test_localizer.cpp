@@ -282,7 +282,7 @@ TEST(LocalizerFaults, TheMapOfAnotherBuilding) {
 TEST(LocalizerFaults, MapsOfNothing) {
   for (const int value : {0, -1, 100}) {
     k::OccupancyGrid grid{0.05, 0,   0,
-                          200,  160, std::vector<std::int8_t>(200 * 160, static_cast<std::int8_t>(value))};
+                          200,  160, std::vector<std::int8_t>(32000, static_cast<std::int8_t>(value))};
     k::Localizer subject(settings(), kChair, 1, grid, room::kMapFromGrid);
     subject.setPose(around(room::truth(0)));
     const auto moments = drive(subject, 0, 10);

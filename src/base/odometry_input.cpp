@@ -39,6 +39,13 @@ bool isCovariance(const Eigen::Matrix3d& matrix) {
   return Eigen::LDLT<Eigen::Matrix3d>(matrix).isPositive();
 }
 
+/// Apart, because the macro counts as a handful of branches.
+void warnRefused(double age, const std::optional<YawRate>& yaw) {
+  ROS_WARN_THROTTLE(kWarningPeriod, "BASE_GYRO_REFUSED: imu: a sample %g s old with yaw rate %g rad/s, %s",
+                    age, yaw ? yaw->rate : NAN,
+                    yaw ? "not finite, out of order or of another time" : "no gyro");
+}
+
 }  // namespace
 
 OdometryInput::OdometryInput(ros::NodeHandle& nh, Drive& drive, const OdometrySettings& settings, Clock clock)
@@ -111,11 +118,7 @@ void OdometryInput::onImu(const sensor_msgs::Imu& imu) {
   const ros::Time now = ros::Time::now();
   const double t = clock_(now);
   const double age = (now - imu.header.stamp).toSec();
-  if (!yaw || !drive_.reckoning().gyro()->add(yaw->rate, yaw->variance, t - age, t)) {
-    ROS_WARN_THROTTLE(kWarningPeriod, "BASE_GYRO_REFUSED: imu: a sample %g s old with yaw rate %g rad/s, %s",
-                      age, yaw ? yaw->rate : NAN,
-                      yaw ? "not finite, out of order or of another time" : "no gyro");
-  }
+  if (!yaw || !drive_.reckoning().gyro()->add(yaw->rate, yaw->variance, t - age, t)) warnRefused(age, yaw);
 }
 
 }  // namespace kurumaisu

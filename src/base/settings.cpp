@@ -13,7 +13,7 @@ int readPriority(Section& section) { return section.integer("priority", kLowest,
 
 /// Sections by name. XmlRpc knows no order of keys: alphabetical.
 template <typename Take>
-void readEach(Section section, Take take) {
+void readEach(Section& section, Take take) {
   for (const std::string& name : section.names()) {
     Section item = section.section(name);
     take(name, item);

@@ -71,6 +71,16 @@ k::OccupancyGrid gridOf(const nav_msgs::OccupancyGrid& map) {
           static_cast<int>(map.info.height),        map.data};
 }
 
+// Apart, because the macros count as a handful of branches each.
+void warnFrame(const std::string& frame, const std::string& taken_for) {
+  ROS_WARN("LOCALIZATION_MAP_FRAME: the map is in %s, and taken for one in %s", frame.c_str(),
+           taken_for.c_str());
+}
+
+void warnSlow(std::uint64_t skipped) {
+  ROS_WARN_THROTTLE(kWarningPeriod, "LOCALIZATION_TOO_SLOW: scan: skipped, %lu so far", skipped);
+}
+
 class LocalizationNode {
  public:
   LocalizationNode(ros::NodeHandle& nh, k::LocalizationNodeSettings settings);
@@ -187,10 +197,7 @@ std::optional<Eigen::Matrix3d> LocalizationNode::covarianceAt(const ros::Time& s
 
 void LocalizationNode::onMap(const nav_msgs::OccupancyGrid& map) {
   if (settings_.first_map_only && map_) return;
-  if (map.header.frame_id != settings_.map_frame) {
-    ROS_WARN("LOCALIZATION_MAP_FRAME: the map is in %s, and taken for one in %s", map.header.frame_id.c_str(),
-             settings_.map_frame.c_str());
-  }
+  if (map.header.frame_id != settings_.map_frame) warnFrame(map.header.frame_id, settings_.map_frame);
   const bool tracking = estimate_ && estimate_->knowledge == k::Knowledge::kTracking;
   const k::Gaussian here = tracking ? estimate_->map_from_base : settings_.start;
   map_ = map;
@@ -251,11 +258,10 @@ void LocalizationNode::work() {
   while (ros::ok() && (ready = queue_.next())) {
     const bool is_slow = (ros::SteadyTime::now() - begin).toSec() > kWorkLimit;
     if (is_slow && queue_.size() >= static_cast<std::size_t>(settings_.backlog)) {
-      ++skipped_;
-      ROS_WARN_THROTTLE(kWarningPeriod, "LOCALIZATION_TOO_SLOW: scan: skipped, %lu so far", skipped_);
-      continue;
+      warnSlow(++skipped_);
+    } else {
+      add(*ready);
     }
-    add(*ready);
   }
 }
 
