@@ -287,10 +287,10 @@ TEST(BaseSettings, AMeasuredNoiseThatMakesNoSenseIsRefused) {
   Value v = nodeValues();
   v["model"]["effects"][0] = processNoise();
   v["model"]["effects"][0]["parameters"]["tau"] = 0.0;
-  EXPECT_EQ(complaintOf(v), "/base_node/model/effects/0/parameters/tau: must be above 0: 0");
+  EXPECT_EQ(complaintOf(v), "/base_node/model/effects[0]/parameters/tau: must be above 0: 0");
   v["model"]["effects"][0] = processNoise();
   v["model"]["effects"][1] = processNoise();
-  EXPECT_NE(complaintOf(v).find("/base_node/model/effects/1/id: is given twice"), std::string::npos);
+  EXPECT_NE(complaintOf(v).find("/base_node/model/effects[1]/id: is given twice"), std::string::npos);
   v = nodeValues();
   v["model"]["effects"] = std::string("none");
   EXPECT_NE(complaintOf(v).find("/base_node/model/effects: must be a list"), std::string::npos);

@@ -66,11 +66,12 @@ def write_map(written: MapFile, path: Path, suffix: str, occupied: float, free: 
     shades[(written.cells >= 0) & (written.cells < free)] = _SHADE_FREE
     image, text = path.with_name(path.name + suffix), path.with_name(path.name + ".yaml")
     x, y, yaw = written.origin
+    turn = np.format_float_positional(yaw, precision=9, trim="0")  # YAML takes 1e-9 for a string
     try:
         Image.fromarray(np.ascontiguousarray(shades[::-1])).save(image)
         text.write_text(
             f"image: {image.name}\nresolution: {written.resolution:.6f}\n"
-            f"origin: [{x:.6f}, {y:.6f}, {yaw:.9f}]\nnegate: 0\n"
+            f"origin: [{x:.6f}, {y:.6f}, {turn}]\nnegate: 0\n"
             f"occupied_thresh: {OCCUPIED_ABOVE / 100}\nfree_thresh: {FREE_BELOW / 100}\n",
             encoding="utf-8",
         )
