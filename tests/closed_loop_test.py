@@ -38,6 +38,8 @@ class ClosedLoop(unittest.TestCase):
         cls.voltages, cls.scans = Topic("voltages", Voltages), Topic("scan", LaserScan)
         cls.commander = Commander("cmd_vel")
         wait_for(lambda: cls.odom.last and cls.truth.last and cls.voltages.last, "odom, ground_truth and voltages")
+        cls.commander.release()
+        cls.commander.silence()
 
     def tearDown(self):
         self.commander.silence()

@@ -34,6 +34,7 @@ class CriticWatch(unittest.TestCase):
         wait_for(status, "a first message, before anything can be judged")
         assert status().level == DiagnosticStatus.WARN
         commander = Commander("cmd_vel")
+        commander.release()
         moves = itertools.cycle(MOVES)
         start = rospy.get_time()
         done = None  # criticisms when there was a whole window to judge; the one under way may have begun before

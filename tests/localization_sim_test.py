@@ -43,6 +43,7 @@ class LocalizationInTheSimulator(unittest.TestCase):
         cls.buffer = tf2_ros.Buffer()
         cls.listener = tf2_ros.TransformListener(cls.buffer)
         wait_for(lambda: cls.truth.last and cls.poses.last, "ground_truth and amcl_pose", PATIENCE)
+        cls.commander.release()
 
     def tearDown(self):
         self.commander.silence()

@@ -32,6 +32,7 @@ class MappingLoop(unittest.TestCase):
         truth, maps = Topic("ground_truth", Odometry), Topic("map", OccupancyGrid)
         start = pose_of(wait_for(lambda: truth.last, "ground_truth"))
         commander = Commander("cmd_vel")
+        commander.release()
         commander.say(0.5, 0.0)
         truth.wait(lambda m: pose_of(m)[0] - start[0] > WAY, "the chair to drive down the corridor", patience=60.0)
         commander.silence()

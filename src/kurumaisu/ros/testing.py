@@ -11,6 +11,7 @@ from typing import Any
 import rospy
 from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 
 PATIENCE = 20.0  # [s] of wall time for things that take a moment; longer is a failure
 
@@ -81,6 +82,12 @@ class Commander:
     def repeat(self, twist: Twist) -> None:
         """From now on publish this."""
         self._twist = twist
+
+    def release(self) -> None:
+        """Command rest until base_node obeys: who commands before it has let go is not heard."""
+        self.say(0.0, 0.0)
+        active = Topic("active_input", String)
+        wait_for(lambda: active.last and active.last.data, "base_node to obey")
 
     def silence(self) -> None:
         """Command nothing any more."""
