@@ -24,17 +24,13 @@ from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import Trigger
 
 from kurumaisu import _core
+from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.ros.testing import Commander, Topic, wait_for
 
 
 def is_neutral(message: Voltages) -> bool:
     zeros = (message.translation, message.steering, message.v, message.w)
     return zeros == (0.0, 0.0, 0.0, 0.0) and message.reference == 2.5
-
-
-def yaw(odom: Odometry) -> float:
-    q = odom.pose.pose.orientation
-    return 2 * math.atan2(q.z, q.w)
 
 
 class BaseNode(unittest.TestCase):
@@ -129,11 +125,11 @@ class BaseNode(unittest.TestCase):
         w = np.array([put_out[m.header.stamp].w for m in odom])[:-1]
         dt = np.diff([m.header.stamp.to_sec() for m in odom])
         first, last = odom[0].pose.pose.position, odom[-1].pose.pose.position
-        truth = _core.integrate(v, w, dt, (first.x, first.y, yaw(odom[0])))[-1]
+        truth = _core.integrate(v, w, dt, (first.x, first.y, yaw_of(odom[0].pose.pose.orientation)))[-1]
         # Stamps are of the system clock, intervals of the steady clock: they differ by microseconds a tick.
         assert abs(last.x - truth[0]) < 0.005
         assert abs(last.y - truth[1]) < 0.005
-        assert abs(math.remainder(yaw(odom[-1]) - truth[2], 2 * math.pi)) < 0.01
+        assert abs(math.remainder(yaw_of(odom[-1].pose.pose.orientation) - truth[2], 2 * math.pi)) < 0.01
         assert np.sum(np.abs(v) * dt) > 0.2
         self.check_tf(buffer, odom[-1])
         self.check_covariance(odom)

@@ -14,13 +14,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from kurumaisu import geometry
-from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import Commander, Topic, wait_for
-
-
-def pose_of(message):
-    pose = message.pose.pose
-    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])
+from kurumaisu.ros.testing import Commander, Topic, pose_of, wait_for
 
 
 def at(topic, stamp):

@@ -24,8 +24,7 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
 
 from kurumaisu.geometry import between, compose, wrap
-from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import Topic, wait_for
+from kurumaisu.ros.testing import Topic, deviation, pose_of, wait_for
 
 DEADLINE = 40.0  # [s] of the wall clock
 STEP = 0.1  # [s] between scans
@@ -92,15 +91,6 @@ def transform(parent, child, pose, stamp):
     out.transform.translation.x, out.transform.translation.y = pose[0], pose[1]
     out.transform.rotation.z, out.transform.rotation.w = np.sin(pose[2] / 2), np.cos(pose[2] / 2)
     return out
-
-
-def pose_of(message):
-    pose = message.pose.pose
-    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])
-
-
-def deviation(message):
-    return np.sqrt(message.pose.covariance[0] + message.pose.covariance[7])
 
 
 class LocalizationNode(unittest.TestCase):

@@ -16,21 +16,11 @@ from nav_msgs.msg import Odometry
 from kurumaisu import geometry
 from kurumaisu.driving import Driver, load_route
 from kurumaisu.params import shipped
-from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import Commander, Topic, wait_for
+from kurumaisu.ros.testing import Commander, Topic, deviation, pose_of, wait_for
 
 WAY = 12.0  # [m]
 PATIENCE = 90.0  # [s] of wall time
 SURE = 0.3  # [m] a deviation of the position below which a pose is meant
-
-
-def pose_of(message):
-    pose = message.pose.pose
-    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])
-
-
-def deviation(message):
-    return np.sqrt(message.pose.covariance[0] + message.pose.covariance[7])
 
 
 class LocalizationInTheSimulator(unittest.TestCase):

@@ -14,15 +14,10 @@ from kurumaisu import geometry, slam_score
 from kurumaisu.maps import Grid
 from kurumaisu.params import shipped
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import Commander, Topic, wait_for
+from kurumaisu.ros.testing import Commander, Topic, pose_of, wait_for
 from kurumaisu.world import load_world
 
 WAY = 5.0  # [m]
-
-
-def pose_of(message):
-    pose = message.pose.pose
-    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])
 
 
 class MappingLoop(unittest.TestCase):

@@ -20,6 +20,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, Joy, LaserScan
 from std_srvs.srv import Trigger
 
+from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.ros.testing import Repeated, Topic, wait_for
 
 PATIENCE = 20.0  # [s]
@@ -42,11 +43,6 @@ def imu(rate: float) -> Imu:
     message.angular_velocity.z = -(rate + 0.01)
     message.angular_velocity_covariance[8] = 1.0e-6
     return message
-
-
-def yaw(odom: Odometry) -> float:
-    q = odom.pose.pose.orientation
-    return 2 * math.atan2(q.z, q.w)
 
 
 class Robot(unittest.TestCase):
@@ -120,7 +116,7 @@ class Robot(unittest.TestCase):
         assert rospy.ServiceProxy("/base_node/reset_odometry", Trigger)().success
         here = self.odom.wait(lambda m: m.pose.pose.position.x < 0.3, "the origin")
         assert here.pose.covariance[0] < 0.01
-        assert abs(yaw(here)) < 0.1
+        assert abs(yaw_of(here.pose.pose.orientation)) < 0.1
         pose = PoseWithCovariance()
         pose.pose.position.x, pose.pose.position.y = 5.0, -3.0
         pose.pose.orientation.z = pose.pose.orientation.w = math.sqrt(0.5)

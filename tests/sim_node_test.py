@@ -19,15 +19,9 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
 
 from kurumaisu.params import load_model
-from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import Topic, wait_for
+from kurumaisu.ros.testing import Topic, pose_of, wait_for
 
 STEP = rospy.Duration(0, 10_000_000)
-
-
-def pose_of(odometry):
-    pose = odometry.pose.pose
-    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])
 
 
 class BadConfiguration:

@@ -23,8 +23,8 @@ from std_srvs.srv import Empty, SetBool, Trigger
 from tf2_msgs.msg import TFMessage
 
 from kurumaisu.params import load_model
-from kurumaisu.ros.rotation import quaternion_of, yaw_of
-from kurumaisu.ros.testing import Topic, wait_for
+from kurumaisu.ros.rotation import quaternion_of
+from kurumaisu.ros.testing import Topic, pose_of, wait_for
 
 SERVICES = {
     "reset": Empty,
@@ -45,11 +45,6 @@ SENSORS = {
     "camera/depth": Image,
     "camera/camera_info": CameraInfo,
 }
-
-
-def pose_of(odometry):
-    pose = odometry.pose.pose
-    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])
 
 
 def pose(x, y, yaw):

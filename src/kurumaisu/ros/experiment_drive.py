@@ -22,8 +22,7 @@ from kurumaisu.msg import Voltages
 from kurumaisu.params import Model
 from kurumaisu.ros.experiment_ground import Ground, hearers, publishers
 from kurumaisu.ros.recorder import Recorder
-from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.types import FloatArray
+from kurumaisu.ros.rotation import planar
 
 VOLTAGE, ACTIVE = "voltages", "active_input"
 RECORDED = (VOLTAGE, "odom", "scan", "ground_truth")
@@ -98,7 +97,7 @@ class _Driver:
 
     def _see(self, source: str, message: Odometry) -> None:
         with self._lock:
-            self._supervisor.see(source, rospy.get_time(), pose_of(message))
+            self._supervisor.see(source, rospy.get_time(), planar(message.pose.pose))
 
     def _touch(self, message: Bool) -> None:
         if message.data:
@@ -127,9 +126,3 @@ def _twist(values: tuple[float, ...]) -> Twist:
     twist = Twist()
     twist.linear.x, twist.angular.z = values
     return twist
-
-
-def pose_of(message: Odometry) -> FloatArray:
-    """Return x [m], y [m], theta [rad]."""
-    pose = message.pose.pose
-    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])

@@ -16,10 +16,9 @@ from kurumaisu.errors import Error
 from kurumaisu.experiments import Script
 from kurumaisu.experiments.supervisor import Care, Rest
 from kurumaisu.experiments.visit import Visit
-from kurumaisu.ros.experiment_drive import pose_of
 from kurumaisu.ros.experiment_ground import TRUTH, Ground
 from kurumaisu.ros.recorder import Recorder
-from kurumaisu.ros.rotation import quaternion_of
+from kurumaisu.ros.rotation import planar, quaternion_of
 from kurumaisu.srv import SetPose
 from kurumaisu.types import FloatArray
 
@@ -90,7 +89,7 @@ class _Walker:
         return False
 
     def _see(self, message: Odometry) -> None:
-        self._pose = pose_of(message)
+        self._pose = planar(message.pose.pose)
         self._rest.see(rospy.get_time(), self._pose)
         if self._visit is not None:
             self._visit.see(rospy.get_time(), self._pose)

@@ -34,6 +34,11 @@ def yaw_of(rotation: Quaternion) -> float:
     return 2 * math.atan2(rotation.z, rotation.w) if rotation.w >= 0 else 2 * math.atan2(-rotation.z, -rotation.w)
 
 
+def planar(pose: Pose) -> FloatArray:
+    """Return x [m], y [m], yaw [rad]."""
+    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])
+
+
 def pose_of(pose: Pose) -> FloatArray:
     """Return x, y, z [m], heading [rad] of a pose. Raise Error unless it is finite and turns about z."""
     values = np.array([pose.position.x, pose.position.y, pose.position.z, yaw_of(pose.orientation)])

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -12,6 +13,9 @@ import rospy
 from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
+
+from kurumaisu.ros.rotation import planar
+from kurumaisu.types import FloatArray
 
 PATIENCE = 20.0  # [s] of wall time for things that take a moment; longer is a failure
 
@@ -24,6 +28,16 @@ def wait_for(condition: Callable[[], Any], what: str, patience: float = PATIENCE
             return result
         time.sleep(0.005)
     raise AssertionError(f"not within {patience} s: {what}")
+
+
+def pose_of(message: Any) -> FloatArray:
+    """Return x [m], y [m], yaw [rad] of Odometry, or of a pose with a covariance."""
+    return planar(message.pose.pose)
+
+
+def deviation(message: Any) -> float:
+    """Return the standard deviation of a position [m] whose covariance the message gives."""
+    return math.sqrt(message.pose.covariance[0] + message.pose.covariance[7])
 
 
 class Topic:

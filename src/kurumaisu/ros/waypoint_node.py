@@ -6,7 +6,6 @@ from __future__ import annotations
 import sys
 import threading
 
-import numpy as np
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
@@ -14,7 +13,7 @@ from nav_msgs.msg import Odometry
 from kurumaisu import settings
 from kurumaisu.driving import Driver, Route, read_route
 from kurumaisu.errors import Error, one_line
-from kurumaisu.ros.rotation import yaw_of
+from kurumaisu.ros.rotation import planar
 
 
 class WaypointNode:
@@ -35,9 +34,7 @@ class WaypointNode:
         self._start = now if self._start is None else self._start
         command = Twist()
         if now - self._start >= self._route.pause:
-            p = message.pose.pose
-            pose = np.array([p.position.x, p.position.y, yaw_of(p.orientation)])
-            command.linear.x, command.angular.z = self._driver.command(pose)
+            command.linear.x, command.angular.z = self._driver.command(planar(message.pose.pose))
         self._publisher.publish(command)
         if self._driver.done and self._end is None:
             self._end = now
