@@ -9,8 +9,10 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event
 
 import results
 import sources
@@ -33,6 +35,7 @@ class Check:
     timeout: float = 600.0  # [s]
     slow: bool = False  # left out by --fast
     tests: bool = False
+    beside: bool = False  # needs no answer soon: runs beside the others, on what they leave of the cores
     reads: list[Path] = field(default_factory=list)  # if given: not run again until one of these changes
 
 
@@ -43,15 +46,24 @@ def main() -> int:
     parser.add_argument("-k", metavar="WORD", default="", help="only the checks and test files whose name has WORD")
     arguments = parser.parse_args()
     LOGS.mkdir(parents=True, exist_ok=True)
-    total = Counts()
-    for check in [*_checks(), *_tests(arguments.k)]:
-        if arguments.k not in check.name and not _holds(check, arguments.k):
-            continue
+    chosen = [c for c in [*_checks(), *_tests(arguments.k)] if arguments.k in c.name or _holds(c, arguments.k)]
+    total = Counts(skipped=sum(c.slow for c in chosen) if arguments.fast else 0)
+    for check in chosen:
         if check.slow and arguments.fast:
-            total += Counts(skipped=1)
             _line("skip", check.name, "--fast", 0.0)
-        else:
-            total += _run(check, arguments.k)
+    chosen = [c for c in chosen if not (c.slow and arguments.fast)]
+    stop = Event()
+    with ThreadPoolExecutor(1) as pool:
+        try:
+            beside = []
+            for check in chosen:
+                if check.beside:
+                    beside.append(pool.submit(_run, check, arguments.k, stop))
+                else:
+                    total += _run(check, arguments.k, stop)
+            total = sum((future.result() for future in beside), total)
+        finally:
+            stop.set()
     if total == Counts():
         print(f"no check and no test file has {arguments.k!r} in its name")
         total = Counts(failed=1)
@@ -72,13 +84,14 @@ def _checks() -> list[Check]:
         Check("catkin_lint", ["catkin_lint", "--offline", "--strict", "-W2", str(ROOT / ".ws/src")]),
         # scripts/setup --dev built the rest; there, too, a warning is an error.
         Check("build tests", ["cmake", "--build", str(BUILD), "--target", "tests"], timeout=1200),
-        Check("clang-tidy", ["python", str(ROOT / ".ci/tidy.py")], timeout=1800),
+        Check("clang-tidy", ["python", str(ROOT / ".ci/tidy.py")], timeout=2400, beside=True),
         Check("install space", ["bash", str(ROOT / ".ci/install_space.bash")], timeout=1200),
         Check(
             "catkin build",
             ["bash", str(ROOT / ".ci/catkin_build.bash")],
-            timeout=1800,
+            timeout=2400,
             slow=True,
+            beside=True,
             reads=inside,
         ),
     ]
@@ -98,7 +111,8 @@ def _tests(word: str) -> list[Check]:
     pytest = ["cmake", "--build", str(BUILD), "--target", f"{TARGET}pytest_unit"]
     if word and word not in "pytest":
         pytest = ["env", f"PYTEST_ADDOPTS=-k {word}", *pytest]
-    return [Check("pytest", pytest, timeout=1200, tests=True), *checks]
+    # nodes wait more than they compute, which leaves the cores to what runs beside them: so pytest comes last
+    return [*checks, Check("pytest", pytest, timeout=1200, tests=True)]
 
 
 def _pytest_files() -> set[str]:
@@ -110,7 +124,7 @@ def _holds(check: Check, word: str) -> bool:
     return check.name == "pytest" and any(word in stem for stem in _pytest_files())
 
 
-def _run(check: Check, word: str) -> Counts:
+def _run(check: Check, word: str, stop: Event) -> Counts:
     stamp = LOGS / f"{check.name}.clean"
     state = sources.content_hash(check.reads)
     if check.reads and stamp.exists() and stamp.read_text() == state:
@@ -118,7 +132,7 @@ def _run(check: Check, word: str) -> Counts:
         return Counts(passed=1)
     start = time.monotonic()
     log = LOGS / f"{check.name}.log"
-    problem = _execute(check, log)
+    problem = _execute(check, log, stop)
     counts = Counts(failed=1) if problem else Counts(passed=1)
     if check.tests and not problem:
         counts = results.read(sorted(XUNIT.glob("*.xml")))
@@ -143,23 +157,26 @@ def _silent(check: Check, word: str) -> list[str]:
     return sorted(_pytest_files() - results.classes(XUNIT / "pytest-unit.xml"))
 
 
-def _execute(check: Check, log: Path) -> str:
+def _execute(check: Check, log: Path, stop: Event) -> str:
     """Run the command in a session of its own, output to the log. Return what went wrong, or nothing."""
     with log.open("w") as output:
         output.write(f"{' '.join(check.command)[:400]}\n")
         output.flush()
         process = subprocess.Popen(
-            check.command,
+            [*(["chrt", "--idle", "0"] if check.beside else []), *check.command],
             cwd=ROOT,
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,
             start_new_session=True,
         )
+        deadline = time.monotonic() + check.timeout
         try:
-            status = process.wait(check.timeout)
-        except subprocess.TimeoutExpired:
-            return f"not done after {check.timeout:.0f} s"
+            while (status := process.poll()) is None:
+                if time.monotonic() > deadline:
+                    return f"not done after {check.timeout:.0f} s"
+                if stop.wait(0.05):
+                    return "interrupted"
         finally:
             _end(process)
     return f"exit status {status}" if status else ""

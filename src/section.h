@@ -146,6 +146,7 @@ class BasicSection {
   /// The keys not yet taken, in alphabetical order.
   std::vector<std::string> names() const {
     std::vector<std::string> result;
+    result.reserve(values_.size());
     for (const auto& item : values_) result.push_back(item.first);
     return result;
   }

@@ -2,13 +2,14 @@
 #include "base/odometry_settings.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 
 namespace kurumaisu {
 namespace {
 
 /// Effects of the base that act on what measures the chair, not on the chair.
-const std::vector<std::string> kOfTheReference{"base.clock_scale", "base.marker_x", "base.marker_y"};
+constexpr std::array<const char*, 3> kOfTheReference{"base.clock_scale", "base.marker_x", "base.marker_y"};
 
 bool isOfTheReference(const std::string& id) {
   return std::find(kOfTheReference.begin(), kOfTheReference.end(), id) != kOfTheReference.end();

@@ -35,6 +35,7 @@ std::vector<c::Edge> edgesOf(const Array& array) {
   requireShape(array, -1, 6, "edges");
   std::vector<c::Edge> edges;
   const auto rows = array.unchecked<2>();
+  edges.reserve(static_cast<std::size_t>(rows.shape(0)));
   for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
     edges.push_back({{rows(i, 0), rows(i, 1)}, {rows(i, 2), rows(i, 3)}, rows(i, 4), rows(i, 5)});
   }
