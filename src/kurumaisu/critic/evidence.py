@@ -9,10 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
+from kurumaisu._core import Whitener
 from kurumaisu.critic import replay, solve
 from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalogue, roughened, settings_of, showing
 from kurumaisu.critic.drive import Drive
-from kurumaisu.critic.noise import Noise, whitened
+from kurumaisu.critic.noise import Noise, whitener
 from kurumaisu.critic.prior import Z_USUAL, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -68,6 +69,7 @@ class Problem:
         self.noise = noise
         self._terms = terms
         self.ids = ids
+        self._whiteners: dict[int, tuple[Drive, Whitener]] = {}
 
     def changed(
         self, *, drives: Sequence[Drive] | None = None, model: Model | None = None, noise: Noise | None = None
@@ -122,9 +124,15 @@ class Problem:
             simulated = self.simulated(drive, here)
             rows = [(drive.measured - simulated).ravel()]
             rows += [(self.simulated(drive, settings) - simulated).ravel() / share for settings, share in moves]
-            parts.append(whitened(drive, np.column_stack(rows), self.noise)[0])
+            parts.append(self.whitened(drive, np.column_stack(rows)))
         both = np.concatenate(parts)
         return both[:, 0], both[:, 1:]
+
+    def whitened(self, drive: Drive, columns: FloatArray) -> FloatArray:
+        """Return columns (3 m, k) of one of the drives, whitened."""
+        if id(drive) not in self._whiteners:
+            self._whiteners[id(drive)] = drive, whitener(drive, self.noise)
+        return self._whiteners[id(drive)][1].whiten(columns)
 
     def fit(self, ids: Iterable[str], start: Mapping[Key, float]) -> Fit:
         """Return the nonlinear fit of a set of effects with all their parameters; start: a first guess by term."""
@@ -239,7 +247,7 @@ class Problem:
 
     def _whitened(self, drive: Drive, settings: tuple[EffectSetting, ...]) -> FloatArray:
         residual = drive.measured - self.simulated(drive, settings)
-        return whitened(drive, residual.reshape(-1, 1), self.noise)[0][:, 0]
+        return self.whitened(drive, residual.reshape(-1, 1))[:, 0]
 
 
 def covariance(gram: FloatArray) -> FloatArray:
