@@ -62,20 +62,26 @@ class Problem:
         noise: Noise,
         terms: tuple[Term, ...] | None = None,
         ids: frozenset[str] | None = None,
+        known: replay.Increments | None = None,
     ) -> None:
-        """Take terms: those that such drives can show, where somebody has found them out; ids: effects that may act."""
+        """Take terms: those that such drives can show, where somebody has found them out; ids: effects that may act.
+
+        known: of the same model.
+        """
         self.drives = drives
         self.model = model
         self.noise = noise
         self._terms = terms
         self.ids = ids
+        self._known = known or replay.Increments(model)
         self._whiteners: dict[int, tuple[Drive, Whitener]] = {}
 
     def changed(
         self, *, drives: Sequence[Drive] | None = None, model: Model | None = None, noise: Noise | None = None
     ) -> Problem:
         """Return the problem, with the same terms, of other drives, another model or another noise."""
-        return Problem(drives or self.drives, model or self.model, noise or self.noise, self.terms, self.ids)
+        known = None if model is not None else self._known
+        return Problem(drives or self.drives, model or self.model, noise or self.noise, self.terms, self.ids, known)
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
@@ -97,7 +103,7 @@ class Problem:
 
     def simulated(self, drive: Drive, settings: Sequence[EffectSetting]) -> FloatArray:
         """Return the simulated body increments of a drive, (m, 3)."""
-        return replay.increments(drive, self.model, settings)
+        return self._known.of(drive, settings)
 
     def simulated_columns(self, drive: Drive, fit: Fit) -> FloatArray:
         """Return the derivative of the simulated increments by every term at a fit, per step, (3 m, k)."""
