@@ -164,6 +164,27 @@ TEST(DacFaults, UnpluggedBetweenTwoFrames) {
   EXPECT_TRUE(has(faultOf(*converter, d::kMoving), "DAC_CLOSED"));
 }
 
+TEST(DacFaults, TheReferenceIsLost) {
+  Rig rig(kNoRetry);
+  const auto converter = rig.open();
+  converter->put(d::kNeutral);
+  rig.board.inject("lost/reference@6x3");
+  const std::string fault = faultOf(*converter, d::kMoving);
+  EXPECT_TRUE(has(fault, "DAC_WRONG_REPLY") && has(fault, "reference")) << fault;
+  ASSERT_TRUE(rig.heardAll(8)) << "the others are written all the same";
+  EXPECT_EQ(rig.board.codes()[d::kReference], 0);
+  EXPECT_GT(rig.board.codes()[d::kTranslation], 0);
+}
+
+TEST(DacFaults, AFaultOfOneSignalSparesTheOthers) {
+  Rig rig(kNoRetry);
+  const auto converter = rig.open();
+  rig.board.inject("silent/steering@3x3");
+  const std::string fault = faultOf(*converter, d::kMoving);
+  EXPECT_TRUE(has(fault, "steering") && !has(fault, "translation of")) << fault;
+  EXPECT_THROW(rig.board.inject("silent/brakes"), std::invalid_argument);
+}
+
 TEST(DacFaults, ASecondOwnerIsRefused) {
   Rig rig;
   const auto converter = rig.open();
