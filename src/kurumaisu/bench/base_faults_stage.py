@@ -28,6 +28,7 @@ NODE = "/base_node"
 _HELD = 0.4  # [s] for which a stick that is still held must move nothing
 _HALF = 0.0007  # [V] more than half a code of the board
 _DIAGNOSTICS = 0.2  # [s] their period here, in place of what ships, to save time
+_BEGIN = 100.0  # [s] of simulated time
 _CONTROL = "qii"  # struct Control of tests/broken_calls.cpp
 
 
@@ -94,6 +95,7 @@ class Stage:
         self.rig.start()
         until(lambda: any(change.neutral for change in self.rig.changes()), "neutral at the start")
         self.node: subprocess.Popen[str] | None = None
+        self._ticks = (_BEGIN, math.inf)  # simulated time [s], and when it was that [s, monotonic]; inf: it stands
         self._marks = (0, 0)
         self.mark()
 
@@ -101,6 +103,25 @@ class Stage:
     def period(self) -> float:
         """Return the time between two ticks of base_node [s]."""
         return 1.0 / float(self.values["rate"])
+
+    def tick(self, now: float | None) -> None:
+        """Let simulated time pass from `now` [s] on; None: let it stand still."""
+        if now is None:
+            self._ticks = (self.clock, math.inf)
+        else:
+            self._ticks = (now, time.monotonic())
+        self.peer.order(do="clock", now=now)
+
+    @property
+    def clock(self) -> float:
+        """Return about what time it is, of simulated time [s]."""
+        begin, since = self._ticks
+        return begin + max(0.0, time.monotonic() - since)
+
+    def replace_peer(self) -> None:
+        """Have another commander in place of one that a new master does not know."""
+        end(self.peer.process)
+        self.peer = self.another_peer()
 
     def another_peer(self) -> Peer:
         """Return one more commander."""
@@ -149,8 +170,8 @@ class Stage:
         self.rig.start()
         if not self.node or self.node.poll() is not None:
             self.start_node(changes)
-        if self.simulated and not self.peer.heard("clock"):
-            self.peer.order(do="clock", now=100.0)
+        if self.simulated and math.isinf(self._ticks[1]):
+            self.tick(_BEGIN)
         self.peer.say(0.0, 0.0)
         until(lambda: self.is_armed() and self._obeys(), "the guard is armed, and base_node obeys")
         self.peer.say(v, w)
