@@ -227,7 +227,9 @@ TEST(BaseSettings, AreReadFromAWholeConfiguration) {
 TEST(BaseSettings, AGuardIsChosenByItsName) {
   Value v = nodeValues();
   EXPECT_FALSE(k::readBaseSettings({v, "/n"}).dac.guard);
+  EXPECT_FALSE(k::readBaseSettings({v, "/n"}).drive.arbiter.first_word_is_rest);
   v["dac"]["kind"] = std::string("guard");
+  EXPECT_TRUE(k::readBaseSettings({v, "/n"}).drive.arbiter.first_word_is_rest);
   const k::DacSettings dac = k::readBaseSettings({v, "/n"}).dac;
   EXPECT_EQ(dac.guard->socket, "/somewhere");
   EXPECT_EQ(dac.guard->reply_wait, 0.01);

@@ -213,6 +213,20 @@ def _held_from_the_start(stage: Stage, seen: Seen) -> None:
     seen.again(stage)
 
 
+def _heard_late(stage: Stage, seen: Seen) -> None:
+    """Its stick is held all along, but the first word of it comes when base_node has heard nothing for long."""
+    stage.peer.say(V, W)
+    begin = time.monotonic()
+    stage.peer.signal(signal.SIGSTOP)
+    stage.start_node()
+    until(stage.is_armed, "the guard is armed")
+    stage.peer.signal(signal.SIGCONT)
+    seen.said(stage, "BASE_NOT_RELEASED: navigation")
+    seen.held(stage, begin)
+    seen.note("neutral")
+    seen.again(stage)
+
+
 def _bounds(stage: Stage, seen: Seen) -> None:
     stage.drive(V, 0.0)
     for v, seconds in _STEPS:
@@ -304,6 +318,13 @@ CASES = (
         Setup(node={"locks/passenger/timeout": _WATCHED}),
     ),
     Case("11", "commanded from the start", "the stick is held", "neutral until it is let go", _held_from_the_start),
+    Case(
+        "11",
+        "commanded from the start",
+        "the stick is held, the commander hangs until the guard is armed",
+        "neutral until it is let go",
+        _heard_late,
+    ),
     Case("12", "steps and reversals", "of 1.7 m/s", "slopes and jerks within the limits", _bounds),
     Case(
         "13",
