@@ -10,29 +10,50 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from kurumaisu.bench import base_faults_board, base_faults_clock, base_faults_commands, base_faults_ends
-from kurumaisu.bench import base_faults_parameters as parameters
+from kurumaisu.bench import (
+    base_faults_board,
+    base_faults_clock,
+    base_faults_commands,
+    base_faults_ends,
+    base_faults_odometry,
+    base_faults_owners,
+    base_faults_parameters,
+    base_faults_stops,
+)
 from kurumaisu.bench.base_faults_seen import OK, Case, Seen
 from kurumaisu.bench.base_faults_stage import Setup, Stage, stage
 from kurumaisu.errors import Error
 
+_MODULES = (
+    base_faults_commands,
+    base_faults_ends,
+    base_faults_board,
+    base_faults_owners,
+    base_faults_clock,
+    base_faults_stops,
+    base_faults_odometry,
+    base_faults_parameters,
+)
 _COLUMNS = ("#", "fault", "injected", "expected", "seen", "verdict")
 
 
 def cases() -> list[Case]:
     """Return all faults, in the order of their numbers."""
-    modules = (base_faults_commands, base_faults_ends, base_faults_board, base_faults_clock, parameters)
-    found = [case for module in modules for case in module.CASES]
+    found = [case for module in _MODULES for case in module.CASES]
     return sorted(found, key=lambda case: (not case.number.isdigit(), int(case.number) if case.number.isdigit() else 0))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table, in markdown. Return 1 if anything is not as expected."""
     parser = argparse.ArgumentParser(prog="bench base_faults", description=__doc__)
-    parser.add_argument("--only", default="", metavar="TEXT", help="only the faults with that text in their row's start")
+    parser.add_argument(
+        "--only", default="", metavar="TEXT", help="only the faults with that text in their row's start"
+    )
     parser.add_argument("--times", type=int, default=3, help="repetitions of those whose times scatter")
     options = parser.parse_args(arguments)
     chosen = [case for case in cases() if options.only in case.name]
+    if not chosen:
+        parser.error(f"no fault has {options.only!r} in its row's start")
     print(f"load average before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
     _row(_COLUMNS)
     _row(["---"] * len(_COLUMNS))

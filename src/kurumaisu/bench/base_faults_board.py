@@ -1,27 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Faults 5, 6, 16 and 17: the D/A board, its wire, its file, and who else wants it."""
+"""Faults 5 and 17: the D/A board, its wire, and its reference."""
 
 from __future__ import annotations
 
-import signal
-import subprocess
 import time
-from collections.abc import Callable, Mapping
-from typing import Any
-
-import yaml
+from collections.abc import Callable
 
 from kurumaisu.bench.base_faults_peer import until
 from kurumaisu.bench.base_faults_seen import Case, Seen, trips
 from kurumaisu.bench.base_faults_stage import BrokenCalls, Setup, Stage, V, W
-from kurumaisu.bench.guard_rig import changed
-from kurumaisu.bench.processes import PATIENCE, program
 
 _SLACK = 0.03  # [s] of two writes and the scheduler, beyond what the board's and the guard's settings allow
 _AWAY = 0.4  # [s] that something is unplugged, or stuck
 _BACK = 0.2  # [s] to open a board again, and to write neutral
 _MANY = 16  # commands that meet a fault: it lasts for some attempts to recover
-_SHORT = 0.5  # [V] a device's clamp that is narrower than the model's band
 
 
 def _noticed(stage: Stage) -> float:
@@ -116,81 +108,6 @@ def _write_fails(how: int, code: str) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def _second_guard(stage: Stage, seen: Seen) -> None:
-    stage.drive()
-    stage.mark()
-    code, said = _guard(stage, {"socket": str(stage.rig.folder / "another.sock")}, {})
-    seen.check(code is None or code != 0, f"exit status {code}")
-    seen.check("DAC_IN_USE" in said, said)
-    seen.undisturbed(stage)
-    seen.note("DAC_IN_USE; the first one's voltages as before")
-
-
-def _second_program(stage: Stage, seen: Seen) -> None:
-    stage.drive()
-    stage.mark()
-    command = [program("set_voltages"), str(stage.rig.device), "0.5", "0", "2.5"]
-    done = subprocess.run(command, input="\n", capture_output=True, text=True, timeout=PATIENCE, check=False)
-    seen.check(done.returncode != 0, "exit status 0")
-    seen.check("DAC_IN_USE" in done.stderr, done.stderr)
-    seen.undisturbed(stage)
-    seen.note(f"exit status {done.returncode}, DAC_IN_USE; the guard's voltages as before")
-
-
-def _second_client(stage: Stage, seen: Seen) -> None:
-    stage.drive()
-    stage.mark()
-    name = "/second/base_node"
-    stage.graph.set_parameter(name, stage.values)
-    begin = time.monotonic()
-    log = (stage.rig.folder / "second.log").open("a")
-    second = stage.graph.run([program("base_node"), "__ns:=/second"], stdout=log, stderr=log)
-    so = lambda e: e["name"].startswith("second") and "another client" in e["message"]  # noqa: E731
-    seen.note(f"diagnostics: {stage.peer.wait('diagnostics', so, begin)['message']}")
-    seen.said(stage, "GUARD_BUSY")
-    second.send_signal(signal.SIGTERM)
-    second.wait(PATIENCE)
-    seen.undisturbed(stage)
-
-
-def _guard(stage: Stage, guard: Mapping[str, Any], device: Mapping[str, Any]) -> tuple[int | None, str]:
-    """Run a guard with changed files for a moment; return its exit status, None if it went on, and what it said."""
-    paths = []
-    for name, tree, changes in (("guard", stage.guard_values, guard), ("device", stage.device_values, device)):
-        paths.append(stage.rig.folder / f"another_{name}.yaml")
-        paths[-1].write_text(yaml.safe_dump(changed(tree, changes)))
-    command = [program("guard"), str(paths[1]), str(paths[0])]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            return process.wait(1.0), process.communicate()[1]
-        except subprocess.TimeoutExpired:
-            process.terminate()
-            return None, process.communicate()[1]
-
-
-def _bad_file(changes: Mapping[str, Any], words: str) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
-        code, said = _guard(stage, {}, changes)
-        seen.check(code == 1, f"exit status {code}")
-        seen.check(words in said and "another_device.yaml" in said, said)
-        seen.note(f"exit status {code}: {said.splitlines()[-1].split('another_')[-1]}")
-
-    return play
-
-
-def _narrow_device(stage: Stage, seen: Seen) -> None:
-    stage.drive(0.2, 0.0)
-    stage.peer.say(1.0, 0.0)
-    stage.peer.wait("voltages", lambda e: e["volts"][0] > _SHORT - 0.002, stage.begun)
-    time.sleep(_AWAY)
-    volts = max(change.volts[0] for change in stage.changes() if change.volts)
-    seen.check(volts <= _SHORT, f"{volts:.3f} V")
-    told = stage.peer.heard("voltages")[-1]
-    rate = (_SHORT - stage.law.translation.positive.intercept) / stage.law.translation.positive.slope
-    seen.check(abs(told["v"] - rate) < 0.002, f"base_node tells {told['v']:.3f} m/s")
-    seen.note(f"{volts:.3f} V; base_node tells {told['v']:.3f} m/s")
-
-
 def _reference_lost(stage: Stage, seen: Seen) -> None:
     """Whatever is left of the joystick's plug: V_f and V_s go to where the reference was."""
     stage.drive()
@@ -200,10 +117,14 @@ def _reference_lost(stage: Stage, seen: Seen) -> None:
     def stopped() -> list[float]:
         found = [c for c in stage.changes(begin) if c.volts]
         return [
-            c.time for c in found if c.volts and max(abs(c.volts[i] + c.volts[2] - stage.law.reference_voltage) for i in (0, 1)) < code
+            c.time
+            for c in found
+            if c.volts and max(abs(c.volts[i] + c.volts[2] - stage.law.reference_voltage) for i in (0, 1)) < code
         ]
 
-    seen.within("V_f and V_s at the neutral pin voltage", until(stopped, "the pins at neutral")[0] - begin, _noticed(stage))
+    seen.within(
+        "V_f and V_s at the neutral pin voltage", until(stopped, "the pins at neutral")[0] - begin, _noticed(stage)
+    )
     seen.said(stage, "GUARD_TRIPPED: the D/A converter failed", "DAC_WRONG_REPLY")
     since = stage.neutral()
     seen.latched(stage, since)
@@ -225,51 +146,97 @@ def _other_reference(stage: Stage, seen: Seen) -> None:
 _LATCHED = "the guard trips and stays neutral until the stick is let go"
 _OBEYS = f"neutral within a period and all retries + 30 ms; {_LATCHED}"
 _RETURN = f"neutral is the first thing that it gets; {_LATCHED}"
-_ALONE = "refused; the first owner is not disturbed"
 _BROKEN = Setup(broken=True)
 
 CASES = (
     Case("5", "board: no reply", "once", "made good by the retry: drives on", _once("silent")),
-    Case("5", "board: no reply", f"to {_MANY} commands", _OBEYS, _answers_badly(f"silentx{_MANY}", "DAC_NO_REPLY"), repeated=True),
-    Case("5", "board: wrong reply", f"to {_MANY} commands", _OBEYS, _answers_badly(f"wrongx{_MANY}", "DAC_WRONG_REPLY"), repeated=True),
-    Case("5", "board: half a reply", f"to {_MANY} commands", _OBEYS, _answers_badly(f"cutx{_MANY}", "DAC_NO_REPLY"), repeated=True),
+    Case(
+        "5",
+        "board: no reply",
+        f"to {_MANY} commands",
+        _OBEYS,
+        _answers_badly(f"silentx{_MANY}", "DAC_NO_REPLY"),
+        repeated=True,
+    ),
+    Case(
+        "5",
+        "board: wrong reply",
+        f"to {_MANY} commands",
+        _OBEYS,
+        _answers_badly(f"wrongx{_MANY}", "DAC_WRONG_REPLY"),
+        repeated=True,
+    ),
+    Case(
+        "5",
+        "board: half a reply",
+        f"to {_MANY} commands",
+        _OBEYS,
+        _answers_badly(f"cutx{_MANY}", "DAC_NO_REPLY"),
+        repeated=True,
+    ),
     Case("5", "board: late reply", "by 0.03 s, once", "waited for: drives on", _once("late=0.03")),
-    Case("5", "board: late reply", f"by 0.12 s, to {_MANY} commands", _OBEYS, _answers_badly(f"latex{_MANY}=0.12", "DAC_NO_REPLY"), repeated=True),
-    Case("5", "board: deaf", f"to {_MANY} commands", f"held; when it hears again, {_RETURN}", _hears_nothing(f"deafx{_MANY}", "DAC_NO_REPLY")),
-    Case("5", "board: stalled", f"reads nothing for {_AWAY:g} s", f"held; when it reads again, {_RETURN}", _hears_nothing(f"stall={_AWAY}", "DAC_NO_REPLY")),
+    Case(
+        "5",
+        "board: late reply",
+        f"by 0.12 s, to {_MANY} commands",
+        _OBEYS,
+        _answers_badly(f"latex{_MANY}=0.12", "DAC_NO_REPLY"),
+        repeated=True,
+    ),
+    Case(
+        "5",
+        "board: deaf",
+        f"to {_MANY} commands",
+        f"held; when it hears again, {_RETURN}",
+        _hears_nothing(f"deafx{_MANY}", "DAC_NO_REPLY"),
+    ),
+    Case(
+        "5",
+        "board: stalled",
+        f"reads nothing for {_AWAY:g} s",
+        f"held; when it reads again, {_RETURN}",
+        _hears_nothing(f"stall={_AWAY}", "DAC_NO_REPLY"),
+    ),
     Case("5", "board: unplugged", f"for {_AWAY:g} s", f"held; back, {_RETURN}", _unplugged, repeated=True),
     Case("5", "wire: short writes", "half of every write()", "the rest is sent, too: drives on", _writes_half, _BROKEN),
-    Case("5", "wire: blocked", "write() takes half, then EAGAIN", f"held; back, {_RETURN}", _write_fails(BrokenCalls.STUCK, "DAC_BLOCKED"), _BROKEN),
-    Case("5", "wire: EIO", "of every write()", f"held; back, {_RETURN}", _write_fails(BrokenCalls.ERROR, "DAC_CLOSED"), _BROKEN),
-    Case("6", "two owners of the port", "a second guard", _ALONE, _second_guard),
-    Case("6", "two owners of the port", "set_voltages", _ALONE, _second_program),
-    Case("6", "two clients of the guard", "a second base_node", _ALONE, _second_client),
-    Case("16", "template: code beyond bits", "bits: 10, codes to 4095", "refused at the start", _bad_file({"bits": 10}, "must be at most 1023")),
     Case(
-        "16",
-        "template: code beyond its digits",
-        "W{ch}{code:02X}",
-        "refused at the start",
-        _bad_file({"write/send": "W{ch}{code:02X}", "write/expect": "OK {ch}{code:02X}"}, "does not fit"),
+        "5",
+        "wire: blocked",
+        "write() takes half, then EAGAIN",
+        f"held; back, {_RETURN}",
+        _write_fails(BrokenCalls.STUCK, "DAC_BLOCKED"),
+        _BROKEN,
     ),
     Case(
-        "16",
-        "template: clamp beyond the codes",
-        "volt to 3 V",
-        "refused at the start",
-        _bad_file({"channels/translation/volt/max": 3.0}, "volt reaches from"),
+        "5",
+        "wire: EIO",
+        "of every write()",
+        f"held; back, {_RETURN}",
+        _write_fails(BrokenCalls.ERROR, "DAC_CLOSED"),
+        _BROKEN,
     ),
     Case(
-        "16",
-        "voltage beyond the device's clamp",
-        f"1 m/s asked for, the device's clamp ends at {_SHORT} V",
-        "clamped; odometry and `voltages` tell what is held",
-        _narrow_device,
-        Setup(device={"channels/translation/volt/max": _SHORT}),
+        "17",
+        "reference: lost",
+        f"its output at 0 V for {_MANY} commands, the reply says so",
+        f"V_f and V_s neutral at the pin; {_LATCHED}",
+        _reference_lost,
+        clamped=False,
     ),
-    Case("17", "reference: lost", f"its output at 0 V for {_MANY} commands, the reply says so", f"V_f and V_s neutral at the pin; {_LATCHED}", _reference_lost, clamped=False),
-    Case("17", "reference: wrong reply", f"to {_MANY} commands", _OBEYS, _answers_badly(f"wrong/referencex{_MANY}", "DAC_WRONG_REPLY")),
-    Case("17", "reference: no reply", f"to {_MANY} commands", _OBEYS, _answers_badly(f"silent/referencex{_MANY}", "DAC_NO_REPLY")),
+    Case(
+        "17",
+        "reference: wrong reply",
+        f"to {_MANY} commands",
+        _OBEYS,
+        _answers_badly(f"wrong/referencex{_MANY}", "DAC_WRONG_REPLY"),
+    ),
+    Case(
+        "17",
+        "reference: no reply",
+        f"to {_MANY} commands",
+        _OBEYS,
+        _answers_badly(f"silent/referencex{_MANY}", "DAC_NO_REPLY"),
+    ),
     Case(
         "17",
         "reference: held elsewhere",

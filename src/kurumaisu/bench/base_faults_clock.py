@@ -8,12 +8,12 @@ import subprocess
 import time
 from collections.abc import Callable
 
+from kurumaisu.bench.base_faults_braking import SLACK, braking, timeout
 from kurumaisu.bench.base_faults_peer import until
 from kurumaisu.bench.base_faults_seen import Case, Seen
 from kurumaisu.bench.base_faults_stage import Setup, Stage, V, W
 from kurumaisu.bench.processes import PATIENCE
 
-_SLACK = 0.06  # [s] a tick each of clock and base_node, and the way
 _AHEAD, _BACK = 3600.0, -7200.0  # [s] by which the wall clock is set
 _LEAP = 1000.0  # [s] of simulated time
 _WATCH = 1.0  # [s]
@@ -32,13 +32,11 @@ def _wall_clock(step: float) -> Callable[[Stage, Seen], None]:
             seen.undisturbed(stage)
             seen.check(stage.count("time resets") == 0, "time ran backwards for it")
             moved = stage.peer.heard("voltages")[-1]["stamp"] - before
-            seen.check(abs(moved - step) < 2 * _WATCH + _SLACK, f"its stamps moved by {moved:.0f} s")
+            seen.check(abs(moved - step) < 2 * _WATCH + SLACK, f"its stamps moved by {moved:.0f} s")
             seen.note(f"stamps moved by {moved:.0f} s, voltages as before")
             begin = time.monotonic()
             stage.peer.repeat("cmd_vel", None)
-            navigation = stage.values["inputs"]["navigation"]
-            brake = V / stage.values["limits"][navigation["limits"]]["v_deceleration"]
-            seen.neutral(stage, begin, navigation["timeout"] + brake + _SLACK)
+            seen.neutral(stage, begin, timeout(stage) + braking(stage) + SLACK)
         finally:
             stage.calls.step_clock(0.0)
 
@@ -49,7 +47,7 @@ def _reset(stage: Stage, seen: Seen) -> None:
     stage.drive()
     begin = time.monotonic()
     stage.tick(1.0)
-    since = seen.neutral(stage, begin, _SLACK)
+    since = seen.neutral(stage, begin, SLACK)
     seen.said(stage, "BASE_TIME_RESET")
     seen.check(stage.count("time resets") > 0, "not counted")
     seen.check(stage.peer.heard("odom")[-1]["x"] == 0.0, "odometry goes on")
@@ -74,21 +72,21 @@ def _stands_still(stage: Stage, seen: Seen) -> None:
     stage.drive()
     begin = time.monotonic()
     stage.tick(None)
-    since = seen.neutral(stage, begin, stage.guard_values["limits"]["silence"] + _SLACK)
+    since = seen.neutral(stage, begin, stage.guard_values["limits"]["silence"] + SLACK)
     seen.said(stage, "GUARD_TRIPPED: the client is silent")
     stage.tick(stage.clock)
     seen.latched(stage, since)
 
 
-def _brake(stage: Stage) -> float:
-    limits = stage.values["limits"][stage.values["inputs"]["navigation"]["limits"]]
-    return V / float(limits["v_deceleration"]) + _SLACK
+def _lost(stage: Stage) -> float:
+    """Return after how long the chair rests once nobody answers for the master [s]."""
+    return _QUESTION * float(stage.values["master_timeout"]) + braking(stage) + SLACK
 
 
 def _master_dies(stage: Stage, seen: Seen) -> None:
     stage.drive()
     begin = stage.graph.kill_master()
-    since = seen.neutral(stage, begin, _QUESTION * stage.values["master_timeout"] + _brake(stage))
+    since = seen.neutral(stage, begin, _lost(stage))
     seen.said(stage, "BASE_MASTER_LOST")
     seen.held(stage, since)
     stage.graph.start_master()
@@ -122,7 +120,7 @@ def _master_and_commander_die(stage: Stage, seen: Seen) -> None:
     stage.drive()
     stage.graph.kill_master()
     begin = stage.peer.signal(signal.SIGKILL)
-    seen.neutral(stage, begin, stage.values["inputs"]["navigation"]["timeout"] + _brake(stage))
+    seen.neutral(stage, begin, timeout(stage) + braking(stage) + SLACK)
 
 
 def _master_hangs(stage: Stage, seen: Seen) -> None:
@@ -139,7 +137,7 @@ def _master_hangs(stage: Stage, seen: Seen) -> None:
 def _master_hangs_long(stage: Stage, seen: Seen) -> None:
     stage.drive()
     begin = stage.strike(signal.SIGSTOP, stage.graph.master.pid)
-    since = seen.neutral(stage, begin, _QUESTION * stage.values["master_timeout"] + _brake(stage))
+    since = seen.neutral(stage, begin, _lost(stage))
     seen.said(stage, "BASE_MASTER_LOST")
     stage.strike(signal.SIGCONT, stage.graph.master.pid)
     stage.status("commands", "not released: navigation")
@@ -151,7 +149,7 @@ def _master_restarts(stage: Stage, seen: Seen) -> None:
     begin = stage.graph.kill_master()
     stage.graph.start_master()
     period = stage.values["master_timeout"] * (_QUESTION - 1)
-    since = seen.neutral(stage, begin, period + 1.0 + _brake(stage))  # 1 s: until a master answers
+    since = seen.neutral(stage, begin, period + 1.0 + braking(stage) + SLACK)  # 1 s: until a master answers
     _ends(stage, seen)
     seen.held(stage, since)
     _supervised(stage, seen)
@@ -166,12 +164,60 @@ _ANEW = "at rest base_node ends, exit status 1; started anew: neutral until the 
 CASES = (
     Case("8", "wall clock set", f"{_AHEAD:+.0f} s {_STEPPED}", _NOTHING, _wall_clock(_AHEAD), _BROKEN),
     Case("8", "wall clock set", f"{_BACK:+.0f} s {_STEPPED}", _NOTHING, _wall_clock(_BACK), _BROKEN),
-    Case("8", "simulated time", "reset to 1 s", "neutral at once, odometry afresh; neutral until the stick is let go", _reset, _SIMULATED),
-    Case("8", "simulated time", f"leaps by {_LEAP:.0f} s", "no voltage beyond what is asked; odometry does not leap", _leap, _SIMULATED),
-    Case("8", "simulated time", "stands still", "neutral after the guard's silence; neutral until the stick is let go", _stands_still, _SIMULATED),
-    Case("14", "roscore dies", "SIGKILL; the commander goes on", f"brakes after master_timeout; another roscore: {_ANEW}", _master_dies, last=True),
-    Case("14", "roscore and commander die", "SIGKILL of both", "neutral within the command's timeout + v / deceleration", _master_and_commander_die, last=True),
+    Case(
+        "8",
+        "simulated time",
+        "reset to 1 s",
+        "neutral at once, odometry afresh; neutral until the stick is let go",
+        _reset,
+        _SIMULATED,
+    ),
+    Case(
+        "8",
+        "simulated time",
+        f"leaps by {_LEAP:.0f} s",
+        "no voltage beyond what is asked; odometry does not leap",
+        _leap,
+        _SIMULATED,
+    ),
+    Case(
+        "8",
+        "simulated time",
+        "stands still",
+        "neutral after the guard's silence; neutral until the stick is let go",
+        _stands_still,
+        _SIMULATED,
+    ),
+    Case(
+        "14",
+        "roscore dies",
+        "SIGKILL; the commander goes on",
+        f"brakes after master_timeout; another roscore: {_ANEW}",
+        _master_dies,
+        last=True,
+    ),
+    Case(
+        "14",
+        "roscore and commander die",
+        "SIGKILL of both",
+        "neutral within the command's timeout + v / deceleration",
+        _master_and_commander_die,
+        last=True,
+    ),
     Case("14", "roscore hangs", "SIGSTOP for half of master_timeout", "nothing", _master_hangs),
-    Case("14", "roscore hangs", "SIGSTOP; SIGCONT when the chair rests", "brakes after master_timeout; then neutral until the stick is let go", _master_hangs_long),
-    Case("14", "roscore is restarted", "SIGKILL, and another one at once", f"brakes; {_ANEW}", _master_restarts, last=True),
+    Case(
+        "14",
+        "roscore hangs",
+        "SIGSTOP; SIGCONT when the chair rests",
+        "brakes after master_timeout; then neutral until the stick is let go",
+        _master_hangs_long,
+    ),
+    Case(
+        "14",
+        "roscore is restarted",
+        "SIGKILL, and another one at once",
+        f"brakes; {_ANEW}",
+        _master_restarts,
+        last=True,
+    ),
 )

@@ -8,6 +8,7 @@ import signal
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from pathlib import Path
 
 from kurumaisu.bench.base_faults_peer import until
 from kurumaisu.bench.base_faults_seen import Case, Seen, trips
@@ -81,7 +82,7 @@ def _sentinel_dies(stage: Stage, seen: Seen) -> None:
     guard = stage.rig.guard()
     since = seen.neutral(stage, stage.strike(signal.SIGKILL, stage.rig.sentinel()), _GUARD)
     stage.rig.reap()
-    until(lambda: not os.path.exists(f"/proc/{guard}"), "the guard's end")
+    until(lambda: not Path(f"/proc/{guard}").exists(), "the guard's end")
     stage.status("guard", "no guard")
     seen.note("diagnostics: no guard")
     seen.held(stage, since)

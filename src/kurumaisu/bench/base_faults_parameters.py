@@ -23,7 +23,24 @@ _SEED = 1
 _WATCH = 0.6  # [s]
 _RESET = "\x1b[0m"  # the log's colours
 _STEERING = "model/voltage_laws/corrected/steering"
-_GARBAGE = ("", "nan", "1e999", "\N{SNOWMAN}", -1, 0, 2**31 - 1, 1e308, -1e308, math.nan, math.inf, True, [], [1, "a"], {}, {"a": 1})
+_GARBAGE: tuple[Any, ...] = (
+    "",
+    "nan",
+    "1e999",
+    "\N{SNOWMAN}",
+    -1,
+    0,
+    2**31 - 1,
+    1e308,
+    -1e308,
+    math.nan,
+    math.inf,
+    True,
+    [],
+    [1, "a"],
+    {},
+    {"a": 1},
+)
 
 
 def _start(stage: Stage, changes: Mapping[str, Any]) -> tuple[int | None, str]:
@@ -170,9 +187,27 @@ CASES = (
         _START,
         _refused({f"{_STEERING}/positive/slope": math.nan}, f"{_STEERING}/positive/slope"),
     ),
-    Case("-", "parameter server: garbage", f"{_TRIALS} keys at random (seed {_SEED})", "refused with a message, or harmless; neutral", _garbage),
+    Case(
+        "-",
+        "parameter server: garbage",
+        f"{_TRIALS} keys at random (seed {_SEED})",
+        "refused with a message, or harmless; neutral",
+        _garbage,
+    ),
     Case("-", "parameter server: garbage", "bytes in place of a number", _START, _master_nonsense),
     Case("-", "parameter server: garbage", "a text in place of all", _START, _no_tree("garbage")),
-    Case("-", "parameter server: garbage", "overwritten, then deleted while driving", "nothing: parameters are read at the start", _while_driving),
-    Case("-", "dynamic_reconfigure: garbage", "limits of NaN, inf, -inf", "set back, or to the lowest that is allowed; no burst", _reconfigured),
+    Case(
+        "-",
+        "parameter server: garbage",
+        "overwritten, then deleted while driving",
+        "nothing: parameters are read at the start",
+        _while_driving,
+    ),
+    Case(
+        "-",
+        "dynamic_reconfigure: garbage",
+        "limits of NaN, inf, -inf",
+        "set back, or to the lowest that is allowed; no burst",
+        _reconfigured,
+    ),
 )

@@ -15,7 +15,10 @@ _REST = 0.002  # [V] more than a code of the board: the rounding of rest
 
 
 def rates(law: AxisLaw, samples: Sequence[tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
-    """Return times [s] and speeds [m/s] of samples of V_f, each a time [s] and volts, the first at each time; rest is 0."""
+    """Return times [s] and speeds [m/s] of samples, each a time [s] and V_f [V]; rest is 0.
+
+    Of samples at the same time the first counts.
+    """
     times, volts = (np.array(column) for column in zip(*samples, strict=True))
     kept = np.r_[True, np.diff(times) > 0]
     times, volts = times[kept], volts[kept]

@@ -15,15 +15,16 @@ from collections.abc import Callable
 from typing import Any
 
 import rospy
-import rosservice
 from diagnostic_msgs.msg import DiagnosticArray
 from dynamic_reconfigure.msg import Config, DoubleParameter
+from dynamic_reconfigure.srv import Reconfigure
 from geometry_msgs.msg import Twist
-from kurumaisu.msg import Voltages
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Bool, Float64, String
+from std_srvs.srv import Trigger
 
 from kurumaisu.errors import Error
+from kurumaisu.msg import Voltages
 from kurumaisu.ros.testing import Repeated, SimulatedClock
 
 _PERIOD = 0.02  # [s] of what is repeated
@@ -100,16 +101,14 @@ class Peer:
             self._clock = None
 
     def call(self, name: str) -> None:
-        """Call a service that takes nothing, and tell its answer."""
-        answer = rospy.ServiceProxy(name, rosservice.get_service_class_by_name(name))()
+        """Call a service of std_srvs/Trigger, and tell its answer."""
+        answer = rospy.ServiceProxy(name, Trigger)()
         _tell("answer", name=name, success=bool(answer.success), message=answer.message)
 
     def limits(self, name: str, values: dict[str, float]) -> None:
         """Ask dynamic_reconfigure for limits, and tell what it answers that holds."""
-        service = f"{name}/set_parameters"
-        request = rosservice.get_service_class_by_name(service)._request_class()
-        request.config = Config(doubles=[DoubleParameter(key, value) for key, value in values.items()])
-        answer = rospy.ServiceProxy(service, rosservice.get_service_class_by_name(service))(request)
+        config = Config(doubles=[DoubleParameter(key, value) for key, value in values.items()])
+        answer = rospy.ServiceProxy(f"{name}/set_parameters", Reconfigure)(config)
         _tell("limits", name=name, values={p.name: p.value for p in answer.config.doubles})
 
 
