@@ -12,6 +12,7 @@ from kurumaisu.bench.guard_rig import Change
 from kurumaisu.errors import Error
 
 _SETTLED = 0.05  # [s] after the first neutral; a burst of commands on the wire may end in between
+_CODE = 0.002  # [V] more than a code of the board
 _LATE = "LATE"
 OK = "ok"
 
@@ -80,6 +81,14 @@ class Seen:
     def undisturbed(self, stage: Stage) -> None:
         """See that the board's voltages did not change since the mark."""
         self.check(not stage.changes(), f"{len(stage.changes())} changes of voltage")
+
+    def no_burst(self, stage: Stage, since: float) -> None:
+        """See that V_f and V_s went nowhere but towards neutral since then [s, monotonic]."""
+        before = next(c.volts for c in reversed(stage.rig.changes()) if c.volts and c.time < since)
+        for change in stage.changes(since):
+            for was, now in zip(before[:2], change.volts or (0.0, 0.0), strict=False):
+                less = abs(now) <= abs(was) + _CODE and was * now >= 0
+                self.check(less, f"{now:.3f} V after {was:.3f} V")
 
     def clamped(self, stage: Stage) -> None:
         """See that no voltage since the mark left the device's clamp, or the model's band."""
