@@ -54,11 +54,32 @@ def test_what_is_not_as_expected_is_told(monkeypatch, capsys, play, verdict, sta
     def fail():
         raise Error("not within 30 s: neutral")
 
-    stage = SimpleNamespace(mark=lambda: None, fail=fail)
+    peer = SimpleNamespace(heard=lambda _what, _since: [])
+    stage = SimpleNamespace(mark=lambda: None, fail=fail, peer=peer, begun=0.0)
     monkeypatch.setattr(base_faults, "stage", lambda _folder, _setup: contextlib.nullcontext(stage))
     monkeypatch.setattr(base_faults, "cases", lambda: [Case("1", "a", "b", "c", play, clamped=False)])
     assert base_faults.main(["--times", "1"]) == status
     assert f"| {verdict} |" in capsys.readouterr().out
+
+
+def test_a_play_that_its_commander_spoils_does_not_count(monkeypatch, capsys):
+    late = [["late"], []]
+    stage = SimpleNamespace(mark=lambda: None, begun=0.0, peer=SimpleNamespace(heard=lambda _what, _since: late[0]))
+
+    def play(_stage, seen):
+        seen.check(not late[0], "brakes")
+        seen.note("done")
+
+    def stages(_folder, _setup):
+        return contextlib.nullcontext(stage)
+
+    monkeypatch.setattr(base_faults, "stage", stages)
+    monkeypatch.setattr(base_faults, "cases", lambda: [Case("1", "a", "b", "c", play, clamped=False)])
+    assert base_faults.main([]) == 1  # it never keeps time
+    stage.peer.heard = lambda _what, _since: late.pop(0)
+    late.insert(0, ["late"])
+    assert base_faults.main([]) == 0
+    assert "| done | ok |" in capsys.readouterr().out
 
 
 def test_of_repetitions_the_worst_counts():

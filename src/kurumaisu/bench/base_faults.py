@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import copy
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -34,6 +35,7 @@ _MODULES = (
     base_faults_odometry,
     base_faults_parameters,
 )
+_TRIES = 3  # of a play that the benchmark's own commander spoils, on a machine that is busy otherwise
 _COLUMNS = ("#", "fault", "injected", "expected", "seen", "verdict")
 
 
@@ -75,7 +77,7 @@ def _play(chosen: Sequence[Case], times: int) -> Iterator[Seen]:
             for case in chosen:
                 seen = Seen()
                 for _ in range(times if case.repeated else 1):
-                    players.play(case, seen)
+                    seen = players.play(case, seen)
                 _row([case.number, case.fault, case.how, case.expected, seen.cell(), seen.verdict()])
                 yield seen
         finally:
@@ -91,10 +93,19 @@ class _Players:
         self._setup = Setup()
         self._stack = ExitStack()
         self._stages = 0
+        self._commander_kept_time = True
 
-    def play(self, case: Case, seen: Seen) -> None:
-        """Play a case once."""
+    def play(self, case: Case, before: Seen) -> Seen:
+        """Play a case once; return what was seen so far, and now. If its own commander was late, play it again."""
+        for _ in range(_TRIES - 1):
+            seen = self._once(case, copy.deepcopy(before))
+            if self._commander_kept_time or seen.verdict() == before.verdict():
+                return seen
+        return self._once(case, copy.deepcopy(before))
+
+    def _once(self, case: Case, seen: Seen) -> Seen:
         wrong = len(seen.wrong)
+        on = None
         try:
             on = self._stage_for(case.setup)
             on.mark()
@@ -103,8 +114,10 @@ class _Players:
                 seen.clamped(on)
         except Error as error:
             seen.check(False, str(error))
+        self._commander_kept_time = on is None or not on.peer.heard("late", on.begun)
         if case.last or len(seen.wrong) > wrong:
             self.end()
+        return seen
 
     def _stage_for(self, setup: Setup) -> Stage:
         if self._stage is None or setup != self._setup:

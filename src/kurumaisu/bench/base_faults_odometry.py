@@ -18,7 +18,7 @@ _DRIVEN = 1.0  # [s]
 
 
 def _compare(stage: Stage, seen: Seen) -> None:
-    """Compare odometry with the board, from the rest before to one that is brought about now."""
+    """Compare odometry with the board, from the rest at the mark to one that is brought about now."""
     stage.peer.say(0.0, 0.0)
     stage.neutral()
     last = stage.peer.wait("odom", lambda event: event["v"] == 0.0, time.monotonic())
@@ -30,6 +30,7 @@ def _compare(stage: Stage, seen: Seen) -> None:
 
 
 def _clamp_active(stage: Stage, seen: Seen) -> None:
+    stage.rest()
     stage.drive(0.3, 0.0)
     stage.peer.say(1.0, 0.0)
     until(lambda: (stage.changes()[-1].volts or (0.0,))[0] > _CUT - 0.002, f"{_CUT} V")
@@ -43,6 +44,7 @@ def _clamp_active(stage: Stage, seen: Seen) -> None:
 
 def _hang(seconds: float) -> Callable[[Stage, Seen], None]:
     def play(stage: Stage, seen: Seen) -> None:
+        stage.rest()
         stage.drive(V, 0.0)
         late = stage.count("late ticks")
         stage.strike(signal.SIGSTOP)

@@ -116,6 +116,7 @@ class Peer:
     def __init__(self, graph: Graph, log: Path) -> None:
         """Start it, and wait until it listens; its complaints go to the log."""
         self.events: list[Event] = []
+        self.said: dict[str, Any] = {}  # what is repeated, by topic
         self.process = graph.run(
             [sys.executable, "-m", "kurumaisu.ros.base_peer"],
             stdin=subprocess.PIPE,
@@ -157,6 +158,7 @@ class Peer:
 
     def repeat(self, topic: str, value: Any) -> None:
         """Repeat a value from now on; None: be silent."""
+        self.said[topic] = value
         self.order(do="repeat", topic=topic, value=value)
 
     def call(self, name: str) -> Event:

@@ -165,17 +165,26 @@ class Stage:
         """Return the board's changes since the mark, and since then [s, monotonic]."""
         return [change for change in self.rig.changes()[self._first :] if change.time >= since]
 
-    def drive(self, v: float = V, w: float = W, changes: Mapping[str, Any] | None = None) -> None:
+    def drive(self, v: float = V, w: float = W) -> None:
         """Start what does not run, let go, and drive until the board has the voltages. Raise Error if it never has."""
         self.rig.start()
-        if not self.node or self.node.poll() is not None:
-            self.start_node(changes)
+        runs = self.node and self.node.poll() is None
+        if runs and self.peer.said.get("cmd_vel") == [v, w] and self.is_armed() and self.has(v, w):
+            return
+        if not runs:
+            self.start_node()
         if self.simulated and math.isinf(self._ticks[1]):
             self.tick(_BEGIN)
         self.peer.say(0.0, 0.0)
         until(lambda: self.is_armed() and self._obeys(), "the guard is armed, and base_node obeys")
         self.peer.say(v, w)
         until(lambda: self.has(v, w), f"the board has the voltages of {v} m/s, {w} rad/s")
+
+    def rest(self) -> None:
+        """Let go, and wait for neutral; what comes counts from now on."""
+        self.peer.say(0.0, 0.0)
+        self.neutral()
+        self.mark()
 
     def _obeys(self) -> bool:
         active = self.peer.heard("active")

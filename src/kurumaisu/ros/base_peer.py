@@ -28,6 +28,7 @@ from kurumaisu.msg import Voltages
 from kurumaisu.ros.testing import Repeated, SimulatedClock
 
 _PERIOD = 0.02  # [s] of what is repeated
+_LATE = 0.15  # [s] from one repetition to the next that are worth telling: base_node's inputs wait not much longer
 _lock = threading.Lock()
 
 
@@ -84,7 +85,7 @@ class Peer:
         """Repeat [v, w], a truth value or a number on a topic from now on; None: nothing any more."""
         if topic not in self._topics:
             self._topics[topic] = Repeated(topic, _kind(value), _PERIOD)
-        self._topics[topic].say(None if value is None else _maker(value))
+        self._topics[topic].say(None if value is None else _timed(topic, _maker(value)))
 
     def once(self, topic: str, value: Any) -> None:
         """Publish a value once, on a topic that something is repeated on."""
@@ -110,6 +111,21 @@ class Peer:
         config = Config(doubles=[DoubleParameter(key, value) for key, value in values.items()])
         answer = rospy.ServiceProxy(f"{name}/set_parameters", Reconfigure)(config)
         _tell("limits", name=name, values={p.name: p.value for p in answer.config.doubles})
+
+
+def _timed(topic: str, make: Callable[[], Any]) -> Callable[[], Any]:
+    """Return a maker that tells when it is called late."""
+    last = time.monotonic()
+
+    def timed() -> Any:
+        nonlocal last
+        now = time.monotonic()
+        if now - last > _LATE:
+            _tell("late", topic=topic, gap=now - last)
+        last = now
+        return make()
+
+    return timed
 
 
 def _kind(value: Any) -> type:
