@@ -124,6 +124,18 @@ TEST(DacFaults, NeutralIsSentAtOnceWhereRepliesAreInDoubt) {
   EXPECT_TRUE(rig.board.isNeutral(last.volts));
 }
 
+TEST(DacFaults, NeutralAfterAFaultWaitsForNoReply) {
+  Rig rig;
+  const auto converter = rig.open();
+  converter->put(d::kMoving);
+  rig.board.inject("silent@7x99");  // the reference is answered once more, V_f is not
+  EXPECT_TRUE(has(faultOf(*converter, {0.6, -0.25, 2.5}), "translation"));
+  std::thread later([&] { EXPECT_FALSE(faultOf(*converter, d::kNeutral).empty()); });
+  EXPECT_TRUE(rig.board.wait([&] { return rig.board.isNeutral(rig.board.volts()); }, 0.3))
+      << "less than reply_timeout";
+  later.join();
+}
+
 TEST(DacFaults, ABoardThatReadsNothingIsAFaultAndNoHang) {
   const std::string padding(200, ' ');
   Rig rig({{R"("W{ch}{code:04X}")", "\"" + padding + R"(W{ch}{code:04X}")"},
