@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -44,8 +45,10 @@ class Recorder : public Dac {
     outputs.push_back(output);
     return output;
   }
+  double patience() const override { return held_for; }
   const Output& last() const { return outputs.back(); }
   std::vector<Output> outputs;
+  double held_for = std::numeric_limits<double>::infinity();  // [s]
 };
 
 /// A drive on a clock; say() is repeated at every tick.

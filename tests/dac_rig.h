@@ -91,7 +91,7 @@ struct Rig {
   Device deviceOf(const Edits& edits) const {
     Edits all{{"port: /dev/kurumaisu_dac", "port: " + (folder / "port")},
               {"reply_timeout: 0.05", "reply_timeout: 0.4"},  // this computer may be busy
-              {"late_reply: 0.2", "late_reply: 0.8"}};
+              {"late_reply: 0.1", "late_reply: 0.8"}};
     all.insert(all.end(), edits.begin(), edits.end());
     return readDevice(written(folder, "device.yaml", edited(textOf(shipped("serial_ascii.yaml")), all)));
   }

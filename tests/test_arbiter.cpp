@@ -105,6 +105,25 @@ TEST_F(ArbiterTest, AfterDisarmingEveryInputMustBeReleasedAnew) {
   EXPECT_EQ(hear(kNavigation, 0.3, 1.4).reason, k::Reason::kDriving);  // it was silent
 }
 
+// Fault 11
+TEST(Arbiter, WhereTheFirstWordMustBeRestSilenceBeforeItReleasesNothing) {
+  k::ArbiterSettings settings = kArbiter;
+  settings.first_word_is_rest = true;
+  k::Arbiter arbiter(settings);
+  arbiter.choose(0);
+  const auto reason = [&arbiter](double v, double t) {
+    arbiter.command(kNavigation, "/a", {v, 0}, t);
+    return arbiter.choose(t).reason;
+  };
+  EXPECT_EQ(reason(0.3, 5.0), k::Reason::kUnreleased);
+  EXPECT_EQ(reason(0.3, 5.2), k::Reason::kUnreleased);
+  EXPECT_EQ(reason(0.3, 5.5), k::Reason::kDriving);  // let go: it was silent since it was heard
+  arbiter.reset();
+  arbiter.choose(6.0);
+  EXPECT_EQ(reason(0.3, 7.0), k::Reason::kUnreleased);
+  EXPECT_EQ(reason(0.0, 7.1), k::Reason::kDriving);
+}
+
 TEST(EStop, IsReleasedByNothingButAReset) {
   k::EStop stop(0);
   stop.tick(1);

@@ -133,6 +133,17 @@ TEST_F(DriveTest, OdometryFollowsTheClampedRateOverTheTimeThatReallyPassed) {
   EXPECT_EQ(chair.drive.counts().late_ticks, 1U);
 }
 
+// Fault 13
+TEST_F(DriveTest, OdometryStopsWhenTheConverterLetsGoByItself) {
+  chair.dac.held_for = 0.15;  // as behind a guard
+  chair.drive.command(kNavigation, "/a", {1.0, 0.0}, chair.t);
+  chair.drive.tick(chair.t + 0.01);
+  chair.drive.tick(chair.t + 0.11);
+  EXPECT_NEAR(chair.drive.odometry().pose().x, 0.1, 1e-9);
+  chair.drive.tick(chair.t + 0.61);  // neutral since 0.26
+  EXPECT_NEAR(chair.drive.odometry().pose().x, 0.25, 1e-9);
+}
+
 // Fault 8
 TEST_F(RideTest, WhenTheClockRunsBackwardsEverythingStartsAfresh) {
   chair.say(0.5, 0.2);

@@ -124,6 +124,18 @@ TEST(DacFaults, NeutralIsSentAtOnceWhereRepliesAreInDoubt) {
   EXPECT_TRUE(rig.board.isNeutral(last.volts));
 }
 
+TEST(DacFaults, NeutralAfterAFaultWaitsForNoReply) {
+  Rig rig;
+  const auto converter = rig.open();
+  converter->put(d::kMoving);
+  rig.board.inject("silent@7x99");  // the reference is answered once more, V_f is not
+  EXPECT_TRUE(has(faultOf(*converter, {0.6, -0.25, 2.5}), "translation"));
+  std::thread later([&] { EXPECT_FALSE(faultOf(*converter, d::kNeutral).empty()); });
+  EXPECT_TRUE(rig.board.wait([&] { return rig.board.isNeutral(rig.board.volts()); }, 0.3))
+      << "less than reply_timeout";
+  later.join();
+}
+
 TEST(DacFaults, ABoardThatReadsNothingIsAFaultAndNoHang) {
   const std::string padding(200, ' ');
   Rig rig({{R"("W{ch}{code:04X}")", "\"" + padding + R"(W{ch}{code:04X}")"},
@@ -162,6 +174,27 @@ TEST(DacFaults, UnpluggedBetweenTwoFrames) {
   const auto converter = rig.open();
   rig.board.inject("unplug@4=60");
   EXPECT_TRUE(has(faultOf(*converter, d::kMoving), "DAC_CLOSED"));
+}
+
+TEST(DacFaults, TheReferenceIsLost) {
+  Rig rig(kNoRetry);
+  const auto converter = rig.open();
+  converter->put(d::kNeutral);
+  rig.board.inject("lost/reference@6x3");
+  const std::string fault = faultOf(*converter, d::kMoving);
+  EXPECT_TRUE(has(fault, "DAC_WRONG_REPLY") && has(fault, "reference")) << fault;
+  ASSERT_TRUE(rig.heardAll(8)) << "the others are written all the same";
+  EXPECT_EQ(rig.board.codes()[d::kReference], 0);
+  EXPECT_GT(rig.board.codes()[d::kTranslation], 0);
+}
+
+TEST(DacFaults, AFaultOfOneSignalSparesTheOthers) {
+  Rig rig(kNoRetry);
+  const auto converter = rig.open();
+  rig.board.inject("silent/steering@3x3");
+  const std::string fault = faultOf(*converter, d::kMoving);
+  EXPECT_TRUE(has(fault, "steering") && !has(fault, "translation of")) << fault;
+  EXPECT_THROW(rig.board.inject("silent/brakes"), std::invalid_argument);
 }
 
 TEST(DacFaults, ASecondOwnerIsRefused) {

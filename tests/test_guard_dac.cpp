@@ -30,7 +30,7 @@ class FakeGuard : public testing::Test {
 
   /// What the base takes for put out when it asks for 0.5 m/s and 0.3 rad/s and hears this.
   k::Output heard(g::State state, double translation, double steering) {
-    k::GuardDac dac({folder / "socket", 0.02, 0.01}, {kTranslation, kSteering});
+    k::GuardDac dac({folder / "socket", 0.02, 0.01}, 0.15, {kTranslation, kSteering});
     const k::Output asked{kTranslation.volts(0.5), kSteering.volts(0.3), 2.5, 0.5, 0.3};
     dac.put(asked);  // connects
     g::Descriptor peer(accept(listener.fd(), nullptr, nullptr));

@@ -260,6 +260,7 @@ namespace {
 class NoDac : public k::Dac {
  public:
   k::Output put(const k::Output& output) override { return output; }
+  double patience() const override { return std::numeric_limits<double>::infinity(); }
 };
 
 }  // namespace

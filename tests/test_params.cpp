@@ -117,6 +117,7 @@ Value nodeValues() {
   v["dac"]["retry_pause"] = 0.1;
   v["dac"]["nice"] = -20;
   v["guard"]["socket"] = std::string("/somewhere");
+  v["guard"]["limits"]["silence"] = 0.15;
   v["guard"]["what_is_the_guards_own"] = true;
   v["odometry"]["imu"]["use"] = false;
   v["odometry"]["imu"]["axis"] = std::string("tf");
@@ -226,11 +227,14 @@ TEST(BaseSettings, AreReadFromAWholeConfiguration) {
 TEST(BaseSettings, AGuardIsChosenByItsName) {
   Value v = nodeValues();
   EXPECT_FALSE(k::readBaseSettings({v, "/n"}).dac.guard);
+  EXPECT_FALSE(k::readBaseSettings({v, "/n"}).drive.arbiter.first_word_is_rest);
   v["dac"]["kind"] = std::string("guard");
+  EXPECT_TRUE(k::readBaseSettings({v, "/n"}).drive.arbiter.first_word_is_rest);
   const k::DacSettings dac = k::readBaseSettings({v, "/n"}).dac;
   EXPECT_EQ(dac.guard->socket, "/somewhere");
   EXPECT_EQ(dac.guard->reply_wait, 0.01);
   EXPECT_EQ(dac.nice, -20);
+  EXPECT_EQ(dac.silence, 0.15);
   v["dac"]["kind"] = std::string("serial");
   EXPECT_EQ(complaint([&v] {
               k::readBaseSettings({v, "/n"});

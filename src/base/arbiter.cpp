@@ -21,7 +21,8 @@ Arbiter::Arbiter(const ArbiterSettings& settings)
 bool Arbiter::command(std::size_t input, const std::string& publisher, const Rates& rates, double t) {
   Input& to = inputs_.at(input);
   const double timeout = settings_.inputs[input].timeout;
-  if (since_ && t - to.heard.value_or(*since_) > timeout) to.released = true;
+  const std::optional<double> heard = to.heard || settings_.first_word_is_rest ? to.heard : since_;
+  if (heard && t - *heard > timeout) to.released = true;
   to.heard = t;
   ++counts_.commands;
   // Written so that NaN is beyond every bound.

@@ -97,9 +97,9 @@ class BaseNode {
 
 BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     : settings_(settings),
-      guard_(settings.dac.guard
-                 ? std::make_unique<k::GuardDac>(*settings.dac.guard, settings.drive.outlet.law)
-                 : nullptr),
+      guard_(settings.dac.guard ? std::make_unique<k::GuardDac>(*settings.dac.guard, settings.dac.silence,
+                                                                settings.drive.outlet.law)
+                                : nullptr),
       dac_(nh, guard_.get()),
       drive_(settings.drive, dac_),
       last_word_([this] { finish(); }),

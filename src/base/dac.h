@@ -20,6 +20,9 @@ class Dac {
 
   /// Holds these voltages until the next call. Returns what it really holds, and the rates that this stands for.
   virtual Output put(const Output& output) = 0;
+
+  /// For how long [s] it holds them if no call comes; then it is neutral.
+  virtual double patience() const = 0;
 };
 
 }  // namespace kurumaisu

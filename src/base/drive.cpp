@@ -82,7 +82,9 @@ Drive::Tick Drive::advanceTo(double t) {
     return Tick::kReset;  // the parts see it for themselves
   }
   if (t == *last) return Tick::kRepeated;
-  reckoning_.advance(output_.v, output_.w, *last, t);
+  const double held = std::min(t, *last + dac_.patience());  // a guard does not wait for a tick that is late
+  reckoning_.advance(output_.v, output_.w, *last, held);
+  if (held < t) reckoning_.advance(0, 0, held, t);
   return Tick::kAdvanced;
 }
 

@@ -12,15 +12,20 @@ namespace kurumaisu {
 /// Asks the guard for every sample, also while it refuses: so it is armed by nobody but whoever drives, by letting go.
 class GuardDac : public Dac {
  public:
-  GuardDac(const guard::ClientSettings& settings, const VoltageLaw& law) : client_(settings), law_(law) {}
+  /// silence: the guard's [s].
+  GuardDac(const guard::ClientSettings& settings, double silence, const VoltageLaw& law)
+      : client_(settings), silence_(silence), law_(law) {}
 
   /// What the guard says that the converter holds, and the rates that it stands for; neutral while there is no guard.
   Output put(const Output& asked) override;
+
+  double patience() const override { return silence_; }
 
   const guard::Status& status() const { return client_.status(); }
 
  private:
   guard::Client client_;
+  double silence_;
   VoltageLaw law_;
   Output held_{};
 };

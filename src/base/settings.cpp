@@ -122,6 +122,7 @@ BaseSettings readBaseSettings(Section node) {
                      "must be at least one period of rate: " + std::to_string(settings.drive.longest_step));
   }
   settings.dac = readDac(node.section("dac"), node.section("guard"));
+  settings.drive.arbiter.first_word_is_rest = settings.dac.guard.has_value();
   settings.odometry = readOdometry(node.section("odometry"), settings.effects);
   settings.drive.noise = settings.odometry.noise;
   if (settings.odometry.imu) settings.drive.gyro = settings.odometry.imu->gyro;

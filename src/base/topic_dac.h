@@ -5,6 +5,8 @@
 #include <kurumaisu/Voltages.h>
 #include <ros/node_handle.h>
 
+#include <limits>
+
 #include "base/dac.h"
 
 namespace kurumaisu {
@@ -26,6 +28,10 @@ class TopicDac : public Dac {
     message.w = output.w;
     publisher_.publish(message);
     return output;
+  }
+
+  double patience() const override {
+    return converter_ != nullptr ? converter_->patience() : std::numeric_limits<double>::infinity();
   }
 
   ros::Time stamp;  ///< of the next sample

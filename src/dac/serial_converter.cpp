@@ -29,6 +29,7 @@ std::string SerialConverter::name() const {
 /// Gives the port up: after it was lost nothing is known of what is behind it.
 Fault SerialConverter::lost(const std::string& what, const std::string& why) {
   dialogue_.reset();
+  failed_ = false;
   return Fault(why + " (" + what + " of " + settings_.port + ")");
 }
 
@@ -99,13 +100,14 @@ void SerialConverter::tell(Frames::const_iterator frame, Frames::const_iterator 
 void SerialConverter::converse(Frames::const_iterator frame, Frames::const_iterator end) {
   const auto in_doubt = [this](const Frame& each) { return dialogue_->inDoubt(each.expect); };
   for (; frame != end; ++frame) {
-    if (std::any_of(frame, end, in_doubt)) {
+    if (std::exchange(failed_, false) || std::any_of(frame, end, in_doubt)) {
       tell(frame, end);
       dialogue_->settle();
     }
     try {
       ask(*frame);
     } catch (const Fault& error) {
+      failed_ = true;  // what comes next may be neutral: it is sent before anything is waited for
       tell(std::next(frame), end);
       throw Fault(std::string(error.what()) + " (" + frame->what + " of " + settings_.port + ")");
     }

@@ -51,6 +51,7 @@ class SerialConverter : public Converter {
   OpenPort open_port_;
   std::unique_ptr<Dialogue> dialogue_;  // none while the port is lost
   std::string identity_;
+  bool failed_ = false;  // at the last put
 };
 
 }  // namespace kurumaisu::dac

@@ -149,9 +149,14 @@ void VirtualBoard::receive() {
   }
 }
 
-const BoardFault* VirtualBoard::faultNow() const {
-  const auto found = std::find_if(faults_.begin(), faults_.end(), [this](const BoardFault& fault) {
-    return fault.at <= commands_ && commands_ < fault.at + fault.count;
+const BoardFault* VirtualBoard::faultNow(const std::optional<BoardReader::Heard>& heard) const {
+  const auto concerns = [&heard](Signal signal) {
+    return heard && std::any_of(heard->codes.begin(), heard->codes.end(),
+                                [signal](const auto& code) { return code.first == signal; });
+  };
+  const auto found = std::find_if(faults_.begin(), faults_.end(), [&](const BoardFault& fault) {
+    return fault.at <= commands_ && commands_ < fault.at + fault.count &&
+           (!fault.signal || concerns(*fault.signal));
   });
   return found == faults_.end() ? nullptr : &*found;
 }
@@ -159,10 +164,11 @@ const BoardFault* VirtualBoard::faultNow() const {
 void VirtualBoard::obey(const std::string& line) {
   ++commands_;
   heard_.push_back(line);
-  const BoardFault* const fault = faultNow();
+  std::optional<BoardReader::Heard> heard = reader_.hear(line, false);
+  const BoardFault* const fault = faultNow(heard);
   if (fault != nullptr && fault->what == BoardFault::kUnplug) return unplug(fault->value);
   if (fault != nullptr && fault->what == BoardFault::kStall) stalled_until_ = steady() + fault->value;
-  const std::optional<BoardReader::Heard> heard = reader_.hear(line);
+  if (fault != nullptr && fault->what == BoardFault::kLost) heard = reader_.hear(line, true);
   if (!heard) ++misheard_;
   const bool obeys = fault == nullptr || fault->what != BoardFault::kDeaf;
   if (obeys && heard) outputs_.put(heard->codes);

@@ -63,7 +63,7 @@ class VirtualBoard {
   void obey(const std::string& line);
   void unplug(double seconds);
   void flush(double now);
-  const BoardFault* faultNow() const;
+  const BoardFault* faultNow(const std::optional<BoardReader::Heard>& heard) const;
 
   const SerialSettings settings_;
   const BoardReader reader_;

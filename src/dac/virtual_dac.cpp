@@ -28,7 +28,7 @@ constexpr const char* kUsage =
     "and `volts`.\n\n"
     "  --log FILE   every change of voltage: TIME volts V_f V_s V_ref, TIME in ns of CLOCK_MONOTONIC\n"
     "  --realtime   before all others, where the system allows it\n"
-    "  FAULT        NAME[@COMMAND][xCOUNT][=SECONDS]; without COMMAND it begins at once\n\n";
+    "  FAULT        NAME[/SIGNAL][@COMMAND][xCOUNT][=SECONDS]; without COMMAND it begins at once\n\n";
 
 struct Options {
   std::vector<std::string> places;  // device, link

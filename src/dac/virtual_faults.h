@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
-#include <vector>
+
+#include "dac/channel.h"
 
 namespace kurumaisu::dac {
 
@@ -16,14 +18,17 @@ struct BoardFault {
     kCut,     ///< obeys; of its answer comes half, without an end
     kLate,    ///< obeys at once, answers after `value` [s]
     kStall,   ///< reads nothing for `value` [s]
+    kLost,    ///< puts out its lowest code, whatever is asked for, and says so
     kUnplug,  ///< before the command is read: out of its socket, back after `value` [s] under a new terminal
   } what;
-  std::uint64_t at;     ///< the first command that meets it; 1 is the first of all
-  std::uint64_t count;  ///< how many commands meet it
-  double value;         ///< [s]
+  std::uint64_t at;              ///< the first command that meets it; 1 is the first of all
+  std::uint64_t count;           ///< how many commands meet it
+  double value;                  ///< [s]
+  std::optional<Signal> signal;  ///< it spares commands that do not write this
 };
 
-/// NAME[@AT][xCOUNT][=SECONDS]: late@5x3=0.1; without AT it begins with the command after `heard`.
+/// NAME[/SIGNAL][@AT][xCOUNT][=SECONDS]: late@5x3=0.1, wrong/reference; without AT it begins with the command after
+/// `heard`.
 ///
 /// Throws std::invalid_argument.
 BoardFault boardFault(const std::string& text, std::uint64_t heard);

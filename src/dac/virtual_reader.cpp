@@ -71,18 +71,18 @@ BoardReader::BoardReader(const SerialSettings& settings) : settings_(settings) {
   for (const Exchange& each : settings_.start) sampleOf(each.expect.plain());
 }
 
-std::optional<BoardReader::Heard> BoardReader::hear(const std::string& line) const {
+std::optional<BoardReader::Heard> BoardReader::hear(const std::string& line, bool lost) const {
   for (const Exchange& each : settings_.start) {
     if (line == each.send.plain()) return Heard{sampleOf(each.expect.plain()), {}};
   }
   try {
-    return hearWrite(line);
+    return hearWrite(line, lost);
   } catch (const std::logic_error&) {
     return std::nullopt;  // no number
   }
 }
 
-std::optional<BoardReader::Heard> BoardReader::hearWrite(const std::string& line) const {
+std::optional<BoardReader::Heard> BoardReader::hearWrite(const std::string& line, bool lost) const {
   std::smatch match;
   if (line.size() > 500 || !std::regex_match(line, match, form_)) return std::nullopt;
   int current = kReference;
@@ -101,7 +101,7 @@ std::optional<BoardReader::Heard> BoardReader::hearWrite(const std::string& line
     }
     const auto signal = static_cast<Signal>(field->signal == Template::kThis ? current : field->signal);
     const Coding& coding = settings_.codings[signal];
-    const int code = codeOf(text, *field, coding);
+    const int code = lost ? coding.min : codeOf(text, *field, coding);
     if (code < coding.min || code > coding.max) return std::nullopt;
     heard.codes.emplace_back(signal, code);
     fillings[signal].level = {code, (code - coding.at_zero) / coding.per_volt, 0};

@@ -22,11 +22,11 @@ class BoardReader {
     std::vector<std::pair<Signal, int>> codes;  ///< what it is to put out
   };
 
-  /// Nothing for a line that it does not understand.
-  std::optional<Heard> hear(const std::string& line) const;
+  /// Nothing for a line that it does not understand. lost: of a board whose outputs are at their lowest codes.
+  std::optional<Heard> hear(const std::string& line, bool lost) const;
 
  private:
-  std::optional<Heard> hearWrite(const std::string& line) const;
+  std::optional<Heard> hearWrite(const std::string& line, bool lost) const;
 
   SerialSettings settings_;
   std::regex form_;  // of the line that writes

@@ -42,8 +42,9 @@ std::size_t Descriptor::read(char* buffer, std::size_t size, double timeout) con
 }
 
 void Descriptor::write(std::string_view bytes, double timeout, bool is_socket) const {
-  for (const double until = steadyTime() + timeout; !bytes.empty();) {
-    if (!wait(POLLOUT, until - steadyTime())) {
+  bool is_late = false;  // by the clock, too: a line may take nothing though poll() says that it would
+  for (const double until = steadyTime() + timeout; !bytes.empty(); is_late = steadyTime() > until) {
+    if (is_late || !wait(POLLOUT, until - steadyTime())) {
       throw LinkLost(who_ + "_BLOCKED: nothing can be sent for " + std::to_string(timeout) + " s");
     }
     const ssize_t count = is_socket ? send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL)

@@ -25,6 +25,7 @@ NAMES = (
     "fuzz",
     "guard",
     "base",
+    "base_faults",
     "drive",
     "odometry",
     "slam",

@@ -13,9 +13,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -36,22 +37,55 @@ class Change:
 
     time: float  # [s, monotonic]
     neutral: bool | None
+    volts: tuple[float, float, float] | None = None  # V_f, V_s, reference
+
+
+def changed(tree: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a copy of a tree with the values at some paths, "a/b/c", replaced; None removes a key."""
+    result = dict(tree)
+    for path, value in changes.items():
+        key, _, rest = path.partition("/")
+        if rest:
+            result[key] = changed(result[key], {rest: value})
+        elif value is None:
+            del result[key]
+        else:
+            result[key] = value
+    return result
 
 
 class Rig:
     """Board, sentinel and guard, in a folder of their own."""
 
-    def __init__(self, folder: Path) -> None:
-        """Write the files that they read. Start with board()."""
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        arming: float | None = _ARMING,
+        device: Mapping[str, Any] | None = None,
+        guard: Mapping[str, Any] | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """Write the files that they read. Start with board().
+
+        arming: of the guard [s], None as it ships; device, guard: changes to the shipped files, see changed();
+        environment: of the guard, added to this process'.
+        """
         self.folder = folder
+        self._environment = {**os.environ, **(environment or {})}
         self.socket = folder / "guard.sock"
         self._log = folder / "board.log"
         self.messages = folder / "guard.log"
-        device = yaml.safe_load(shipped("launch/dac/serial_ascii.yaml").read_text())
+        self._changes: list[Change] = []
+        self._read = 0  # [bytes] of the log
+        tree = yaml.safe_load(shipped("launch/dac/serial_ascii.yaml").read_text())
+        device = changed(tree, device or {})
         self._code = 1 / min(device["channels"][name]["code"]["per_volt"] for name in ("translation", "steering"))
         self.device = self._write("device.yaml", device | {"port": str(folder / "dac")})
         settings = yaml.safe_load(shipped("launch/guard.yaml").read_text())
-        settings["limits"]["arming"] = _ARMING
+        if arming is not None:
+            settings["limits"]["arming"] = arming
+        settings = changed(settings, guard or {})
         self.silence = float(settings["limits"]["silence"])
         base = yaml.safe_load(shipped("launch/base_node.yaml").read_text())
         self.nice = int(base["dac"]["nice"])
@@ -86,7 +120,9 @@ class Rig:
         if self._sentinel and self._sentinel.poll() is None:
             return
         self._sentinel = subprocess.Popen(
-            [program("guard"), str(self.device), str(self.settings)], stderr=self.messages.open("ab")
+            [program("guard"), str(self.device), str(self.settings)],
+            stderr=self.messages.open("ab"),
+            env=self._environment,
         )
 
     def end(self) -> None:
@@ -127,13 +163,22 @@ class Rig:
 
     def changes(self) -> list[Change]:
         """Return what the board's outputs became so far."""
-        found = []
-        for line in self._log.read_text().splitlines(keepends=True):
-            match = re.fullmatch(r"(\d+) (?:volts (\S+) (\S+) \S+|plugged)\n", line)  # the last may be half a line
+        with self._log.open() as log:
+            log.seek(self._read)
+            text = log.read()
+        lines = text[: text.rfind("\n") + 1]  # the last may be half a line
+        self._read += len(lines)
+        for line in lines.splitlines():
+            match = re.fullmatch(r"(\d+) (?:volts (\S+) (\S+) (\S+)|plugged)", line)
             if match:
-                volts = [abs(float(word)) for word in match.groups()[1:] if word]
-                found.append(Change(NS * int(match[1]), max(volts) < self._code / 2 if volts else None))
-        return found
+                self._changes.append(self._change(NS * int(match[1]), match.groups()[1:]))
+        return self._changes
+
+    def _change(self, time_s: float, words: tuple[str | None, ...]) -> Change:
+        if words[0] is None:
+            return Change(time_s, None)
+        f, s, reference = (float(word) for word in words if word)
+        return Change(time_s, max(abs(f), abs(s)) < self._code / 2, (f, s, reference))
 
     def neutral(self, patience: float, after: float = math.inf) -> float | None:
         """Wait until the board is neutral; return since when [s, monotonic], or None if it is not in so long [s].
