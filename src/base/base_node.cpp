@@ -25,8 +25,8 @@
 #include "base/report.h"
 #include "base/settings.h"
 #include "base/topic_dac.h"
-#include "guard/clock.h"
 #include "guard/realtime.h"
+#include "steady.h"
 
 namespace k = kurumaisu;
 
@@ -123,7 +123,7 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
     reported_ = k::tally(drive_);
   });
   diagnostics_.add("odometry", [this](Status& status) { reportOdometry(status); });
-  const std::string refusal = guard_ ? k::guard::favourThreads(settings_.dac.nice) : "";
+  const std::string refusal = guard_ ? k::guard::favourThreads(settings_.dac.favour) : "";
   if (!refusal.empty()) warn("BASE_NOT_FAVOURED: busy cores may delay commands, and neutral: " + refusal);
   if (guard_) diagnostics_.add("guard", [this](Status& status) { reportGuard(status); });
   if (ros::Time::isSimTime()) {
@@ -241,7 +241,7 @@ void BaseNode::reportOdometry(Status& status) {
 }
 
 void BaseNode::reportGuard(Status& status) {
-  diagnose(status, k::reportGuard(guard_->status(), reported_guard_, k::guard::monotonic()));
+  diagnose(status, k::reportGuard(guard_->status(), reported_guard_, k::steadyTime()));
   reported_guard_ = guard_->status();
 }
 

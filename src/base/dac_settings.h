@@ -5,16 +5,17 @@
 #include <optional>
 
 #include "guard/client.h"
+#include "guard/realtime.h"
 #include "params.h"
 
 namespace kurumaisu {
 
 struct DacSettings {
   std::optional<guard::ClientSettings> guard;  ///< none: the topic alone
-  int nice;                                    ///< of all threads, with a guard; 0: as they are
+  guard::Favour favour;                        ///< with a guard
 };
 
-/// guard: launch/guard.yaml, of which only the socket is ours. Throws std::invalid_argument naming the parameter.
+/// guard: launch/guard.yaml, of which its socket and its priority concern us. Throws std::invalid_argument naming the parameter.
 DacSettings readDac(Section dac, Section guard);
 
 }  // namespace kurumaisu
