@@ -65,9 +65,9 @@ PYTHON_RULES = [
 ]
 CPP_RULES = [
     Rule(
-        r"(?!.*_node\.cpp|.*/messages\.(cpp|h)|base/((command|odometry|diagnostics)_(in|out)put|limits_server|master_watch|stop_request|topic_dac)\.(cpp|h)|params\.h)",
+        r"(?!.*_node\.cpp|kurumaisu/bench/drivers/|.*/messages\.(cpp|h)|base/((command|odometry|diagnostics)_(in|out)put|limits_server|master_watch|stop_request|topic_dac)\.(cpp|h)|params\.h)",
         ROS_CPP,
-        "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, and params.h",
+        "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, params.h, and peers of benchmarks",
     ),
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
     Rule(r"(?!.*bindings\.(cpp|h))", r"<pybind11/", "pybind11 only in bindings"),

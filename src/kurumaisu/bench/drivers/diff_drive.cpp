@@ -3,6 +3,7 @@
 // experiment_vel, the speed that its wheels are told out on voltages. A loop as controller_manager's, without it: callbacks in a
 // spinner's thread, update() by the clock. At its end it says what an update() took.
 #include <diff_drive_controller/diff_drive_controller.h>
+#include <hardware_interface/robot_hw.h>
 #include <kurumaisu/Voltages.h>
 #include <ros/ros.h>
 
@@ -10,6 +11,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <vector>
 
 namespace {
 
@@ -36,6 +38,8 @@ void setParameters(const ros::NodeHandle& nh, double rate) {
   nh.setParam("wheel_separation", kSeparation);
   nh.setParam("publish_rate", rate);
   nh.setParam("publish_cmd", true);
+  for (const char* name : {"pose_covariance_diagonal", "twist_covariance_diagonal"})
+    nh.setParam(name, std::vector<double>(6, 0.01));
   nh.setParam("linear/x/has_velocity_limits", true);
   nh.setParam("linear/x/max_velocity", 1.5);
   nh.setParam("linear/x/has_acceleration_limits", true);
@@ -45,7 +49,7 @@ void setParameters(const ros::NodeHandle& nh, double rate) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  ros::init(argc, argv, "diff_drive");
+  ros::init(ros::M_string{{"/diff_drive/cmd_vel", "/experiment_vel"}}, "diff_drive");
   if (argc != 2) {
     std::fprintf(stderr, "usage: diff_drive RATE\n");
     return 2;
@@ -62,11 +66,15 @@ int main(int argc, char** argv) {
     velocities.registerHandle({states.getHandle(i == 0 ? "left" : "right"), &wheel.command});
   }
   diff_drive_controller::DiffDriveController controller;
-  if (!controller.init(&velocities, root, own)) return 1;
+  hardware_interface::RobotHW robot;
+  robot.registerInterface(&velocities);
+  controller_interface::ControllerBase& base = controller;
+  controller_interface::ControllerBase::ClaimedResources claimed;
+  if (!base.initRequest(&robot, root, own, claimed)) return 1;
   ros::Publisher voltages = root.advertise<kurumaisu::Voltages>("voltages", 10);
   ros::AsyncSpinner spinner(1);
   spinner.start();
-  controller.starting(ros::Time::now());
+  base.startRequest(ros::Time::now());
   double spent = 0;
   long updates = 0;
   for (ros::WallRate loop(rate); ros::ok(); loop.sleep()) {
