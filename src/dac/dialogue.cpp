@@ -120,6 +120,17 @@ void Dialogue::tell(const std::string& command, const std::string& expect) {
   if (!expect.empty()) owe(expect, steadyTime());
 }
 
+bool Dialogue::askAtOnce(const std::vector<Command>& commands) {
+  discard();
+  if (!owed_.empty()) return false;
+  for (const Command& command : commands) tell(command.text, command.expect);
+  for (const double until = steadyTime() + manner_.reply_timeout; !owed_.empty();) {
+    const std::optional<std::string> line = next(until);
+    if (!line || !settled(*line)) return false;
+  }
+  return true;
+}
+
 std::string Dialogue::ask(const std::string& command, const std::string& expect) {
   discard();
   if (inDoubt(expect)) settle();

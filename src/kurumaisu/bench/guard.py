@@ -24,7 +24,11 @@ from kurumaisu.bench.table import Table
 
 _PHASE = 0.04  # [s] from armed to the strike, at most: two periods of the client
 _FIFO = 1  # the benchmark's own priority while cores are busy: or it would measure when it gets its turn to strike
-_DEVICES = {"serial": Rig, "iio": ChipRig}
+_DEVICES: dict[str, Callable[[Path], Rig]] = {
+    "serial": Rig,
+    "burst": lambda folder: Rig(folder, device={"write/frame": "burst"}),
+    "iio": ChipRig,
+}
 
 
 @dataclass(frozen=True)
@@ -43,14 +47,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--load", choices=("idle", "busy", "both"), default="both", help="all cores busy, or as they are"
     )
-    parser.add_argument("--device", choices=(*_DEVICES, "both"), default="both", help="virtual board, or chip")
+    parser.add_argument("--device", choices=(*_DEVICES, "all"), default="all", help="docs/guard.md")
     parser.add_argument("--seed", type=int, default=1, help="of the moments at which is struck")
     options = parser.parse_args(arguments)
     cores = os.cpu_count() or 1
     print(f"load average before: {os.getloadavg()[0]:.1f} on {cores} cores; arming shortened, to save time")
     print("noticed: of that, until guard or sentinel saw it, by its own log; the rest is its writing, and the device's")
     broken = 0
-    for device in _DEVICES if options.device == "both" else (options.device,):
+    for device in _DEVICES if options.device == "all" else (options.device,):
         if options.load != "busy":
             broken += _table(device, options, lambda times: max(times), 0)
         if options.load != "idle":
