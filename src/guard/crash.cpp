@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "guard/crash.h"
 
+#include <sched.h>
 #include <sys/socket.h>
 
 #include <atomic>
@@ -12,9 +13,12 @@ namespace {
 
 std::atomic<int> to_hang_up{-1};
 
-/// Nothing but system calls that a signal's handler may make.
+/// Nothing but system calls that a signal's handler may make. A core file is not written at a real-time priority: that
+/// would keep the kernel's thread that carries the tty's bytes waiting, and neutral.
 void hangUp(int signal) {
   shutdown(to_hang_up, SHUT_RDWR);
+  const sched_param ordinary{};
+  sched_setscheduler(0, SCHED_OTHER, &ordinary);
   raise(signal);  // by then its default again
 }
 
