@@ -111,6 +111,9 @@ inline const Edits kOneFrame{
     {R"("W{ch}{code:04X}")", R"("S{reference.code:03X}{translation.code:03X}{steering.code:03X}")"},
     {R"("OK {ch}{code:04X}")", R"("OK")"}};
 
+/// One command for each, sent without waiting.
+inline const Edits kBurst{{"frame: channel ", "frame: burst "}};
+
 constexpr Volts kNeutral{0, 0, 2.5};
 constexpr Volts kMoving{0.5, -0.25, 2.5};
 

@@ -13,7 +13,7 @@
 #include <string>
 
 #include "dac/converter.h"
-#include "guard/clock.h"
+#include "steady.h"
 
 namespace guarding {
 
@@ -64,7 +64,7 @@ class SharedBoard {
 
     d::Volts put(const d::Volts& volts) override {
       if (board_.broken || board_.unplugged) throw d::Fault("the board: no answer");
-      board_.written.at(board_.count) = {kurumaisu::guard::monotonic(), getpid(), volts};
+      board_.written.at(board_.count) = {kurumaisu::steadyTime(), getpid(), volts};
       ++board_.count;
       return {volts.translation + board_.residue, volts.steering, volts.reference + board_.offset};
     }

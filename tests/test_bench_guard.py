@@ -8,8 +8,9 @@ import pytest
 from kurumaisu.bench import guard
 
 
-def test_every_end_leads_to_neutral(capsys):
-    status = guard.main(["--times", "1", "--load", "idle"])
+@pytest.mark.parametrize("device", ["serial", "iio"])
+def test_every_end_leads_to_neutral(capsys, device):
+    status = guard.main(["--times", "1", "--load", "idle", "--device", device])
     printed = capsys.readouterr().out
     for case in guard.CASES:
         cells = next(line[len(case.name) :].split() for line in printed.splitlines() if line.startswith(case.name))
@@ -36,10 +37,8 @@ def test_a_bound_is_judged_by_the_worst(times, bound, verdict):
 
 def test_of_busy_cores_the_99th_percentile_counts(monkeypatch):
     bounds = []
-    monkeypatch.setattr(
-        guard, "_table", lambda _words, _cases, _options, worst, loops: bounds.append((worst, loops)) or 0
-    )
-    assert guard.main([]) == 0
+    monkeypatch.setattr(guard, "_table", lambda _device, _options, worst, loops: bounds.append((worst, loops)) or 0)
+    assert guard.main(["--device", "iio"]) == 0
     (idle, none), (busy, loops) = bounds
     times = [0.001] * 199 + [1.0]
     assert none == 0

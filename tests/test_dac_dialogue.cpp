@@ -32,9 +32,9 @@ class Peer : public s::Port {
   };
 
   std::size_t read(char* buffer, std::size_t size, double timeout) override {
-    const double until = s::steadyTime() + timeout;
+    const double until = kurumaisu::steadyTime() + timeout;
     for (;;) {
-      const double now = s::steadyTime();
+      const double now = kurumaisu::steadyTime();
       const auto due =
           std::find_if(replies_.begin(), replies_.end(), [now](const Reply& r) { return r.at <= now; });
       if (due != replies_.end()) {
@@ -55,7 +55,7 @@ class Peer : public s::Port {
     if (!habits.empty()) habits.erase(habits.begin());
     heard.push_back(command);
     if (now.obeys) obeyed.push_back(command);
-    if (now.delay >= 0) replies_.push_back({s::steadyTime() + now.delay, now.reply + "\n"});
+    if (now.delay >= 0) replies_.push_back({kurumaisu::steadyTime() + now.delay, now.reply + "\n"});
   }
 
   void say(const std::string& bytes) { replies_.push_back({0, bytes}); }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dac_rig.h"
+#include "steady.h"
 
 namespace d = kurumaisu::dac;
 using d::complaint;
@@ -96,6 +97,33 @@ TEST(DacFaults, ALateReplyIsNotTakenForTheNextCommands) {
   rig.board.inject("deaf@5x6");
   EXPECT_TRUE(has(faultOf(*converter, d::kNeutral), "DAC_NO_REPLY"));
   EXPECT_FALSE(rig.board.isNeutral(rig.board.volts()));
+}
+
+TEST(DacFaults, ABurstWaitsForNoReplyBeforeTheChairIsStopped) {
+  d::Rig rig(d::kBurst);
+  const auto converter = rig.open();
+  converter->put(d::kMoving);
+  const std::size_t before = rig.board.history().size();
+  rig.board.inject("late=0.3");  // of the reference's command
+  const double begin = kurumaisu::steadyTime();
+  converter->put(d::kNeutral);
+  EXPECT_GE(kurumaisu::steadyTime() - begin, 0.3);
+  const auto changes = rig.board.history();
+  ASSERT_EQ(changes.size(), before + 2);
+  EXPECT_TRUE(rig.board.isNeutral(changes.back().volts));
+  EXPECT_LT(kurumaisu::seconds(changes.back().time) - begin, 0.3);
+}
+
+TEST(DacFaults, ABurstThatIsNotConfirmedIsRepeatedOneByOne) {
+  d::Rig rig(d::kBurst);
+  const auto converter = rig.open();
+  converter->put(d::kMoving);
+  const std::uint64_t before = rig.board.commands();
+  for (const char* fault : {"silent", "wrong"}) {
+    rig.board.inject(fault);
+    EXPECT_EQ(converter->put(d::kNeutral).translation, 0) << fault;
+  }
+  EXPECT_GE(rig.board.commands(), before + 12);
 }
 
 TEST(DacFaults, AfterALateReplyAllIsWellAgain) {

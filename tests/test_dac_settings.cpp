@@ -186,7 +186,7 @@ TEST(DacSettings, RefusesWhatIsWrongInASerialDevice) {
       {{{"terminator: \"\\r\" ", "terminator: \"\" "}}, "terminator: must not be empty"},
       {{{"reply_timeout: 0.05", "reply_timeout: 0.0"}}, "reply_timeout: must be from"},
       {{{"late_reply: 0.1", "late_reply: 0.02"}}, "late_reply: must not be below reply_timeout"},
-      {{{"frame: channel", "frame: each"}}, "write/frame: must be one of channel, all"},
+      {{{"frame: channel", "frame: each"}}, "write/frame: must be one of channel, burst, all"},
       {{{"W{ch}{code:04X}", "W{ch}{kode:04X}"}}, "write/send: placeholder {kode:04X}: is unknown"},
       {{{"W{ch}{code:04X}", "W{code:04X}"}}, "write/send: does not say which channel"},
       {{{"W{ch}{code:04X}", "W{ch}"}}, "write/send: says neither"},

@@ -25,8 +25,8 @@ def start(tmp_path):
     """Start the board; with the folder in which `dac` is its port and `log` its log."""
     started = []
 
-    def board(*faults, stdin=subprocess.PIPE):
-        command = [program("virtual_dac"), str(EXAMPLE), str(tmp_path / "dac"), "--log", str(tmp_path / "log"), *faults]
+    def board(*faults, stdin=subprocess.PIPE, file=EXAMPLE):
+        command = [program("virtual_dac"), str(file), str(tmp_path / "dac"), "--log", str(tmp_path / "log"), *faults]
         started.append(subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, text=True))
         assert started[-1].stdout.readline() == f"a virtual board at {tmp_path / 'dac'}\n"
         return started[-1]
@@ -35,6 +35,13 @@ def start(tmp_path):
     for process in started:
         with process:  # closes its streams, and waits
             process.kill()
+
+
+def wait_for(condition):
+    deadline = time.monotonic() + DEADLINE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.001)
 
 
 def set_voltages_at(tmp_path, *volts):
@@ -109,11 +116,58 @@ def test_without_an_input_it_goes_on_until_it_is_told(start, tmp_path):
     assert not (tmp_path / "dac").is_symlink()
 
 
+@pytest.mark.parametrize("chip", ["mcp4728", "ad5592r"])
+def test_a_chip_is_a_tree_of_files(start, tmp_path, chip):
+    """Codes are recomputed from the scale that the tree shows, by nothing of ours."""
+    tree = tmp_path / "dac"
+    file = tmp_path / "device.yaml"
+    file.write_text(EXAMPLE.with_name(f"{chip}.yaml").read_text().replace("/sys/bus/iio/devices", str(tree)))
+    board = start(file=file)
+    before = time.monotonic_ns()
+    command = [program("set_voltages"), str(file), "0.5", "-0.2", "2.5"]
+    done = subprocess.run(command, input="\n", capture_output=True, text=True, timeout=DEADLINE, check=False)
+    after = time.monotonic_ns()
+    assert done.returncode == 0, done.stderr
+    rows = [line.split() for line in (tmp_path / "log").read_text().splitlines()]
+    assert before < int(rows[0][0]) <= int(rows[-1][0]) < after
+    said = [[float(word) for word in row[2:]] for row in rows]
+    scale = float((tree / "iio:device0/out_voltage0_scale").read_text()) / 1000
+    codes = [round(volt / scale) for volt in (0.5 + 2.5, -0.2 + 2.5, 2.5)]
+    assert [scale * (codes[0] - codes[2]), scale * (codes[1] - codes[2]), scale * codes[2]] in [
+        pytest.approx(volts, abs=1e-5) for volts in said
+    ]
+    assert said[-1] == pytest.approx([0, 0, scale * codes[2]], abs=1e-5)
+    board.stdin.write("unplug=60\n")
+    board.stdin.flush()
+    assert board.stdout.readline() == "unplug=60\n"
+    assert "DAC_NO_PORT" in subprocess.run(command, input="\n", capture_output=True, text=True, check=False).stderr
+    board.stdin.close()
+    assert board.wait(DEADLINE) == 0
+    assert not tree.exists()
+
+
+def test_a_chip_comes_back_with_the_codes_it_had(start, tmp_path):
+    tree = tmp_path / "dac"
+    file = tmp_path / "device.yaml"
+    file.write_text(EXAMPLE.with_name("mcp4728.yaml").read_text().replace("/sys/bus/iio/devices", str(tree)))
+    board = start(file=file)
+    raw = tree / "iio:device0/out_voltage0_raw"
+    raw.write_text("1234\n")
+    log = tmp_path / "log"
+    wait_for(lambda: "volts" in log.read_text())
+    board.stdin.write("unplug=0.05\n")
+    board.stdin.flush()
+    wait_for(lambda: log.read_text().endswith(" plugged\n"))
+    assert raw.read_text() == "1234\n"
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "DEVICE.yaml LINK"),
-        ([str(EXAMPLE.with_name("mcp4728.yaml")), "dac"], "kind must be serial"),
+        ([], "DEVICE.yaml PLACE"),
+        ([str(EXAMPLE.with_name("mcp4728.yaml")), "no/such/folder"], "no/such/folder"),
+        ([str(EXAMPLE.with_name("mcp4728.yaml")), "."], "is there already"),
+        ([str(EXAMPLE.with_name("mcp4728.yaml")), "chip", "deaf"], "can only be unplugged"),
         ([str(EXAMPLE.with_name("dacs_82ada_unverified.yaml")), "dac"], "manual"),
         ([str(EXAMPLE), "dac", "sulk"], "no such fault"),
         ([str(EXAMPLE), "no/such/folder"], "no/such/folder"),

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "base/guard_dac.h"
-#include "guard/clock.h"
 #include "guard/socket.h"
+#include "steady.h"
 
 namespace k = kurumaisu;
 namespace g = kurumaisu::guard;
@@ -33,7 +33,7 @@ class FakeGuard : public testing::Test {
     k::GuardDac dac({folder / "socket", 0.02, 0.01}, 0.15, {kTranslation, kSteering});
     const k::Output asked{kTranslation.volts(0.5), kSteering.volts(0.3), 2.5, 0.5, 0.3};
     dac.put(asked);  // connects
-    g::Descriptor peer(accept(listener.fd(), nullptr, nullptr));
+    kurumaisu::Descriptor peer(accept(listener.get(), nullptr, nullptr));
     g::Reply reply{};
     reply.magic = g::kMagic;
     reply.version = g::kVersion;
@@ -50,7 +50,7 @@ class FakeGuard : public testing::Test {
   }
 
   std::filesystem::path folder;
-  g::Descriptor listener;
+  kurumaisu::Descriptor listener;
   std::uint64_t late = 0;
 };
 

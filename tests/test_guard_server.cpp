@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Guard and sentinel as processes that are really killed, in front of a board in shared memory.
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sched.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <sys/wait.h>
 
+#include <array>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -15,6 +19,8 @@
 #include <thread>
 
 #include "guard/client.h"
+#include "guard/crash.h"
+#include "guard/realtime.h"
 #include "guard/sentinel.h"
 #include "guard/socket.h"
 #include "guarding.h"
@@ -76,8 +82,8 @@ class GuardProcess : public testing::Test {
   }
 
   static void waitFor(const std::function<bool()>& condition, const char* what) {
-    for (const double until = g::monotonic() + kPatience; !condition(); pause(0.001)) {
-      if (g::monotonic() > until) FAIL() << "waited in vain for " << what;
+    for (const double until = kurumaisu::steadyTime() + kPatience; !condition(); pause(0.001)) {
+      if (kurumaisu::steadyTime() > until) FAIL() << "waited in vain for " << what;
     }
   }
 
@@ -139,7 +145,7 @@ TEST_F(GuardProcess, ArmsAndTellsWhatIsPutOut) {
 TEST_F(GuardProcess, AStartWithACommandStaysNeutral) {
   start();
   g::Client driver = client();
-  for (const double until = g::monotonic() + 0.8; g::monotonic() < until; pause(kPeriod))
+  for (const double until = kurumaisu::steadyTime() + 0.8; kurumaisu::steadyTime() < until; pause(kPeriod))
     driver.put({0.4, 0, 2.5});
   EXPECT_EQ(driver.status().reason, g::Reason::kNotNeutral);
   for (std::size_t i = 0; i < board->count; ++i) EXPECT_TRUE(isNeutral(board->written[i].volts));
@@ -151,7 +157,7 @@ TEST_F(GuardProcess, AClientThatGoesIsFollowedByNeutral) {
     g::Client driver = client();
     drive(driver);
   }
-  EXPECT_LT(neutralAfter(g::monotonic()), kSoon);
+  EXPECT_LT(neutralAfter(kurumaisu::steadyTime()), kSoon);
   EXPECT_TRUE(isNeutral(board->last().volts));
 }
 
@@ -159,7 +165,7 @@ TEST_F(GuardProcess, AClientThatFallsSilentIsFollowedByNeutral) {
   start();
   g::Client driver = client();
   drive(driver);
-  const double begin = g::monotonic();
+  const double begin = kurumaisu::steadyTime();
   const double after = neutralAfter(begin);
   EXPECT_GT(after, 0.05);
   EXPECT_LT(after, 0.15 + kSoon);
@@ -171,7 +177,7 @@ TEST_F(GuardProcess, StopIsNeutralAtOnce) {
   start();
   g::Client driver = client();
   drive(driver);
-  const double begin = g::monotonic();
+  const double begin = kurumaisu::steadyTime();
   EXPECT_EQ(driver.stop().reason, g::Reason::kStopped);
   EXPECT_LT(neutralAfter(begin), kSoon);
 }
@@ -194,13 +200,13 @@ TEST_F(GuardProcess, ASecondClientIsToldThatItIsOne) {
 TEST_F(GuardProcess, BytesThatAreNoMessageTrip) {
   start();
   for (const std::size_t size : {1U, 47U, 48U, 49U, 4000U}) {
-    g::Descriptor raw;
+    kurumaisu::Descriptor raw;
     waitFor([&] { return static_cast<bool>(raw = g::connectTo(settings.socket)); }, "a connection");
     std::uint64_t sequence = 0;
     waitFor(
         [&] {
           pause(kPeriod);
-          const g::Request neutral = request(++sequence, g::monotonic());
+          const g::Request neutral = request(++sequence, kurumaisu::steadyTime());
           g::send(raw, &neutral, sizeof neutral);
           g::Reply reply{};
           std::size_t length = sizeof reply;
@@ -245,9 +251,10 @@ TEST_F(GuardProcess, ADeviceThatHoldsAnotherReferenceOrNoNeutralDoesNotCount) {
     drive(driver);
     (*board.operator->()).*fault = 0.02;  // more than either tolerance
     putUntil(driver, 0, [](const g::Status& s) { return !s.has_device && s.reason == g::Reason::kDevice; });
-    const double until = g::monotonic() + 0.8;
-    putUntil(driver, 0,
-             [until](const g::Status& s) { return s.state == g::State::kArmed || g::monotonic() > until; });
+    const double until = kurumaisu::steadyTime() + 0.8;
+    putUntil(driver, 0, [until](const g::Status& s) {
+      return s.state == g::State::kArmed || kurumaisu::steadyTime() > until;
+    });
     EXPECT_EQ(driver.status().state, g::State::kTripped);
     (*board.operator->()).*fault = 0.0;
   }
@@ -270,7 +277,7 @@ TEST_F(GuardProcess, TheSentinelWritesNeutralForAKilledGuardAndStartsAnother) {
     drive(driver);
     const pid_t killed = guardPid();
     ASSERT_NE(killed, sentinel);
-    const double begin = g::monotonic();
+    const double begin = kurumaisu::steadyTime();
     kill(killed, signal);
     EXPECT_LT(neutralAfter(begin), kSoon);
     waitFor([&] { return guardPid() != killed && guardPid() != sentinel; }, "another guard");
@@ -287,12 +294,12 @@ TEST_F(GuardProcess, TheSentinelEndsAGuardThatHangs) {
   g::Client driver = client();
   drive(driver);
   const pid_t stopped = guardPid();
-  const double begin = g::monotonic();
+  const double begin = kurumaisu::steadyTime();
   kill(stopped, SIGSTOP);
   // the client is never held up longer than it allows
-  const double before = g::monotonic();
+  const double before = kurumaisu::steadyTime();
   const g::Status& status = driver.put({0.4, 0, 2.5});
-  EXPECT_LT(g::monotonic() - before, kReplyWait + kSoon);
+  EXPECT_LT(kurumaisu::steadyTime() - before, kReplyWait + kSoon);
   EXPECT_GE(status.late, 1U);
   EXPECT_LT(neutralAfter(begin), 0.3 + kSoon);
   waitFor([&] { return guardPid() != stopped && guardPid() != sentinel; }, "another guard");
@@ -303,7 +310,7 @@ TEST_F(GuardProcess, AGuardWhoseSentinelDiesEndsNeutral) {
   g::Client driver = client();
   drive(driver);
   const pid_t guard = guardPid();
-  const double begin = g::monotonic();
+  const double begin = kurumaisu::steadyTime();
   end(SIGKILL);
   EXPECT_LT(neutralAfter(begin), kSoon);
   EXPECT_EQ(guardPid(), guard);
@@ -316,7 +323,7 @@ TEST_F(GuardProcess, ASignalToEndIsFollowedByNeutral) {
     start();
     g::Client driver = client();
     drive(driver);
-    const double begin = g::monotonic();
+    const double begin = kurumaisu::steadyTime();
     const int status = end(signal);
     EXPECT_TRUE(WIFEXITED(status));
     EXPECT_EQ(WEXITSTATUS(status), 0);
@@ -344,19 +351,19 @@ TEST_F(GuardProcess, NeutralCanBeForcedWhenNobodyIsLeft) {
   EXPECT_TRUE(g::forceNeutral(settings, board.opener(), 0));
   EXPECT_TRUE(isNeutral(board->last().volts));
   board->unplugged = true;
-  const double begin = g::monotonic();
+  const double begin = kurumaisu::steadyTime();
   EXPECT_FALSE(g::forceNeutral(settings, board.opener(), 0.2));
-  EXPECT_LT(g::monotonic() - begin, 0.2 + kSoon);
-  EXPECT_GT(g::monotonic() - begin, 0.1);
+  EXPECT_LT(kurumaisu::steadyTime() - begin, 0.2 + kSoon);
+  EXPECT_GT(kurumaisu::steadyTime() - begin, 0.1);
 }
 
 TEST_F(GuardProcess, TellsSystemdThatItIsReadyAndAlive) {
   const std::string path = folder / "notify";
-  const g::Descriptor systemd(socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0));
+  const kurumaisu::Descriptor systemd(socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0));
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   path.copy(address.sun_path, path.size());
-  ASSERT_EQ(bind(systemd.fd(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ASSERT_EQ(bind(systemd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
   setenv("NOTIFY_SOCKET", path.c_str(), 1);
   start();
   unsetenv("NOTIFY_SOCKET");
@@ -365,7 +372,7 @@ TEST_F(GuardProcess, TellsSystemdThatItIsReadyAndAlive) {
     waitFor(
         [&] {
           heard.resize(100);
-          const ssize_t size = recv(systemd.fd(), heard.data(), heard.size(), 0);
+          const ssize_t size = recv(systemd.get(), heard.data(), heard.size(), 0);
           heard.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
           return size > 0;
         },
@@ -374,11 +381,68 @@ TEST_F(GuardProcess, TellsSystemdThatItIsReadyAndAlive) {
   }
 }
 
+/// What a child does with a client's connection, which a grandchild holds open until nobody has the gate's other end.
+void crash(const std::string& path, const std::array<int, 2>& gate) {
+  const rlimit none{0, 0};
+  setrlimit(RLIMIT_CORE, &none);
+  g::catchCrashes();
+  g::Client client({path, kReplyWait, 0.01});
+  client.put({0, 0, 2.5});
+  if (fork() == 0) {
+    close(gate[1]);
+    char byte = 0;
+    _exit(static_cast<int>(read(gate[0], &byte, 1)));
+  }
+  raise(SIGSEGV);
+}
+
+TEST(GuardClient, ACrashIsHeardThoughTheSocketIsStillOpen) {
+  std::string name = (fs::temp_directory_path() / "guard_XXXXXX").string();
+  const fs::path folder = mkdtemp(name.data());
+  const kurumaisu::Descriptor listener = g::listenAt(folder / "socket");
+  std::array<int, 2> gate{};
+  ASSERT_EQ(pipe(gate.data()), 0);
+  const pid_t child = fork();
+  if (child == 0) crash(folder / "socket", gate);
+  kurumaisu::Descriptor peer;
+  for (const double until = kurumaisu::steadyTime() + kPatience; !peer && kurumaisu::steadyTime() < until;) {
+    pause(0.001);
+    peer = kurumaisu::Descriptor(accept(listener.get(), nullptr, nullptr));
+  }
+  pollfd ready{peer.get(), POLLRDHUP, 0};
+  EXPECT_EQ(poll(&ready, 1, static_cast<int>(1e3 * kPatience)), 1);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGSEGV);
+  for (const int end : gate) close(end);
+  fs::remove_all(folder);
+}
+
+/// The policy of this thread once it has run for so long at a real-time priority; -1: it may have none.
+int policyAfter(double seconds) {
+  if (!g::favourThreads({1, 0.02, 0}).empty()) return -1;
+  timespec used{};
+  do clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+  while (static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec) < seconds &&
+         sched_getscheduler(0) == SCHED_FIFO);
+  return sched_getscheduler(0);
+}
+
+TEST(GuardClient, WhoRunsTooLongLosesHisPriority) {
+  const pid_t child = fork();
+  if (child == 0) _exit(policyAfter(1) == SCHED_OTHER && g::unfavoured() == 1 ? 0 : geteuid() == 0 ? 1 : 77);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "may have no priority";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
 TEST(GuardClient, WithoutAGuardItDoesNotWait) {
   g::Client client({"/nowhere/at/all", 1.0, 0.01});
-  const double begin = g::monotonic();
+  const double begin = kurumaisu::steadyTime();
   for (int i = 0; i < 100; ++i) EXPECT_FALSE(client.put({0.4, 0, 2.5}).connected);
-  EXPECT_LT(g::monotonic() - begin, kSoon);
+  EXPECT_LT(kurumaisu::steadyTime() - begin, kSoon);
   EXPECT_EQ(client.status().volts.translation, 0);
 }
 

@@ -168,7 +168,7 @@ class Watched {
   }
 
   bool awaitStatus(const std::function<bool(const l::Status&)>& holds, double seconds) const {
-    for (const double until = l::steadyTime() + seconds; l::steadyTime() < until;) {
+    for (const double until = kurumaisu::steadyTime() + seconds; l::steadyTime() < until;) {
       if (holds(driver_.status())) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
@@ -177,9 +177,9 @@ class Watched {
 
   Result stop() {
     const l::State state = driver_.status().state;
-    const double start = l::steadyTime();
+    const double start = kurumaisu::steadyTime();
     driver_.stop();
-    const double end = l::steadyTime();
+    const double end = kurumaisu::steadyTime();
     Result result = result_;
     result.status = driver_.status();
     result.status.state = state;
@@ -192,7 +192,7 @@ class Watched {
  private:
   void take(const l::Scan& scan) {
     const std::lock_guard<std::mutex> guard(mutex_);
-    result_.scans.push_back({l::steadyTime(), scan});
+    result_.scans.push_back({kurumaisu::steadyTime(), scan});
     came_.notify_all();
   }
 
@@ -201,10 +201,10 @@ class Watched {
     timespec used{};
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
     cpu_ = static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
-    return l::steadyTime();
+    return kurumaisu::steadyTime();
   }
 
-  const double start_ = l::steadyTime();
+  const double start_ = kurumaisu::steadyTime();
   std::mutex mutex_;
   std::condition_variable came_;
   std::atomic<double> cpu_{0};
@@ -242,9 +242,9 @@ class Lateness {
   void watch() {
     constexpr double kNap = 0.005;  // [s]
     while (!stop_) {
-      const double start = l::steadyTime();
+      const double start = kurumaisu::steadyTime();
       std::this_thread::sleep_for(std::chrono::duration<double>(kNap));
-      worst_ = std::max(worst_, l::steadyTime() - start - kNap);
+      worst_ = std::max(worst_, kurumaisu::steadyTime() - start - kNap);
     }
   }
 
@@ -523,12 +523,12 @@ TEST(Driver, WaitsWhileTimeStands) {
   std::atomic<bool> stands{true};
   std::atomic<std::uint64_t> scans{0};
   l::Driver driver(
-      sensor.settings(), [&](const l::Scan&) { ++scans; }, [&] { return stands ? 100.0 : l::steadyTime(); },
-      [](const l::Report&) {});
+      sensor.settings(), [&](const l::Scan&) { ++scans; },
+      [&] { return stands ? 100.0 : kurumaisu::steadyTime(); }, [](const l::Report&) {});
   driver.start();
   const auto await = [&](std::uint64_t count, double seconds) {
-    const double until = l::steadyTime() + seconds;
-    while (scans < count && l::steadyTime() < until)
+    const double until = kurumaisu::steadyTime() + seconds;
+    while (scans < count && kurumaisu::steadyTime() < until)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     return scans >= count;
   };
@@ -546,7 +546,7 @@ TEST(Driver, RefusesSettingsThatCannotBe) {
     change(settings);
     try {
       l::Driver(
-          settings, [](const l::Scan&) {}, l::steadyTime, [](const l::Report&) {});
+          settings, [](const l::Scan&) {}, kurumaisu::steadyTime, [](const l::Report&) {});
     } catch (const std::invalid_argument& error) {
       return error.what();
     }

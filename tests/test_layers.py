@@ -23,6 +23,7 @@ ROS_CPP = r"<(ros\w*|tf2?|tf2_\w+|xmlrpcpp|actionlib|nodelet|diagnostic_updater|
 ABSTRACT = {"base", "mechanism", "laser"}
 MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - ABSTRACT | {r"laser\.\w+"}
 CONCRETE = rf"kurumaisu\.effects\.({'|'.join([*MODULES, *(effect.__name__ for effect in effects.ALL)])})(\.|$)"
+SHARED = r"file_descriptor\.h|steady\.h"  # C++ that rests on nothing
 IDS = {effect.id for effect in effects.ALL}
 
 
@@ -64,21 +65,23 @@ PYTHON_RULES = [
 ]
 CPP_RULES = [
     Rule(
-        r"(?!.*_node\.cpp|.*/messages\.(cpp|h)|base/((command|odometry)_(in|out)put|limits_server|master_watch|topic_dac)\.(cpp|h)|params\.h)",
+        r"(?!.*_node\.cpp|kurumaisu/bench/drivers/|.*/messages\.(cpp|h)|base/((command|odometry|diagnostics)_(in|out)put|limits_server|master_watch|stop_request|topic_dac)\.(cpp|h)|params\.h)",
         ROS_CPP,
-        "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, and params.h",
+        "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, params.h, and peers of benchmarks",
     ),
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
     Rule(r"(?!.*bindings\.(cpp|h))", r"<pybind11/", "pybind11 only in bindings"),
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
     Rule(r"follow/", r'"(?!follow/|bindings\.h)', "following rests on nothing"),
     Rule(r"scip/", r'"(?!scip/)', "the protocol rests on nothing"),
-    Rule(r"guard/", r'"(?!dac/|guard/|yaml\.h)', "the guard rests on the D/A converter only"),
-    Rule(r"virtual_urg/", r'"(?!scip/|virtual_urg/|bindings\.h)', "the virtual sensor shares the protocol only"),
+    Rule(r"guard/", rf'"(?!dac/|guard/|yaml\.h|{SHARED})', "the guard rests on the D/A converter only"),
+    Rule(
+        r"virtual_urg/", rf'"(?!scip/|virtual_urg/|bindings\.h|{SHARED})', "the virtual sensor shares the protocol only"
+    ),
     Rule(r"laser/", r'"(?!scip/|serial/|laser/|params\.h)', "the driver rests on the protocol and the port only"),
-    Rule(r"serial/", r'"(?!serial/)', "a port rests on nothing"),
+    Rule(r"serial/", rf'"(?!serial/|{SHARED})', "a port rests on nothing"),
     # a virtual board is plugged in and out as a virtual sensor is
-    Rule(r"dac/(?!virtual_)", r'"(?!dac/|serial/|yaml\.h)', "what moves the chair rests on the port only"),
+    Rule(r"dac/(?!virtual_)", rf'"(?!dac/|serial/|yaml\.h|{SHARED})', "what moves the chair rests on the port only"),
     Rule(r"(kalman|raycast)/", r'"(?!model/|kalman/|raycast/|bindings\.h)', "numerics rest on the equations at most"),
 ]
 

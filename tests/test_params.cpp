@@ -115,9 +115,12 @@ Value nodeValues() {
   v["dac"]["kind"] = std::string("topic");
   v["dac"]["reply_wait"] = 0.01;
   v["dac"]["retry_pause"] = 0.1;
+  v["dac"]["priority"] = 20;
+  v["dac"]["longest_run"] = 0.05;
   v["dac"]["nice"] = -20;
   v["guard"]["socket"] = std::string("/somewhere");
   v["guard"]["limits"]["silence"] = 0.15;
+  v["guard"]["priority"] = 40;
   v["guard"]["what_is_the_guards_own"] = true;
   v["odometry"]["imu"]["use"] = false;
   v["odometry"]["imu"]["axis"] = std::string("tf");
@@ -233,8 +236,16 @@ TEST(BaseSettings, AGuardIsChosenByItsName) {
   const k::DacSettings dac = k::readBaseSettings({v, "/n"}).dac;
   EXPECT_EQ(dac.guard->socket, "/somewhere");
   EXPECT_EQ(dac.guard->reply_wait, 0.01);
-  EXPECT_EQ(dac.nice, -20);
   EXPECT_EQ(dac.silence, 0.15);
+  EXPECT_EQ(dac.favour.priority, 20);
+  EXPECT_EQ(dac.favour.longest_run, 0.05);
+  EXPECT_EQ(dac.favour.nice, -20);
+  v["guard"]["priority"] = 20;
+  EXPECT_THROW(k::readBaseSettings({v, "/n"}), std::invalid_argument);
+  v["guard"]["priority"] = 0;
+  EXPECT_THROW(k::readBaseSettings({v, "/n"}), std::invalid_argument);
+  v["dac"]["priority"] = 0;
+  EXPECT_EQ(k::readBaseSettings({v, "/n"}).dac.favour.priority, 0);
   v["dac"]["kind"] = std::string("serial");
   EXPECT_EQ(complaint([&v] {
               k::readBaseSettings({v, "/n"});

@@ -1,44 +1,37 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Commands in; voltages, cmd_vel_out, odom, tf and diagnostics out. What it does with them is in drive.h.
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <geometry_msgs/TwistStamped.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
-#include <ros/xmlrpc_manager.h>
 #include <std_msgs/String.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <exception>
 #include <memory>
 #include <stdexcept>
 
 #include "base/command_input.h"
+#include "base/diagnostics_output.h"
 #include "base/guard_dac.h"
 #include "base/last_word.h"
 #include "base/limits_server.h"
 #include "base/master_watch.h"
 #include "base/odometry_input.h"
 #include "base/odometry_output.h"
-#include "base/odometry_report.h"
 #include "base/report.h"
 #include "base/settings.h"
+#include "base/stop_request.h"
 #include "base/topic_dac.h"
-#include "guard/clock.h"
+#include "guard/crash.h"
 #include "guard/realtime.h"
 
 namespace k = kurumaisu;
 
 namespace {
 
-using Status = diagnostic_updater::DiagnosticStatusWrapper;
-
 constexpr double kGlance = 0.02;     // [s] longest wait for anything
 constexpr int kLastSamples = 5;      // of neutral at the end, with
 constexpr double kLastPause = 0.02;  // [s] after each, time for it to leave the process
-
-std::atomic<bool> stop_requested{false};
 
 void warn(const std::string& text) { ROS_WARN("%s", text.c_str()); }
 
@@ -68,25 +61,20 @@ class BaseNode {
   void tell();
   bool isForgotten();
   void finish();
-  void reportOdometry(Status& status);
-  void reportGuard(Status& status);
-  static void diagnose(Status& status, const k::Report& report);
+  void favour();
 
   k::BaseSettings settings_;
   std::unique_ptr<k::GuardDac> guard_;  ///< or none
   k::TopicDac dac_;
   k::Drive drive_;
   k::LastWord last_word_;
-  k::Tally told_;                    ///< at the last tick
-  k::Tally reported_;                ///< at the last diagnostics
-  std::string state_;                ///< at the last tick
-  k::guard::Status reported_guard_;  ///< at the last diagnostics
-  double last_diagnostics_ = 0;      ///< [s]
-  bool heard_ = false;               ///< a word that may change what is put out
-  diagnostic_updater::Updater diagnostics_;
+  k::Tally told_;       ///< at the last tick
+  std::string state_;   ///< at the last tick
+  int unfavoured_ = 0;  ///< threads, at the last tick
+  bool heard_ = false;  ///< a word that may change what is put out
+  k::DiagnosticsOutput diagnostics_;
   k::OdometryOutput odom_;
   k::OdometryInput odom_input_;
-  k::GyroCounts reported_gyro_;  ///< at the last diagnostics
   ros::Publisher cmd_vel_out_;
   ros::Publisher active_input_;
   k::CommandInput input_;
@@ -103,6 +91,7 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
       dac_(nh, guard_.get()),
       drive_(settings.drive, dac_),
       last_word_([this] { finish(); }),
+      diagnostics_(settings_, drive_, guard_.get()),
       odom_(nh, settings.odometry.names),
       odom_input_(nh, drive_, settings.odometry, loopTime),
       cmd_vel_out_(nh.advertise<geometry_msgs::TwistStamped>("cmd_vel_out", 10)),
@@ -114,28 +103,24 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
   logLaw(settings_.law_name, k::ambiguity(drive_.outlet()));
   const std::string unfollowed = k::unfollowedWarning(settings.effects.unfollowed);
   if (!unfollowed.empty()) warn(unfollowed);
-  diagnostics_.setHardwareID("none");
-  diagnostics_.add("voltage law", [this](Status& status) {
-    diagnose(status, k::reportLaw(drive_.outlet(), settings_.law_name));
-  });
-  diagnostics_.add("commands", [this](Status& status) {
-    diagnose(status, k::reportCommands(drive_, reported_));
-    reported_ = k::tally(drive_);
-  });
-  diagnostics_.add("odometry", [this](Status& status) { reportOdometry(status); });
-  const std::string refusal = guard_ ? k::guard::favourThreads(settings_.dac.nice) : "";
-  if (!refusal.empty()) warn("BASE_NOT_FAVOURED: busy cores may delay commands, and neutral: " + refusal);
-  if (guard_) diagnostics_.add("guard", [this](Status& status) { reportGuard(status); });
+  if (guard_) favour();
   if (ros::Time::isSimTime()) {
     timer_ =
         nh.createTimer(ros::Duration(1.0 / settings_.rate), [this](const ros::TimerEvent&) { onTick(); });
   }
 }
 
+/// With a guard, dying must not wait for busy cores, and a crash must not wait to be heard of.
+void BaseNode::favour() {
+  k::guard::catchCrashes();
+  const std::string refusal = k::guard::favourThreads(settings_.dac.favour);
+  if (!refusal.empty()) warn("BASE_NOT_FAVOURED: busy cores may delay commands, and neutral: " + refusal);
+}
+
 void BaseNode::run() {
   try {
     ros::SteadyTime due = ros::SteadyTime::now();
-    while (ros::ok() && !stop_requested && !isForgotten()) {
+    while (ros::ok() && !k::isStopRequested() && !isForgotten()) {
       due = ros::Time::isSimTime() ? listen(due) : tickAfter(due);
     }
   } catch (...) {
@@ -195,10 +180,7 @@ void BaseNode::onTick() {
   odom_input_.check();
   if (tick != k::Drive::Tick::kRepeated) publish();
   tell();
-  if (std::abs(t - last_diagnostics_) >= settings_.diagnostic_period) {
-    last_diagnostics_ = t;
-    diagnostics_.force_update();  // update() would fall silent when the clock is set back
-  }
+  diagnostics_.tick(t);
 }
 
 /// Words are obeyed at once, not at the next tick; those that came together, together. In simulated time there
@@ -224,6 +206,9 @@ void BaseNode::tell() {
   const std::string warning = k::warningOf(drive_, told_, state_);
   if (!warning.empty()) warn(warning);
   told_ = k::tally(drive_);
+  if (k::guard::unfavoured() > unfavoured_)
+    warn("BASE_NOT_FAVOURED: a thread ran for too long without a wait");
+  unfavoured_ = k::guard::unfavoured();
   const std::string state = k::stateOf(drive_);
   if (state == state_) return;
   state_ = state;
@@ -232,44 +217,12 @@ void BaseNode::tell() {
   active_input_.publish(active);
 }
 
-void BaseNode::reportOdometry(Status& status) {
-  const k::Reckoning& reckoning = drive_.reckoning();
-  const k::KnownEffects& effects = settings_.effects;
-  diagnose(status,
-           k::reportOdometry(reckoning, effects.unfollowed, effects.noise.has_value(), reported_gyro_));
-  if (reckoning.gyro()) reported_gyro_ = reckoning.gyro()->counts();
-}
-
-void BaseNode::reportGuard(Status& status) {
-  diagnose(status, k::reportGuard(guard_->status(), reported_guard_, k::guard::monotonic()));
-  reported_guard_ = guard_->status();
-}
-
-void BaseNode::diagnose(Status& status, const k::Report& report) {
-  status.summary(report.error ? Status::ERROR : report.warning ? Status::WARN : Status::OK, report.summary);
-  for (const auto& [name, value] : report.values) status.add(name, value);
-}
-
-/// Replaces what roscpp does at `rosnode kill`: it would close the topics before neutral is out.
-void onShutdownCall(XmlRpc::XmlRpcValue& /*parameters*/, XmlRpc::XmlRpcValue& result) {
-  stop_requested = true;
-  result = ros::xmlrpc::responseInt(1, "", 0);
-}
-
-void stopGracefully() {
-  for (const int signal : {SIGINT, SIGTERM}) {
-    std::signal(signal, [](int /*signal*/) { stop_requested = true; });
-  }
-  ros::XMLRPCManager::instance()->unbind("shutdown");
-  ros::XMLRPCManager::instance()->bind("shutdown", onShutdownCall);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "base_node", ros::init_options::NoSigintHandler);
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
-  stopGracefully();
+  k::catchStopRequests();
   try {
     BaseNode node(nh, k::readBaseSettings(k::Section::load(ros::this_node::getName())));
     node.run();

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "guard/client.h"
+#include "guard/realtime.h"
 #include "params.h"
 
 namespace kurumaisu {
@@ -12,10 +13,11 @@ namespace kurumaisu {
 struct DacSettings {
   std::optional<guard::ClientSettings> guard;  ///< none: the topic alone
   double silence;                              ///< after which that guard is neutral [s]
-  int nice;                                    ///< of all threads, with a guard; 0: as they are
+  guard::Favour favour;                        ///< with a guard
 };
 
-/// guard: launch/guard.yaml, of which only its socket and its silence concern us. Throws std::invalid_argument naming the parameter.
+/// guard: launch/guard.yaml, of which its socket, its priority and its silence concern us. Throws std::invalid_argument
+/// naming the parameter.
 DacSettings readDac(Section dac, Section guard);
 
 }  // namespace kurumaisu

@@ -69,10 +69,9 @@ std::optional<std::string> Dialogue::next(double until) {
     }
     if (input_.size() > kReplyMost) return std::exchange(input_, "");
     std::array<char, kReplyMost> bytes;
-    const std::size_t count =
-        port_->read(bytes.data(), bytes.size(), std::max(0.0, until - serial::steadyTime()));
+    const std::size_t count = port_->read(bytes.data(), bytes.size(), std::max(0.0, until - steadyTime()));
     input_.append(bytes.data(), count);
-    if (count == 0 && serial::steadyTime() >= until) return std::nullopt;
+    if (count == 0 && steadyTime() >= until) return std::nullopt;
   }
 }
 
@@ -93,21 +92,21 @@ void Dialogue::discard() {
     if (++lines > kLinesMost) throw Fault("DAC_WRONG_REPLY: it does not stop talking");
   }
   input_.clear();
-  const double now = serial::steadyTime();
+  const double now = steadyTime();
   owed_.erase(
       std::remove_if(owed_.begin(), owed_.end(), [now](const Owed& owed) { return owed.until <= now; }),
       owed_.end());
 }
 
 bool Dialogue::inDoubt(const std::string& expect) const {
-  const double now = serial::steadyTime();
+  const double now = steadyTime();
   return std::any_of(owed_.begin(), owed_.end(),
                      [&](const Owed& owed) { return owed.until > now && overlap(owed.expect, expect); });
 }
 
 void Dialogue::settle() {
   for (;;) {
-    const double now = serial::steadyTime();
+    const double now = steadyTime();
     double until = now;
     for (const Owed& owed : owed_) until = std::max(until, owed.until);
     if (until <= now) break;
@@ -118,7 +117,18 @@ void Dialogue::settle() {
 
 void Dialogue::tell(const std::string& command, const std::string& expect) {
   send(command);
-  if (!expect.empty()) owe(expect, serial::steadyTime());
+  if (!expect.empty()) owe(expect, steadyTime());
+}
+
+bool Dialogue::askAtOnce(const std::vector<Command>& commands) {
+  discard();
+  if (!owed_.empty()) return false;
+  for (const Command& command : commands) tell(command.text, command.expect);
+  for (const double until = steadyTime() + manner_.reply_timeout; !owed_.empty();) {
+    const std::optional<std::string> line = next(until);
+    if (!line || !settled(*line)) return false;
+  }
+  return true;
 }
 
 std::string Dialogue::ask(const std::string& command, const std::string& expect) {
@@ -127,7 +137,7 @@ std::string Dialogue::ask(const std::string& command, const std::string& expect)
   std::string wrong;
   for (int attempt = 0; attempt <= manner_.retries; ++attempt) {
     send(command);
-    const double sent = serial::steadyTime();
+    const double sent = steadyTime();
     while (std::optional<std::string> line = next(sent + manner_.reply_timeout)) {
       if (matches(*line, expect)) return *line;
       if (settled(*line)) continue;

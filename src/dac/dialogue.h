@@ -33,6 +33,15 @@ class Dialogue {
   /// Sends a command without waiting; its reply, if a pattern describes one, is owed.
   void tell(const std::string& command, const std::string& expect);
 
+  struct Command {
+    std::string text;
+    std::string expect;  // "": it has no reply
+  };
+
+  /// Sends commands without waiting in between, then waits for their replies. Returns whether all have come, and nothing
+  /// else; those that have not are owed. Sends nothing if a reply is owed already.
+  bool askAtOnce(const std::vector<Command>& commands);
+
   /// Could the reply to an earlier command be taken for one that is expected now?
   bool inDoubt(const std::string& expect) const;
 

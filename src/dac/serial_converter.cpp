@@ -75,30 +75,31 @@ SerialConverter::Frames SerialConverter::framesOf(const Levels& levels) const {
   Fillings fillings;
   for (const Signal signal : kWriteOrder) fillings[signal] = {settings_.ch[signal], levels[signal]};
   const Exchange& write = settings_.write;
-  if (settings_.one_frame) return {{"all channels", write.send.fill(fillings), write.expect.fill(fillings)}};
+  if (settings_.one_frame)
+    return {{"all channels", {write.send.fill(fillings), write.expect.fill(fillings)}}};
   Frames frames;
   for (const Signal signal : kWriteOrder) {
     const Filling& one = fillings[signal];
-    frames.push_back({kSignalNames[signal], write.send.fill(one), write.expect.fill(one)});
+    frames.push_back({kSignalNames[signal], {write.send.fill(one), write.expect.fill(one)}});
   }
   return frames;
 }
 
 void SerialConverter::ask(const Frame& frame) {
   if (settings_.write.answered) {
-    dialogue_->ask(frame.command, frame.expect);
+    dialogue_->ask(frame.command.text, frame.command.expect);
   } else {
-    dialogue_->tell(frame.command, "");
+    dialogue_->tell(frame.command.text, "");
   }
 }
 
 /// Sends frames without waiting: what stops the chair must not.
 void SerialConverter::tell(Frames::const_iterator frame, Frames::const_iterator end) {
-  for (; frame != end; ++frame) dialogue_->tell(frame->command, frame->expect);
+  for (; frame != end; ++frame) dialogue_->tell(frame->command.text, frame->command.expect);
 }
 
 void SerialConverter::converse(Frames::const_iterator frame, Frames::const_iterator end) {
-  const auto in_doubt = [this](const Frame& each) { return dialogue_->inDoubt(each.expect); };
+  const auto in_doubt = [this](const Frame& each) { return dialogue_->inDoubt(each.command.expect); };
   for (; frame != end; ++frame) {
     if (std::exchange(failed_, false) || std::any_of(frame, end, in_doubt)) {
       tell(frame, end);
@@ -114,12 +115,18 @@ void SerialConverter::converse(Frames::const_iterator frame, Frames::const_itera
   }
 }
 
+bool SerialConverter::putAtOnce(const Frames& frames) {
+  std::vector<Dialogue::Command> commands;
+  for (const Frame& frame : frames) commands.push_back(frame.command);
+  return dialogue_->askAtOnce(commands);
+}
+
 Volts SerialConverter::put(const Volts& volts) {
   const Levels levels = levelsOf(volts, channels_, settings_.codings);
   if (!dialogue_) throw Fault("DAC_CLOSED: " + settings_.port + " must be opened anew");
   const Frames frames = framesOf(levels);
   try {
-    converse(frames.begin(), frames.end());
+    if (!settings_.burst || !putAtOnce(frames)) converse(frames.begin(), frames.end());
   } catch (const serial::LinkLost& error) {
     throw lost("voltages", error.what());
   }

@@ -15,8 +15,8 @@ namespace kurumaisu::dac {
 
 /// put() sends every frame even if one before it was not confirmed, for it may be the one that stops the chair.
 ///
-/// A frame goes out when the one before is confirmed, or found not to be, after (1 + retries) * reply_timeout. After a
-/// fault all of them go out at once. It returns within that and late_reply, for each frame.
+/// A frame goes out when the one before is confirmed, or found not to be, after (1 + retries) * reply_timeout. In a burst,
+/// and after a fault, all of them go out at once; a burst that is not confirmed is repeated frame by frame. It returns within that and late_reply, for each frame.
 class SerialConverter : public Converter {
  public:
   using OpenPort = std::function<std::unique_ptr<serial::Port>()>;
@@ -32,13 +32,13 @@ class SerialConverter : public Converter {
  private:
   struct Frame {
     std::string what;  // for messages
-    std::string command;
-    std::string expect;
+    Dialogue::Command command;
   };
 
   using Frames = std::vector<Frame>;
 
   Frames framesOf(const Levels& levels) const;
+  bool putAtOnce(const Frames& frames);
   void start();
   void settle();
   void converse(Frames::const_iterator frame, Frames::const_iterator end);

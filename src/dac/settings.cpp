@@ -83,7 +83,9 @@ void checkWrite(const Section& section, const SerialSettings& serial) {
 }
 
 void readWrite(Section section, SerialSettings& serial) {
-  serial.one_frame = section.choice("frame", {"channel", "all"}) == "all";
+  const std::string frame = section.choice("frame", {"channel", "burst", "all"});
+  serial.one_frame = frame == "all";
+  serial.burst = frame == "burst";
   serial.write = readExchange(section, serial.one_frame ? Template::Kind::kAll : Template::Kind::kChannel);
   checkWrite(section, serial);
   section.end();

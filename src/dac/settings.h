@@ -30,6 +30,7 @@ struct SerialSettings {
   std::vector<Exchange> start;   ///< identification and what else comes before the first voltage
   bool identifies;               ///< is the first of them the identification?
   bool one_frame;                ///< for all channels
+  bool burst;                    ///< one for each, sent without waiting for replies in between
   Exchange write;
   std::array<std::string, kSignals> ch;
   Codings codings;

@@ -9,6 +9,7 @@
 #include <cerrno>
 
 #include "dac/converter.h"
+#include "serial/descriptor.h"
 
 namespace kurumaisu::dac {
 namespace {
@@ -20,27 +21,26 @@ Fault faultOf(int code, const std::string& file) {
   return Fault(name + file + ": " + serial::systemError(code));
 }
 
-int openFolder(const std::string& folder) {
-  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) throw Fault("DAC_NO_PORT: " + folder + ": " + serial::systemError(errno));
+Descriptor openFolder(const std::string& folder) {
+  Descriptor fd(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!fd) throw Fault("DAC_NO_PORT: " + folder + ": " + serial::systemError(errno));
   return fd;
 }
 
 }  // namespace
 
-Attributes::Attributes(const std::string& folder) : folder_(folder), directory_(openFolder(folder), "DAC") {
-  if (flock(directory_.fd(), LOCK_EX | LOCK_NB) == 0) return;
+Attributes::Attributes(const std::string& folder) : folder_(folder), directory_(openFolder(folder)) {
+  if (flock(directory_.get(), LOCK_EX | LOCK_NB) == 0) return;
   if (errno == EWOULDBLOCK) throw Fault("DAC_IN_USE: another program holds " + folder);
   throw Fault("DAC_NO_PORT: " + folder + " cannot be locked: " + serial::systemError(errno));
 }
 
 std::optional<std::string> Attributes::readIfThere(const std::string& name) const {
-  const int fd = openat(directory_.fd(), name.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0 && errno == ENOENT) return std::nullopt;
-  if (fd < 0) throw faultOf(errno, folder_ + "/" + name);
-  const serial::Descriptor file(fd, "DAC");
+  const Descriptor file(openat(directory_.get(), name.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!file && errno == ENOENT) return std::nullopt;
+  if (!file) throw faultOf(errno, folder_ + "/" + name);
   std::array<char, 256> text;
-  const ssize_t count = ::read(fd, text.data(), text.size());
+  const ssize_t count = ::read(file.get(), text.data(), text.size());
   if (count < 0) throw faultOf(errno, folder_ + "/" + name);
   std::string result(text.data(), static_cast<std::size_t>(count));
   while (!result.empty() && result.back() == '\n') result.pop_back();
@@ -53,10 +53,9 @@ std::string Attributes::read(const std::string& name) const {
 }
 
 void Attributes::write(const std::string& name, const std::string& text) const {
-  const int fd = openat(directory_.fd(), name.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC);
-  if (fd < 0) throw faultOf(errno, folder_ + "/" + name);
-  const serial::Descriptor file(fd, "DAC");
-  const ssize_t count = ::write(fd, text.data(), text.size());
+  const Descriptor file(openat(directory_.get(), name.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
+  if (!file) throw faultOf(errno, folder_ + "/" + name);
+  const ssize_t count = ::write(file.get(), text.data(), text.size());
   if (count < 0) throw faultOf(errno, folder_ + "/" + name);
   if (static_cast<std::size_t>(count) != text.size()) throw faultOf(EIO, folder_ + "/" + name);
 }

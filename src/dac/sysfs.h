@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "serial/descriptor.h"
+#include "file_descriptor.h"
 
 namespace kurumaisu::dac {
 
@@ -28,7 +28,7 @@ class Attributes {
 
  private:
   std::string folder_;
-  serial::Descriptor directory_;
+  Descriptor directory_;
 };
 
 }  // namespace kurumaisu::dac

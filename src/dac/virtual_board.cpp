@@ -10,12 +10,10 @@
 #include <ctime>
 #include <stdexcept>
 
-#include "virtual_urg/steady.h"
+#include "steady.h"
 
 namespace kurumaisu::dac {
 namespace {
-
-using virtual_urg::steady;
 
 constexpr double kNap = 0.2;  // [s] at most between two looks
 
@@ -49,7 +47,7 @@ void VirtualBoard::inject(const std::string& fault) {
   const bool at_once = fault.find('@') == std::string::npos;
   if (read.what == BoardFault::kUnplug && at_once) return unplug(read.value);
   if (read.what == BoardFault::kStall && at_once) {
-    stalled_until_ = steady() + read.value;
+    stalled_until_ = steadyTime() + read.value;
   } else {
     faults_.push_back(read);
   }
@@ -87,10 +85,10 @@ std::vector<std::string> VirtualBoard::heard() const {
 }
 
 bool VirtualBoard::wait(const std::function<bool()>& so, double timeout) const {
-  const double until = steady() + timeout;
+  const double until = steadyTime() + timeout;
   while (!so()) {
     std::unique_lock lock(mutex_);
-    if (steady() >= until) return false;
+    if (steadyTime() >= until) return false;
     changed_.wait_for(lock, std::chrono::milliseconds(1));
   }
   return true;
@@ -105,7 +103,7 @@ void VirtualBoard::run() {
 }
 
 void VirtualBoard::serve(std::unique_lock<std::mutex>& lock) {
-  const double now = steady();
+  const double now = steadyTime();
   if (back_at_ > 0 && now >= back_at_) {
     back_at_ = 0;
     pty_.plug();
@@ -167,7 +165,7 @@ void VirtualBoard::obey(const std::string& line) {
   std::optional<BoardReader::Heard> heard = reader_.hear(line, false);
   const BoardFault* const fault = faultNow(heard);
   if (fault != nullptr && fault->what == BoardFault::kUnplug) return unplug(fault->value);
-  if (fault != nullptr && fault->what == BoardFault::kStall) stalled_until_ = steady() + fault->value;
+  if (fault != nullptr && fault->what == BoardFault::kStall) stalled_until_ = steadyTime() + fault->value;
   if (fault != nullptr && fault->what == BoardFault::kLost) heard = reader_.hear(line, true);
   if (!heard) ++misheard_;
   const bool obeys = fault == nullptr || fault->what != BoardFault::kDeaf;
@@ -178,15 +176,15 @@ void VirtualBoard::obey(const std::string& line) {
   if (fault != nullptr && fault->what == BoardFault::kWrong) reply = "?" + settings_.reply_terminator;
   if (fault != nullptr && fault->what == BoardFault::kCut) reply.resize((reply.size() - 1) / 2);
   const double delay = fault != nullptr && fault->what == BoardFault::kLate ? fault->value : 0;
-  replies_.push_back({steady() + delay, reply});
-  flush(steady());
+  replies_.push_back({steadyTime() + delay, reply});
+  flush(steadyTime());
 }
 
 void VirtualBoard::unplug(double seconds) {
   pty_.unplug();
   input_.clear();
   replies_.clear();
-  back_at_ = steady() + seconds;
+  back_at_ = steadyTime() + seconds;
   outputs_.note("unplugged");
   wake_.set();
 }

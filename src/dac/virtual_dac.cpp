@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// rosrun kurumaisu virtual_dac DEVICE.yaml LINK: be the board that a device's file describes.
+// rosrun kurumaisu virtual_dac DEVICE.yaml PLACE: be the converter that a device's file describes.
 #include <poll.h>
 #include <sched.h>
 #include <sys/mman.h>
@@ -15,23 +15,32 @@
 #include <vector>
 
 #include "dac/virtual_board.h"
+#include "dac/virtual_chip.h"
 
 namespace {
 
+using kurumaisu::dac::Device;
 using kurumaisu::dac::VirtualBoard;
+using kurumaisu::dac::VirtualChip;
 
 constexpr const char* kUsage =
-    "virtual_dac DEVICE.yaml LINK [--log FILE] [--realtime] [FAULT]...\n\n"
-    "A serial D/A board at a terminal to which LINK leads, as the file describes it (its `port` is not "
-    "read), until Ctrl-C\n"
-    "or the end of its standard input, unless that is /dev/null. It reads faults from there, one per line, "
-    "and `volts`.\n\n"
+    "virtual_dac DEVICE.yaml PLACE [--log FILE] [--realtime] [FAULT]...\n\n"
+    "A D/A converter that is none, as the file describes it, until Ctrl-C or the end of its standard input, "
+    "unless "
+    "that is\n"
+    "/dev/null. kind serial: a board at a terminal to which PLACE leads (the file's `port` is not read); "
+    "kind iio: a "
+    "chip in a\n"
+    "tree of files, which is made at PLACE (give it as the file's `root`) and can only be unplugged. It "
+    "reads faults "
+    "from its\n"
+    "input, one per line, and `volts`.\n\n"
     "  --log FILE   every change of voltage: TIME volts V_f V_s V_ref, TIME in ns of CLOCK_MONOTONIC\n"
     "  --realtime   before all others, where the system allows it\n"
     "  FAULT        NAME[/SIGNAL][@COMMAND][xCOUNT][=SECONDS]; without COMMAND it begins at once\n\n";
 
 struct Options {
-  std::vector<std::string> places;  // device, link
+  std::vector<std::string> places;  // device, place
   std::vector<std::string> faults;
   std::string log;
   bool realtime = false;
@@ -61,13 +70,21 @@ void goFirst() {
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) std::perror("--realtime");
 }
 
-void obey(VirtualBoard& board, const std::string& line) {
+std::string summaryOf(const VirtualBoard& board) {
+  return std::to_string(board.history().size()) + " changes, " + std::to_string(board.commands()) +
+         " commands, " + std::to_string(board.misheard()) + " not understood";
+}
+
+std::string summaryOf(const VirtualChip& chip) { return std::to_string(chip.changes()) + " changes"; }
+
+template <typename Converter>
+void obey(Converter& device, const std::string& line) {
   if (line == "volts") {
-    const auto volts = board.volts();
+    const auto volts = device.volts();
     std::printf("%.6f %.6f %.6f\n", volts.translation, volts.steering, volts.reference);
   } else {
     try {
-      board.inject(line);
+      device.inject(line);
       std::printf("%s\n", line.c_str());
     } catch (const std::exception& error) {
       std::printf("%s\n", error.what());
@@ -77,13 +94,14 @@ void obey(VirtualBoard& board, const std::string& line) {
 }
 
 /// Obeys the lines that have come; false at the end of the input.
-bool obeyInput(VirtualBoard& board, std::string& input) {
+template <typename Converter>
+bool obeyInput(Converter& device, std::string& input) {
   std::array<char, 512> bytes;
   const ssize_t count = ::read(STDIN_FILENO, bytes.data(), bytes.size());
   if (count <= 0) return false;
   input.append(bytes.data(), static_cast<std::size_t>(count));
   for (std::size_t end = input.find('\n'); end != std::string::npos; end = input.find('\n')) {
-    obey(board, input.substr(0, end));
+    obey(device, input.substr(0, end));
     input.erase(0, end + 1);
   }
   return true;
@@ -95,13 +113,25 @@ bool hasInput() {
   return fstat(STDIN_FILENO, &status) == 0 && (!S_ISCHR(status.st_mode) || isatty(STDIN_FILENO) == 1);
 }
 
-void serve(VirtualBoard& board, int signals) {
+template <typename Converter>
+void waitIn(Converter& device, int signals) {
   std::array<pollfd, 2> ready{{{signals, POLLIN, 0}, {hasInput() ? STDIN_FILENO : -1, POLLIN, 0}}};
   std::string input;
   while (poll(ready.data(), ready.size(), -1) > 0) {
     if (ready[0].revents != 0) return;
-    if (ready[1].revents != 0 && !obeyInput(board, input)) return;
+    if (ready[1].revents != 0 && !obeyInput(device, input)) return;
   }
+}
+
+/// Works until a signal, or the end of the input.
+template <typename Converter>
+void serve(const Options& options, const Device& file, int signals) {
+  Converter device(file, options.places[1], options.log);
+  for (const std::string& fault : options.faults) device.inject(fault);
+  std::printf("a virtual board at %s\n", options.places[1].c_str());
+  std::fflush(stdout);
+  waitIn(device, signals);
+  std::printf("%s\n", summaryOf(device).c_str());
 }
 
 int run(const Options& options) {
@@ -110,15 +140,14 @@ int run(const Options& options) {
   sigaddset(&ends, SIGINT);
   sigaddset(&ends, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
-  const kurumaisu::virtual_urg::Descriptor signals(signalfd(-1, &ends, SFD_CLOEXEC));
+  const kurumaisu::Descriptor signals(signalfd(-1, &ends, SFD_CLOEXEC));
   if (options.realtime) goFirst();
-  VirtualBoard board(kurumaisu::dac::readDevice(options.places[0]), options.places[1], options.log);
-  for (const std::string& fault : options.faults) board.inject(fault);
-  std::printf("a virtual board at %s\n", options.places[1].c_str());
-  std::fflush(stdout);
-  serve(board, signals.get());
-  std::printf("%zu changes, %lu commands, %lu not understood\n", board.history().size(),
-              static_cast<unsigned long>(board.commands()), static_cast<unsigned long>(board.misheard()));
+  const Device file = kurumaisu::dac::readDevice(options.places[0]);
+  if (std::holds_alternative<kurumaisu::dac::SerialSettings>(file.back_end)) {
+    serve<VirtualBoard>(options, file, signals.get());
+  } else {
+    serve<VirtualChip>(options, file, signals.get());
+  }
   return 0;
 }
 

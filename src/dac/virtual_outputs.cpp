@@ -6,23 +6,18 @@
 
 #include <cmath>
 #include <cstdio>
-#include <ctime>
+
+#include "steady.h"
 
 namespace kurumaisu::dac {
 namespace {
 
 constexpr double kNearlyHalf = 0.501;  // [codes] what is rounded to neutral
 
-std::int64_t nanoseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{1000000000} * now.tv_sec + now.tv_nsec;
-}
-
-virtual_urg::Descriptor openLog(const std::string& file) {
-  if (file.empty()) return {};
+Descriptor openLog(const std::string& file) {
+  if (file.empty()) return Descriptor();
   const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  return virtual_urg::Descriptor(virtual_urg::checked(fd, file));
+  return Descriptor(checked(fd, file));
 }
 
 }  // namespace
@@ -31,7 +26,7 @@ Outputs::Outputs(const Channels& channels, const Codings& codings, const std::st
     : channels_(channels), codings_(codings), log_(openLog(log)) {}
 
 void Outputs::put(const std::vector<std::pair<Signal, int>>& codes) {
-  const std::int64_t time = nanoseconds();
+  const std::int64_t time = steadyNanoseconds();
   const std::array<int, kSignals> before = codes_;
   for (const auto& [signal, code] : codes) codes_[signal] = code;
   if (codes_ == before) return;
@@ -43,7 +38,7 @@ void Outputs::put(const std::vector<std::pair<Signal, int>>& codes) {
   log(time, text.data());
 }
 
-void Outputs::note(const std::string& what) const { log(nanoseconds(), what); }
+void Outputs::note(const std::string& what) const { log(steadyNanoseconds(), what); }
 
 void Outputs::log(std::int64_t time, const std::string& what) const {
   if (!log_) return;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "dac/settings.h"
-#include "virtual_urg/descriptor.h"
+#include "file_descriptor.h"
 
 namespace kurumaisu::dac {
 
@@ -40,7 +40,7 @@ class Outputs {
 
   const Channels channels_;
   const Codings codings_;
-  virtual_urg::Descriptor log_;
+  Descriptor log_;
   std::array<int, kSignals> codes_{};
   std::vector<Change> history_;
 };

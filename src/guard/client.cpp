@@ -8,8 +8,9 @@
 #include <ctime>
 #include <utility>
 
-#include "guard/clock.h"
+#include "guard/crash.h"
 #include "guard/socket.h"
+#include "steady.h"
 
 namespace kurumaisu::guard {
 namespace {
@@ -18,7 +19,7 @@ void waitFor(const Descriptor& socket, double seconds_left) {
   timespec wait{};
   wait.tv_sec = static_cast<time_t>(seconds_left);
   wait.tv_nsec = static_cast<long>(1e9 * (seconds_left - static_cast<double>(wait.tv_sec)));
-  pollfd ready{socket.fd(), POLLIN, 0};
+  pollfd ready{socket.get(), POLLIN, 0};
   ppoll(&ready, 1, &wait, nullptr);
 }
 
@@ -27,24 +28,24 @@ void waitFor(const Descriptor& socket, double seconds_left) {
 Client::Client(ClientSettings settings) : settings_(std::move(settings)) {}
 
 const Status& Client::exchange(Kind kind, const dac::Volts& volts) {
-  const std::int64_t begin = monotonicNanoseconds();
+  const std::int64_t begin = steadyNanoseconds();
   if (!socket_ && !connect(seconds(begin))) return status_;
   hear(seconds(begin));  // answers that came too late for the last call
   const Request request{kMagic,
                         kVersion,
                         static_cast<std::uint16_t>(kind),
                         ++sequence_,
-                        monotonicNanoseconds(),
+                        steadyNanoseconds(),
                         volts.translation,
                         volts.steering,
                         volts.reference};
   if (socket_ && send(socket_, &request, sizeof request) == Sent::kGone) lose(seconds(begin));
   for (;;) {
-    const double left = seconds(begin) + settings_.reply_wait - monotonic();
+    const double left = seconds(begin) + settings_.reply_wait - steadyTime();
     if (!socket_ || answered_ == sequence_) return status_;
     if (left <= 0) break;
     waitFor(socket_, left);
-    hear(monotonic());
+    hear(steadyTime());
   }
   ++status_.late;
   return status_;
@@ -59,6 +60,7 @@ bool Client::connect(double now) {
   }
   const std::uint64_t late = status_.late;
   const std::uint64_t connections = status_.connections + 1;
+  hangUpOnCrash(socket_.get());
   status_ = Status();
   status_.late = late;
   status_.connections = connections;
@@ -68,6 +70,7 @@ bool Client::connect(double now) {
 
 /// Without a guard its sentinel writes neutral; nobody knows more.
 void Client::lose(double now) {
+  hangUpOnCrash(-1);
   socket_.close();
   retry_at_ = now + settings_.retry_pause;
   status_.connected = false;

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "dac/converter.h"
-#include "guard/descriptor.h"
+#include "file_descriptor.h"
 #include "guard/protocol.h"
 
 namespace kurumaisu::guard {

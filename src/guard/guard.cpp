@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "guard/clock.h"
+#include "steady.h"
 
 namespace kurumaisu::guard {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A process that others cannot keep waiting, as far as the system allows.
+// Processes that others cannot keep waiting, as far as the system allows.
 #pragma once
 
 #include <string>
@@ -9,10 +9,21 @@ namespace kurumaisu::guard {
 /// Locks the memory and takes a SCHED_FIFO priority, 0 for none. Says what was refused.
 void makeRealtime(int priority);
 
-/// Gives all threads of this process a nice value, and with them those that they will start. A process needs processor
-/// time even to die: one that busy cores keep from it holds its socket, and so its voltages, meanwhile. Not a real-time
-/// priority: an endless loop at one keeps the kernel's own threads from their work, the tty's among them, and so neutral.
-/// Returns what was refused, or "".
-std::string favourThreads(int nice);
+/// How a client comes before others. A process needs processor time even to die: one that busy cores keep from it holds
+/// its socket, and so its voltages, meanwhile.
+struct Favour {
+  int priority;  ///< of SCHED_FIFO, below the guard's; 0: none
+  double
+      longest_run;  ///< [s] of processor time at it without a wait: who takes more loses it, but not his nice value.
+      ///< An endless loop would keep the kernel's own threads from their work, the tty's among them
+  int nice;  ///< also where the priority is refused; 0: as it is. It counts among one session's processes only,
+             ///< where the kernel groups them (sched_autogroup_enabled), or systemd does
+};
+
+/// Favours all threads of this process, and those that they will start. Returns what was refused, or "".
+std::string favourThreads(const Favour& favour);
+
+/// How many threads have lost their priority, having run for too long.
+int unfavoured();
 
 }  // namespace kurumaisu::guard

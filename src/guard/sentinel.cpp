@@ -17,11 +17,11 @@
 #include <optional>
 #include <system_error>
 
-#include "guard/clock.h"
 #include "guard/log.h"
 #include "guard/notify.h"
 #include "guard/realtime.h"
 #include "guard/server.h"
+#include "steady.h"
 
 namespace kurumaisu::guard {
 namespace {
@@ -76,10 +76,11 @@ int Sentinel::run() {
   for (;;) {
     start();
     const int status = watch();
+    const double noticed = steadyTime();
     const bool is_clean = WIFEXITED(status) && WEXITSTATUS(status) == 0;
     if (is_leaving_ && is_clean) return 0;
-    forceNeutral(settings_, open_, 0);
-    say("GUARD_DEAD", wordsFor(status));
+    const bool is_neutral = forceNeutral(settings_, open_, 0);
+    say("GUARD_DEAD", wordsFor(status) + (is_neutral ? reaction(noticed, steadyTime()) : ""));
     if (is_leaving_) return 0;
     if (!has_begun_) return 1;
     if (!rest()) return 0;
@@ -92,23 +93,23 @@ void Sentinel::start() {
     throw std::system_error(errno, std::generic_category(), "pipe");
   beats_ = Descriptor(ends[0]);
   Descriptor beating(ends[1]);
-  last_beat_ = monotonic();
+  last_beat_ = steadyTime();
   const pid_t parent = getpid();
   guard_ = fork();
   if (guard_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
-  if (guard_ == 0) _exit(runGuard(settings_, open_, beating.fd(), parent));
+  if (guard_ == 0) _exit(runGuard(settings_, open_, beating.get(), parent));
 }
 
 /// Returns the guard's wait status once it is dead.
 int Sentinel::watch() {
   for (;;) {
-    const double left = std::max(0.0, last_beat_ + settings_.sentinel_silence - monotonic());
-    std::array<pollfd, 2> ready = {{{signals_.fd(), POLLIN, 0}, {beats_.fd(), POLLIN, 0}}};
+    const double left = std::max(0.0, last_beat_ + settings_.sentinel_silence - steadyTime());
+    std::array<pollfd, 2> ready = {{{signals_.fd(), POLLIN, 0}, {beats_.get(), POLLIN, 0}}};
     poll(ready.data(), ready.size(), static_cast<int>(std::ceil(1e3 * left)));
     while (const auto signal = signals_.next()) pass(*signal);
     int status = 0;
     if (waitpid(guard_, &status, WNOHANG) == guard_) return status;
-    if (hear() || monotonic() < last_beat_ + settings_.sentinel_silence) continue;
+    if (hear() || steadyTime() < last_beat_ + settings_.sentinel_silence) continue;
     kill(guard_, SIGKILL);
     waitpid(guard_, &status, 0);
     return status;
@@ -118,9 +119,9 @@ int Sentinel::watch() {
 bool Sentinel::hear() {
   std::array<char, 64> bytes{};
   bool heard = false;
-  while (read(beats_.fd(), bytes.data(), bytes.size()) > 0) heard = true;
+  while (read(beats_.get(), bytes.data(), bytes.size()) > 0) heard = true;
   if (!heard) return false;
-  last_beat_ = monotonic();
+  last_beat_ = steadyTime();
   if (!has_begun_) notify("READY=1");
   has_begun_ = true;
   if (last_beat_ >= notified_ + kNotifyPeriod) {
@@ -139,10 +140,10 @@ void Sentinel::pass(int signal) {
 
 /// Waits before the next start. False if told to leave.
 bool Sentinel::rest() {
-  const double until = monotonic() + settings_.restart_pause;
-  while (!is_leaving_ && monotonic() < until) {
+  const double until = steadyTime() + settings_.restart_pause;
+  while (!is_leaving_ && steadyTime() < until) {
     pollfd ready{signals_.fd(), POLLIN, 0};
-    poll(&ready, 1, static_cast<int>(std::ceil(1e3 * std::max(0.0, until - monotonic()))));
+    poll(&ready, 1, static_cast<int>(std::ceil(1e3 * std::max(0.0, until - steadyTime()))));
     while (const auto signal = signals_.next()) is_leaving_ |= *signal != SIGCHLD;
   }
   return !is_leaving_;
@@ -154,8 +155,8 @@ int runSentinel(const Settings& settings, const Device::Open& open) { return Sen
 
 bool forceNeutral(const Settings& settings, const Device::Open& open, double patience) {
   Device device(open, neutralOf(settings.limits), settings.reopening);
-  double now = monotonic();
-  for (const double end = now + patience;; now = monotonic()) {
+  double now = steadyTime();
+  for (const double end = now + patience;; now = steadyTime()) {
     if (device.recover(now)) {
       say("GUARD_NEUTRAL", device.name() + ": written from outside the guard");
       return true;

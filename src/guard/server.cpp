@@ -10,9 +10,9 @@
 #include <ctime>
 #include <utility>
 
-#include "guard/clock.h"
 #include "guard/log.h"
 #include "guard/socket.h"
+#include "steady.h"
 
 namespace kurumaisu::guard {
 namespace {
@@ -25,7 +25,7 @@ bool isSame(const dac::Volts& a, const dac::Volts& b) {
 }
 
 timespec timeUntil(double when) {
-  const double wait = std::max(0.0, when - monotonic());
+  const double wait = std::max(0.0, when - steadyTime());
   timespec result{};
   result.tv_sec = static_cast<time_t>(wait);
   result.tv_nsec = static_cast<long>(1e9 * (wait - static_cast<double>(result.tv_sec)));
@@ -35,7 +35,7 @@ timespec timeUntil(double when) {
 std::string peerOf(const Descriptor& client) {
   ucred peer{};
   socklen_t size = sizeof peer;
-  getsockopt(client.fd(), SOL_SOCKET, SO_PEERCRED, &peer, &size);
+  getsockopt(client.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size);
   return "process " + std::to_string(peer.pid) + " of user " + std::to_string(peer.uid);
 }
 
@@ -47,7 +47,7 @@ Server::Server(const Settings& settings, Device::Open open, std::function<void()
       guard_(settings.limits),
       device_(std::move(open), neutralOf(settings.limits), settings.reopening) {
   // neutral comes before anybody can ask for anything
-  for (double now = monotonic(); device_.isLost() && device_.retryAt() <= now; now = monotonic())
+  for (double now = steadyTime(); device_.isLost() && device_.retryAt() <= now; now = steadyTime())
     recover(now);
   if (device_.isLost()) guard_.loseDevice();
   listener_ = listenAt(settings.socket);
@@ -57,17 +57,18 @@ void Server::run() {
   while (!signals_.next()) {
     beat_();
     wait();
+    noticed_ = steadyTime();
     listen();
     acceptClients();  // after a client that left: the next one may be its successor
-    const double now = monotonic();
+    const double now = steadyTime();
     guard_.advance(now);
     write(now);
     answer();
     report();
   }
   drop();
-  if (!device_.isLost()) put({0, 0, settings_.limits.reference}, monotonic());
-  say("GUARD_END", device_.isLost() ? "told to stop, the device is lost" : "told to stop, neutral");
+  if (!device_.isLost()) put({0, 0, settings_.limits.reference}, steadyTime());
+  say("GUARD_END", "told to stop" + reacted());
 }
 
 void Server::wait() {
@@ -75,7 +76,7 @@ void Server::wait() {
   // silence shows just after its deadline, not at it
   if (const auto deadline = guard_.deadline()) until = std::min(until, std::nextafter(*deadline, INFINITY));
   std::array<pollfd, 3> ready = {
-      {{signals_.fd(), POLLIN, 0}, {listener_.fd(), POLLIN, 0}, {client_.fd(), POLLIN | POLLRDHUP, 0}}};
+      {{signals_.fd(), POLLIN, 0}, {listener_.get(), POLLIN, 0}, {client_.get(), POLLIN | POLLRDHUP, 0}}};
   const timespec timeout = timeUntil(until);
   ppoll(ready.data(), ready.size(), &timeout, nullptr);
   client_left_ = (ready[2].revents & (POLLHUP | POLLRDHUP | POLLERR)) != 0;
@@ -83,7 +84,7 @@ void Server::wait() {
 
 void Server::acceptClients() {
   for (int i = 0; i < kClientsPerRound; ++i) {
-    Descriptor client(accept4(listener_.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    Descriptor client(accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!client) return;
     if (!client_) {
       say("GUARD_CLIENT", peerOf(client));
@@ -96,7 +97,7 @@ void Server::acceptClients() {
     refusal.version = kVersion;
     refusal.state = static_cast<std::uint16_t>(guard_.state());
     refusal.reason = static_cast<std::uint16_t>(Reason::kBusy);
-    refusal.time = monotonicNanoseconds();
+    refusal.time = steadyNanoseconds();
     send(client, &refusal, sizeof refusal);
     say("GUARD_BUSY", peerOf(client) + " is refused: there is a client");
   }
@@ -111,7 +112,7 @@ void Server::listen() {
     const Heard heard = receive(client_, bytes.data(), size);
     if (heard == Heard::kGone) return drop();
     if (heard == Heard::kNothing) return;
-    take(bytes.data(), size, monotonic());
+    take(bytes.data(), size, steadyTime());
   }
 }
 
@@ -148,7 +149,9 @@ void Server::write(double now) {
 void Server::put(const dac::Volts& volts, double now) {
   written_ = volts;
   written_at_ = now;
-  if (device_.put(volts, now)) return;
+  const bool is_held = device_.put(volts, now);
+  held_at_ = steadyTime();
+  if (is_held) return;
   guard_.loseDevice();
   say("GUARD_DEVICE_FAULT", device_.problem());
 }
@@ -176,7 +179,7 @@ void Server::answer() {
                     static_cast<std::uint16_t>(device_.isLost() ? 0 : 1),
                     guard_.trips(),
                     *asked_,
-                    monotonicNanoseconds(),
+                    steadyNanoseconds(),
                     held.translation,
                     held.steering,
                     held.reference};
@@ -189,7 +192,11 @@ void Server::report() {
   reported_ = guard_.state();
   if (reported_ == State::kArmed) say("GUARD_ARMED", "neutral was held");
   if (reported_ == State::kTripped)
-    say("GUARD_TRIPPED", nameOf(guard_.reason()) + ": neutral until it is held again");
+    say("GUARD_TRIPPED", nameOf(guard_.reason()) + ": neutral until it is held again" + reacted());
+}
+
+std::string Server::reacted() const {
+  return device_.isLost() ? "; the device is lost" : reaction(noticed_, held_at_);
 }
 
 }  // namespace kurumaisu::guard

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "guard/descriptor.h"
+#include "file_descriptor.h"
 #include "guard/device.h"
 #include "guard/guard.h"
 #include "guard/settings.h"
@@ -37,6 +37,7 @@ class Server {
   void recover(double now);
   void answer();
   void report();
+  std::string reacted() const;
 
   Settings settings_;
   std::function<void()> beat_;
@@ -49,6 +50,8 @@ class Server {
   std::optional<std::uint64_t> asked_;  ///< sequence of a message that is not answered yet
   std::optional<dac::Volts> written_;   ///< what the device was last asked for; none: write at once
   double written_at_ = 0;               ///< [s]
+  double noticed_ = 0;                  ///< [s] what there is to notice in this round
+  double held_at_ = 0;                  ///< [s] the device confirmed what was last written
   State reported_ = State::kIdle;
   std::string reported_problem_;
 };

@@ -20,7 +20,7 @@ Signals::Signals(std::initializer_list<int> numbers) {
 
 std::optional<int> Signals::next() const {
   signalfd_siginfo info{};
-  if (read(descriptor_.fd(), &info, sizeof info) != sizeof info) return std::nullopt;
+  if (read(descriptor_.get(), &info, sizeof info) != sizeof info) return std::nullopt;
   return static_cast<int>(info.ssi_signo);
 }
 

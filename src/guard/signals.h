@@ -4,7 +4,7 @@
 #include <initializer_list>
 #include <optional>
 
-#include "guard/descriptor.h"
+#include "file_descriptor.h"
 
 namespace kurumaisu::guard {
 
@@ -13,7 +13,7 @@ class Signals {
  public:
   explicit Signals(std::initializer_list<int> numbers);
 
-  int fd() const { return descriptor_.fd(); }
+  int fd() const { return descriptor_.get(); }
 
   /// The next that came; none if there is none.
   std::optional<int> next() const;

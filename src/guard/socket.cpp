@@ -50,30 +50,30 @@ Descriptor listenAt(const std::string& path) {
   removeStale(path);
   Descriptor socket = open();
   const mode_t before = umask(kOthers);
-  const int bound = bind(socket.fd(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
+  const int bound = bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
   const int error = errno;
   umask(before);
   if (bound != 0) throw std::system_error(error, std::generic_category(), path);
-  if (listen(socket.fd(), kWaiting) != 0) throw std::system_error(errno, std::generic_category(), path);
+  if (listen(socket.get(), kWaiting) != 0) throw std::system_error(errno, std::generic_category(), path);
   return socket;
 }
 
 Descriptor connectTo(const std::string& path) {
   const sockaddr_un address = addressOf(path);
   Descriptor socket = open();
-  if (connect(socket.fd(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+  if (connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
     return Descriptor();
   return socket;
 }
 
 Sent send(const Descriptor& socket, const void* message, std::size_t size) {
-  const ssize_t sent = ::send(socket.fd(), message, size, MSG_DONTWAIT | MSG_NOSIGNAL);
+  const ssize_t sent = ::send(socket.get(), message, size, MSG_DONTWAIT | MSG_NOSIGNAL);
   if (sent >= 0) return Sent::kYes;
   return isPassing(errno) ? Sent::kFull : Sent::kGone;
 }
 
 Heard receive(const Descriptor& socket, void* buffer, std::size_t& size) {
-  const ssize_t count = recv(socket.fd(), buffer, size, MSG_DONTWAIT | MSG_TRUNC);
+  const ssize_t count = recv(socket.get(), buffer, size, MSG_DONTWAIT | MSG_TRUNC);
   if (count < 0) return isPassing(errno) ? Heard::kNothing : Heard::kGone;
   size = static_cast<std::size_t>(count);
   return count == 0 ? Heard::kGone : Heard::kMessage;

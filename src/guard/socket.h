@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <string>
 
-#include "guard/descriptor.h"
+#include "file_descriptor.h"
 
 namespace kurumaisu::guard {
 

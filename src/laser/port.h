@@ -10,7 +10,6 @@ using serial::LinkLost;
 using serial::NoAnswer;
 using serial::Port;
 using serial::PortInUse;
-using serial::steadyTime;
 
 constexpr const char* kWho = "LASER";  // the codes of errors begin so: LASER_NO_PORT
 

@@ -21,12 +21,8 @@ bool isTemporary(int code) { return code == EAGAIN || code == EWOULDBLOCK || cod
 
 std::string systemError(int code) { return std::system_category().message(code); }
 
-Descriptor::~Descriptor() {
-  if (fd_ >= 0) close(fd_);
-}
-
 bool Descriptor::wait(short events, double timeout) const {
-  pollfd waiting{fd_, events, 0};
+  pollfd waiting{fd(), events, 0};
   const int ready = poll(&waiting, 1, static_cast<int>(std::ceil(1e3 * std::max(timeout, 0.0))));
   if (ready < 0 && errno != EINTR) throw LinkLost("poll: " + systemError(errno));
   return ready > 0;
@@ -34,7 +30,7 @@ bool Descriptor::wait(short events, double timeout) const {
 
 std::size_t Descriptor::read(char* buffer, std::size_t size, double timeout) const {
   if (!wait(POLLIN, timeout)) return 0;
-  const ssize_t count = ::read(fd_, buffer, size);
+  const ssize_t count = ::read(fd(), buffer, size);
   if (count > 0) return static_cast<std::size_t>(count);
   if (count == 0) throw LinkLost(who_ + "_CLOSED: the other end has closed the connection");
   if (isTemporary(errno)) return 0;
@@ -47,8 +43,8 @@ void Descriptor::write(std::string_view bytes, double timeout, bool is_socket) c
     if (is_late || !wait(POLLOUT, until - steadyTime())) {
       throw LinkLost(who_ + "_BLOCKED: nothing can be sent for " + std::to_string(timeout) + " s");
     }
-    const ssize_t count = is_socket ? send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL)
-                                    : ::write(fd_, bytes.data(), bytes.size());
+    const ssize_t count = is_socket ? send(fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL)
+                                    : ::write(fd(), bytes.data(), bytes.size());
     if (count < 0 && !isTemporary(errno)) throw LinkLost(who_ + "_CLOSED: " + systemError(errno));
     if (count > 0) bytes.remove_prefix(static_cast<std::size_t>(count));
   }

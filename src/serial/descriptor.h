@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "file_descriptor.h"
+
 namespace kurumaisu::serial {
 
 /// What the system says of the last error: "No such file or directory".
@@ -17,11 +19,8 @@ class Descriptor {
  public:
   /// who: what the codes of its errors begin with.
   Descriptor(int fd, std::string who) : fd_(fd), who_(std::move(who)) {}
-  ~Descriptor();
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
 
-  int fd() const { return fd_; }
+  int fd() const { return fd_.get(); }
 
   /// Waits until it is ready for these events of poll(), at most so long [s].
   bool wait(short events, double timeout) const;
@@ -31,7 +30,7 @@ class Descriptor {
   void write(std::string_view bytes, double timeout, bool is_socket) const;
 
  private:
-  int fd_;
+  kurumaisu::Descriptor fd_;
   std::string who_;
 };
 

@@ -2,11 +2,12 @@
 // A line to a device, whatever it is made of.
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+
+#include "steady.h"
 
 namespace kurumaisu::serial {
 
@@ -45,10 +46,5 @@ class Port {
   /// Changes the rate [baud]; what was under way is lost.
   virtual void setBaud(int baud) = 0;
 };
-
-/// Time that no one sets [s], for deadlines and latencies.
-inline double steadyTime() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 }  // namespace kurumaisu::serial

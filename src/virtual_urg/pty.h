@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "virtual_urg/descriptor.h"
+#include "file_descriptor.h"
 #include "virtual_urg/endpoint.h"
 
 namespace kurumaisu::virtual_urg {

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "virtual_urg/steady.h"
+#include "steady.h"
 
 namespace kurumaisu::virtual_urg {
 namespace {
@@ -27,9 +27,9 @@ Server::Server(Model model, std::vector<Fault> faults, const Clock& clock, std::
                const Options& options)
     : options_(options),
       steps_(stepsOf(model)),
-      device_(std::move(model), std::move(faults), clock, options.pace == Pace::kFed ? 0 : steady()),
+      device_(std::move(model), std::move(faults), clock, options.pace == Pace::kFed ? 0 : steadyTime()),
       endpoint_(std::move(endpoint)),
-      turn_start_(steady()),
+      turn_start_(steadyTime()),
       back_at_(Outbox::kNever) {
   shown_.ranges.assign(steps_, std::numeric_limits<double>::infinity());
   if (device_.isBlackHole()) endpoint_->ignore();
@@ -116,6 +116,6 @@ int Server::baud() const {
   return device_.baud();
 }
 
-double Server::deviceTime() const { return options_.pace == Pace::kFed ? fed_time_ : steady(); }
+double Server::deviceTime() const { return options_.pace == Pace::kFed ? fed_time_ : steadyTime(); }
 
 }  // namespace kurumaisu::virtual_urg

@@ -10,8 +10,8 @@
 #include <ctime>
 #include <utility>
 
+#include "steady.h"
 #include "virtual_urg/server.h"
-#include "virtual_urg/steady.h"
 #include "virtual_urg/uart.h"
 
 namespace kurumaisu::virtual_urg {
@@ -49,7 +49,7 @@ void Server::run() {
 void Server::serve() {
   std::unique_lock lock(mutex_);
   while (!stopping_) {
-    const double now = steady();
+    const double now = steadyTime();
     if (now >= back_at_) {
       back_at_ = kNever;
       endpoint_->plug();
@@ -62,7 +62,7 @@ void Server::serve() {
     std::array<pollfd, 2> polled{pollfd{wake_.descriptor(), POLLIN, 0},
                                  pollfd{endpoint_->descriptor(), events, 0}};
     lock.unlock();
-    pollFor(polled, until - steady());
+    pollFor(polled, until - steadyTime());
     lock.lock();
     wake_.clear();
     if ((polled[1].revents & POLLOUT) != 0) full_ = false;
@@ -118,7 +118,7 @@ void Server::heed() {
   }
   const bool wanted = device_.wantsScan();
   post(device_.receive(*bytes, deviceTime()), baud, false);
-  if (!wanted && device_.wantsScan()) begin(steady());
+  if (!wanted && device_.wantsScan()) begin(steadyTime());
 }
 
 void Server::flush(double now) {
@@ -188,7 +188,7 @@ void Server::apply(const Output& output) {
       break;
     case Event::kHangUp:
       endpoint_->unplug();
-      back_at_ = steady() + output.away;
+      back_at_ = steadyTime() + output.away;
       break;
   }
   gone();

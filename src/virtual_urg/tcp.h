@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "virtual_urg/descriptor.h"
+#include "file_descriptor.h"
 #include "virtual_urg/endpoint.h"
 
 namespace kurumaisu::virtual_urg {

@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-#include "virtual_urg/descriptor.h"
+#include "file_descriptor.h"
 
 namespace kurumaisu::virtual_urg {
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What base_node costs: from a command to the voltage that obeys it, and CPU at 50 Hz and at 1 kHz."""
+"""What base_node costs beside roscpp alone: from a command to its voltage, and CPU at 50 Hz and at 1 kHz."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from kurumaisu.types import FloatArray
 
 _INPUT = "experiment_vel"  # of base_node.yaml: its limits let a small step through at once
 _RATES = ((50.0, 50.0), (50.0, 1000.0), (1000.0, 1000.0))  # [Hz] of the loop, of commands
+_PEER = "diff_drive_controller"
 _LATENCY, _SHARE = 1e-3, 0.01  # at 50 Hz: p99 [s] at most, and share of a core
 
 
@@ -42,35 +43,50 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print a row per rate of loop and commands. Return 1 if at 50 Hz it is slow or dear."""
     parser = argparse.ArgumentParser(prog="bench drive", description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0, help="of each row")
+    parser.add_argument(
+        "--peer", type=Path, metavar="PROGRAM", help="drivers/diff_drive.cpp, built elsewhere: more rows"
+    )
     options = parser.parse_args(arguments)
     title = f"base_node, {options.seconds:g} s a row: from a command's publishing to the coming of its voltage"
     columns = ("commands", "median [ms]", "p99 [ms]", "longest [ms]", "overtaken", "CPU [%]", "memory [MB]")
-    table = Table(title, "D/A, loop, commands", *columns)
+    table = Table(title, "D/A or peer, loop, commands", *columns)
+    more = [(_PEER, str(options.peer))] if options.peer else []
     good = True
-    for guarded in (False, True):
-        for loop, commands in _RATES:
-            cost = measure(loop, commands, options.seconds, guarded=guarded)
-            median, late, longest = np.percentile(1e3 * cost.latencies, [50, 99, 100])
-            count = len(cost.latencies) + cost.overtaken
-            name = f"{'guard' if guarded else 'topic'}, {loop:g} Hz, {commands:g} Hz"
-            table.row(name, str(count), median, late, longest, str(cost.overtaken), 100 * cost.cpu, cost.memory)
-            if commands == _RATES[0][1] and not guarded:
-                good = late < 1e3 * _LATENCY and cost.cpu < _SHARE
+    for loop, commands in _RATES:
+        for name, peer in (("roscpp alone", program("drive_floor")), *more, ("topic", None), ("guard", None)):
+            cost = measure(name, peer, loop, commands, options.seconds)
+            late = _row(table, f"{name}, {loop:g} Hz, {commands:g} Hz", cost)
+            if commands == _RATES[0][1] and name == "topic":
+                good = late < _LATENCY and cost.cpu < _SHARE
+    print("roscpp alone: a node with the same topics and rates that computes nothing")
     print("guard: with a virtual board at a pty; its answer is in the time, the guard's own CPU is not in the share")
     print(f"limits at 50 Hz, topic: p99 {1e3 * _LATENCY:g} ms, CPU {100 * _SHARE:g} %")
     return int(not good)
 
 
-def measure(loop: float, commands: float, seconds: float, *, guarded: bool) -> Cost:
-    """Run base_node with a loop of so many Hz for so long, with so many commands a second; guarded: with a guard."""
+def _row(table: Table, name: str, cost: Cost) -> float:
+    """Print a row; return the 99th percentile of the latencies [s]."""
+    median, late, longest = np.percentile(1e3 * cost.latencies, [50, 99, 100])
+    count = len(cost.latencies) + cost.overtaken
+    table.row(name, str(count), median, late, longest, str(cost.overtaken), 100 * cost.cpu, cost.memory)
+    return float(1e-3 * late)
+
+
+def measure(name: str, peer: str | None, loop: float, commands: float, seconds: float) -> Cost:
+    """Run base_node with that D/A converter, or a peer, with so many Hz and commands a second for so long [s]."""
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         environment = stack.enter_context(master())
         rig = Rig(folder)
-        if guarded:
+        if name == "guard":
             stack.enter_context(rig.board())
             rig.start()
-        pid = stack.enter_context(_base(loop, rig.settings if guarded else None, folder, environment))
+        if peer is not None:
+            command = [peer, str(loop)]
+        else:
+            _load(loop, rig.settings if name == "guard" else None, folder, environment)
+            command = [program("base_node")]
+        pid = stack.enter_context(_node(command, folder, environment))
         probe = subprocess.Popen(
             [program("drive_probe"), _INPUT, str(commands), str(seconds)],
             env=environment,
@@ -89,9 +105,8 @@ def measure(loop: float, commands: float, seconds: float, *, guarded: bool) -> C
         return Cost(answered, int(np.sum(latencies < 0)), share, memory(pid))
 
 
-@contextlib.contextmanager
-def _base(loop: float, guard: Path | None, folder: Path, environment: dict[str, str]) -> Iterator[int]:
-    """Run base_node with the shipped settings but for the rate of its loop; yield its process id."""
+def _load(loop: float, guard: Path | None, folder: Path, environment: dict[str, str]) -> None:
+    """Give base_node the shipped settings but for the rate of its loop."""
     settings = _yaml(shipped("launch/base_node.yaml"))
     settings["rate"] = loop
     settings["dac"]["kind"] = "guard" if guard else "topic"
@@ -100,12 +115,17 @@ def _base(loop: float, guard: Path | None, folder: Path, environment: dict[str, 
     file = folder / "parameters.yaml"
     file.write_text(yaml.safe_dump(settings), encoding="utf-8")
     subprocess.run(["rosparam", "load", str(file), "/base_node"], env=environment, check=True, timeout=PATIENCE)
+
+
+@contextlib.contextmanager
+def _node(command: list[str], folder: Path, environment: dict[str, str]) -> Iterator[int]:
+    """Run a node; yield its process id."""
     with (folder / "log").open("w") as log:
-        process = subprocess.Popen([program("base_node")], env=environment, stdout=log, stderr=log)
+        process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
     try:
         time.sleep(1.0)  # what it costs to start does not count
         if process.poll() is not None:
-            raise Error(f"base_node: ended: {(folder / 'log').read_text(encoding='utf-8')}")
+            raise Error(f"{command[0]}: ended: {(folder / 'log').read_text(encoding='utf-8')}")
         yield process.pid
     finally:
         process.terminate()

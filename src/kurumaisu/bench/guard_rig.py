@@ -8,7 +8,6 @@ import itertools
 import math
 import os
 import re
-import select
 import signal
 import subprocess
 import sys
@@ -20,13 +19,18 @@ from typing import Any
 
 import yaml
 
+from kurumaisu.bench.guard_client import Favour
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 
 NS = 1e-9  # [s]
 _ARMING = 0.2  # [s] in place of what ships, to save time; nothing else differs
-_LOOK = 0.0005  # [s] between two looks at the board's log
+_LOOK = 0.005  # [s] between two looks at logs: what counts is when a line says that it happened
+_TAIL = 4096  # [bytes] at a log's end
+_SAYING = 0.02  # [s] in which they say what they have done
+_SHARED_MEMORY = Path("/dev/shm")  # tmpfs on every Linux
+_SUPPLY = 5.0  # [V] of the virtual chip
 _ENDING = 5.0  # [s]
 _BUSY = "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    sum(range(10000))"
 
@@ -87,8 +91,8 @@ class Rig:
             settings["limits"]["arming"] = arming
         settings = changed(settings, guard or {})
         self.silence = float(settings["limits"]["silence"])
-        base = yaml.safe_load(shipped("launch/base_node.yaml").read_text())
-        self.nice = int(base["dac"]["nice"])
+        dac = yaml.safe_load(shipped("launch/base_node.yaml").read_text())["dac"]
+        self.favour = Favour(dac["priority"], dac["longest_run"], dac["nice"])
         model = str(shipped(f"launch/{settings['model']}").resolve())
         self.settings = self._write("guard.yaml", settings | {"model": model, "socket": str(self.socket)})
         self._sentinel: subprocess.Popen[bytes] | None = None
@@ -180,6 +184,16 @@ class Rig:
         f, s, reference = (float(word) for word in words if word)
         return Change(time_s, max(abs(f), abs(s)) < self._code / 2, (f, s, reference))
 
+    def reaction(self, since: float) -> float | None:
+        """Return when [s, monotonic] guard or sentinel noticed what happened, by their log; None if none says so."""
+        time.sleep(_SAYING)
+        with self.messages.open("rb") as log:
+            log.seek(max(0, self.messages.stat().st_size - _TAIL))
+            for found in re.finditer(rb"noticed at (\S+) s, neutral", log.read()):
+                if float(found[1]) >= since:
+                    return float(found[1])
+        return None
+
     def neutral(self, patience: float, after: float = math.inf) -> float | None:
         """Wait until the board is neutral; return since when [s, monotonic], or None if it is not in so long [s].
 
@@ -196,42 +210,20 @@ class Rig:
         return None
 
 
-class Client:
-    """A process that drives through the guard; see tests/guard_client.cpp."""
+class ChipRig(Rig):
+    """The same with a virtual chip, in a tree of files like those of Linux's IIO."""
 
-    def __init__(self, socket: Path, mode: str, nice: int) -> None:
-        """Start it. nice: as base_node has it; 0: as it is."""
-        command = [program("guard_client"), str(socket), mode, str(nice)]
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+    def __init__(self, folder: Path) -> None:
+        """Write the files that they read. Start with board()."""
+        super().__init__(folder)
+        device = yaml.safe_load(shipped("launch/dac/mcp4728.yaml").read_text())
+        self.device = self._write("device.yaml", device | {"root": str(folder / "dac")})
+        self._code = _SUPPLY / 2 ** device["bits"]
 
-    def line(self) -> str:
-        """Return its next line. Raise Error if none comes."""
-        assert self.process.stdout
-        if not select.select([self.process.stdout], [], [], PATIENCE)[0]:
-            raise Error("guard_client: says nothing; is the guard armed?")
-        return self.process.stdout.readline().strip()
 
-    def wait_armed(self) -> None:
-        """Wait until its voltage is put out."""
-        while self.line() != "armed":
-            pass
-
-    def fail(self) -> float:
-        """Let it break as its mode says; return when it did [s, monotonic]."""
-        assert self.process.stdin
-        self.process.stdin.write("now\n")
-        line = self.line()
-        while not line.isdigit():
-            line = self.line()
-        return NS * int(line)
-
-    def end(self) -> None:
-        """Kill it, whatever state it is in."""
-        self.process.kill()
-        self.process.wait(_ENDING)
-        for stream in (self.process.stdin, self.process.stdout):
-            with contextlib.suppress(BrokenPipeError):
-                stream.close()  # type: ignore[union-attr]
+def in_memory() -> Path | None:
+    """Return a folder whose files are on no disk, None if there is none: a disk keeps waiting who writes to it."""
+    return _SHARED_MEMORY if os.access(_SHARED_MEMORY, os.W_OK) else None
 
 
 def strike(pids: Callable[[], list[int]], number: signal.Signals) -> float:

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A crash that the guard hears of at once. The kernel closes a socket only when the process' memory has been written to a
+// core file and given back.
+#pragma once
+
+namespace kurumaisu::guard {
+
+/// From now on a crash (SIGSEGV and the like, abort()) first hangs up the socket that was last named.
+void catchCrashes();
+
+/// Names the socket; -1: none.
+void hangUpOnCrash(int socket);
+
+}  // namespace kurumaisu::guard

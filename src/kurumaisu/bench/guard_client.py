@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A process that drives through the guard, until it ends badly."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from kurumaisu.bench.processes import PATIENCE, program
+from kurumaisu.errors import Error
+
+_NS = 1e-9  # [s]
+_ENDING = 5.0  # [s]
+_BREAKING = 0.05  # [s] that a client gets to break
+
+
+@dataclass(frozen=True)
+class Favour:
+    """How a client comes before others: as in launch/base_node.yaml."""
+
+    priority: int
+    longest_run: float  # [s]
+    nice: int
+
+
+class Client:
+    """A process that drives through the guard; see tests/guard_client.cpp."""
+
+    def __init__(self, socket: Path, mode: str, favour: Favour) -> None:
+        """Start it. socket: the guard's; it may leave a core file beside it."""
+        command = [program("guard_client"), str(socket), mode]
+        command += [str(favour.priority), str(favour.longest_run), str(favour.nice)]
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1, cwd=socket.parent
+        )
+
+    def line(self) -> str:
+        """Return its next line. Raise Error if none comes."""
+        assert self.process.stdout
+        if not select.select([self.process.stdout], [], [], PATIENCE)[0]:
+            raise Error("guard_client: says nothing; is the guard armed?")
+        return self.process.stdout.readline().strip()
+
+    def wait_armed(self) -> None:
+        """Wait until its voltage is put out."""
+        while self.line() != "armed":
+            pass
+
+    def fail(self) -> float:
+        """Let it break as its mode says; return when it did [s, monotonic]."""
+        assert self.process.stdin
+        self.process.stdin.write("now\n")
+        time.sleep(_BREAKING)  # who waits for its word might come before it, and keep it from breaking
+        line = self.line()
+        while not line.isdigit():
+            line = self.line()
+        return _NS * int(line)
+
+    def end(self) -> None:
+        """Kill it, whatever state it is in."""
+        self.process.kill()
+        self.process.wait(_ENDING)
+        for stream in (self.process.stdin, self.process.stdout):
+            with contextlib.suppress(BrokenPipeError):
+                stream.close()  # type: ignore[union-attr]

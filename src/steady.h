@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The clock that nobody can set: it starts with this computer, and is the same for all its processes.
+#pragma once
+
+#include <cstdint>
+#include <ctime>
+
+namespace kurumaisu {
+
+/// [ns] of CLOCK_MONOTONIC, which is Python's time.monotonic_ns().
+inline std::int64_t steadyNanoseconds() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
+}
+
+/// Nanoseconds as seconds.
+constexpr double seconds(std::int64_t nanoseconds) { return 1e-9 * static_cast<double>(nanoseconds); }
+
+/// [s] for deadlines and latencies.
+inline double steadyTime() { return seconds(steadyNanoseconds()); }
+
+}  // namespace kurumaisu
