@@ -6,6 +6,7 @@
 
 namespace kurumaisu::laser {
 
+using kurumaisu::steadyTime;
 using serial::LinkLost;
 using serial::NoAnswer;
 using serial::Port;
