@@ -30,6 +30,7 @@ NAMES = (
     "slam",
     "slam_localise",
     "predict",
+    "paper",
 )
 
 

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""paper FIGURES: repeat the paper's experiments on the simulator, or evaluate recordings of the chair."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from kurumaisu.errors import Error, one_line
+from kurumaisu.paper import commands
+from kurumaisu.params import shipped
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Repeat figures; return 0, 1 when something is refused or does not agree with the paper's equations."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the same sums, however many cores there are
+    options = _parser().parse_args(arguments)
+    command: Callable[[argparse.Namespace], int] = options.command
+    try:
+        return command(options)
+    except Error as error:
+        print(f"paper: {one_line(error)}", file=sys.stderr)
+        return 1
+
+
+def _drive(options: argparse.Namespace) -> int:
+    return commands.figures_drive(
+        options.model,
+        options.recordings,
+        options.out,
+        seed=options.seed,
+        keep=options.keep,
+        settings=options.settings,
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="paper", description=__doc__)
+    parts = parser.add_subparsers(required=True, metavar="FIGURES")
+    drive = _part(parts, "drive", _drive, "figures 3 to 6, equations (1) and (2): a drive")
+    drive.add_argument(
+        "recordings", nargs="*", type=Path, help="bags or folders of a real drive; none: a simulated one"
+    )
+    drive.add_argument(
+        "--keep", action="append", default=[], metavar="BRANCH", help="take a refused branch from the model"
+    )
+    return parser
+
+
+def _part(
+    parts: argparse._SubParsersAction[argparse.ArgumentParser],
+    name: str,
+    command: Callable[[argparse.Namespace], int],
+    words: str,
+) -> argparse.ArgumentParser:
+    part: argparse.ArgumentParser = parts.add_parser(name, help=words, description=words)
+    part.set_defaults(command=command)
+    part.add_argument("--out", type=Path, required=True, help="folder for figures, data and model files")
+    part.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="what the chair is")
+    part.add_argument("--seed", type=int, default=1, help="of the simulated noise")
+    part.add_argument("--settings", type=Path, help="in place of launch/paper.yaml")
+    return part
