@@ -40,17 +40,34 @@ class Drive:
 
 
 @dataclass(frozen=True)
+class Wall:
+    """How scans of a wall are looked at."""
+
+    distances: tuple[float, ...]
+    scans: int
+    ahead: float
+    square: float
+    depth: float
+    least_scans: int
+    tape_sd: float
+    gate: float
+    agree: float
+    chance: float
+
+
+@dataclass(frozen=True)
 class Options:
     """All of it."""
 
     drive: Drive
+    wall: Wall
     bootstrap: Bootstrap
 
 
 def load_options(path: Path | None = None) -> Options:
     """Read a file of settings, or the package's own. Raise Error naming file and key."""
     top = settings.load(shipped(FILE) if path is None else path)
-    options = Options(_drive(top.section("drive")), _bootstrap(top.section("bootstrap")))
+    options = Options(_drive(top.section("drive")), _wall(top.section("wall")), _bootstrap(top.section("bootstrap")))
     top.end()
     return options
 
@@ -72,6 +89,18 @@ def _drive(section: settings.Section) -> Drive:
     drive = Drive(**counts, **{name: section.number(name, above=0) for name in names})  # type: ignore[arg-type]
     section.end()
     return drive
+
+
+def _wall(section: settings.Section) -> Wall:
+    names = ("ahead", "square", "depth", "tape_sd", "gate", "agree", "chance")
+    wall = Wall(
+        distances=section.numbers("distances", 5),
+        scans=section.integer("scans", at_least=2),
+        least_scans=section.integer("least_scans", at_least=2),
+        **{name: section.number(name, above=0) for name in names},
+    )
+    section.end()
+    return wall
 
 
 def _bootstrap(section: settings.Section) -> Bootstrap:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from kurumaisu.errors import Error, one_line
-from kurumaisu.paper import commands
+from kurumaisu.paper import commands, commands_wall
 from kurumaisu.params import shipped
 
 
@@ -37,6 +37,21 @@ def _drive(options: argparse.Namespace) -> int:
     )
 
 
+def _wall(options: argparse.Namespace) -> int:
+    return commands_wall.figures_wall_of(
+        options.model,
+        options.recordings,
+        options.out,
+        distances=options.distances,
+        seed=options.seed,
+        settings=options.settings,
+    )
+
+
+def _conjecture(options: argparse.Namespace) -> int:
+    return commands_wall.conjecture(options.model, options.recordings, options.out, options.seed, commands.say)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="paper", description=__doc__)
     parts = parser.add_subparsers(required=True, metavar="FIGURES")
@@ -46,6 +61,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     drive.add_argument(
         "--keep", action="append", default=[], metavar="BRANCH", help="take a refused branch from the model"
+    )
+    wall = _part(parts, "wall", _wall, "figures 7 to 9, equation (4): scans of a wall at known distances")
+    wall.add_argument("recordings", nargs="*", type=Path, help="scans of a real wall; none: of the simulated board")
+    wall.add_argument(
+        "--distances", nargs="+", type=float, default=[], help="[m] of the runs, by name; none: the paper's"
+    )
+    conjecture = _part(
+        parts, "conjecture", _conjecture, "does noise rise with range, or with incidence? The critic's answer"
+    )
+    conjecture.add_argument(
+        "recordings", nargs="*", type=Path, help="of a wall, with its world; none: data made either way"
     )
     return parser
 
