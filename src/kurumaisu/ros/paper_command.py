@@ -27,6 +27,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _drive(options: argparse.Namespace) -> int:
+    if options.through_base:
+        from kurumaisu.ros import paper_parts
+
+        return paper_parts.drive(
+            options.model, options.out, seed=options.seed, speed=options.speed, settings=options.settings
+        )
     return commands.figures_drive(
         options.model,
         options.recordings,
@@ -52,6 +58,26 @@ def _conjecture(options: argparse.Namespace) -> int:
     return commands_wall.conjecture(options.model, options.recordings, options.out, options.seed, commands.say)
 
 
+def _dac(options: argparse.Namespace) -> int:
+    from kurumaisu.ros import paper_parts
+
+    return paper_parts.dac(options.model, options.out, options.speeds)
+
+
+def _simulated_wall(options: argparse.Namespace) -> int:
+    from kurumaisu.ros import paper_parts
+
+    return paper_parts.simulated_wall(
+        options.model, options.out, seed=options.seed, speed=options.speed, settings=options.settings
+    )
+
+
+def _all(options: argparse.Namespace) -> int:
+    from kurumaisu.ros import paper_parts
+
+    return paper_parts.everything(options.model, options.out, seed=options.seed, settings=options.settings)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="paper", description=__doc__)
     parts = parser.add_subparsers(required=True, metavar="FIGURES")
@@ -62,6 +88,10 @@ def _parser() -> argparse.ArgumentParser:
     drive.add_argument(
         "--keep", action="append", default=[], metavar="BRANCH", help="take a refused branch from the model"
     )
+    drive.add_argument(
+        "--through-base", action="store_true", help="drive the simulator through base_node and its limits: needs ROS"
+    )
+    drive.add_argument("--speed", type=float, default=4.0, help="simulated seconds per second, with --through-base")
     wall = _part(parts, "wall", _wall, "figures 7 to 9, equation (4): scans of a wall at known distances")
     wall.add_argument("recordings", nargs="*", type=Path, help="scans of a real wall; none: of the simulated board")
     wall.add_argument(
@@ -73,6 +103,13 @@ def _parser() -> argparse.ArgumentParser:
     conjecture.add_argument(
         "recordings", nargs="*", type=Path, help="of a wall, with its world; none: data made either way"
     )
+    dac = _part(parts, "dac", _dac, "figure 10: voltages at the D/A converter")
+    dac.add_argument("--speeds", type=Path, help="script of speeds in place of launch/paper/figure_10.yaml")
+    simulated = _part(
+        parts, "simulated-wall", _simulated_wall, "figures 11 and 12: a simulated wall, through the driver"
+    )
+    simulated.add_argument("--speed", type=float, default=2.0, help="simulated seconds per second")
+    _part(parts, "all", _all, "all figures, one after the other")
     return parser
 
 
