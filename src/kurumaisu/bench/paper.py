@@ -52,6 +52,8 @@ class Case:
     code: float = 0.0
     slips: float = 0.0
     told: bool = True
+    translation: Law = TRANSLATION
+    base: tuple[Law, Law] | None = None  # by which the base makes voltages of commands; None: that of the chair
 
 
 CASES = (
@@ -107,7 +109,7 @@ def judge(case: Case, seed: int, options: Options) -> Judged:
     run = make(case, rng)
     found = samples_of([run], (case.pose_sd, case.pose_sd) if case.known else None, options.drive)
     judged = Judged([], [], [], [], 0)
-    for axis, truth in zip(law.axes_of(found), (TRANSLATION, case.steering), strict=True):
+    for axis, truth in zip(law.axes_of(found), (case.translation, case.steering), strict=True):
         own = replace(options, bootstrap=replace(options.bootstrap, seed=seed))
         fit = law.fit_axis(axis, found, own)
         for branch, line in zip((fit.positive, fit.negative), truth, strict=True):
@@ -143,16 +145,17 @@ def _row(told: list[Judged]) -> tuple[str | float, ...]:
     )
 
 
-def make(case: Case, rng: np.random.Generator) -> Run:
-    """Return the identification drive on a chair of this case."""
-    rows = samples(drive.script(drive.IDENTIFICATION).phases, _TICK)
-    volts = np.column_stack([_volts(rows[:, 1], TRANSLATION), _volts(rows[:, 2], case.steering)])
+def make(case: Case, rng: np.random.Generator, file: str = drive.IDENTIFICATION) -> Run:
+    """Return a drive of launch/paper on a chair of this case."""
+    rows = samples(drive.script(file).phases, _TICK)
+    base = case.base or (case.translation, case.steering)
+    volts = np.column_stack([_volts(rows[:, 1], base[0]), _volts(rows[:, 2], base[1])])
     if case.code > 0:
         volts = case.code * np.round(volts / case.code)
     per_tick = round(_TICK / _STEP)
     count = per_tick * (len(rows) - 1)
     rates = []
-    for column, table, sd in ((0, TRANSLATION, case.sd_v), (1, case.steering, case.sd_w)):
+    for column, table, sd in ((0, case.translation, case.sd_v), (1, case.steering, case.sd_w)):
         asked = _rates(volts[:-1, column], rows[:-1, 1 + column], table)
         rates.append(_follow(np.repeat(asked, per_tick), case) + _wander(count, sd, case.tau, rng))
     poses = _path(*rates)[::_EVERY]
