@@ -78,6 +78,12 @@ def _all(options: argparse.Namespace) -> int:
     return paper_parts.everything(options.model, options.out, seed=options.seed, settings=options.settings)
 
 
+def _odometry(options: argparse.Namespace) -> int:
+    from kurumaisu.ros.replay_odometry import check
+
+    return max(check(bag) for bag in options.bags)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="paper", description=__doc__)
     parts = parser.add_subparsers(required=True, metavar="FIGURES")
@@ -110,6 +116,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     simulated.add_argument("--speed", type=float, default=2.0, help="simulated seconds per second")
     _part(parts, "all", _all, "all figures, one after the other")
+    odometry = parts.add_parser("odometry", help="odometry again, from a bag's voltages: is it what was recorded?")
+    odometry.set_defaults(command=_odometry)
+    odometry.add_argument("bags", nargs="+", type=Path)
     return parser
 
 
