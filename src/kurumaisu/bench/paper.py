@@ -74,13 +74,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="bench paper", description=__doc__)
     parser.add_argument("--drives", type=int, default=100, help="of each case")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--case", default="", help="only those whose name has this in it")
     options = parser.parse_args(arguments)
     settings = load_options()
     wanted = settings.bootstrap.level
     title = f"{options.drives} drives each: share of intervals ({100 * wanted:.0f} %) that hold the truth, exact 90 %"
     table = Table(title, "case", "all 8", "slopes", "intercepts", "refused", "paper's", "slope sd/half", "bias/half")
     good = True
-    for case in CASES:
+    for case in (case for case in CASES if options.case in case.name):
         told = [judge(case, options.seed + n, settings) for n in range(options.drives)]
         table.row(case.name, *_row(told))
         if case.name == "usual":

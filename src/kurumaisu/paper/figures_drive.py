@@ -45,7 +45,10 @@ def _lines(axis: Any, fit: AxisFit, law: AxisLaw) -> None:
         ends = _ends(branch, 1.0 if side == "positive" else -1.0)
         own = getattr(law, side)
         label = "the model's" if number == 0 else None
-        axis.plot(ends, own.slope * ends + own.intercept, "--", color=drawing.PAPER, linewidth=1.0, label=label)
+        # above the other, which it may well lie upon
+        axis.plot(
+            ends, own.slope * ends + own.intercept, "--", color=drawing.PAPER, linewidth=1.0, label=label, zorder=4
+        )
         if branch.slope is not None and branch.intercept is not None and not branch.refused:
             line = branch.slope.value * ends + branch.intercept.value
             axis.plot(ends, line, color=drawing.LINE, linewidth=1.4, label="found" if number == 0 else None)
