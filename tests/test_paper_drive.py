@@ -225,6 +225,15 @@ def test_no_law_is_written_of_what_is_refused_unless_it_is_kept():
         law_file.settled(MODEL, found.fits, ["sideways"])
 
 
+def test_wrong_data_are_refused_unless_they_are_of_what_is_not_looked_at():
+    run = bench.make(bench.CASES[0], np.random.default_rng(1))
+    whole = recording(run)
+    for words in ("a.bag experiment_vel: repeats its rows: drop the copies", "drive/command.csv: goes back in time"):
+        assert identify.identify(replace(whole, invalid=(words,)), OPTIONS, silent).refused == []
+    with pytest.raises(Error, match=r"drive: a\.bag voltages: repeats its rows"):
+        identify.identify(replace(whole, invalid=("a.bag voltages: repeats its rows",)), OPTIONS, silent)
+
+
 def test_a_drive_of_bends_to_one_side_only_is_told_to_mix():
     v = np.tile([0.2, -0.2, 0.4, -0.4, 0.6, -0.6], 6)
     found = identify.identify(recording(driven(v, v)), OPTIONS, silent)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from kurumaisu.critic.recording import Run
 from kurumaisu.errors import Error
 from kurumaisu.paper import law
+from kurumaisu.paper.correlation import correlations
 from kurumaisu.paper.law import AxisFit
 from kurumaisu.paper.options import Options
 from kurumaisu.paper.samples import samples_of
@@ -55,7 +56,7 @@ def missing(runs: Sequence[Run], options: Options) -> list[str]:
     except Error as error:
         return [str(error)]
     words = [why for axis in law.axes_of(samples) for why in _of_axis(law.fit_axis(axis, samples, quick))]
-    mixed = law.correlations(samples).drive
+    mixed = correlations(samples).drive
     if abs(mixed) > options.drive.mixed:
         words.append(f"the voltages go together (correlation {mixed:+.2f}): turn the other way, too, at such speeds")
     return words

@@ -38,7 +38,7 @@ def drive(
     samples = samples_of(runs, judged.truth, options.drive)
     before, after = (held_out.errors(load_model(path), samples, runs) for path in (model, out / "chair.yaml"))
     lines = held_out.lines(before, after)
-    better = after.better_than(before)
+    better = after.better_than(before, options.drive.better)
     lines.append("the new law is better" if better else "the new law is NO better: keep the model that you have")
     print("\n".join(lines))
     drawing.write(out / "held_out.txt", "\n".join(lines) + "\n")

@@ -11,7 +11,8 @@ import numpy as np
 
 from kurumaisu._core import AxisLaw
 from kurumaisu.paper import drawing
-from kurumaisu.paper.law import AxisFit, BranchFit, Correlations
+from kurumaisu.paper.correlation import Correlations
+from kurumaisu.paper.law import AxisFit, BranchFit
 from kurumaisu.paper.samples import Samples
 from kurumaisu.types import FloatArray
 

@@ -28,10 +28,10 @@ class Errors:
     place: float
     heading: float
 
-    def better_than(self, other: Errors) -> bool:
-        """Return whether neither rate is worse and one is clearly better, by a tenth."""
+    def better_than(self, other: Errors, share: float) -> bool:
+        """Return whether one rate's error is below that share of the other's, and none is as much worse."""
         mine, theirs = np.array([self.v, self.w]), np.array([other.v, other.w])
-        return bool((mine <= 1.1 * theirs).all() and (mine < 0.9 * theirs).any())
+        return bool((share * mine <= theirs).all() and (mine < share * theirs).any())
 
 
 def errors(model: Model, samples: Samples, runs: Sequence[Run]) -> Errors:

@@ -37,6 +37,7 @@ class Drive:
     widest_intercept: float
     bent: float
     mixed: float
+    better: float
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,7 @@ def _drive(section: settings.Section) -> Drive:
         "widest_intercept",
         "bent",
         "mixed",
+        "better",
     )
     drive = Drive(**counts, **{name: section.number(name, above=0) for name in names})  # type: ignore[arg-type]
     section.end()
