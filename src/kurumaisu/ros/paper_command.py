@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -18,6 +20,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Repeat figures; return 0, 1 when something is refused or does not agree with the paper's equations."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the same sums, however many cores there are
     options = _parser().parse_args(arguments)
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # what was started is ended on the way out
     command: Callable[[argparse.Namespace], int] = options.command
     try:
         return command(options)
