@@ -16,7 +16,7 @@ from kurumaisu.bench.processes import master, program
 from kurumaisu.errors import Error
 from kurumaisu.paper import drive
 from kurumaisu.params import shipped
-from kurumaisu.ros import paper_run
+from kurumaisu.ros import paper_parts, paper_run
 from kurumaisu.ros.paper_command import main
 
 SPEEDS = (0.3, 0.9, -0.4)
@@ -98,3 +98,22 @@ def test_programs_are_where_rosrun_looks():
     for name in ("paper", "calibrate"):
         assert os.access(program(name), os.X_OK)
         assert Path(program(name)).name == name
+
+
+def test_all_figures_are_repeated_and_one_that_fails_is_not_forgotten(monkeypatch, tmp_path):
+    done = []
+
+    def part(name, code):
+        def run(*_, **__):
+            done.append(name)
+            return code
+
+        return run
+
+    monkeypatch.setattr(paper_parts, "drive", part("3-6", 1))
+    monkeypatch.setattr(paper_parts.commands_wall, "figures_wall_of", part("7-9", 0))
+    monkeypatch.setattr(paper_parts.commands_wall, "conjecture", part("conjecture", 0))
+    monkeypatch.setattr(paper_parts, "dac", part("10", 0))
+    monkeypatch.setattr(paper_parts, "simulated_wall", part("11-12", 0))
+    assert main(["all", "--out", str(tmp_path)]) == 1
+    assert done == ["3-6", "7-9", "conjecture", "10", "11-12"]

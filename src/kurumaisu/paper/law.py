@@ -142,7 +142,8 @@ def _fit_branch(axis: Axis, samples: Samples, on: BoolArray, options: Options, r
     rate, volts, block = axis.rate[on], axis.volts[on], samples.block[on]
     blocks = len(np.unique(block))
     if blocks < options.drive.least_blocks:
-        why = f"{blocks} stretches of steady motion to this side, {options.drive.least_blocks} are needed"
+        plural = "" if blocks == 1 else "es"
+        why = f"{blocks} stretch{plural} of steady motion to this side, {options.drive.least_blocks} are needed"
         return _none(rate, blocks, why)
     if np.ptp(volts) < options.drive.steady:
         span = f"{volts.min():.3f} to {volts.max():.3f} V"
