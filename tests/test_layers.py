@@ -47,7 +47,7 @@ PYTHON_RULES = [
     Rule(r"kurumaisu/(?!ros/|bench/|demo/)", r"kurumaisu\.ros(\.|$)", "only entry points come before kurumaisu/ros"),
     # map_command is an entry point, too: it reads recordings as the critic does
     Rule(
-        r"kurumaisu/(?!critic/|ros/|bench/|demo/|real/|riddles/|map_command)",
+        r"kurumaisu/(?!critic/|ros/|bench/|demo/|paper/|real/|riddles/|map_command)",
         r"kurumaisu\.critic(\.|$)",
         "nothing rests on the critic",
     ),

@@ -6,7 +6,7 @@ import math
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -38,17 +38,42 @@ def wait_for_file(path: Path) -> None:
     assert path.exists()
 
 
-def wait_for_message(topic: str, environment: dict[str, str]) -> None:
-    command = ["rostopic", "echo", "-n", "1", "--noarr", topic]
+def wait_for_message(topic: str, environment: dict[str, str], count: int = 1) -> None:
+    command = ["rostopic", "echo", "-n", str(count), "--noarr", topic]
     subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
 
 
-def record(bag: Path) -> None:
-    """Record the simulator driven this way and that."""
+@contextlib.contextmanager
+def recording(bag: Path, *topics: str, environment: dict[str, str]) -> Iterator[None]:
+    """Record topics beside what record.launch records."""
+    with running("rosbag", "record", "-O", str(bag), *topics, environment=environment):
+        wait_for_file(Path(f"{bag}.active"))
+        yield
+    wait_for_file(bag)
+
+
+@contextlib.contextmanager
+def mapping(bag: Path | None, environment: dict[str, str]) -> Iterator[None]:
+    """Map meanwhile, and record the maps, where a bag is named."""
+    if bag is None:
+        yield
+        return
+    with (
+        recording(bag, "/map", environment=environment),
+        running("roslaunch", "kurumaisu", "slam.launch", environment=environment),
+    ):
+        wait_for_message("/map_metadata", environment)  # of the first scan
+        yield
+
+
+def record(bag: Path, *arguments: str, maps: Path | None = None) -> None:
+    """Record the simulator driven this way and that; arguments: of record.launch."""
+    names = [bag] if not arguments else [bag.with_name(f"{bag.stem}_0.bag")]
     with master() as environment, running("roslaunch", "kurumaisu", "sim.launch", environment=environment):
         wait_for_message("/odom", environment)
-        with running("roslaunch", "kurumaisu", "record.launch", f"bag:={bag}", environment=environment):
-            wait_for_file(Path(f"{bag}.active"))
+        command = ["roslaunch", "kurumaisu", "record.launch", f"bag:={bag}", *arguments]
+        with mapping(maps, environment), running(*command, environment=environment):
+            wait_for_file(Path(f"{names[0]}.active"))
             wait_for_message("/scan", environment)
             for v, w in DRIVES:
                 twist = f"{{linear: {{x: {v}}}, angular: {{z: {w}}}}}"
@@ -60,18 +85,16 @@ def record(bag: Path) -> None:
                         stdout=subprocess.DEVNULL,
                         check=True,
                     )
-            wait_for_message("/scan", environment)
-        wait_for_file(bag)
+            wait_for_message("/scan", environment, 30)  # at rest: the last map comes up to 2 s after the last scan
+        wait_for_file(names[0])
 
 
-def replay(bag: Path, out: Path) -> None:
-    """Replay it and record what the re-run base says beside what was recorded."""
-    topics = ["/odom", "/recorded/odom", "/voltages", "/recorded/voltages", "/scan", "/tf", "/recorded/tf"]
-    with master() as environment, running("rosbag", "record", "-O", str(out), *topics, environment=environment):
-        wait_for_file(Path(f"{out}.active"))
-        command = ["roslaunch", "kurumaisu", "replay.launch", f"bag:={bag}"]
+def replay(bags: Sequence[Path], out: Path, *arguments: str) -> None:
+    """Replay them and record what the re-run base says beside what was recorded; arguments: of replay.launch."""
+    topics = ["/odom", "/recorded/odom", "/voltages", "/recorded/voltages", "/scan", "/tf", "/recorded/tf", "/map"]
+    with master() as environment, recording(out, *topics, environment=environment):
+        command = ["roslaunch", "kurumaisu", "replay.launch", f"bag:={' '.join(map(str, bags))}", *arguments]
         subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
-    wait_for_file(out)
 
 
 def poses(bag: rosbag.Bag, topic: str) -> np.ndarray:
@@ -90,7 +113,7 @@ def test_the_base_run_again_goes_where_it_went(tmp_path):
         info = recorded.get_type_and_topic_info().topics
         names = {topic.lstrip("/") for topic in info}
         assert {"cmd_vel", "voltages", "odom", "scan", "ground_truth", "tf", "tf_static"} <= names
-    replay(bag, out)
+    replay([bag], out)
     with rosbag.Bag(out) as both:
         then, now = poses(both, "/recorded/odom"), poses(both, "/odom")
         assert both.get_message_count("/scan") > 10
@@ -102,3 +125,57 @@ def test_the_base_run_again_goes_where_it_went(tmp_path):
     assert math.dist(at, then[-1, 1:3]) < 4 * 0.5 * TICK + 0.02
     heading = np.interp(then[-1, 0], now[:, 0], np.unwrap(now[:, 3])) - np.unwrap(then[:, 3])[-1]
     assert abs(math.remainder(heading, 2 * math.pi)) < 4 * 0.5 * TICK + 0.02
+
+
+def bits(bag: rosbag.Bag, topic: str) -> dict[int, tuple[float, ...]]:
+    """Return position and heading of an odometry topic by stamp, as they were sent."""
+    found = {}
+    for _, message, _ in bag.read_messages(topic):
+        p, q = message.pose.pose.position, message.pose.pose.orientation
+        found[message.header.stamp.to_nsec()] = (p.x, p.y, q.z, q.w)
+    return found
+
+
+def last_map(bag: Path) -> tuple[np.ndarray, tuple[float, float], float]:
+    """Return cells (rows, columns), origin [m] and resolution [m] of the last map in a bag."""
+    with rosbag.Bag(bag) as maps:
+        *_, (_, grid, _) = maps.read_messages("/map")
+    info = grid.info
+    cells = np.array(grid.data, dtype=np.int8).reshape(info.height, info.width)
+    return cells, (info.origin.position.x, info.origin.position.y), info.resolution
+
+
+def alike(one: Path, other: Path) -> tuple[float, float]:
+    """Return, of the cells that either map knows, the share that both know; and of those, the share that agree."""
+    (a, at, cell), (b, bt, _) = last_map(one), last_map(other)
+    low = np.minimum(at, bt)
+    offsets = [np.round((np.array(origin) - low) / cell).astype(int)[::-1] for origin in (at, bt)]
+    shape = np.max([o + m.shape for o, m in zip(offsets, (a, b), strict=True)], axis=0)
+    laid = [np.full(shape, -1, dtype=np.int8) for _ in offsets]
+    for whole, (row, column), part in zip(laid, offsets, (a, b), strict=True):
+        whole[row : row + part.shape[0], column : column + part.shape[1]] = part
+    both, either = (laid[0] >= 0) & (laid[1] >= 0), (laid[0] >= 0) | (laid[1] >= 0)
+    agree = (laid[0][both] > 50) == (laid[1][both] > 50)
+    return both.sum() / either.sum(), agree.mean()
+
+
+def test_odometry_again_is_the_same_to_the_last_bit_and_so_is_nearly_the_map(tmp_path):
+    """Through live topics and a recorded clock, from a bag that was split."""
+    live, out = tmp_path / "live.bag", tmp_path / "again.bag"
+    record(tmp_path / "drive.bag", "split:=4", maps=live)
+    parts = sorted(tmp_path.glob("drive_*.bag"))
+    assert len(parts) > 1
+    with rosbag.Bag(parts[0]) as first:
+        assert first.get_compression_info().compression == "lz4"
+    for part in parts:  # each can be read alone: what is latched is in each
+        with rosbag.Bag(part) as bag:
+            assert "tf_static" in {name.lstrip("/") for name in bag.get_type_and_topic_info().topics}
+    replay(parts, out, "base:=reckoned", "slam:=true")
+    with rosbag.Bag(out) as both:
+        then, now = bits(both, "/recorded/odom"), bits(both, "/odom")
+    assert len(now) > 200
+    assert {stamp: pose for stamp, pose in then.items() if stamp in now} == now
+    assert max(abs(pose[0]) for pose in now.values()) > 0.5  # it has driven
+    known, agreed = alike(live, out)
+    assert known > 0.95
+    assert agreed > 0.97

@@ -31,6 +31,7 @@ NAMES = (
     "slam",
     "slam_localise",
     "predict",
+    "paper",
 )
 
 

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Equations (1) and (2) from samples: two lines that meet at the origin, each with intervals, or a reason why not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from kurumaisu._core import AxisLaw, Branch
+from kurumaisu.paper import lines
+from kurumaisu.paper.options import Bootstrap, Options
+from kurumaisu.paper.samples import Samples
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+SIDES = {"positive": 1.0, "negative": -1.0}
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Translation or steering: names, unit of the rate, and its samples."""
+
+    name: str
+    rate: FloatArray
+    volts: FloatArray
+    side: FloatArray
+    sd: FloatArray
+    unit: str
+
+    def rest_level(self, options: Options) -> float:
+        """Return the rate below which a sample may be one at rest: what samples at neutral, and the reference, scatter.
+
+        At neutral the chair stands, equations (1) and (2).
+        """
+        near = np.abs(self.volts) < 3 * options.drive.voltage_sd
+        # by (2) as printed a slow turn has next to no voltage either: by what was meant, where somebody says so
+        neutral = near & (np.isnan(self.side) | (self.side == 0))
+        scatter = float(np.median(np.abs(self.rate[neutral]))) / lines.NORMAL_MAD if neutral.any() else 0.0
+        return options.drive.rest * max(scatter, float(np.median(self.sd)))
+
+
+def axes_of(samples: Samples) -> tuple[Axis, Axis]:
+    """Return translation and steering."""
+    return (
+        Axis("translation", samples.v, samples.v_f, samples.side_v, samples.sd_v, "m/s"),
+        Axis("steering", samples.w, samples.v_s, samples.side_w, samples.sd_w, "rad/s"),
+    )
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """An estimate with its interval."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def half(self) -> float:
+        """Half the interval's width."""
+        return 0.5 * (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class BranchFit:
+    """One side of a law: volts = slope * rate + intercept.
+
+    paper: least squares as in the paper; refused: why the samples do not determine it, or ''; curvature: of the
+    branch, in standard errors; scatter: sd of a sample's rate about the line; lowest, highest: rates that were seen.
+    """
+
+    samples: int
+    blocks: int
+    lowest: float
+    highest: float
+    paper: Branch | None
+    slope: Coefficient | None
+    intercept: Coefficient | None
+    scatter: float
+    curvature: float
+    refused: str
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """Both sides of a law. overlap: whether both would answer to a voltage, as equation (2) as printed."""
+
+    name: str
+    unit: str
+    positive: BranchFit
+    negative: BranchFit
+
+    def branches(self) -> dict[str, BranchFit]:
+        """Return both by their names in the model file."""
+        return {"positive": self.positive, "negative": self.negative}
+
+    @property
+    def refused(self) -> list[str]:
+        """Return why a side is not determined."""
+        return [f"{self.name}.{side}: {fit.refused}" for side, fit in self.branches().items() if fit.refused]
+
+    def law(self) -> AxisLaw:
+        """Return the law, which must be determined. Raise ValueError for slopes of different signs."""
+        found = []
+        for fit in self.branches().values():
+            assert fit.slope is not None
+            assert fit.intercept is not None
+            found.append(Branch(fit.slope.value, fit.intercept.value))
+        return AxisLaw(*found)
+
+    @property
+    def overlap(self) -> bool:
+        """True where both sides answer to a voltage: base_node takes such a law only if it is called `published`."""
+        return overlaps(self.law())
+
+
+def overlaps(law: AxisLaw) -> bool:
+    """Return whether the branches of a law leave no dead zone about 0 V."""
+    sign = np.sign(law.positive.slope)
+    return bool(sign * law.positive.intercept < 0 or sign * law.negative.intercept > 0)
+
+
+def fit_axis(axis: Axis, samples: Samples, options: Options) -> AxisFit:
+    """Return the law of an axis; each side is fitted, or refused, for itself."""
+    level = axis.rest_level(options)
+    rng = np.random.default_rng(options.bootstrap.seed)
+    fits = [_fit_branch(axis, samples, _on_side(axis, samples, side, level), options, rng) for side in SIDES.values()]
+    return AxisFit(axis.name, axis.unit, *fits)
+
+
+def _on_side(axis: Axis, samples: Samples, side: float, level: float) -> BoolArray:
+    """Return which samples are steady and move to a side.
+
+    By what the reference saw: on a chair whose dead zone is wider than its model's, a command is no motion.
+    """
+    told = np.isnan(axis.side) | (axis.side == side)
+    return np.asarray(samples.steady & told & (side * axis.rate > level) & (axis.volts != 0))
+
+
+def _fit_branch(axis: Axis, samples: Samples, on: BoolArray, options: Options, rng: np.random.Generator) -> BranchFit:
+    rate, volts, block = axis.rate[on], axis.volts[on], samples.block[on]
+    blocks = len(np.unique(block))
+    if blocks < options.drive.least_blocks:
+        plural = "" if blocks == 1 else "es"
+        why = f"{blocks} stretch{plural} of steady motion to this side, {options.drive.least_blocks} are needed"
+        return _none(rate, blocks, why)
+    if np.ptp(volts) < options.drive.steady:
+        span = f"{volts.min():.3f} to {volts.max():.3f} V"
+        return _none(rate, blocks, f"all its voltages are from {span}: slope and intercept cannot be told apart")
+    ones = np.ones(len(rate))
+    line = lines.robust(rate, volts, ones, options.drive.voltage_sd)
+    drawn = lines.robust(
+        rate, volts, lines.block_counts(block, options.bootstrap.resamples, rng), options.drive.voltage_sd
+    )
+    plain = lines.least_squares(rate, volts, ones)
+    slope = interval(float(line.slope), drawn.slope, blocks, options.bootstrap)
+    intercept = interval(float(line.intercept), drawn.intercept, blocks, options.bootstrap)
+    return BranchFit(
+        samples=len(rate),
+        blocks=blocks,
+        lowest=float(np.abs(rate).min()),
+        highest=float(np.abs(rate).max()),
+        paper=Branch(float(plain.slope), float(plain.intercept)),
+        slope=slope,
+        intercept=intercept,
+        scatter=float(np.std((volts - line.at(rate)) / line.slope, ddof=2)),
+        curvature=_curvature(rate, volts, block),
+        refused=_refusal(slope, intercept, rate, axis.unit, options),
+    )
+
+
+def _none(rate: FloatArray, blocks: int, why: str) -> BranchFit:
+    size = np.abs(rate) if len(rate) else np.array([np.nan])
+    return BranchFit(len(rate), blocks, float(size.min()), float(size.max()), None, None, None, np.nan, np.nan, why)
+
+
+def interval(value: float, drawn: FloatArray, blocks: int, options: Bootstrap) -> Coefficient:
+    """Return an estimate with Student's interval by the bootstrap's sd.
+
+    Few blocks scatter by less than they should about a line fitted to them, by the root of (n - 2) / n, and Student
+    knows that their scatter is a guess, too. Percentiles of the bootstrap know neither.
+    """
+    finite = drawn[np.isfinite(drawn)]
+    if len(finite) < 0.9 * len(drawn):
+        return Coefficient(value, -np.inf, np.inf)
+    sd = float(np.std(finite)) * np.sqrt(blocks / (blocks - 2))
+    half = float(student.ppf(0.5 + options.level / 2, blocks - 2)) * sd
+    return Coefficient(value, value - half, value + half)
+
+
+def _refusal(slope: Coefficient, intercept: Coefficient, rate: FloatArray, unit: str, options: Options) -> str:
+    size = np.abs(rate)
+    seen = f"rates from {size.min():.2f} to {size.max():.2f} {unit}, {len(rate)} samples"
+    if not slope.half <= options.drive.widest_slope * abs(slope.value):
+        return f"its slope is known to {100 * slope.half / abs(slope.value):.0f} % only: {seen}"
+    if not intercept.half <= options.drive.widest_intercept:
+        return f"its intercept is known to {intercept.half:.3f} V only: {seen}"
+    return ""
+
+
+def _curvature(rate: FloatArray, volts: FloatArray, block: IntArray) -> float:
+    """Return the t value of a square term, by block means: noise within a block is one."""
+    names, index = np.unique(block, return_inverse=True)
+    size = np.bincount(index)
+    x, y = np.bincount(index, volts) / size, np.bincount(index, rate) / size
+    columns = np.column_stack([np.ones(len(x)), x, (x - x.mean()) ** 2])
+    if len(names) < 5 or np.linalg.matrix_rank(columns) < 3:
+        return 0.0
+    root = np.sqrt(size)
+    found, *_ = np.linalg.lstsq(columns * root[:, np.newaxis], y * root, rcond=None)
+    left = (y - columns @ found) * root
+    covariance = np.linalg.inv((columns * size[:, np.newaxis]).T @ columns) * (left @ left) / (len(x) - 3)
+    return float(found[2] / np.sqrt(max(covariance[2, 2], 1e-300)))

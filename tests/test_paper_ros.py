@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The paper's experiments through the chair's own programs, at small size: docs/paper.md has them in full."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rosbag
+
+from kurumaisu.bench.processes import master, program
+from kurumaisu.errors import Error
+from kurumaisu.paper import drive
+from kurumaisu.params import shipped
+from kurumaisu.ros import paper_parts, paper_run
+from kurumaisu.ros.paper_command import main
+
+SPEEDS = (0.3, 0.9, -0.4)
+PATIENCE = 90.0  # [s] of wall time: this computer may be busy
+
+
+def test_the_voltages_at_the_converter_are_those_of_the_law(tmp_path, capsys):
+    text = shipped("launch/paper/figure_10.yaml").read_text().split("phases:")[0]
+    phases = [f"  - {{seconds: 1.5, v: {v}, w: 0.0, ramp: 0.0}}\n" for v in (*SPEEDS, 0.0)]
+    (tmp_path / "speeds.yaml").write_text(f"{text}phases:\n{''.join(phases)}")
+    assert main(["dac", "--out", str(tmp_path / "out"), "--speeds", str(tmp_path / "speeds.yaml")]) == 0
+    rows = np.genfromtxt(tmp_path / "out/figure_10.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    for law, intercepts in (("intercept 0.1 V", (0.1, -0.1)), ("equation (1)", (0.127906, -0.108783))):
+        mine = rows[rows["law"] == law]
+        volts = dict(zip(mine["v"].tolist(), mine["volts"].tolist(), strict=True))
+        for v in SPEEDS:  # by hand, from the paper
+            line = 1.32402 * v + intercepts[0] if v > 0 else 2.07369 * v + intercepts[1]
+            assert volts[v] == pytest.approx(line, abs=1.5 / 819)
+    assert "a step is 1.22 mV" in capsys.readouterr().out
+
+
+def test_the_wall_through_driver_and_virtual_sensor_agrees_with_equation_4(tmp_path, capsys):
+    settings = tmp_path / "paper.yaml"
+    settings.write_text(shipped("launch/paper.yaml").read_text().replace("  scans: 50 ", "  scans: 22 "))
+    out = tmp_path / "out"
+    assert main(["simulated-wall", "--out", str(out), "--settings", str(settings), "--speed", "4"]) == 0
+    assert "off [se]" in capsys.readouterr().out
+    with rosbag.Bag(out / "scans/place_5.bag") as bag:
+        (connection, *_) = bag._get_connections("scan")
+        assert connection.header["callerid"] in ("/laser_node", b"/laser_node")
+    rows = np.genfromtxt(out / "figure_12.csv", delimiter=",", names=True)
+    assert list(rows["distance"]) == [0.2, 0.5, 1.0, 2.0, 4.0]
+    assert (rows["scans"] >= 20).all()
+    np.testing.assert_allclose(rows["mean"], 1.004587 * rows["distance"] * 1.0013 + 0.058826, atol=0.003)
+
+
+def test_a_launch_that_fails_shows_the_end_of_its_log(tmp_path):
+    with pytest.raises(Error, match=r"figure_12\.launch .*the end of"):
+        paper_run.launch(
+            ["figure_12.launch", "bag:=b", "file:=none.yaml", "model:=none.yaml"], tmp_path / "l.log", 60.0
+        )
+
+
+@contextlib.contextmanager
+def running(*command, environment, output=subprocess.DEVNULL):
+    process = subprocess.Popen(command, env=environment, stdout=output, stderr=subprocess.STDOUT)
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        process.wait(PATIENCE)
+
+
+def test_a_drive_is_watched_while_it_is_recorded(tmp_path):
+    """Half a drive: what it lacks is said, and when it is interrupted the bag is whole."""
+    said, bag = tmp_path / "said", tmp_path / "drive.bag"
+    arguments = [f"file:={shipped(drive.HELD_OUT)}", f"bag:={tmp_path / 'other.bag'}", "speed:=4"]
+    with (
+        master() as ros,
+        running("roslaunch", "kurumaisu", "identification.launch", *arguments, environment=ros),
+        said.open("wb") as stream,
+        running(program("calibrate"), "record", str(bag), "--every", "1", environment=ros, output=stream) as watcher,
+    ):
+        deadline = time.monotonic() + PATIENCE
+        while "turning left:" not in said.read_text() and time.monotonic() < deadline:
+            time.sleep(0.2)
+        watcher.send_signal(signal.SIGINT)
+        assert watcher.wait(PATIENCE) == 1
+    told = said.read_text()
+    assert "stretches of steady motion to this side, 8 are needed" in told
+    assert "not enough" in told
+    with rosbag.Bag(bag) as recorded:
+        topics = recorded.get_type_and_topic_info().topics
+        assert {"voltages", "ground_truth"} <= {name.lstrip("/") for name in topics}
+
+
+def test_programs_are_where_rosrun_looks():
+    for name in ("paper", "calibrate"):
+        assert os.access(program(name), os.X_OK)
+        assert Path(program(name)).name == name
+
+
+def test_all_figures_are_repeated_and_one_that_fails_is_not_forgotten(monkeypatch, tmp_path):
+    done = []
+
+    def part(name, code):
+        def run(*_, **__):
+            done.append(name)
+            return code
+
+        return run
+
+    monkeypatch.setattr(paper_parts, "drive", part("3-6", 1))
+    monkeypatch.setattr(paper_parts.commands_wall, "figures_wall_of", part("7-9", 0))
+    monkeypatch.setattr(paper_parts.commands_wall, "conjecture", part("conjecture", 0))
+    monkeypatch.setattr(paper_parts, "dac", part("10", 0))
+    monkeypatch.setattr(paper_parts, "simulated_wall", part("11-12", 0))
+    assert main(["all", "--out", str(tmp_path)]) == 1
+    assert done == ["3-6", "7-9", "conjecture", "10", "11-12"]
