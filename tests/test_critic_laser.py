@@ -12,7 +12,7 @@ from laser_scene import neighbours, recording
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, marginal, whitened
 from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.search import Search
+from kurumaisu.critic.laser.search import Search, confusion
 from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.still import repeatability
 from kurumaisu.critic.laser.verdicts import criticise
@@ -160,3 +160,11 @@ def real_scans():
         if len(codes) == 3 * 677:
             out.append(codes.reshape(-1, 3) @ [4096, 64, 1])
     return np.array(out, dtype=float)
+
+
+def test_one_more_effect_that_nobody_knows_is_no_rival():
+    a_or_b = [(("a",), 0.4), (("b",), 0.38), (("a", "c"), 0.11), (("b", "c"), 0.1), ((), 0.01)]
+    weights = [(frozenset(ids), weight) for ids, weight in a_or_b]
+    p, confounded = confusion(weights, frozenset("a"), "abc")
+    assert p["c"] == pytest.approx(0.21)
+    assert confounded == (("a", "b"),)

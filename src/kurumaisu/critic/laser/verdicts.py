@@ -13,6 +13,7 @@ from kurumaisu.critic.laser import pictures, rivals, still
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.pictures import NO_PICTURES, Part, Pictures, misfits, noise_rows
+from kurumaisu.critic.laser.pinned import pinned
 from kurumaisu.critic.laser.rivals import Rival, Weighed
 from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
@@ -147,8 +148,9 @@ def _scatter(
 def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scatter]) -> LaserFinding:
     found = made.found
     sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
-    settings = {setting.id: setting for setting in _settings(assembly, made.fit)}
-    estimates = {name: _estimates(made.fit, setting) for name, setting in settings.items()}
+    refitted = pinned(assembly, normal, made.fit.forms, _settings(assembly, made.fit), made.winner)
+    settings = {setting.id: setting for setting, _ in refitted}
+    estimates = {setting.id: _estimates(setting, sds) for setting, sds in refitted}
     if made.winner is not None:
         free = made.winner.free
         valid = normal.beam_noise.valid
@@ -280,22 +282,12 @@ def _squared(effect: type[Mechanism], signs: Mapping[str, float], coefficient: f
     }
 
 
-def _estimates(fit: Fitted, setting: EffectSetting) -> dict[str, Estimate]:
-    out, start = {}, 0
-    parameters = {p.name: p for p in effects.by_id(setting.id).parameters}
-    for form in fit.forms:
-        for i, column in enumerate(form.columns):
-            if form.id != setting.id:
-                continue
-            sd = float(fit.sds[start + i])
-            names = [column.parameter.name]
-            if column.squared:
-                names = [name for name, size in form.at.items() if size]
-                sd /= 2 * float(np.sqrt(max(fit.coefficients[start + i], sd)))
-            for name in names:
-                p, value, half = parameters[name], setting.parameters[name], NORMAL90 * parameters[name].scale * sd
-                out[name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
-        start += len(form.columns)
+def _estimates(setting: EffectSetting, sds: Mapping[str, float]) -> dict[str, Estimate]:
+    out = {}
+    for p in effects.by_id(setting.id).parameters:
+        if p.name in sds:
+            value, half = setting.parameters[p.name], NORMAL90 * sds[p.name]
+            out[p.name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
     return out
 
 
