@@ -74,6 +74,8 @@ class Assembly:
         self.forms, fixed = self.marks.forms(ids)
         self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
         self.columns = np.concatenate([fixed, more], axis=2)
+        # A beam that meets nothing with one of the effects at work says nothing about it.
+        self.first = replace(self.first, valid=self.first.valid & np.isfinite(self.columns).all(axis=2))
         self._fixed = fixed.shape[2]
 
     def _linearise(self, shots: Shots, *, roughly: bool) -> None:
@@ -149,6 +151,8 @@ class Assembly:
         for form in fitted:
             best, at, columns = -np.inf, form.at, None
             for shape, some in self.marks.finer(form):
+                if not np.isfinite(some[beam.valid]).all():
+                    continue  # with this shape some beams meet nothing
                 self.columns[:, :, form.span] = some
                 use = np.concatenate([np.arange(other.span.start, other.span.stop) for other in fitted])
                 gram = marginal(self.grams(beam, use), self.layout, scan)[0]
@@ -208,7 +212,10 @@ class Assembly:
         """Return the normal equations of other columns (k, b, m) and another residual (k, b), in the noise known."""
         other = copy(self)
         other.columns, other.residual = columns.astype(np.float32), residual
-        grams, cross = other._crossed(normal.beam_noise, columns.shape[2])
+        known = np.isfinite(columns).all(axis=2) & np.isfinite(residual)
+        grams, cross = other._crossed(
+            replace(normal.beam_noise, valid=normal.beam_noise.valid & known), columns.shape[2]
+        )
         return without_beams(grams, cross, self.layout, normal.scan_noise, normal.beam_noise.own_sd)
 
     def _crossed(self, beam: BeamNoise, count: int) -> tuple[list[Gram], Crossed]:

@@ -268,7 +268,10 @@ def _settings(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
             else:
                 values[column.parameter.name] = column.parameter.null + column.parameter.scale * coefficient
         shape = {} if form.columns[0].squared else form.at
-        out.append(EffectSetting(form.id, {**values, **shape}))
+        values |= shape
+        # Two effects that nearly cancel are fitted as sums, which no bound stops.
+        within = {p.name: float(np.clip(values[p.name], p.lower, p.upper)) for p in effect.parameters}
+        out.append(EffectSetting(form.id, within))
     return out
 
 
