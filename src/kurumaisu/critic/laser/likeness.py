@@ -46,6 +46,6 @@ class Likeness:
         return np.asarray(solve_triangular(self._root(numbers), change / self.sd, lower=True))
 
     def _root(self, numbers: FloatArray) -> FloatArray:
-        """Return the root of the covariance where effects have made such numbers: their real form may do more or less."""
+        """Return the root of the covariance where effects made such numbers: their real form may do more or less."""
         slack = _FORM * np.minimum(np.abs(self.units(numbers)), self._most)
         return np.asarray(np.linalg.cholesky(self._covariance + np.diag(slack**2)))

@@ -206,9 +206,7 @@ def poses_at(shots: Shots, times: FloatArray) -> FloatArray:
     return out
 
 
-def read(
-    shots: Shots, seen: Look, chain: LaserChain, noise: FloatArray, moved: FloatArray | float = 0.0
-) -> FloatArray:
+def read(shots: Shots, seen: Look, chain: LaserChain, noise: FloatArray, moved: FloatArray | float = 0.0) -> FloatArray:
     """Return readings (k, b) [m] of what is met by a chain, for standard deviates (k, b); neither rounded nor gated.
 
     moved (k, b) [m]: added to the mean, as errors of the poses are.

@@ -196,7 +196,7 @@ class ScatterSearch:
         a, b = (
             self._likeness.whitened(self._statistics((piece.setting,), (1, 2)) - plain, plain) for piece in (one, other)
         )
-        return float(abs(a @ b) / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-9))
+        return float(abs(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-9))
 
     def _pushes(self) -> Iterator[_Push]:
         """Yield what each parameter alone does to the statistics, at some values."""
@@ -278,10 +278,13 @@ class ScatterSearch:
             step = 0.1 * max(abs(setting.parameters[p.name] - p.null), p.scale)
             ends = np.clip(setting.parameters[p.name] + np.array([-step, step]), p.lower, p.upper)
             each = [
-                [self._simulate((*beside, EffectSetting(setting.id, {**setting.parameters, p.name: end})), seed) for seed in (1, 2)]
+                [
+                    self._simulate((*beside, EffectSetting(setting.id, {**setting.parameters, p.name: end})), seed)
+                    for seed in (1, 2)
+                ]
                 for end in ends.tolist()
             ]
-            low, high = np.array(each)
+            low, high = np.array(each[0]), np.array(each[1])
             middle = 0.25 * (low + high).sum(axis=0)
             first, second = (self._likeness.whitened(change, middle) for change in high - low)
             change, chance = 0.5 * (first + second), 0.25 * float((first - second) @ (first - second))

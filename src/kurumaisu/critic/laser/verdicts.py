@@ -19,12 +19,13 @@ from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch, Simulator
 from kurumaisu.critic.laser.statistics import Statistics
+from kurumaisu.critic.laser.supply import every_id, supplier
 from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
 from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Comparison
-from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, Unknown
+from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, NextExperiment, Unknown
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray, IntArray
@@ -40,7 +41,7 @@ class LaserFinding:
 
     causes: named and material; confounded: sets of which one acts; unknown: what is in no catalogue; settings: what
     extends the model; details, pictures: for the report; small: certain, but they do not matter; refused: why there
-    is no laser criticism, None where there is.
+    is no laser criticism, None where there is; next_experiment: what supplies what the scans lack.
     """
 
     causes: tuple[Cause, ...] = ()
@@ -51,6 +52,7 @@ class LaserFinding:
     pictures: Pictures = NO_PICTURES
     small: tuple[str, ...] = ()
     refused: str | None = None
+    next_experiment: NextExperiment | None = None
 
 
 def criticise(
@@ -62,7 +64,8 @@ def criticise(
     """
     why = missing(recording)
     if why is not None:
-        return LaserFinding(refused=why, details=still.words(recording, model))
+        drive = supplier(model, every_id(), recording.truth) if recording.world is not None else None
+        return LaserFinding(refused=why, details=still.words(recording, model), next_experiment=drive)
     progress("laser: predicting the scans")
     assembly = Assembly(gather(recording, model), ids)
     progress("laser: estimating the noise")
@@ -79,8 +82,18 @@ def criticise(
     progress("laser: weighing effects on the scatter")
     scatter, comparison = _scatter(assembly, normal, made, ids)
     finding = _finding(assembly, normal, made, scatter)
+    finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
     return replace(finding, pictures=Pictures(shown, pictures.rivals(made.found), noise_rows(normal), comparison))
+
+
+def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model: Model) -> NextExperiment | None:
+    """Return the experiment that tells apart what the scans cannot, or that supplies what they lack."""
+    open_ids = sorted({name for group in finding.confounded for name in group})
+    lacks = not finding.causes and not finding.unknown and lacking(assembly)
+    if not open_ids and not lacks:
+        return None
+    return supplier(model, open_ids or every_id(), recording.truth)
 
 
 @dataclass(frozen=True)
