@@ -30,11 +30,17 @@ def say(_):
 
 def test_what_is_missing_is_said(tmp_path):
     good = recording(tmp_path, None, 0.0, 1, scans=6)
-    assert "map" in criticise(replace(good, world=None), MODEL, say).refused
+    mapless = criticise(replace(good, world=None), MODEL, say)
+    assert "map" in mapless.refused
+    assert mapless.next_experiment is None, "no drive makes a map of measured walls"
     blind = replace(good, runs=(replace(good.runs[0], pose=None),))
     assert "reference pose" in criticise(blind, MODEL, say).refused
     none = replace(good, runs=(replace(good.runs[0], scan=None),))
-    assert "scans" in criticise(none, MODEL, say).refused
+    scanless = criticise(none, MODEL, say)
+    assert "scans" in scanless.refused
+    assert scanless.next_experiment.id == "room_poses"
+    assert {"laser.offset", "laser.scale", "laser.mount_yaw"} <= set(scanless.next_experiment.separates)
+    assert not {"laser.latency", "laser.sweep"} & set(scanless.next_experiment.separates), "they show on the way only"
     late = replace(good.runs[0].scan, t=good.runs[0].scan.t + 1000)
     assert "within the time" in criticise(replace(good, runs=(replace(good.runs[0], scan=late),)), MODEL, say).refused
 

@@ -43,6 +43,7 @@ class Statistics:
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
         self._sides = _sides(seen.ranges, met & (seen.incidence < _SQUARE))
+        self._stand = assembly.layout.stand
         self._basis, self._size = _basis(assembly, noise)
         axes = np.r_[0, 1 + np.arange(self._basis.shape[2] - 1) % 3]
         limit = _steepest(seen.level, seen.incidence)[:, :, axes]
@@ -58,6 +59,8 @@ class Statistics:
         """Return errors of readings (k, b) [m] by errors of the reference, drawn."""
         draws = rng.standard_normal(self._size.shape) * self._size
         draws[:, 0] = 0.0
+        for stand in np.unique(self._stand[self._stand >= 0]):  # scans of one pose have its one error
+            draws[self._stand == stand] = draws[np.flatnonzero(self._stand == stand)[0]]
         return np.asarray((self._moves @ draws[:, :, np.newaxis])[:, :, 0])
 
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
