@@ -12,7 +12,7 @@ from laser_scene import neighbours, recording
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, marginal, whitened
 from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.search import Search
+from kurumaisu.critic.laser.search import Search, confusion
 from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.still import repeatability
 from kurumaisu.critic.laser.verdicts import criticise
@@ -30,11 +30,17 @@ def say(_):
 
 def test_what_is_missing_is_said(tmp_path):
     good = recording(tmp_path, None, 0.0, 1, scans=6)
-    assert "map" in criticise(replace(good, world=None), MODEL, say).refused
+    mapless = criticise(replace(good, world=None), MODEL, say)
+    assert "map" in mapless.refused
+    assert mapless.next_experiment is None, "no drive makes a map of measured walls"
     blind = replace(good, runs=(replace(good.runs[0], pose=None),))
     assert "reference pose" in criticise(blind, MODEL, say).refused
     none = replace(good, runs=(replace(good.runs[0], scan=None),))
-    assert "scans" in criticise(none, MODEL, say).refused
+    scanless = criticise(none, MODEL, say)
+    assert "scans" in scanless.refused
+    assert scanless.next_experiment.id == "room_poses"
+    assert {"laser.offset", "laser.scale", "laser.mount_yaw"} <= set(scanless.next_experiment.separates)
+    assert not {"laser.latency", "laser.sweep"} & set(scanless.next_experiment.separates), "they show on the way only"
     late = replace(good.runs[0].scan, t=good.runs[0].scan.t + 1000)
     assert "within the time" in criticise(replace(good, runs=(replace(good.runs[0], scan=late),)), MODEL, say).refused
 
@@ -160,3 +166,11 @@ def real_scans():
         if len(codes) == 3 * 677:
             out.append(codes.reshape(-1, 3) @ [4096, 64, 1])
     return np.array(out, dtype=float)
+
+
+def test_one_more_effect_that_nobody_knows_is_no_rival():
+    a_or_b = [(("a",), 0.4), (("b",), 0.38), (("a", "c"), 0.11), (("b", "c"), 0.1), ((), 0.01)]
+    weights = [(frozenset(ids), weight) for ids, weight in a_or_b]
+    p, confounded = confusion(weights, frozenset("a"), "abc")
+    assert p["c"] == pytest.approx(0.21)
+    assert confounded == (("a", "b"),)

@@ -99,6 +99,8 @@ def test_one_wall_does_not_tell_the_mounting_from_the_map(tmp_path, monkeypatch)
     assert finding.confounded == (("laser.mount_x", "world.map_error"),)
     assert finding.causes == ()
     assert any("only one wall" in line and "room_poses" in line for line in finding.details)
+    assert finding.next_experiment.id == "room_poses"
+    assert finding.next_experiment.separates == ("laser.mount_x", "world.map_error")
     null = criticise(case.null, MODEL, say)
     assert (null.confounded, null.causes, null.unknown) == ((), (), ())
 

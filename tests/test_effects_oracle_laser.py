@@ -177,7 +177,7 @@ def test_neighbours_err_together(rho):
 @pytest.mark.parametrize("inverse_nu", [0.1, 0.2, 0.4])
 def test_tails_are_student_s_of_the_same_size(inverse_nu):
     n, nu = 40_000, 1 / inverse_nu
-    z = (chain("laser.heavy_tails", 2, inverse_nu=inverse_nu).read(flat(n, 4)) - 2.0) / 0.001
+    z = (chain("laser.heavy_tails", 2, inverse_nu=inverse_nu, core=0.0).read(flat(n, 4)) - 2.0) / 0.001
     assert stats.kstest(z * np.sqrt(nu / (nu - 2)), stats.t(nu).cdf).pvalue > 1e-3
     assert stats.kstest(z, "norm").pvalue < 1e-6, "and not the normal distribution"
     far = 2 * stats.t(nu).sf(3 * np.sqrt(nu / (nu - 2)))
@@ -243,3 +243,8 @@ def test_another_laser_s_light_comes_from_a_sector_that_drifts():
             assert hit[inside].mean() == pytest.approx(0.25, abs=SIGMAS * np.sqrt(0.19 / inside.sum()))
             assert stats.kstest(readings[hit] / 5.0, "uniform").pvalue > 1e-3
     assert inside.any()
+
+
+def test_tails_on_an_unchanged_core_are_student_s_own():
+    z = (chain("laser.heavy_tails", 2, inverse_nu=0.25, core=1.0).read(flat(40_000, 4)) - 2.0) / 0.001
+    assert stats.kstest(z, stats.t(4).cdf).pvalue > 1e-3

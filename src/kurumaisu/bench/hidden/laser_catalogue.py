@@ -63,7 +63,9 @@ def _of(stage: str, act: Callable[..., object], other: Callable[..., object] | N
 
 
 def _tilt_names(s: Sizes) -> Sizes:
-    return {"pitch": s["size"] * float(np.cos(s["bearing"])), "roll": s["size"] * float(np.sin(s["bearing"]))}
+    """Return pitch and roll, the roll not negative: ranges to walls are the same with both turned round."""
+    size = s["size"] * (1.0 if np.sin(s["bearing"]) >= 0 else -1.0)
+    return {"pitch": size * float(np.cos(s["bearing"])), "roll": size * float(np.sin(s["bearing"]))}
 
 
 _cyclic = _of("bias", lf.cyclic, lf.triangle)

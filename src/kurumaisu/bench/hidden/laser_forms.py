@@ -59,6 +59,14 @@ def map_shift(a: Aim, s: Sizes) -> Aim:
     return replace(a, corners=a.corners + shift + turned)
 
 
+def box_turned(a: Aim, s: Sizes) -> Aim:
+    """A single box turned by `size` [rad] about its middle."""
+    corners, box = a.corners.copy(), int(s["box"])
+    arm = corners[box] - corners[box].mean(axis=0)
+    corners[box] += s["size"] * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+    return replace(a, corners=corners)
+
+
 def _add(c: Scans, bias: FloatArray | float) -> Scans:
     return replace(c, mean=c.mean + bias)
 

@@ -4,8 +4,8 @@
 Mean signals: the readings' noise is known, neighbours' correlation and the scans' common mode included; each stop, or
 each scan of a drive, has an error of its pose with the stated deviations, which takes its part of the signal away.
 Beams that come to meet another box have jumped, and those more than 78 degrees oblique hardly come back: both count
-as nothing.
-The offsets of single beams, where the background has them, and rounding other than its variance are left out.
+as nothing. Offsets of single beams, where the background has them, are those of patches of neighbours. Rounding other
+than its variance is left out.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from scipy.stats import norm, t
 from kurumaisu.bench.hidden import laws
 from kurumaisu.bench.hidden.backdrop import Backdrop
 from kurumaisu.bench.hidden.laser_catalogue import LASER
-from kurumaisu.bench.hidden.motion import STEP, Fault, Sizes
+from kurumaisu.bench.hidden.laser_forms import box_turned
+from kurumaisu.bench.hidden.motion import STEP, Fault, Form, Sizes
 from kurumaisu.bench.hidden.scanning import BEAM_TIME, MOUNT, Scans, expected
 from kurumaisu.bench.hidden.tours import REFERENCE_TIME, Tour
 from kurumaisu.types import BoolArray, FloatArray
@@ -29,6 +30,9 @@ _PART = 1e-5
 _OBLIQUE = 0.2  # least cosine of the incidence that counts
 _JUMP = 0.05  # [m/s, rad/s] from one step of the integration to the next, more than the noise of the rates
 _SELDOM = 1e-4  # share of readings that are wild anyway
+_PATCH = 22  # neighbouring beams, over which signals hardly change
+# Nobody says at which temperature a laser reads right, so an effect of the temperature has any offset it likes.
+_BESIDE = {"laser.temperature": "laser.offset"}
 EVERY = 5  # of the scans, the first of so many is looked at and stands for all
 
 
@@ -54,13 +58,29 @@ class LaserScale:
 
     def gram(self, signals: FloatArray) -> FloatArray:
         """Return the products (k, k) of whitened signals (s, b, k): z squared on the diagonal."""
+        k, offsets = signals.shape[2], self._beam_columns()
+        products = self._without_poses(np.concatenate([signals, offsets], axis=2))
+        cross = products[:k, k:]
+        return np.asarray(
+            products[:k, :k] - cross @ np.linalg.solve(products[k:, k:] + np.eye(offsets.shape[2]), cross.T)
+        )
+
+    def _beam_columns(self) -> FloatArray:
+        """Return what one sd of the mean offset of each patch of beams does, (s, b, patches); none without offsets."""
+        sd = self._backdrop.beam_sd
+        patches = np.arange(self._seen.shape[1]) // _PATCH
+        mine = patches[:, None] == np.unique(patches)[: None if sd > 0 else 0]
+        return np.where(self._seen[..., None], mine * sd / np.sqrt(_PATCH), 0.0)
+
+    def _without_poses(self, signals: FloatArray) -> FloatArray:
+        """Return the products of whitened signals without what errors of poses and of whole scans explain."""
         sd = np.hypot(self.nominal.sd, 0.001 / np.sqrt(12))
         effects = np.where(self._seen[..., None], self._pose_columns(), 0.0)
         white = _unchained(np.concatenate([signals, effects], axis=2) / sd[..., None], self._backdrop.beam_rho)
         # Stops stand still, so one scan says what all of its stop do; scans of a drive have each a pose of their own.
         weight = 1.0 if self.tour.moving else self.count
         k = signals.shape[2]
-        products = weight * np.einsum("sbi,sbj->sij", white, white, optimize=True)
+        products = weight * (white.transpose(0, 2, 1) @ white)
         rest = self._taken(products, k)
         return np.asarray(products[:, :k, :k].sum(axis=0) - rest) * (self.count if self.tour.moving else 1.0)
 
@@ -122,17 +142,20 @@ class LaserScale:
                 out[name] = self._walls()
             else:
                 faults = [LASER[name].fault(shape, "plain") for shape in _shapes(name)]
+                if name in _BESIDE:
+                    faults.append(LASER[_BESIDE[name]].fault({"size": 1e-3}, "plain"))
                 out[name] = np.stack([self.signal(fault) for fault in faults], axis=-1)
         return out
 
     def _walls(self) -> FloatArray:
-        """Return what moving each wall by 5 mm along x and y does."""
+        """Return what moving each wall by 5 mm along x and y does, and turning it by 2 mrad."""
         columns, c = [], self.nominal
         facing = c.normal[..., 0] * np.cos(c.angles) + c.normal[..., 1] * np.sin(c.angles)
         facing = np.where(self._seen, facing, 1.0)
         for i in range(len(self.tour.room)):
             for axis in range(2):
                 columns.append(np.where(self._seen & (c.box == i), 0.005 * c.normal[..., axis] / facing, 0.0))
+            columns.append(self.signal(Fault(Form("aim", box_turned), {"size": 0.002, "box": float(i)})))
         return np.stack(columns, axis=-1)
 
 

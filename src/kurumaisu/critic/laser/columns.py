@@ -95,6 +95,11 @@ class Marks:
         seen = self._seen if moved else look(self._shots, (setting,), seed, like=self._seen)
         return np.asarray(predict(self._shots, (setting,), seen, seed) - self.base)
 
+    def together(self, settings: Sequence[EffectSetting]) -> FloatArray:
+        """Return the change (k, b) [m] of the mean by effects with these values in place of the model's."""
+        seen = look(self._shots, settings, 0, like=self._seen)
+        return np.asarray(predict(self._shots, settings, seen, 0) - self.base)
+
     def null(self, effect: type[Mechanism]) -> dict[str, float]:
         """Return an effect's parameters in the model criticised."""
         own = self._own.get(effect.id, {})

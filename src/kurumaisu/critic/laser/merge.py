@@ -11,10 +11,12 @@ from kurumaisu.critic.verdict import Kind
 from kurumaisu.critic.words import named
 
 _NOTHING_SAID = "none"
+_TOLD = 4  # ids in a sentence; the verdict has them all
 
 
 def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
     """Return a criticism of the base with what the scans say besides."""
+    criticism = _with_drive(criticism, finding)
     verdict, story = criticism.verdict, criticism.story
     if finding.refused is not None:
         told = replace(story, details=(*story.details, _refusal(finding.refused), *finding.details))
@@ -53,6 +55,21 @@ def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
         noise=(*story.noise, *shown.noise),
     )
     return replace(criticism, verdict=joined, story=told, settings=(*criticism.settings, *finding.settings))
+
+
+def _with_drive(criticism: Criticism, finding: LaserFinding) -> Criticism:
+    """Return a criticism that proposes what the scans need, where the drives need nothing."""
+    drive = finding.next_experiment
+    if drive is None or criticism.verdict.next_experiment is not None:
+        return criticism
+    first, more = ", ".join(drive.separates[:_TOLD]), len(drive.separates) - _TOLD
+    listed = f"{first} and {more} more" if more > 0 else first
+    sentence = f"critic experiment {drive.id} ({drive.seconds:.0f} s), whose scans tell {listed} from their rivals."
+    return replace(
+        criticism,
+        verdict=replace(criticism.verdict, next_experiment=drive),
+        story=replace(criticism.story, next_drive=criticism.story.next_drive or sentence),
+    )
 
 
 def headline(finding: LaserFinding) -> str:

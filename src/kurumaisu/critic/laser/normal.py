@@ -13,10 +13,11 @@ from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
-from kurumaisu.critic.laser.shots import Shots, look, poses_at, predict, thin
+from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, thin
 from kurumaisu.critic.laser.standing import kinks, smoothed
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
 from kurumaisu.geometry import compose
+from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
@@ -73,6 +74,8 @@ class Assembly:
         self.forms, fixed = self.marks.forms(ids)
         self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
         self.columns = np.concatenate([fixed, more], axis=2)
+        # A beam that meets nothing with one of the effects at work says nothing about it.
+        self.first = replace(self.first, valid=self.first.valid & np.isfinite(self.columns).all(axis=2))
         self._fixed = fixed.shape[2]
 
     def _linearise(self, shots: Shots, *, roughly: bool) -> None:
@@ -148,6 +151,8 @@ class Assembly:
         for form in fitted:
             best, at, columns = -np.inf, form.at, None
             for shape, some in self.marks.finer(form):
+                if not np.isfinite(some[beam.valid]).all():
+                    continue  # with this shape some beams meet nothing
                 self.columns[:, :, form.span] = some
                 use = np.concatenate([np.arange(other.span.start, other.span.stop) for other in fitted])
                 gram = marginal(self.grams(beam, use), self.layout, scan)[0]
@@ -192,6 +197,26 @@ class Assembly:
         grams, cross = self._crossed(normal.beam_noise, self.columns.shape[2])
         gram = without_beams(grams, cross, self.layout, normal.scan_noise, normal.beam_noise.own_sd)
         return replace(normal, gram=gram)
+
+    def again(self, settings: Sequence[EffectSetting]) -> Assembly:
+        """Return the same scans predicted with effects at work, and poses sought anew; without columns."""
+        shots = replace(
+            self.shots,
+            own=own_with(self.shots, settings),
+            tracks=self.tracks,
+            shift=np.zeros_like(self.shots.shift),
+        )
+        return Assembly(shots, frozenset())
+
+    def products(self, normal: Normal, columns: FloatArray, residual: FloatArray) -> FloatArray:
+        """Return the normal equations of other columns (k, b, m) and another residual (k, b), in the noise known."""
+        other = copy(self)
+        other.columns, other.residual = columns.astype(np.float32), residual
+        known = np.isfinite(columns).all(axis=2) & np.isfinite(residual)
+        grams, cross = other._crossed(
+            replace(normal.beam_noise, valid=normal.beam_noise.valid & known), columns.shape[2]
+        )
+        return without_beams(grams, cross, self.layout, normal.scan_noise, normal.beam_noise.own_sd)
 
     def _crossed(self, beam: BeamNoise, count: int) -> tuple[list[Gram], Crossed]:
         """Return the first columns' normal equations of each scan, and what single beams' offsets share with them."""

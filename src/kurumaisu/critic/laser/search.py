@@ -17,6 +17,7 @@ from kurumaisu.types import FloatArray
 _LARGEST = 5  # effects in a set
 _WIDTH = 8  # sets that are extended at a time
 _WEAK = 1e-4  # prior precision of a coefficient, in units of its parameter's scale
+_INSTEAD = 2.0  # times as likely without an effect as beside it is what stands in for it
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,8 @@ def confusion(
 ) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
     """Return the posterior of each effect by weighed sets, and the sets of which one acts but not known which.
 
-    best: the effects of the best set; those of it that are not certain have rivals.
+    best: the effects of the best set; those of it that are not certain have rivals. A rival takes their place: what is
+    as likely beside them as without them is one more effect, about which nobody knows.
     """
 
     def p_any(names: Iterable[str]) -> float:
@@ -145,7 +147,14 @@ def confusion(
 
     p = {name: p_any([name]) for name in ids}
     uncertain = sorted(name for name in best if p[name] < NAMED)
-    group = tuple(uncertain + sorted(name for name in p if name not in best and p[name] >= RIVAL))
+    without = 1 - p_any(uncertain)
+
+    def instead(name: str) -> bool:
+        alone = sum(weight for chosen, weight in weights if name in chosen and chosen.isdisjoint(uncertain))
+        beside = p[name] - alone
+        return alone >= RIVAL and alone * (1 - without) > _INSTEAD * beside * without
+
+    group = tuple(uncertain + sorted(name for name in p if name not in best and instead(name)))
     one = uncertain and len(group) > 1 and p_any(group) >= NAMED
     return p, (group,) if one else ()
 

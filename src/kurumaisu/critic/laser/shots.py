@@ -206,9 +206,12 @@ def poses_at(shots: Shots, times: FloatArray) -> FloatArray:
     return out
 
 
-def read(shots: Shots, seen: Look, chain: LaserChain, noise: FloatArray) -> FloatArray:
-    """Return readings (k, b) [m] of what is met by a chain, for standard deviates (k, b); neither rounded nor gated."""
-    mean, sd = shots.laser.error.mean(seen.ranges), shots.laser.error.deviation(seen.ranges)
+def read(shots: Shots, seen: Look, chain: LaserChain, noise: FloatArray, moved: FloatArray | float = 0.0) -> FloatArray:
+    """Return readings (k, b) [m] of what is met by a chain, for standard deviates (k, b); neither rounded nor gated.
+
+    moved (k, b) [m]: added to the mean, as errors of the poses are.
+    """
+    mean, sd = shots.laser.error.mean(seen.ranges) + moved, shots.laser.error.deviation(seen.ranges)
     known = [{name: float(v[k]) for name, v in shots.known.items()} for k in range(len(shots.stamps))]
     parts = (seen.ranges, seen.incidence, seen.returns, mean, sd, noise, seen.ranges, seen.origins, known)
     rows = [

@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Effects that change how readings scatter, not their mean: likelihood of statistics, simulated with the very effects.
 
-Which numbers an effect changes is found by simulating it. No effect is named.
+Which numbers an effect changes is found by simulating it. No effect is named. One is added at a time; those that change
+the same numbers are then fitted together, and what is no longer needed goes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
 from scipy.special import logsumexp
 
 from kurumaisu import effects
+from kurumaisu.critic.laser.likeness import Likeness
 from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.shots import own_with, read
 from kurumaisu.critic.laser.statistics import Statistics
@@ -21,21 +23,21 @@ from kurumaisu.critic.prior import log_prior, occam
 from kurumaisu.critic.story import Comparison
 from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray
 
 _NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
-_MODEL = 0.5  # what the simulation of the statistics itself is off by, in their sds
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
-_COUNTS = 1.0  # no statistic but a root of a count is that large
 _SIZES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # in units of a parameter's scale, tried first
 _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
 _LEFT = 1e-3  # share of an effect's evidence that its own form may leave to others
-_LARGEST = 3  # effects in a set
+_LARGEST = 6  # effects in a set
 _TRIES = 12  # simulations of a refit per parameter
 _REFITS = 4  # effects that are refitted
 _CLOSE = 0.5  # share of what the best of them gains that another one must gain, to be refitted
 _COMPARED = 10  # simulations with the effects, for the report
 _FREE = 2.0  # nats that a further parameter must bring
+_POOR = 15.0  # nats of misfit from which shapes of an effect are tried, too
+_OVERLAP = 0.3  # cosine of two effects' changes of the statistics, from which they are fitted together
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,22 @@ class _Push:
     change: FloatArray
 
 
+@dataclass(frozen=True)
+class _Piece:
+    """An effect that acts: its setting, which parameters are fitted, posterior and log evidence of it."""
+
+    effect: type[Mechanism]
+    setting: EffectSetting
+    free: tuple[str, ...]
+    p: float
+    nats: float
+
+    @property
+    def price(self) -> float:
+        """What its parameters but the first cost [nat]."""
+        return _FREE * (len(self.free) - 1)
+
+
 def _low(rough: _Rough) -> float:
     return rough.low
 
@@ -76,14 +94,17 @@ class Simulator:
         self._assembly = assembly
         self._statistics = statistics
 
+    def counts(self) -> BoolArray:
+        """Return which of the statistics are roots of counts."""
+        return self._statistics.counts()
+
     def __call__(self, settings: Sequence[EffectSetting], seed: int) -> FloatArray:
         """Return the statistics of a simulation."""
         shots, seen, base = self._assembly.shots, self._assembly.marks.seen, self._assembly.marks.base
         rng = np.random.default_rng([seed, 7])
         chain = effects.build_laser(own_with(shots, settings), np.random.default_rng(seed))
-        raw = read(shots, seen, chain, rng.standard_normal(base.shape))
         error = shots.laser.error
-        raw = raw + self._statistics.pose_errors(rng)
+        raw = read(shots, seen, chain, rng.standard_normal(base.shape), self._statistics.pose_errors(rng))
         readings = error.reading(error.range(raw), np.zeros_like(raw))
         with np.errstate(invalid="ignore"):
             return self._statistics.of(readings, np.where(np.isfinite(readings), readings - base, np.nan))
@@ -101,75 +122,93 @@ class ScatterSearch:
         """
         self._ids = ids
         nulls = np.array([simulate((), 1000 + i) for i in range(_NULLS)])
-        self._simulate, self._measured, self._means = simulate, measured, set(means)
-        # A count that is always 0 in simulations may well be 1 in truth; roots of counts have an sd of 1.
-        sd = np.maximum(nulls.std(axis=0), np.where(np.abs(nulls.mean(axis=0)) >= _COUNTS, 0.7, 0.003))
-        unit = (nulls - nulls.mean(axis=0)) / sd
-        half = 0.5 * (unit.T @ unit / _NULLS + np.eye(len(sd)))  # of 50 draws, correlations of 40 are uncertain
-        self._sd = sd
-        self._whiten = np.linalg.inv(np.linalg.cholesky(half + _MODEL**2 * np.eye(len(sd))))
-        self._offset = nulls.mean(axis=0)
+        self._simulate, self._means = simulate, set(means)
+        self._likeness = Likeness(nulls, measured, simulate.counts())
 
     def run(self) -> list[Scatter]:
-        """Return the effects, greedily added while the evidence grows."""
-        if np.abs((self._measured - self._offset) / self._sd).max() < _QUIET:
+        """Return the effects, added while the evidence grows."""
+        if np.abs(self._likeness.units(self._likeness.measured)).max() < _QUIET:
             return []
         pushes = list(self._pushes())
-        chosen: list[type[Mechanism]] = []
-        settings: list[EffectSetting] = []
-        out: list[Scatter] = []
+        chosen: list[_Piece] = []
+        gone: set[type[Mechanism]] = set()
         while len(chosen) < _LARGEST:
-            step = self._step(pushes, chosen, settings)
-            least = max([_ENOUGH, *(_LEFT * each.nats for each in out)])
-            if step is None or step[3] < least:
+            new = self._step(pushes, chosen, gone)
+            if new is None or new.nats < max([_ENOUGH, *(_LEFT * piece.nats for piece in chosen)]):
                 break
-            effect, setting, p, gain = step
-            out.append(Scatter(setting, p, gain, self._errors(effect, setting, settings)))
-            chosen.append(effect)
-            settings.append(setting)
-        return out
+            chosen = self._settled(chosen, new, gone)
+        settings = [piece.setting for piece in chosen]
+        return [Scatter(piece.setting, piece.p, piece.nats, self._errors(piece, settings)) for piece in chosen]
 
     def compared(self, names: Sequence[str], settings: Sequence[EffectSetting]) -> Comparison:
         """Return the statistics of the measured scans and of simulated ones without and with effects."""
         extended = self._statistics(settings, range(1, _COMPARED + 1))
         blamed = " + ".join(setting.id for setting in settings)
-        return Comparison(blamed, tuple(names), self._measured, self._offset, extended, self._sd)
+        known = self._likeness
+        return Comparison(blamed, tuple(names), known.measured, known.offset, extended, known.sd)
 
-    def _step(
-        self, pushes: Sequence[_Push], chosen: Sequence[type[Mechanism]], beside: Sequence[EffectSetting]
-    ) -> tuple[type[Mechanism], EffectSetting, float, float] | None:
-        """Return the effect to add, its setting, posterior and evidence; None where there is too little."""
+    def _step(self, pushes: Sequence[_Push], chosen: Sequence[_Piece], gone: set[type[Mechanism]]) -> _Piece | None:
+        """Return the effect to add; None where there is too little."""
+        beside = [piece.setting for piece in chosen]
         at = self._statistics(beside, (1, 2))
-        here, count = self._cost(at), len(effects.LASER)
+        here, count = self._likeness.cost(at), len(effects.LASER)
+        without = {*gone, *(piece.effect for piece in chosen)}
         starts = [
-            self._rough([push for push in pushes if push.effect is effect], at) for effect in self._candidates(chosen)
+            self._rough([push for push in pushes if push.effect is effect], at) for effect in self._candidates(without)
         ]
         starts = sorted((start for start in starts if start.low < here), key=_low)
-        tried = []
+        tried: list[_Piece] = []
         for start in starts[:_REFITS]:
             if here - start.low < _CLOSE * (here - starts[0].low):
                 break
-            setting, misfit = self._refit(start, beside)
+            piece, misfit = self._alone(start, beside)
             z = np.sqrt(max(2 * (here - misfit), 0.0))
-            gain = here - misfit - float(occam(np.array(z))) - 2.0 * (len(start.values) - 1)
-            tried.append((gain + log_prior(1, count) - log_prior(0, count), start.effect, setting))
+            gain = here - misfit - float(occam(np.array(z))) - piece.price
+            tried.append(replace(piece, nats=gain + log_prior(1, count) - log_prior(0, count)))
         if not tried:
             return None
-        best, effect, setting = max(tried, key=lambda item: item[0])
-        p = float(np.exp(best - logsumexp([0.0, *(item[0] for item in tried)])))
-        return None if p < 0.5 else (effect, setting, p, best)
+        best = max(tried, key=lambda piece: piece.nats)
+        p = float(np.exp(best.nats - logsumexp([0.0, *(piece.nats for piece in tried)])))
+        return None if p < 0.5 else replace(best, p=p)
+
+    def _settled(self, chosen: Sequence[_Piece], new: _Piece, gone: set[type[Mechanism]]) -> list[_Piece]:
+        """Return the pieces with a new one, fitted together with those like it; what it makes superfluous is gone."""
+        like = [piece for piece in chosen if self._overlap(piece, new) > _OVERLAP]
+        rest = [piece for piece in chosen if piece not in like]
+        if not like:
+            return [*chosen, new]
+        beside = [piece.setting for piece in rest]
+        group, cost = self._together([*like, new], beside)
+        for old in like:
+            fewer, more = self._together([piece for piece in group if piece.effect is not old.effect], beside)
+            z = np.sqrt(max(2 * (more - cost), 0.0))
+            nats = more - cost - float(occam(np.array(z))) - old.price
+            if nats < _ENOUGH:
+                group, cost = fewer, more
+                gone.add(old.effect)
+            else:
+                group = [replace(piece, nats=nats) if piece.effect is old.effect else piece for piece in group]
+        return [*rest, *group]
+
+    def _overlap(self, one: _Piece, other: _Piece) -> float:
+        """Return the cosine of what two effects do to the statistics, whatever its sign."""
+        plain = self._statistics((), (1, 2))
+        a, b = (
+            self._likeness.whitened(self._statistics((piece.setting,), (1, 2)) - plain, plain) for piece in (one, other)
+        )
+        return float(abs(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-9))
 
     def _pushes(self) -> Iterator[_Push]:
         """Yield what each parameter alone does to the statistics, at some values."""
         plain = self._simulate((), 1)
-        for effect in self._candidates(()):
+        for effect in self._candidates(set()):
             null = {p.name: p.null for p in effect.parameters}
             for p in self._parameters(effect):
                 for value in _sizes(p):
                     moved = self._simulate((EffectSetting(effect.id, {**null, p.name: value}),), 1)
                     yield _Push(effect, p.name, value, moved - plain)
 
-    def _candidates(self, without: Sequence[type[Mechanism]]) -> Iterator[type[Mechanism]]:
+    def _candidates(self, without: set[type[Mechanism]]) -> Iterator[type[Mechanism]]:
         for effect in effects.LASER:
             asked = self._ids is None or effect.id in self._ids
             if asked and effect not in without and effect.stage > LaserStage.GEOMETRY and self._parameters(effect):
@@ -181,12 +220,8 @@ class ScatterSearch:
     def _statistics(self, settings: Sequence[EffectSetting], seeds: Sequence[int]) -> FloatArray:
         return np.asarray(np.mean([self._simulate(settings, seed) for seed in seeds], axis=0))
 
-    def _misfit(self, settings: Sequence[EffectSetting], seeds: Sequence[int] = (1, 2)) -> float:
-        return self._cost(self._statistics(settings, seeds))
-
-    def _cost(self, statistics: FloatArray) -> float:
-        white = self._whiten @ ((statistics - self._measured) / self._sd)
-        return 0.5 * float(white @ white)
+    def _misfit(self, settings: Sequence[EffectSetting]) -> float:
+        return self._likeness.cost(self._statistics(settings, (1, 2)))
 
     def _rough(self, pushes: Sequence[_Push], at: FloatArray) -> _Rough:
         """Return the best of some sizes of an effect's parameters, as if changes of the statistics were sums."""
@@ -194,53 +229,72 @@ class ScatterSearch:
         for name in dict.fromkeys(push.name for push in pushes):
             known = at + sum(push.change for push in pushes if best.get(push.name) == push.value)
             for push in pushes:
-                misfit = self._cost(known + push.change) if push.name == name else np.inf
+                misfit = self._likeness.cost(known + push.change) if push.name == name else np.inf
                 if misfit < low - _FREE:
                     low, best = misfit, {**{k: v for k, v in best.items() if k != name}, name: push.value}
         return _Rough(low, pushes[0].effect, best)
 
-    def _refit(self, start: _Rough, beside: Sequence[EffectSetting]) -> tuple[EffectSetting, float]:
-        """Return an effect's best setting and its misfit, from a rough one: those parameters that helped, together."""
-        effect = start.effect
-        null = {p.name: p.null for p in effect.parameters}
-        free = [p for p in effect.parameters if p.name in start.values]
-        centre = np.array([start.values[p.name] for p in free])
-        step = np.array([0.3 * abs(x - p.null) or 0.1 * p.scale for x, p in zip(centre, free, strict=True)])
+    def _alone(self, start: _Rough, beside: Sequence[EffectSetting]) -> tuple[_Piece, float]:
+        """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
+        null = {p.name: p.null for p in start.effect.parameters}
+        setting = EffectSetting(start.effect.id, {**null, **start.values})
+        (piece,), low = self._together([_Piece(start.effect, setting, tuple(start.values), 0.0, 0.0)], beside)
+        for p in self._parameters(start.effect) if low > _POOR else ():
+            if p.name in piece.free:
+                continue
+            values = piece.setting.parameters
+            tried = [EffectSetting(start.effect.id, {**values, p.name: value}) for value in _sizes(p)]
+            misfits = [self._misfit((*beside, each)) for each in tried]
+            if min(misfits) < low - _FREE:
+                better = replace(piece, setting=tried[int(np.argmin(misfits))], free=(*piece.free, p.name))
+                (piece,), low = self._together([better], beside)
+        return piece, low
 
-        def at(x: FloatArray) -> EffectSetting:
-            values = {p.name: float(np.clip(v, p.lower, p.upper)) for p, v in zip(free, centre + step * x, strict=True)}
-            return EffectSetting(effect.id, {**null, **values})
+    def _together(self, pieces: Sequence[_Piece], beside: Sequence[EffectSetting]) -> tuple[list[_Piece], float]:
+        """Return effects fitted together beside others, and the misfit."""
+        places = [(i, p) for i, each in enumerate(pieces) for p in each.effect.parameters if p.name in each.free]
+        centre = np.array([pieces[i].setting.parameters[p.name] for i, p in places])
+        step = np.array([0.3 * abs(x - p.null) or 0.1 * p.scale for x, (_, p) in zip(centre, places, strict=True)])
 
-        simplex = np.vstack([np.zeros(len(free)), np.eye(len(free))])
-        options = {"maxfev": _TRIES * len(free), "xatol": 0.02, "fatol": 0.1, "initial_simplex": simplex}
-        cost = lambda x: self._misfit((*beside, at(x)), (1, 2))  # noqa: E731
-        result = minimize(cost, np.zeros(len(free)), method="Nelder-Mead", options=options)
+        def at(x: FloatArray) -> list[_Piece]:
+            values = [dict(piece.setting.parameters) for piece in pieces]
+            for (i, p), value in zip(places, (centre + step * x).tolist(), strict=True):
+                values[i][p.name] = float(np.clip(value, p.lower, p.upper))
+            made = zip(pieces, values, strict=True)
+            return [replace(piece, setting=EffectSetting(piece.setting.id, each)) for piece, each in made]
+
+        cost: Callable[[FloatArray], float] = lambda x: self._misfit((*beside, *(p.setting for p in at(x))))  # noqa: E731
+        simplex = np.vstack([np.zeros(len(places)), np.eye(len(places))])
+        options = {"maxfev": _TRIES * len(places), "xatol": 0.02, "fatol": 0.1, "initial_simplex": simplex}
+        result = minimize(cost, np.zeros(len(places)), method="Nelder-Mead", options=options)
         return at(result.x), float(result.fun)
 
-    def _errors(
-        self, effect: type[Mechanism], setting: EffectSetting, beside: Sequence[EffectSetting]
-    ) -> dict[str, float]:
-        """Return sds of the parameters from how the statistics follow each."""
+    def _errors(self, piece: _Piece, every: Sequence[EffectSetting]) -> dict[str, float]:
+        """Return sds of the parameters that were fitted, from how the statistics follow each."""
+        setting, parameters = piece.setting, [p for p in piece.effect.parameters if p.name in piece.free]
+        beside = [other for other in every if other is not setting]
         slopes = []
-        for p in self._parameters(effect):
-            step = 0.1 * abs(setting.parameters[p.name] - p.null) or 0.05 * p.scale
+        for p in parameters:
+            step = 0.1 * max(abs(setting.parameters[p.name] - p.null), p.scale)
             ends = np.clip(setting.parameters[p.name] + np.array([-step, step]), p.lower, p.upper)
-            moved = [
-                np.mean(
-                    [
-                        self._simulate((*beside, EffectSetting(effect.id, {**setting.parameters, p.name: float(e)})), s)
-                        for s in (1, 2)
-                    ],
-                    axis=0,
-                )
-                for e in ends
+            each = [
+                [
+                    self._simulate((*beside, EffectSetting(setting.id, {**setting.parameters, p.name: end})), seed)
+                    for seed in (1, 2)
+                ]
+                for end in ends.tolist()
             ]
-            slopes.append(self._whiten @ ((moved[1] - moved[0]) / self._sd) / (ends[1] - ends[0]))
+            low, high = np.array(each[0]), np.array(each[1])
+            middle = 0.25 * (low + high).sum(axis=0)
+            first, second = (self._likeness.whitened(change, middle) for change in high - low)
+            change, chance = 0.5 * (first + second), 0.25 * float((first - second) @ (first - second))
+            sure = np.sqrt(max(1 - chance / max(float(change @ change), 1e-9), 0.0))  # other draws alone differ, too
+            slopes.append(sure * change / (ends[1] - ends[0]))
         j = np.array(slopes).T
-        scale = np.array([p.scale for p in self._parameters(effect)])
+        scale = np.array([p.scale for p in parameters])
         inverse = np.linalg.inv((j * scale).T @ (j * scale) + 1e-4 * np.eye(len(scale)))
         sds = np.sqrt(np.diag(inverse)) * scale
-        return {p.name: float(sd) for p, sd in zip(self._parameters(effect), sds, strict=True)}
+        return {p.name: float(sd) for p, sd in zip(parameters, sds, strict=True)}
 
 
 def _sizes(p: Parameter) -> list[float]:

@@ -16,6 +16,9 @@ _FAR = 6.0  # deviations of an outlier
 _COMMON = 0.005  # [m] plausible common mode of a scan, when it is read off one scan alone
 _CELL = 0.5  # [m] of the map in which errors are averaged
 _GRID = 1e-3  # [m] to which readings are rounded before their values are counted
+_OBLIQUE = np.radians(80.0)  # [rad] beyond which no reading counts
+_SQUARE = np.radians(60.0)  # [rad] within which a wall beside a jump hardly moves with an error of the heading
+_LEVER = 0.5  # [m] from base_link to a laser, at most
 _ROUNDS = 3
 
 
@@ -39,22 +42,31 @@ class Statistics:
         met = np.asarray(np.isfinite(self._base) & (self._base < shots.laser.range_max - 0.1))
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
-        self._sides = _sides(seen.ranges, met)
+        self._sides = _sides(seen.ranges, met & (seen.incidence < _SQUARE))
+        self._stand = assembly.layout.stand
         self._basis, self._size = _basis(assembly, noise)
+        axes = np.r_[0, 1 + np.arange(self._basis.shape[2] - 1) % 3]
+        limit = _steepest(seen.level, seen.incidence)[:, :, axes]
+        self._moves = np.clip(self._basis, -limit, limit)
         weighed = np.asarray(self._basis * (self._trust / self._sd)[:, :, np.newaxis])
         inner = np.asarray(weighed.transpose(0, 2, 1) @ weighed, dtype=np.float64)
         inner = inner + np.eye(inner.shape[1]) * (self._size**-2)[:, np.newaxis, :]
-        self._solve = np.linalg.inv(inner) @ weighed.transpose(0, 2, 1)
+        inverse = np.linalg.inv(inner)
+        self._solve = inverse @ weighed.transpose(0, 2, 1)
+        self._common_sd = _common_sd(inner, inverse, self._size)
 
     def pose_errors(self, rng: np.random.Generator) -> FloatArray:
         """Return errors of readings (k, b) [m] by errors of the reference, drawn."""
         draws = rng.standard_normal(self._size.shape) * self._size
         draws[:, 0] = 0.0
-        return np.asarray((self._basis @ draws[:, :, np.newaxis])[:, :, 0])
+        for stand in np.unique(self._stand[self._stand >= 0]):  # scans of one pose have its one error
+            draws[self._stand == stand] = draws[np.flatnonzero(self._stand == stand)[0]]
+        return np.asarray((self._moves @ draws[:, :, np.newaxis])[:, :, 0])
 
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
         """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
         left, common = self._leftover(error)
+        common = common / self._common_sd
         inside = self._trust & np.isfinite(left)
         z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
         out = [_log(float(np.mean(z[group & inside] ** 2))) for group in self._groups.masks if (group & inside).any()]
@@ -75,25 +87,32 @@ class Statistics:
 
     def names(self) -> list[str]:
         """Return what a reader calls the numbers, in their order."""
+        return [name for name, _ in self._told()]
+
+    def counts(self) -> BoolArray:
+        """Return which of the numbers are roots of counts."""
+        return np.array([count for _, count in self._told()])
+
+    def _told(self) -> list[tuple[str, bool]]:
         groups = [
             f"reflectance {at}" if kind == "return" else f"{kind} {int(at) + 1} of 4"
             for kind, at in (name.split() for name in self._groups.names)
         ]
         return [
-            *(f"spread, {name}" for name in groups),
-            *(f"correlation of beams {lag} apart" for lag in (1, 2, 4)),
-            *(f"readings more than {far:g} sd off" for far in (3, 4.5, _FAR)),
-            f"neighbours more than {_FAR:g} sd off",
-            "spread of whole scans",
-            "correlation of whole scans",
-            "spread of the beams' means",
-            "spread of the places' means",
-            *(f"missing readings, {name}" for name in groups),
-            "readings without return",
-            "readings inside jumps",
-            "different values",
-            "readings of the least value",
-            "readings of the greatest value",
+            *((f"spread, {name}", False) for name in groups),
+            *((f"correlation of beams {lag} apart", False) for lag in (1, 2, 4)),
+            *((f"readings more than {far:g} sd off", True) for far in (3, 4.5, _FAR)),
+            (f"neighbours more than {_FAR:g} sd off", True),
+            ("spread of whole scans", False),
+            ("correlation of whole scans", False),
+            ("spread of the beams' means", False),
+            ("spread of the places' means", False),
+            *((f"missing readings, {name}", True) for name in groups),
+            ("readings without return", True),
+            ("readings inside jumps", True),
+            ("different values", False),
+            ("readings of the least value", True),
+            ("readings of the greatest value", True),
         ]
 
     def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -170,6 +189,28 @@ def _basis(assembly: Assembly, noise: ScanNoise) -> tuple[FloatArray, FloatArray
         basis[k, :, : part.shape[1]] = part
         size[k, : part.shape[1]] = np.concatenate([[_COMMON], np.tile(pose, part.shape[1] // 3)])
     return basis, size
+
+
+def _steepest(ranges: FloatArray, angles: FloatArray) -> FloatArray:
+    """Return how much the reading of a beam (k, b, 4) follows common mode, x, y [1] and yaw [m/rad] at most.
+
+    A finite difference over the edge of a wall finds far more, where in truth the beam meets the one wall or the other.
+    """
+    along = 1 / np.cos(np.minimum(angles, _OBLIQUE))
+    reach = np.where(np.isfinite(ranges), ranges, 0.0) + _LEVER
+    return np.stack([np.ones_like(along), along, along, reach * along], axis=-1)
+
+
+def _common_sd(inner: FloatArray, inverse: FloatArray, size: FloatArray) -> FloatArray:
+    """Return the sds (k,) [m] of common modes that noise and errors of poses alone give; inner (k, q, q), size (k, q).
+
+    Where walls are all on one side, what looks like a common mode is mostly an error of the pose.
+    """
+    eye = np.eye(inner.shape[1])
+    known = inner - eye * (size**-2)[:, np.newaxis, :]
+    drawn = eye * np.where(np.arange(size.shape[1]) > 0, size**2, 0.0)[:, np.newaxis, :]
+    covariance = inverse @ (known @ drawn @ known + known) @ inverse
+    return np.asarray(np.sqrt(np.maximum(covariance[:, 0, 0], 1e-18)))
 
 
 def _between(z: FloatArray, inside: BoolArray, group: IntArray) -> float:

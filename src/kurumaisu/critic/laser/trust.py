@@ -14,6 +14,8 @@ _KINK = 1e-4  # departure from a straight wall, where 1/r(i+1) + 1/r(i-1) = 2 co
 _BESIDE = 4  # beams on each side of a corner or jump: an error of the pose or the mounting moves it so far
 _STEEPEST = np.radians(80.0)  # [rad] oblique beyond this, a beam slides along the wall with every error of the pose
 _GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
+_PILED = 20  # readings of one value, the least or the greatest, that are a pile if hardly more lie beside them
+_GRID = 1e-3  # [m] within which values are one
 
 
 def edges(seen: Look, increment: float) -> BoolArray:
@@ -39,7 +41,20 @@ def trusted_place(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
 
 def trusted(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
     """Return (k, b) which readings may speak about the mean, outliers aside."""
-    return np.asarray(trusted_place(shots, seen, base) & np.isfinite(shots.measured))
+    low, high = _ends(shots.measured)
+    inside = (base > low + _GATE) & (base < high - _GATE)
+    return np.asarray(trusted_place(shots, seen, base) & inside & np.isfinite(shots.measured))
+
+
+def _ends(readings: FloatArray) -> tuple[float, float]:
+    """Return the least and the greatest reading [m] where readings pile up there, as if cut off; else infinite ones."""
+    values = readings[np.isfinite(readings)]
+    ends = []
+    for sign in (-1.0, 1.0):
+        off = np.max(sign * values) - sign * values if len(values) else values
+        pile, beside = np.sum(off < _GRID), np.sum((off >= _GRID) & (off < _GATE))
+        ends.append(sign * float(np.max(sign * values)) if pile > max(_PILED, beside) else sign * np.inf)
+    return ends[0], ends[1]
 
 
 @dataclass(frozen=True)

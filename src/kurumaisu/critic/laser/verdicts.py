@@ -13,17 +13,19 @@ from kurumaisu.critic.laser import pictures, rivals, still
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.pictures import NO_PICTURES, Part, Pictures, misfits, noise_rows
+from kurumaisu.critic.laser.pinned import pinned
 from kurumaisu.critic.laser.rivals import Rival, Weighed
 from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch, Simulator
 from kurumaisu.critic.laser.statistics import Statistics
+from kurumaisu.critic.laser.supply import every_id, supplier
 from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
 from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Comparison
-from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, Unknown
+from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, NextExperiment, Unknown
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray, IntArray
@@ -39,7 +41,7 @@ class LaserFinding:
 
     causes: named and material; confounded: sets of which one acts; unknown: what is in no catalogue; settings: what
     extends the model; details, pictures: for the report; small: certain, but they do not matter; refused: why there
-    is no laser criticism, None where there is.
+    is no laser criticism, None where there is; next_experiment: what supplies what the scans lack.
     """
 
     causes: tuple[Cause, ...] = ()
@@ -50,6 +52,7 @@ class LaserFinding:
     pictures: Pictures = NO_PICTURES
     small: tuple[str, ...] = ()
     refused: str | None = None
+    next_experiment: NextExperiment | None = None
 
 
 def criticise(
@@ -61,7 +64,8 @@ def criticise(
     """
     why = missing(recording)
     if why is not None:
-        return LaserFinding(refused=why, details=still.words(recording, model))
+        drive = supplier(model, every_id(), recording.truth) if recording.world is not None else None
+        return LaserFinding(refused=why, details=still.words(recording, model), next_experiment=drive)
     progress("laser: predicting the scans")
     assembly = Assembly(gather(recording, model), ids)
     progress("laser: estimating the noise")
@@ -78,8 +82,18 @@ def criticise(
     progress("laser: weighing effects on the scatter")
     scatter, comparison = _scatter(assembly, normal, made, ids)
     finding = _finding(assembly, normal, made, scatter)
+    finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
     return replace(finding, pictures=Pictures(shown, pictures.rivals(made.found), noise_rows(normal), comparison))
+
+
+def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model: Model) -> NextExperiment | None:
+    """Return the experiment that tells apart what the scans cannot, or that supplies what they lack."""
+    open_ids = sorted({name for group in finding.confounded for name in group})
+    lacks = not finding.causes and not finding.unknown and lacking(assembly)
+    if not open_ids and not lacks:
+        return None
+    return supplier(model, open_ids or every_id(), recording.truth)
 
 
 @dataclass(frozen=True)
@@ -147,8 +161,9 @@ def _scatter(
 def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scatter]) -> LaserFinding:
     found = made.found
     sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
-    settings = {setting.id: setting for setting in _settings(assembly, made.fit)}
-    estimates = {name: _estimates(made.fit, setting) for name, setting in settings.items()}
+    refitted = pinned(assembly, normal, made.fit.forms, _settings(assembly, made.fit), made.winner)
+    settings = {setting.id: setting for setting, _ in refitted}
+    estimates = {setting.id: _estimates(setting, sds) for setting, sds in refitted}
     if made.winner is not None:
         free = made.winner.free
         valid = normal.beam_noise.valid
@@ -266,7 +281,10 @@ def _settings(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
             else:
                 values[column.parameter.name] = column.parameter.null + column.parameter.scale * coefficient
         shape = {} if form.columns[0].squared else form.at
-        out.append(EffectSetting(form.id, {**values, **shape}))
+        values |= shape
+        # Two effects that nearly cancel are fitted as sums, which no bound stops.
+        within = {p.name: float(np.clip(values[p.name], p.lower, p.upper)) for p in effect.parameters}
+        out.append(EffectSetting(form.id, within))
     return out
 
 
@@ -280,22 +298,12 @@ def _squared(effect: type[Mechanism], signs: Mapping[str, float], coefficient: f
     }
 
 
-def _estimates(fit: Fitted, setting: EffectSetting) -> dict[str, Estimate]:
-    out, start = {}, 0
-    parameters = {p.name: p for p in effects.by_id(setting.id).parameters}
-    for form in fit.forms:
-        for i, column in enumerate(form.columns):
-            if form.id != setting.id:
-                continue
-            sd = float(fit.sds[start + i])
-            names = [column.parameter.name]
-            if column.squared:
-                names = [name for name, size in form.at.items() if size]
-                sd /= 2 * float(np.sqrt(max(fit.coefficients[start + i], sd)))
-            for name in names:
-                p, value, half = parameters[name], setting.parameters[name], NORMAL90 * parameters[name].scale * sd
-                out[name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
-        start += len(form.columns)
+def _estimates(setting: EffectSetting, sds: Mapping[str, float]) -> dict[str, Estimate]:
+    out = {}
+    for p in effects.by_id(setting.id).parameters:
+        if p.name in sds:
+            value, half = setting.parameters[p.name], NORMAL90 * sds[p.name]
+            out[p.name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
     return out
 
 

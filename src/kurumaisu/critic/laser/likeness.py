@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How far the numbers of simulated scans are from those of the measured ones, in nats."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from kurumaisu.types import BoolArray, FloatArray
+
+_SIMULATED = 0.5  # variance of the numbers of simulations, of which two are averaged, in theirs
+_COUNT = 1.0  # sd of twice the root of a count, also of one that is always 0 in simulations
+_MATTERS = 0.02  # of any other number, a log of a square or a correlation, by which it may differ and matter to nobody
+_FORM = 0.1  # share of what an effect does to a number, by which a real effect of that name may do more or less
+
+
+class Likeness:
+    """Normal numbers about those of a simulation, with the covariance of the model's own."""
+
+    def __init__(self, nulls: FloatArray, measured: FloatArray, counts: BoolArray) -> None:
+        """Take numbers of simulations of the model as it is (n, m), the measured ones (m,), which are roots of counts.
+
+        The latter have all the same sd, whatever there is to count.
+        """
+        self.offset, self.measured = nulls.mean(axis=0), measured
+        spread = nulls.std(axis=0)
+        self.sd = np.where(counts, np.maximum(spread, _COUNT), np.hypot(spread, _MATTERS))
+        unit = (nulls - self.offset) / self.sd
+        half = 0.5 * (unit.T @ unit / len(nulls) + np.eye(len(measured)))  # few draws leave correlations uncertain
+        self._covariance = (1 + _SIMULATED) * half
+        self._log_det = float(np.linalg.slogdet(self._covariance)[1])
+        self._most = np.abs(self.units(measured))
+
+    def units(self, numbers: FloatArray) -> FloatArray:
+        """Return how far numbers are from the model's own, in sds."""
+        return np.asarray((numbers - self.offset) / self.sd)
+
+    def cost(self, numbers: FloatArray) -> float:
+        """Return the negative log likelihood of the measured numbers for simulated ones, 0 for a perfect model."""
+        lower = self._root(numbers)
+        white = solve_triangular(lower, (numbers - self.measured) / self.sd, lower=True)
+        return 0.5 * (float(white @ white) - self._log_det) + float(np.log(np.diag(lower)).sum())
+
+    def whitened(self, change: FloatArray, numbers: FloatArray) -> FloatArray:
+        """Return a change of the numbers (m,) about simulated ones in independent units."""
+        return np.asarray(solve_triangular(self._root(numbers), change / self.sd, lower=True))
+
+    def _root(self, numbers: FloatArray) -> FloatArray:
+        """Return the root of the covariance where effects made such numbers: their real form may do more or less."""
+        slack = _FORM * np.minimum(np.abs(self.units(numbers)), self._most)
+        return np.asarray(np.linalg.cholesky(self._covariance + np.diag(slack**2)))
