@@ -80,15 +80,16 @@ bool ScanQueue::has(const sensor_msgs::LaserScan& scan, std::string* why) const 
 
 std::optional<ScanQueue::Ready> ScanQueue::next() {
   while (!waiting_.empty()) {
+    // Out of the queue first: whatever is thrown, the next round is about the next scan.
     const Waiting front = waiting_.front();
+    waiting_.pop_front();
     std::string why;
     try {
-      if (has(*front.scan, &why)) {
-        waiting_.pop_front();
-        return ready(*front.scan);
+      if (has(*front.scan, &why)) return ready(*front.scan);
+      if ((ros::SteadyTime::now() - front.since).toSec() < frames_.deadline) {
+        waiting_.push_front(front);
+        return std::nullopt;
       }
-      if ((ros::SteadyTime::now() - front.since).toSec() < frames_.deadline) return std::nullopt;
-      waiting_.pop_front();
       drop(dropped_.no_transform, "NO_TRANSFORM",
            "none of " + front.scan->header.frame_id + " and " + frames_.base + " to " + frames_.odom +
                " at " + std::to_string(front.scan->header.stamp.toSec()) + " s within transform_deadline" +
@@ -96,7 +97,6 @@ std::optional<ScanQueue::Ready> ScanQueue::next() {
     } catch (const tf2::TransformException& error) {
       drop(dropped_.no_transform, "NO_TRANSFORM", error.what());
     } catch (const std::exception& error) {  // std::runtime_error: a time out of ros::Time's range
-      if (!waiting_.empty() && waiting_.front().scan == front.scan) waiting_.pop_front();
       refuse(error.what());
     }
   }
