@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <string>
 
 #include "slam/localizer.h"
@@ -81,14 +80,8 @@ inline LocalizationNodeSettings readLocalizationNodeSettings(const std::string& 
   out.start = readStart(top);
   out.seed = static_cast<std::uint32_t>(top.integer("seed", 0));
   out.chair = {readLaserError(model), readProcessNoise(model)};
-  std::map<std::string, double> values;
-  for (const std::string& key : localizerSettingNames()) values[key] = top.number(key);
+  out.localizer = readNamed(top, localizerSettingNames(), makeLocalizerSettings);
   top.end();
-  try {
-    out.localizer = makeLocalizerSettings([&values](const std::string& key) { return values.at(key); });
-  } catch (const std::invalid_argument& error) {
-    throw top.error("", error.what());
-  }
   return out;
 }
 

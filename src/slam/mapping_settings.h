@@ -43,6 +43,19 @@ inline LaserError readLaserError(Section model) {
   return error;
 }
 
+/// Takes the keys of these names and makes settings of them; make: as makeSettings(). Throws std::invalid_argument
+/// naming the section and the key.
+template <typename Make>
+auto readNamed(Section& section, const std::vector<std::string>& names, const Make& make) {
+  std::map<std::string, double> values;
+  for (const std::string& key : names) values[key] = section.number(key);
+  try {
+    return make([&values](const std::string& key) { return values.at(key); });
+  } catch (const std::invalid_argument& error) {
+    throw section.error("", error.what());
+  }
+}
+
 /// Reads everything under an absolute name. Throws std::invalid_argument naming the key.
 inline MappingNodeSettings readMappingNodeSettings(const std::string& name) {
   Section top = Section::load(name);
@@ -61,14 +74,8 @@ inline MappingNodeSettings readMappingNodeSettings(const std::string& name) {
                                {},
                                laser_error};
   node.end();
-  std::map<std::string, double> values;
-  for (const std::string& key : settingNames()) values[key] = mapper.number(key);
+  settings.mapper = readNamed(mapper, settingNames(), makeSettings);
   mapper.end();
-  try {
-    settings.mapper = makeSettings([&values](const std::string& key) { return values.at(key); });
-  } catch (const std::invalid_argument& error) {
-    throw mapper.error("", error.what());
-  }
   return settings;
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "slam/settings.h"
 
-#include "slam/bounded.h"
-
 namespace kurumaisu {
 namespace {
 
@@ -43,23 +41,13 @@ void visitSettings(MapperSettings& s, Visit&& visit) {
   visit("resample_below", s.resample_below, 0, 1);
 }
 
+/// visitSettings() as a value that templates take.
+constexpr auto kVisit = [](MapperSettings& settings, auto&& visit) { visitSettings(settings, visit); };
+
 }  // namespace
 
-std::vector<std::string> settingNames() {
-  std::vector<std::string> names;
-  MapperSettings settings{};
-  visitSettings(settings, [&names](const char* name, const auto& /*member*/, double, double) {
-    names.emplace_back(name);
-  });
-  return names;
-}
+std::vector<std::string> settingNames() { return namesOf<MapperSettings>(kVisit); }
 
-MapperSettings makeSettings(const std::function<double(const std::string&)>& value_of) {
-  MapperSettings settings{};
-  visitSettings(settings, [&value_of](const char* name, auto& member, double lower, double upper) {
-    setBounded(value_of, name, member, lower, upper);
-  });
-  return settings;
-}
+MapperSettings makeSettings(const ValueOf& value_of) { return made<MapperSettings>(kVisit, value_of); }
 
 }  // namespace kurumaisu

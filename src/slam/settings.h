@@ -2,9 +2,10 @@
 // Settings of the mapper. They have no defaults: the values are in launch/mapping_node.yaml.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
+
+#include "slam/bounded.h"
 
 namespace kurumaisu {
 
@@ -57,6 +58,6 @@ std::vector<std::string> settingNames();
 
 /// Settings from a function that gives the value for a name. Throws std::invalid_argument naming the key that
 /// is out of its bounds (or is no whole number where one is needed); what the function throws passes through.
-MapperSettings makeSettings(const std::function<double(const std::string&)>& value_of);
+MapperSettings makeSettings(const ValueOf& value_of);
 
 }  // namespace kurumaisu
