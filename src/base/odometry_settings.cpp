@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <map>
 
+#include "model_file.h"
+
 namespace kurumaisu {
 namespace {
 
@@ -12,13 +14,6 @@ const std::vector<std::string> kOfTheReference{"base.clock_scale", "base.marker_
 
 bool isOfTheReference(const std::string& id) {
   return std::find(kOfTheReference.begin(), kOfTheReference.end(), id) != kOfTheReference.end();
-}
-
-RateNoise readRateNoise(Section parameters) {
-  const RateNoise noise{parameters.atLeast("sd_v", 0), parameters.atLeast("sd_w", 0),
-                        parameters.above("tau", 0), parameters.atLeast("growth", 0)};
-  parameters.end();
-  return noise;
 }
 
 OdometryNoise readNoise(Section section, const KnownEffects& known) {

@@ -31,14 +31,10 @@ struct LocalizationNodeSettings {
 };
 
 /// base.process_noise among the effects of a model file; the others concern the simulator and the critic.
-inline ProcessNoise readProcessNoise(Section model) {
-  ProcessNoise noise{0, 0, 1, 0};
+inline RateNoise readProcessNoise(Section model) {
+  RateNoise noise;
   for (Section& effect : model.sections("effects")) {
-    if (effect.text("id") != "base.process_noise") continue;
-    Section parameters = effect.section("parameters");
-    noise = {parameters.atLeast("sd_v", 0), parameters.atLeast("sd_w", 0), parameters.above("tau", 0),
-             parameters.atLeast("growth", 0)};
-    parameters.end();
+    if (effect.text("id") == "base.process_noise") noise = readRateNoise(effect.section("parameters"));
   }
   return noise;
 }

@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "model/laser_error.h"
-#include "params.h"
+#include "model_file.h"
 #include "slam/settings.h"
 
 namespace kurumaisu {
@@ -25,23 +24,6 @@ struct MappingNodeSettings {
   MapperSettings mapper;
   LaserError laser_error;  ///< of the model file: its mean is taken out of the readings
 };
-
-/// Reads laser.error of a model file; the rest of it has other readers.
-inline LaserError readLaserError(Section model) {
-  Section laser = model.section("laser");
-  Section section = laser.section("error");
-  const std::vector<double> sigma = section.numbers("sigma", 3);
-  const LaserError error{section.number("scale"),        section.number("datum_offset"),
-                         {sigma[0], sigma[1], sigma[2]}, section.number("resolution"),
-                         section.number("range_min"),    section.number("range_max")};
-  section.end();
-  try {
-    validate(error);
-  } catch (const std::invalid_argument& problem) {
-    throw section.error("", problem.what());
-  }
-  return error;
-}
 
 /// Takes the keys of these names and makes settings of them; make: as makeSettings(). Throws std::invalid_argument
 /// naming the section and the key.
