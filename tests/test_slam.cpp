@@ -4,11 +4,11 @@
 
 #include <cmath>
 #include <limits>
-#include <map>
 #include <random>
 #include <stdexcept>
 #include <thread>
 
+#include "mapper_values.h"
 #include "slam/mapper.h"
 #include "slam/pose.h"
 #include "slam_room.h"
@@ -31,48 +31,6 @@ double distanceToWall(double x, double y) {
   return nearest;
 }
 
-/// As shipped in launch/mapping_node.yaml; written down here, so that tuning that file cannot break this
-/// test.
-std::map<std::string, double> values() {
-  return {{"match_iterations", 15},
-          {"match_every", 2},
-          {"match_reach", 1.0},
-          {"match_deviation", 0.02},
-          {"match_key_distance", 0.25},
-          {"match_key_angle", 0.17},
-          {"match_key_scans", 40},
-          {"match_prior_distance", 0.2},
-          {"match_prior_angle", 0.2},
-          {"match_prior_floor", 0.005},
-          {"match_prior_angle_floor", 0.005},
-          {"slip_gain", 0.1},
-          {"resolution", 0.05},
-          {"range", 25},
-          {"certainty", 0.6},
-          {"particles", 10},
-          {"localise_distance", 0.25},
-          {"localise_angle", 0.1745},
-          {"insert_distance", 0.5},
-          {"insert_angle", 0.5},
-          {"distance_per_distance", 0.002},
-          {"distance_per_angle", 0.0004},
-          {"angle_per_distance", 0.0008},
-          {"angle_per_angle", 0.001},
-          {"distance_floor", 0.0004},
-          {"angle_floor", 0.0002},
-          {"hit_deviation", 0.1},
-          {"hit_reach", 0.3},
-          {"hit_share", 0.95},
-          {"hit_every", 3},
-          {"likelihood_power", 0.1},
-          {"resample_below", 0.5}};
-}
-
-k::MapperSettings settings() {
-  const auto table = values();
-  return k::makeSettings([&table](const std::string& name) { return table.at(name); });
-}
-
 struct Drive {
   std::vector<k::StampedPose> trajectory;
   std::vector<k::Pose2D> online;
@@ -80,7 +38,7 @@ struct Drive {
 };
 
 Drive drive(std::uint32_t seed, double seconds, const k::Fan& fan = room::kUrg, int beams = room::kBeams) {
-  k::Mapper mapper(settings(), seed);
+  k::Mapper mapper(room::settings(), seed);
   std::mt19937 noise(7);
   room::Wheels odometry;
   Drive out;
@@ -193,7 +151,7 @@ TEST(Mapper, PutsEveryBeamOfAClockwiseFanWhereItPoints) {
 
 TEST(Mapper, BeamsWithoutReturnClearAndUnknownOnesDoNot) {
   for (const bool no_return : {true, false}) {
-    k::Mapper mapper(settings(), 1);
+    k::Mapper mapper(room::settings(), 1);
     k::Scan scan{0, {-1.0, 0.01, 0, 4.0, {0, 0, 0}}, std::vector<float>(201, 2.0F)};
     for (int i = 80; i < 120; ++i) scan.ranges[i] = no_return ? kInf : std::nanf("");
     mapper.add(scan, {0, 0, 0}, {0, 0, 0});
@@ -228,7 +186,7 @@ TEST(Mapper, IsTheSameForASeedInAnyThread) {
 }
 
 TEST(Mapper, RefusesWhatMakesNoSense) {
-  k::Mapper mapper(settings(), 1);
+  k::Mapper mapper(room::settings(), 1);
   EXPECT_TRUE(mapper.trajectory().empty());
   EXPECT_EQ(mapper.grid().width, 0);
   const k::Scan scan = room::scanAt(1.0, room::kUrg, room::kBeams, nullptr);
@@ -249,7 +207,7 @@ TEST(Mapper, RefusesWhatMakesNoSense) {
 }
 
 TEST(Mapper, SurvivesScansThatSeeNothing) {
-  k::Mapper mapper(settings(), 1);
+  k::Mapper mapper(room::settings(), 1);
   for (int i = 0; i < 20; ++i) {
     const k::Pose2D odom{0.2 * i, 0, 0};
     const auto estimate =
@@ -260,7 +218,7 @@ TEST(Mapper, SurvivesScansThatSeeNothing) {
 
 TEST(Settings, EveryKeyIsNamedWhenItIsWrong) {
   for (const std::string& name : k::settingNames()) {
-    auto table = values();
+    auto table = room::values();
     table[name] = -1;
     try {
       k::makeSettings([&table](const std::string& key) { return table.at(key); });
@@ -272,7 +230,7 @@ TEST(Settings, EveryKeyIsNamedWhenItIsWrong) {
 }
 
 TEST(Settings, CountsAreWhole) {
-  auto table = values();
+  auto table = room::values();
   table["particles"] = 2.5;
   EXPECT_THROW(k::makeSettings([&table](const std::string& key) { return table.at(key); }),
                std::invalid_argument);

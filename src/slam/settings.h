@@ -26,15 +26,19 @@ struct MatchSettings {
 
 struct MapperSettings {
   MatchSettings match;
-  double slip_gain;  ///< share of odometry's rate of error, per scan, that is learnt for the next [-]
+  double jump_speed;  ///< odometry that goes faster has jumped [m/s]
+  double jump_turn;   ///< or turns faster [rad/s]
+  double slip_gain;   ///< share of odometry's rate of error, per scan, that is learnt for the next [-]
 
   double resolution;  ///< of the grid [m]
   double range;       ///< readings beyond are not mapped; beams without a return clear so far [m]
   double certainty;   ///< of one reading for its cell [-], 0.5 to 1
+  double most_cells;  ///< of a map; a scan that would make it larger does not go in
 
   int particles;
   double localise_distance;  ///< the filter runs after so much way [m]
   double localise_angle;     ///< or so much turn [rad]
+  double localise_time;      ///< or so much time, at rest as well [s]; 0 = never for time alone
   double insert_distance;    ///< the map grows after so much way [m]
   double insert_angle;       ///< or so much turn [rad]
 
