@@ -39,38 +39,6 @@ constexpr double kOdometryMemory = 10.0;  // [s] of covariances
 constexpr double kOdometryGap = 0.2;      // [s] a covariance holds for scans so near at most
 constexpr double kAhead = 10.0;  // [s] an initial pose stamped farther in the future is of another clock
 
-geometry_msgs::Pose messageOf(const k::Pose2D& pose) {
-  geometry_msgs::Pose out;
-  out.position.x = pose.x;
-  out.position.y = pose.y;
-  out.orientation.z = std::sin(pose.theta / 2);
-  out.orientation.w = std::cos(pose.theta / 2);
-  return out;
-}
-
-k::Pose2D planarOf(const geometry_msgs::Pose& pose) {
-  geometry_msgs::Transform transform;
-  transform.translation.x = pose.position.x;
-  transform.translation.y = pose.position.y;
-  transform.rotation = pose.orientation;
-  return k::planar(transform).pose;
-}
-
-/// x, y, heading of a ROS covariance of 6 x 6.
-Eigen::Matrix3d planarOf(const boost::array<double, 36>& values) {
-  constexpr std::array<int, 3> kRows{0, 1, 5};
-  Eigen::Matrix3d out;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) out(i, j) = values[6 * kRows[i] + kRows[j]];
-  }
-  return out;
-}
-
-k::OccupancyGrid gridOf(const nav_msgs::OccupancyGrid& map) {
-  return {static_cast<double>(map.info.resolution), 0,       0, static_cast<int>(map.info.width),
-          static_cast<int>(map.info.height),        map.data};
-}
-
 // Apart, because the macros count as a handful of branches each.
 void warnFrame(const std::string& frame, const std::string& taken_for) {
   ROS_WARN("LOCALIZATION_MAP_FRAME: the map is in %s, and taken for one in %s", frame.c_str(),
@@ -176,7 +144,7 @@ void LocalizationNode::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) {
 }
 
 void LocalizationNode::onOdometry(const nav_msgs::Odometry& odometry) {
-  const Eigen::Matrix3d covariance = planarOf(odometry.pose.covariance);
+  const Eigen::Matrix3d covariance = k::planarOf(odometry.pose.covariance);
   if (!covariance.allFinite() || !(covariance(0, 0) > 0)) return;  // it has none
   covariances_[odometry.header.stamp] = covariance;
   const ros::Time& newest = covariances_.rbegin()->first;
@@ -225,8 +193,8 @@ void LocalizationNode::begin() {
   bad_map_.clear();
   if (!map_) return;
   try {
-    localizer_.emplace(settings_.localizer, settings_.chair, settings_.seed, gridOf(*map_),
-                       planarOf(map_->info.origin));
+    localizer_.emplace(settings_.localizer, settings_.chair, settings_.seed, k::gridOf(*map_),
+                       k::planarOf(map_->info.origin));
     if (settings_.known_start) localizer_->setPose(settings_.start);
   } catch (const std::exception& error) {
     bad_map_ = error.what();
@@ -240,7 +208,7 @@ void LocalizationNode::onInitialPose(const PoseMessage& message) {
 
 bool LocalizationNode::setPose(const PoseMessage& message) {
   const std::string& frame = message.header.frame_id;
-  const k::Gaussian pose{planarOf(message.pose.pose), planarOf(message.pose.covariance)};
+  const k::Gaussian pose{k::planarOf(message.pose.pose), k::planarOf(message.pose.covariance)};
   const bool finite =
       std::isfinite(pose.mean.x + pose.mean.y + pose.mean.theta) && pose.covariance.allFinite();
   if (!localizer_ || !finite || (!frame.empty() && frame != settings_.map_frame)) return false;
@@ -295,12 +263,7 @@ void LocalizationNode::publish(const k::ScanQueue::Ready& ready, const k::Locali
   PoseMessage message;
   message.header.stamp = ready.stamp;
   message.header.frame_id = settings_.map_frame;
-  message.pose.pose = messageOf(estimate.map_from_base.mean);
-  constexpr std::array<int, 3> kRows{0, 1, 5};
-  for (int i = 0; i < 9; ++i) {
-    message.pose.covariance[6 * kRows[i / 3] + kRows[i % 3]] =
-        estimate.map_from_base.covariance(i / 3, i % 3);
-  }
+  message.pose = k::messageOf(estimate.map_from_base);
   pose_.publish(message);
   publishCloud(ready.stamp);
   if (estimate.knowledge == k::Knowledge::kTracking) save(estimate.map_from_base);
@@ -313,7 +276,7 @@ void LocalizationNode::publishCloud(const ros::Time& stamp) {
   geometry_msgs::PoseArray cloud;
   cloud.header.stamp = stamp;
   cloud.header.frame_id = settings_.map_frame;
-  for (const auto& [pose, weight] : localizer_->particles()) cloud.poses.push_back(messageOf(pose));
+  for (const auto& [pose, weight] : localizer_->particles()) cloud.poses.push_back(k::messageOf(pose));
   cloud_.publish(cloud);
 }
 

@@ -87,7 +87,15 @@ class Room:
         self.scan = rospy.Publisher("scan", LaserScan, queue_size=100)
         self.tf = rospy.Publisher("tf", TFMessage, queue_size=100)
         self._static = tf2_ros.StaticTransformBroadcaster()
-        self._static.sendTransform(transform("base_link", "laser", MOUNT, rospy.Time(0)))
+        self.place_laser("laser", MOUNT)
+
+    def place_laser(self, frame: str, mount: FloatArray, *, upside_down: bool = False) -> None:
+        """Say on tf where a laser is."""
+        place = transform("base_link", frame, mount, rospy.Time(0))
+        if upside_down:  # rolled by half a turn before it is yawed
+            q = place.transform.rotation
+            q.x, q.y, q.z, q.w = q.w, q.z, 0.0, 0.0
+        self._static.sendTransform(place)
 
     def wait_for_subscribers(self) -> None:
         """Return when somebody hears all of it."""
