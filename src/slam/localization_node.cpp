@@ -11,17 +11,17 @@
 #include <ros/ros.h>
 #include <std_srvs/Empty.h>
 #include <tf2_ros/transform_broadcaster.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <cmath>
-#include <ctime>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "slam/localization_node_settings.h"
 #include "slam/localization_report.h"
 #include "slam/messages.h"
 #include "slam/pose.h"
+#include "slam/scan_feed.h"
 
 namespace k = kurumaisu;
 
@@ -30,23 +30,17 @@ namespace {
 using PoseMessage = geometry_msgs::PoseWithCovarianceStamped;
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
-constexpr double kWarningPeriod = 5.0;    // [s] of throttled warnings
 constexpr double kPollPeriod = 0.01;      // [s] between looks whether scans have their transforms
-constexpr double kWorkLimit = 0.1;        // [s] of work in a row before scans that wait are skipped
 constexpr double kAskPeriod = 1.0;        // [s] between two calls of static_map
-constexpr std::size_t kQueue = 100;       // scans and odometry that may wait
+constexpr std::size_t kQueue = 100;       // odometry that may wait
 constexpr double kOdometryMemory = 10.0;  // [s] of covariances
 constexpr double kOdometryGap = 0.2;      // [s] a covariance holds for scans so near at most
 constexpr double kAhead = 10.0;  // [s] an initial pose stamped farther in the future is of another clock
 
-// Apart, because the macros count as a handful of branches each.
+// Apart, because the macro counts as a handful of branches.
 void warnFrame(const std::string& frame, const std::string& taken_for) {
   ROS_WARN("LOCALIZATION_MAP_FRAME: the map is in %s, and taken for one in %s", frame.c_str(),
            taken_for.c_str());
-}
-
-void warnSlow(std::uint64_t skipped) {
-  ROS_WARN_THROTTLE(kWarningPeriod, "LOCALIZATION_TOO_SLOW: scan: skipped, %lu so far", skipped);
 }
 
 class LocalizationNode {
@@ -54,20 +48,18 @@ class LocalizationNode {
   LocalizationNode(ros::NodeHandle& nh, k::LocalizationNodeSettings settings);
 
  private:
-  void onScan(const sensor_msgs::LaserScan::ConstPtr& scan);
   void onOdometry(const nav_msgs::Odometry& odometry);
   void onMap(const nav_msgs::OccupancyGrid& map);
   void onInitialPose(const PoseMessage& message);
   bool setMap(nav_msgs::SetMap::Request& request, nav_msgs::SetMap::Response& response);
   void advertise(ros::NodeHandle& nh);
   void askForMap();
-  void work();
   void add(const k::ScanQueue::Ready& ready);
   void publish(const k::ScanQueue::Ready& ready, const k::Localizer::Estimate& estimate, bool is_news);
   void publishCloud(const ros::Time& stamp);
   void save(const k::Gaussian& pose);
   void begin();
-  void reset(const char* why);
+  void reset();
   std::optional<Eigen::Matrix3d> covarianceAt(const ros::Time& stamp) const;
   bool setPose(const PoseMessage& message);
   void diagnose(Status& status);
@@ -79,32 +71,33 @@ class LocalizationNode {
   std::optional<k::Localizer> localizer_;
   std::optional<k::Localizer::Estimate> estimate_;
   std::map<ros::Time, Eigen::Matrix3d> covariances_;  ///< of odometry
-  ros::Time last_scan_, last_clock_, last_transform_;
-  ros::SteadyTime came_ = ros::SteadyTime::now(), taken_ = came_;  ///< the last scan, and the last one used
+  ros::Time last_transform_;
   ros::SteadyTime last_cloud_, last_save_;
-  std::uint64_t skipped_ = 0, scans_ = 0, reported_skipped_ = 0, reported_dropped_ = 0;
-  double work_seconds_ = 0;  ///< of processor time, for all scans
-  tf2_ros::Buffer buffer_;
-  tf2_ros::TransformListener listener_{buffer_};
-  k::ScanQueue queue_;
+  std::uint64_t reported_skipped_ = 0, reported_dropped_ = 0;
   tf2_ros::TransformBroadcaster broadcaster_;
   diagnostic_updater::Updater diagnostics_;
   ros::Publisher pose_, cloud_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
+  k::ScanFeed feed_;
   std::vector<ros::SteadyTimer> timers_;
 };
 
 LocalizationNode::LocalizationNode(ros::NodeHandle& nh, k::LocalizationNodeSettings settings)
     : settings_(std::move(settings)),
       nh_(nh),
-      queue_(buffer_, {settings_.odom_frame, settings_.base_frame, settings_.transform_deadline},
-             settings_.chair.laser, "LOCALIZATION", kQueue) {
+      feed_(
+          nh,
+          {{settings_.odom_frame, settings_.base_frame, settings_.transform_deadline},
+           settings_.chair.laser,
+           "LOCALIZATION",
+           settings_.backlog,
+           1},
+          [this](const k::ScanQueue::Ready& ready) { add(ready); }, [this](const char*) { reset(); }) {
   diagnostics_.setHardwareID("none");
   diagnostics_.add("localization", this, &LocalizationNode::diagnose);
   pose_ = nh.advertise<PoseMessage>("amcl_pose", 2, true);
   cloud_ = nh.advertise<geometry_msgs::PoseArray>("particlecloud", 2, true);
-  subscribers_.push_back(nh.subscribe("scan", kQueue, &LocalizationNode::onScan, this));
   subscribers_.push_back(nh.subscribe("odom", kQueue, &LocalizationNode::onOdometry, this));
   subscribers_.push_back(nh.subscribe("initialpose", 2, &LocalizationNode::onInitialPose, this));
   if (settings_.map_topic) subscribers_.push_back(nh.subscribe("map", 1, &LocalizationNode::onMap, this));
@@ -114,7 +107,7 @@ LocalizationNode::LocalizationNode(ros::NodeHandle& nh, k::LocalizationNodeSetti
     timers_.push_back(
         nh.createSteadyTimer(ros::WallDuration(period), [call](const ros::SteadyTimerEvent&) { call(); }));
   };
-  every(kPollPeriod, [this] { work(); });
+  every(kPollPeriod, [this] { feed_.work(); });
   every(kAskPeriod, [this] {
     diagnostics_.force_update();  // update() waits for a time that may have been set back
     if (!settings_.map_topic && !map_) askForMap();
@@ -134,13 +127,6 @@ void LocalizationNode::advertise(ros::NodeHandle& nh) {
         return localizer_.has_value();
       }));
   services_.push_back(nh.advertiseService("set_map", &LocalizationNode::setMap, this));
-}
-
-void LocalizationNode::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) {
-  if (scan->header.stamp + ros::Duration(k::kTimeJump) < last_scan_)
-    reset("a scan is older than the last one");
-  came_ = ros::SteadyTime::now();
-  queue_.push(scan);
 }
 
 void LocalizationNode::onOdometry(const nav_msgs::Odometry& odometry) {
@@ -217,37 +203,14 @@ bool LocalizationNode::setPose(const PoseMessage& message) {
   return true;
 }
 
-void LocalizationNode::work() {
-  const ros::Time now = ros::Time::now();
-  if (now + ros::Duration(k::kTimeJump) < last_clock_) reset("time ran backwards");
-  last_clock_ = now;
-  const ros::SteadyTime begin = ros::SteadyTime::now();
-  std::optional<k::ScanQueue::Ready> ready;
-  while (ros::ok() && (ready = queue_.next())) {
-    const bool is_slow = (ros::SteadyTime::now() - begin).toSec() > kWorkLimit;
-    if (is_slow && queue_.size() >= static_cast<std::size_t>(settings_.backlog)) {
-      warnSlow(++skipped_);
-    } else {
-      add(*ready);
-    }
-  }
-}
-
-void LocalizationNode::add(const k::ScanQueue::Ready& ready) try {
-  taken_ = ros::SteadyTime::now();
-  last_scan_ = ready.stamp;
+void LocalizationNode::add(const k::ScanQueue::Ready& ready) {
   if (!localizer_) return;
-  const std::clock_t start = std::clock();
   const auto estimate =
       localizer_->add(ready.scan, {ready.scan.stamp, ready.start, covarianceAt(ready.stamp)}, ready.end);
-  work_seconds_ += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-  ++scans_;
   const bool is_news = !estimate_ || estimate_->knowledge != estimate.knowledge;
   if (is_news) ROS_INFO("localization: %s", k::nameOf(estimate.knowledge));
   estimate_ = estimate;
   publish(ready, estimate, is_news);
-} catch (const std::invalid_argument& error) {
-  queue_.refuse(error.what());
 }
 
 void LocalizationNode::publish(const k::ScanQueue::Ready& ready, const k::Localizer::Estimate& estimate,
@@ -292,30 +255,23 @@ void LocalizationNode::save(const k::Gaussian& pose) {
   private_.setParam("initial_cov_aa", pose.covariance(2, 2));
 }
 
-void LocalizationNode::reset(const char* why) {
-  ROS_WARN("LOCALIZATION_TIME_RESET: %s: localisation starts afresh", why);
-  buffer_.clear();
-  queue_.forgetAfter(ros::Time::now() + ros::Duration(k::kTimeJump));
+void LocalizationNode::reset() {
   covariances_.clear();
-  last_scan_ = last_transform_ = ros::Time();
+  last_transform_ = ros::Time();
   begin();
 }
 
 void LocalizationNode::diagnose(Status& status) {
-  const ros::SteadyTime now = ros::SteadyTime::now();
-  const double silence = (now - came_).toSec();
-  const bool waiting = silence < settings_.silence && (now - taken_).toSec() > settings_.silence;
-  const std::uint64_t dropped = queue_.dropped().all();
+  const auto& queue = feed_.queue();
+  const std::uint64_t lost = queue.dropped().no_transform + queue.dropped().bad_scan;
   const k::LocalizationState state{map_.has_value(),
                                    bad_map_,
-                                   silence,
+                                   feed_.silence(),
                                    settings_.silence,
-                                   waiting,
+                                   feed_.missing(settings_.silence),
                                    estimate_ ? &*estimate_ : nullptr,
-                                   dropped - reported_dropped_,
-                                   skipped_ - reported_skipped_};
-  reported_dropped_ = dropped;
-  reported_skipped_ = skipped_;
+                                   lost - std::exchange(reported_dropped_, lost),
+                                   feed_.skipped() - std::exchange(reported_skipped_, feed_.skipped())};
   const k::LocalizationVerdict verdict = k::judge(state);
   status.summary(static_cast<unsigned char>(verdict.level), verdict.summary);
   if (estimate_) {
@@ -324,13 +280,13 @@ void LocalizationNode::diagnose(Status& status) {
     status.add("usual fit", estimate_->fit_usual);
     status.add("particles", estimate_->particles);
   }
-  status.add("scans", scans_);
-  status.add("dropped without transform", queue_.dropped().no_transform);
-  status.add("dropped as senseless", queue_.dropped().bad_scan);
-  status.add("skipped", skipped_ + queue_.dropped().too_slow);
-  status.add("last dropped", queue_.reason());
+  status.add("scans", feed_.used());
+  status.add("dropped without transform", queue.dropped().no_transform);
+  status.add("dropped as senseless", queue.dropped().bad_scan);
+  status.add("skipped", feed_.skipped());
+  status.add("last dropped", queue.reason());
   status.add("processor time per scan [ms]",
-             scans_ > 0 ? 1000 * work_seconds_ / static_cast<double>(scans_) : 0);
+             feed_.used() > 0 ? 1000 * feed_.seconds() / static_cast<double>(feed_.used()) : 0);
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include <cmath>
 #include <csignal>
 #include <optional>
+#include <utility>
 
 #include "slam/mapper.h"
 #include "slam/mapping_node_parameters.h"
@@ -72,7 +73,7 @@ class MappingNode {
   std::optional<k::Mapper> mapper_;  ///< none while the map to go on from is not there
   std::optional<k::Mapper::Estimate> estimate_;
   k::Pose2D map_from_odom_{0, 0, 0};
-  bool map_changed_ = false, full_ = false;
+  bool map_changed_ = false, path_changed_ = false, full_ = false;
   std::uint64_t jumps_ = 0;
   std::uint64_t reported_jumps_ = 0, reported_dropped_ = 0, reported_skipped_ = 0;
   ros::Time last_scan_, last_transform_;
@@ -169,7 +170,7 @@ void MappingNode::offer(const char* name, const std::function<void(std_srvs::Tri
 void MappingNode::begin() {
   mapper_.reset();
   estimate_.reset();
-  map_changed_ = full_ = false;
+  map_changed_ = path_changed_ = full_ = false;
   last_scan_ = last_transform_ = ros::Time();
   next_map_ = ros::SteadyTime();
   start_problem_.clear();
@@ -213,15 +214,17 @@ void MappingNode::use(const k::ScanQueue::Ready& ready) {
   jumps_ += estimate_->jumped ? 1 : 0;
   if (estimate_->map_updated || estimate_->full) full_ = estimate_->full;
   map_changed_ = map_changed_ || estimate_->map_updated;
-  if (estimate_->localised) publishEstimate();
+  if (!estimate_->localised) return;
+  path_changed_ = true;
+  publishEstimate();
 }
 
 void MappingNode::work() {
   feed_.work();
-  if (!map_changed_ || ros::SteadyTime::now() < next_map_) return;
+  if ((!map_changed_ && !path_changed_) || ros::SteadyTime::now() < next_map_) return;
   const ros::SteadyTime start = ros::SteadyTime::now();
-  publishMap();
-  publishTrajectory();
+  if (map_changed_) publishMap();
+  if (path_changed_) publishTrajectory();
   const double cost = (ros::SteadyTime::now() - start).toSec();
   next_map_ = start + ros::WallDuration(std::fmax(settings_.map_period, cost / kMapShare));
 }
@@ -256,6 +259,7 @@ void MappingNode::publishMap() {
 }
 
 void MappingNode::publishTrajectory() {
+  path_changed_ = false;
   kurumaisu::Trajectory trajectory;
   nav_msgs::Path path;
   trajectory.header.stamp = last_scan_;
