@@ -246,7 +246,8 @@ class MappingNode(unittest.TestCase):
         wait_for(self.own_maps, "a map of the new time", DEADLINE)
         wait_for(self.map_from_odom, "map -> odom of the new time", DEADLINE)
         # This second's drift, not that of the 20 s before.
-        np.testing.assert_allclose(pose_of(self.map_from_odom()[-1]), np.zeros(3), atol=0.05)
+        x, y, theta = pose_of(self.map_from_odom()[-1])
+        np.testing.assert_allclose([x, y, wrap(theta)], np.zeros(3), atol=0.05)
 
     def test_3_scans_without_transforms_are_counted_and_said(self):
         begin = time.monotonic()
@@ -267,8 +268,7 @@ class MappingNode(unittest.TestCase):
     def test_5_scans_without_transforms_do_not_stop_the_others(self):
         self.room.step(0.0, with_tf=False)
         self.room.odom = np.array([1.0, 2.0, 0.5])
-        self.room.step(STEP)
-        self.room.step(2 * STEP)
+        self.room.drive(1.0, first=STEP)  # tf's own listener may notice the jump back late, and forget the first ones
         wait_for(self.own_maps, "a map from the scans that have transforms", DEADLINE)
         assert self.room.time_of(self.own_maps()[0]) > STEP / 2
 

@@ -44,7 +44,7 @@ class Slip {
 };
 
 constexpr double kLeastFit = 0.6;  // share of the first scan's readings that a map to go on from must explain
-constexpr int kLeastReadings = 8;
+constexpr int kLeastReadings = 3;  // fewer do not say where a scan was taken
 constexpr double kMostDistance = 1.0;  // [m] deviation of the pose to go on from
 constexpr double kMostAngle = 0.5;     // [rad]
 
@@ -220,7 +220,6 @@ class Mapper::Impl {
                                     [](float range) { return std::isfinite(range); }) >= kLeastReadings;
     const bool grow = sees && reached(inserted_, matched, settings_.insert_distance, settings_.insert_angle);
     const bool late = settings_.localise_time > 0 && scan.stamp - localised_at_ > settings_.localise_time;
-    // A scan without readings does not say where it was taken.
     const bool localise =
         sees &&
         (grow || late || reached(localised_, matched, settings_.localise_distance, settings_.localise_angle));

@@ -100,7 +100,7 @@ class Room:
     def wait_for_subscribers(self) -> None:
         """Return when somebody hears all of it."""
         for publisher in (self.clock, self.scan, self.tf):
-            wait_for(lambda p=publisher: p.get_num_connections() > 0, f"subscriber of {publisher.name}", 40.0)
+            wait_for(publisher.get_num_connections, f"subscriber of {publisher.name}", 40.0)
 
     def begin_anew(self) -> None:
         """Set the clock back, and the odometry to where it starts."""
