@@ -45,8 +45,9 @@ class Slip {
 
 constexpr double kLeastFit = 0.6;  // share of the first scan's readings that a map to go on from must explain
 constexpr int kLeastReadings = 3;  // fewer do not say where a scan was taken
-constexpr double kMostDistance = 1.0;  // [m] deviation of the pose to go on from
-constexpr double kMostAngle = 0.5;     // [rad]
+constexpr double kOdometryPeriod = 0.1;  // [s] odometry may come in steps so far apart
+constexpr double kMostDistance = 1.0;    // [m] deviation of the pose to go on from
+constexpr double kMostAngle = 0.5;       // [rad]
 
 std::string percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
 
@@ -170,15 +171,16 @@ class Mapper::Impl {
   }
 
   bool isJump(const Pose2D& motion, double duration) const {
-    return std::hypot(motion.x, motion.y) > settings_.jump_speed * duration ||
-           std::abs(motion.theta) > settings_.jump_turn * duration;
+    const double time = std::fmax(duration, kOdometryPeriod);
+    return std::hypot(motion.x, motion.y) > settings_.jump_speed * time ||
+           std::abs(motion.theta) > settings_.jump_turn * time;
   }
 
   /// A jump during the scan is none of the chair's motion either.
   Scan deskewed(const Scan& raw, const Pose2D& start, const Pose2D& end) const {
     const double sweep = raw.fan.time_increment * static_cast<double>(raw.ranges.size() - 1);
     const Pose2D motion = between(start, end);
-    if (isJump(motion, std::fmax(sweep, 1e-3))) return deskew(raw, scaled(rate_, sweep));
+    if (isJump(motion, sweep)) return deskew(raw, scaled(rate_, sweep));
     return deskew(raw, slip_.corrected(motion, sweep));
   }
 
