@@ -52,9 +52,9 @@ class MappingNode(unittest.TestCase):
     def setUpClass(cls):
         cls.room = Room(20000.0)
         cls.diagnostics = Topic("/diagnostics", DiagnosticArray)
-        cls.transforms = Topic("/tf", tf2_msgs.msg.TFMessage)
         cls.maps = Topic("map", OccupancyGrid)
-        cls.room.wait_for_subscribers()
+        cls.room.wait_for_subscribers(2)  # this node and the one beside it
+        cls.transforms = Topic("/tf", tf2_msgs.msg.TFMessage)  # last: it would count as one of them
 
     def setUp(self):
         self.room.begin_anew()
@@ -128,9 +128,11 @@ class MappingNode(unittest.TestCase):
         assert (off < 0.1).mean() > 0.98, np.sort(off)[-20:]
 
     @contextmanager
-    def second_node(self, **parameters):
+    def second_node(self, mapper=None, **parameters):
         """Start another one on the same scans, without tf; yield the process."""
-        rospy.set_param("/second/mapping_node", {"node": {"transform_period": 0.0, **parameters}})
+        rospy.set_param(
+            "/second/mapping_node", {"node": {"transform_period": 0.0, **parameters}, "mapper": mapper or {}}
+        )
         program = roslib.packages.find_node("kurumaisu", "mapping_node")[0]
         arguments = ["__ns:=/second", "scan:=/scan", "static_map:=/dynamic_map", "/diagnostics:=/second/diagnostics"]
         process = subprocess.Popen([program, *arguments])
@@ -317,7 +319,34 @@ class MappingNode(unittest.TestCase):
         self.origin = compose(self.room.odom, between(truth(last + STEP), np.zeros(3)))
         self.wait_for_pose(self.room.drive(2.0, first=last + STEP))
 
-    def test_a_bad_configuration_stops_it(self):
+    def test_a_when_too_slow_it_skips_scans_and_says_so(self):
+        diagnostics = Topic("/second/diagnostics", DiagnosticArray)
+
+        def said():
+            return [
+                s.message for m in diagnostics.messages for s in m.status if s.name == "second/mapping_node: mapping"
+            ]
+
+        with self.second_node(mapper={"particles": 1000, "insert_distance": 0.2}):
+            connections = self.room.scan.get_num_connections
+            wait_for(lambda: connections() > 2, "its subscription", DEADLINE)
+            wait_for(said, "its diagnostics", DEADLINE)
+            for i in range(80):  # a burst
+                self.room.step(i * STEP)
+            try:
+                wait_for(lambda: any("MAPPING_TOO_SLOW" in each for each in said()), "skipped scans", DEADLINE)
+            except AssertionError as error:
+                raise AssertionError(f"not too slow: {set(said())}") from error
+            poses = Topic("/second/mapping_node/pose", PoseWithCovarianceStamped)
+            last = self.room.drive(1.0, first=80 * STEP)
+            wait_for(lambda: poses.last and self.room.time_of(poses.last) > last - 1.5, "its pose", DEADLINE)
+            pose = poses.last.pose.pose.position
+            expected = compose(self.origin, truth(self.room.time_of(poses.last)))
+            assert np.hypot(pose.x - expected[0], pose.y - expected[1]) < 0.15
+            poses.close()
+        diagnostics.close()
+
+    def test_b_bad_configuration_stops_it(self):
         good = rospy.get_param("/mapping_node")
         node = roslib.packages.find_node("kurumaisu", "mapping_node")[0]
         for section, key, value, message in (

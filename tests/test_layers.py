@@ -64,7 +64,7 @@ PYTHON_RULES = [
 ]
 CPP_RULES = [
     Rule(
-        r"(?!.*_node\.cpp|.*/messages\.(cpp|h)|base/((command|odometry)_(in|out)put|limits_server|master_watch|topic_dac)\.(cpp|h)|slam/(scan_feed\.(cpp|h)|mapping_node_parameters\.h)|params\.h)",
+        r"(?!.*_node\.cpp|.*/messages\.(cpp|h)|base/((command|odometry)_(in|out)put|limits_server|master_watch|topic_dac)\.(cpp|h)|slam/((mapping_output|scan_feed)\.(cpp|h)|mapping_node_parameters\.h)|params\.h)",
         ROS_CPP,
         "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, and params.h",
     ),

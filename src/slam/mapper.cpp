@@ -13,35 +13,12 @@
 #include "slam/matcher.h"
 #include "slam/motion.h"
 #include "slam/pose.h"
+#include "slam/slip.h"
 #include "slam/start.h"
 
 namespace kurumaisu {
 
 namespace {
-
-/// How fast odometry goes wrong: its scale, drift and lag all show as a rate that changes slowly against the
-/// scans. Uncorrected, the bend it leaves in every de-skewed scan adds up: 0.07 degrees a scan are 90 degrees
-/// an hour.
-class Slip {
- public:
-  explicit Slip(double gain) : gain_(gain) {}
-
-  /// What odometry says of a stretch of time [s], corrected.
-  Pose2D corrected(const Pose2D& motion, double duration) const {
-    return {motion.x + rate_.x * duration, motion.y + rate_.y * duration,
-            motion.theta + rate_.theta * duration};
-  }
-
-  void learn(const Pose2D& matched, const Pose2D& odometry, double duration) {
-    rate_.x += gain_ * ((matched.x - odometry.x) / duration - rate_.x);
-    rate_.y += gain_ * ((matched.y - odometry.y) / duration - rate_.y);
-    rate_.theta += gain_ * ((matched.theta - odometry.theta) / duration - rate_.theta);
-  }
-
- private:
-  double gain_;
-  Pose2D rate_{0, 0, 0};  ///< [m/s, m/s, rad/s] in the base's frame
-};
 
 constexpr double kLeastFit = 0.6;  // share of the first scan's readings that a map to go on from must explain
 constexpr int kLeastReadings = 3;  // fewer do not say where a scan was taken

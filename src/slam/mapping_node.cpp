@@ -2,18 +2,11 @@
 // scan and tf in; map, map_metadata, entropy, tf map -> odom, the trajectory and diagnostics out: slam_gmapping's names,
 // and more. What it does with them is in mapper.h.
 #include <diagnostic_updater/diagnostic_updater.h>
-#include <geometry_msgs/PoseArray.h>
-#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <kurumaisu/StateFile.h>
-#include <kurumaisu/Trajectory.h>
 #include <nav_msgs/GetMap.h>
-#include <nav_msgs/OccupancyGrid.h>
-#include <nav_msgs/Path.h>
 #include <ros/package.h>
 #include <ros/ros.h>
-#include <std_msgs/Float64.h>
 #include <std_srvs/Trigger.h>
-#include <tf2_ros/transform_broadcaster.h>
 
 #include <cmath>
 #include <csignal>
@@ -22,6 +15,7 @@
 
 #include "slam/mapper.h"
 #include "slam/mapping_node_parameters.h"
+#include "slam/mapping_output.h"
 #include "slam/mapping_report.h"
 #include "slam/mapping_settings.h"
 #include "slam/messages.h"
@@ -33,15 +27,10 @@ namespace k = kurumaisu;
 namespace {
 
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
-using PoseMessage = geometry_msgs::PoseWithCovarianceStamped;
 
 constexpr double kPollPeriod = 0.02;  // [s] between looks whether transforms have come
 constexpr double kAskPeriod = 1.0;    // [s] between two calls of static_map, and two diagnostics
 constexpr double kMapShare = 0.1;     // of the time may go into publishing the map
-
-k::Gaussian gaussianOf(const k::Pose2D& pose, const std::array<double, 9>& covariance) {
-  return {pose, Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(covariance.data())};
-}
 
 class MappingNode {
  public:
@@ -56,13 +45,8 @@ class MappingNode {
   void begin();
   void askForMap();
   void use(const k::ScanQueue::Ready& ready);
-  void publishTransform();
-  void publishEstimate();
-  void publishMap();
-  void publishTrajectory();
   void work();
   std::string save(const std::string& path) const;
-  nav_msgs::OccupancyGrid message() const;
   void diagnose(Status& status);
 
   k::MappingNodeSettings settings_;
@@ -76,11 +60,10 @@ class MappingNode {
   bool map_changed_ = false, path_changed_ = false, full_ = false;
   std::uint64_t jumps_ = 0;
   std::uint64_t reported_jumps_ = 0, reported_dropped_ = 0, reported_skipped_ = 0;
-  ros::Time last_scan_, last_transform_;
+  ros::Time last_scan_;
   ros::SteadyTime next_map_;
-  tf2_ros::TransformBroadcaster broadcaster_;
   diagnostic_updater::Updater diagnostics_;
-  ros::Publisher map_, metadata_, entropy_, pose_, cloud_, path_, trajectory_;
+  k::MappingOutput output_;
   std::vector<ros::ServiceServer> services_;
   k::ScanFeed feed_;
   std::vector<ros::SteadyTimer> timers_;
@@ -91,6 +74,7 @@ MappingNode::MappingNode(ros::NodeHandle& nh, k::MappingNodeSettings settings,
     : settings_(std::move(settings)),
       unused_(std::move(unused)),
       nh_(nh),
+      output_(nh, settings_.map_frame, settings_.odom_frame, settings_.occ_thresh),
       feed_(
           nh,
           {{settings_.odom_frame, settings_.base_frame, settings_.transform_deadline},
@@ -111,7 +95,11 @@ MappingNode::MappingNode(ros::NodeHandle& nh, k::MappingNodeSettings settings,
         nh.createSteadyTimer(ros::WallDuration(period), [call](const ros::SteadyTimerEvent&) { call(); }));
   };
   every(kPollPeriod, [this] { work(); });
-  if (settings_.transform_period > 0) every(settings_.transform_period, [this] { publishTransform(); });
+  if (settings_.transform_period > 0)
+    every(settings_.transform_period, [this] {
+      if (estimate_)
+        output_.transform(map_from_odom_, ros::Time::now() + ros::Duration(settings_.transform_tolerance));
+    });
   every(kAskPeriod, [this] {
     diagnostics_.force_update();  // update() waits for a time that may have been set back
     if (!mapper_) askForMap();
@@ -119,17 +107,10 @@ MappingNode::MappingNode(ros::NodeHandle& nh, k::MappingNodeSettings settings,
 }
 
 void MappingNode::advertise(ros::NodeHandle& nh) {
-  map_ = nh.advertise<nav_msgs::OccupancyGrid>("map", 1, true);
-  metadata_ = nh.advertise<nav_msgs::MapMetaData>("map_metadata", 1, true);
-  cloud_ = nh.advertise<geometry_msgs::PoseArray>("particlecloud", 1, true);
-  path_ = nh.advertise<nav_msgs::Path>("trajectory", 1, true);
-  entropy_ = private_.advertise<std_msgs::Float64>("entropy", 1, true);
-  pose_ = private_.advertise<PoseMessage>("pose", 1, true);
-  trajectory_ = private_.advertise<kurumaisu::Trajectory>("trajectory_with_covariance", 1, true);
   using GetMap = nav_msgs::GetMap;
   services_.push_back(nh.advertiseService<GetMap::Request, GetMap::Response>(
       "dynamic_map", [this](GetMap::Request&, GetMap::Response& response) {
-        response.map = message();
+        if (mapper_) response.map = output_.mapOf(*mapper_, last_scan_);
         return response.map.info.width > 0;
       }));
   using StateFile = kurumaisu::StateFile;
@@ -171,7 +152,8 @@ void MappingNode::begin() {
   mapper_.reset();
   estimate_.reset();
   map_changed_ = path_changed_ = full_ = false;
-  last_scan_ = last_transform_ = ros::Time();
+  last_scan_ = ros::Time();
+  output_.forget();
   next_map_ = ros::SteadyTime();
   start_problem_.clear();
   if (!settings_.start_map.empty() && !start_) {
@@ -216,68 +198,18 @@ void MappingNode::use(const k::ScanQueue::Ready& ready) {
   map_changed_ = map_changed_ || estimate_->map_updated;
   if (!estimate_->localised) return;
   path_changed_ = true;
-  publishEstimate();
+  output_.estimate(*mapper_, *estimate_, last_scan_);
 }
 
 void MappingNode::work() {
   feed_.work();
   if ((!map_changed_ && !path_changed_) || ros::SteadyTime::now() < next_map_) return;
   const ros::SteadyTime start = ros::SteadyTime::now();
-  if (map_changed_) publishMap();
-  if (path_changed_) publishTrajectory();
+  if (map_changed_) output_.map(*mapper_, last_scan_);
+  if (path_changed_) output_.trajectory(*mapper_, last_scan_);
+  map_changed_ = path_changed_ = false;
   const double cost = (ros::SteadyTime::now() - start).toSec();
   next_map_ = start + ros::WallDuration(std::fmax(settings_.map_period, cost / kMapShare));
-}
-
-void MappingNode::publishTransform() {
-  const ros::Time stamp = ros::Time::now() + ros::Duration(settings_.transform_tolerance);
-  if (!estimate_ || stamp <= last_transform_) return;  // tf refuses the same time twice
-  last_transform_ = stamp;
-  broadcaster_.sendTransform(k::stamped(map_from_odom_, stamp, settings_.map_frame, settings_.odom_frame));
-}
-
-void MappingNode::publishEstimate() {
-  std_msgs::Float64 entropy;
-  entropy.data = mapper_->entropy();
-  entropy_.publish(entropy);
-  PoseMessage pose;
-  pose.header.stamp = last_scan_;
-  pose.header.frame_id = settings_.map_frame;
-  pose.pose = k::messageOf(gaussianOf(estimate_->map_from_base, estimate_->covariance));
-  pose_.publish(pose);
-  geometry_msgs::PoseArray cloud;
-  cloud.header = pose.header;
-  for (const auto& [each, weight] : mapper_->particles()) cloud.poses.push_back(k::messageOf(each));
-  cloud_.publish(cloud);
-}
-
-void MappingNode::publishMap() {
-  map_changed_ = false;
-  const auto grid = message();
-  map_.publish(grid);
-  metadata_.publish(grid.info);
-}
-
-void MappingNode::publishTrajectory() {
-  path_changed_ = false;
-  kurumaisu::Trajectory trajectory;
-  nav_msgs::Path path;
-  trajectory.header.stamp = last_scan_;
-  trajectory.header.frame_id = settings_.map_frame;
-  path.header = trajectory.header;
-  for (const k::UncertainPose& node : mapper_->nodes()) {
-    PoseMessage pose;
-    pose.header.stamp.fromSec(node.stamp);
-    pose.header.frame_id = settings_.map_frame;
-    pose.pose = k::messageOf(gaussianOf(node.pose, node.covariance));
-    trajectory.poses.push_back(pose);
-    geometry_msgs::PoseStamped point;
-    point.header = pose.header;
-    point.pose = pose.pose.pose;
-    path.poses.push_back(point);
-  }
-  trajectory_.publish(trajectory);
-  path_.publish(path);
 }
 
 /// What was written, in words. Throws std::runtime_error.
@@ -300,11 +232,6 @@ void MappingNode::end() {
   } catch (const std::exception& error) {
     ROS_ERROR("MAPPING_NOT_SAVED: %s", error.what());
   }
-}
-
-nav_msgs::OccupancyGrid MappingNode::message() const {
-  if (!mapper_) return {};
-  return k::messageOf(k::decided(mapper_->grid(), settings_.occ_thresh), last_scan_, settings_.map_frame);
 }
 
 void MappingNode::diagnose(Status& status) {

@@ -54,6 +54,7 @@ void ScanFeed::take(const ScanQueue::Ready& ready) try {
   use_(ready);
   seconds_ += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   ++used_;
+  came_ = ros::SteadyTime::now();  // who works does not hear
 } catch (const std::invalid_argument& error) {
   queue_.refuse(error.what());
 }

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -74,6 +75,10 @@ def transform(parent: str, child: str, pose: FloatArray, stamp: rospy.Time) -> T
     return out
 
 
+def _heard(publisher: rospy.Publisher, count: int) -> bool:
+    return bool(publisher.get_num_connections() >= count)
+
+
 class Room:
     """The clock, the laser and the odometry of a chair in the room; times are those of one test, which begins anew.
 
@@ -86,6 +91,7 @@ class Room:
         self.clock = rospy.Publisher("clock", Clock, queue_size=100)
         self.scan = rospy.Publisher("scan", LaserScan, queue_size=100)
         self.tf = rospy.Publisher("tf", TFMessage, queue_size=100)
+        self._places: list[TransformStamped] = []
         self._static = tf2_ros.StaticTransformBroadcaster()
         self.place_laser("laser", MOUNT)
 
@@ -95,12 +101,13 @@ class Room:
         if upside_down:  # rolled by half a turn before it is yawed
             q = place.transform.rotation
             q.x, q.y, q.z, q.w = q.w, q.z, 0.0, 0.0
-        self._static.sendTransform(place)
+        self._places.append(place)
+        self._static.sendTransform(self._places)  # all of them: who comes later hears the last message only
 
-    def wait_for_subscribers(self) -> None:
-        """Return when somebody hears all of it."""
+    def wait_for_subscribers(self, count: int = 1) -> None:
+        """Return when so many nodes hear all of it."""
         for publisher in (self.clock, self.scan, self.tf):
-            wait_for(publisher.get_num_connections, f"subscriber of {publisher.name}", 40.0)
+            wait_for(partial(_heard, publisher, count), f"subscriber of {publisher.name}", 40.0)
 
     def begin_anew(self) -> None:
         """Set the clock back, and the odometry to where it starts."""
