@@ -32,6 +32,10 @@ constexpr double kPollPeriod = 0.02;  // [s] between looks whether transforms ha
 constexpr double kAskPeriod = 1.0;    // [s] between two calls of static_map, and two diagnostics
 constexpr double kMapShare = 0.1;     // of the time may go into publishing the map
 
+// Apart, because the macros count as a handful of branches each.
+void say(const std::string& what) { ROS_INFO("mapping: %s", what.c_str()); }
+void complain(const char* why) { ROS_ERROR("MAPPING_NOT_SAVED: %s", why); }
+
 class MappingNode {
  public:
   MappingNode(ros::NodeHandle& nh, k::MappingNodeSettings settings, std::vector<std::string> unused);
@@ -95,11 +99,12 @@ MappingNode::MappingNode(ros::NodeHandle& nh, k::MappingNodeSettings settings,
         nh.createSteadyTimer(ros::WallDuration(period), [call](const ros::SteadyTimerEvent&) { call(); }));
   };
   every(kPollPeriod, [this] { work(); });
-  if (settings_.transform_period > 0)
+  if (settings_.transform_period > 0) {
     every(settings_.transform_period, [this] {
-      if (estimate_)
-        output_.transform(map_from_odom_, ros::Time::now() + ros::Duration(settings_.transform_tolerance));
+      const ros::Time until = ros::Time::now() + ros::Duration(settings_.transform_tolerance);
+      if (estimate_) output_.transform(map_from_odom_, until);
     });
+  }
   every(kAskPeriod, [this] {
     diagnostics_.force_update();  // update() waits for a time that may have been set back
     if (!mapper_) askForMap();
@@ -228,9 +233,9 @@ std::string MappingNode::save(const std::string& path) const {
 void MappingNode::end() {
   if (settings_.save_on_shutdown.empty()) return;
   try {
-    ROS_INFO("mapping: %s", save(settings_.save_on_shutdown).c_str());
+    say(save(settings_.save_on_shutdown));
   } catch (const std::exception& error) {
-    ROS_ERROR("MAPPING_NOT_SAVED: %s", error.what());
+    complain(error.what());
   }
 }
 
@@ -272,7 +277,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });  // ros::init() sees to SIGINT only
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
   try {
-    const std::string name = ros::this_node::getName();
+    const std::string& name = ros::this_node::getName();
     const std::string launch = ros::package::getPath("kurumaisu") + "/launch/";
     auto unused = k::completeParameters(name, launch + "mapping_node.yaml", launch + "md100.yaml");
     MappingNode node(nh, k::readMappingNodeSettings(name), std::move(unused));

@@ -48,33 +48,42 @@ inline void layBelow(XmlRpc::XmlRpcValue& top, const XmlRpc::XmlRpcValue& below)
   }
 }
 
+// Apart, because the macros count as a handful of branches each.
+inline void tellUnsupported(const GmappingName& name) {
+  ROS_WARN("MAPPING_UNSUPPORTED: %s: is not used: %s", name.name, name.key);
+}
+inline void tellTaken(const GmappingName& name) {
+  ROS_INFO("mapping: %s: is taken for %s/%s", name.name, name.section, name.key);
+}
+
+/// A value of slam_gmapping as one of ours: there, times below 0 mean never.
+inline XmlRpc::XmlRpcValue ourValueOf(const GmappingName& name, XmlRpc::XmlRpcValue value) {
+  const bool is_time = std::string(name.name) == "temporalUpdate";
+  const bool is_number = value.getType() == XmlRpc::XmlRpcValue::TypeDouble;
+  return is_time && is_number && static_cast<double>(value) < 0 ? XmlRpc::XmlRpcValue(0.0) : value;
+}
+
 /// Moves slam_gmapping's parameters to where ours are, and says so; those that mean nothing here are taken away, and
 /// returned by name.
 inline std::vector<std::string> takeGmappingNames(XmlRpc::XmlRpcValue& top) {
   std::vector<std::string> unused;
-  XmlRpc::XmlRpcValue rest;
+  XmlRpc::XmlRpcValue ours;
   for (const auto& [key, value] : top) {
     const auto& names = gmappingNames();
-    const auto found =
-        std::find_if(names.begin(), names.end(), [&key = key](const auto& n) { return key == n.name; });
-    if (found == names.end()) {
-      rest[key] = value;
-    } else if (found->section == nullptr) {
-      ROS_WARN("MAPPING_UNSUPPORTED: %s: is not used: %s", found->name, found->key);
-      unused.emplace_back(found->name);
-    }
+    if (std::none_of(names.begin(), names.end(), [&key = key](const auto& n) { return key == n.name; }))
+      ours[key] = value;
   }
   for (const GmappingName& each : gmappingNames()) {
-    if (each.section == nullptr || !top.hasMember(each.name)) continue;
-    ROS_INFO("mapping: %s: is taken for %s/%s", each.name, each.section, each.key);
-    XmlRpc::XmlRpcValue value = top[each.name];
-    const bool is_number = value.getType() == XmlRpc::XmlRpcValue::TypeDouble;
-    // slam_gmapping: below 0 = never
-    if (std::string(each.name) == "temporalUpdate" && is_number && static_cast<double>(value) < 0)
-      value = 0.0;
-    rest[each.section][each.key] = value;
+    if (!top.hasMember(each.name)) continue;
+    if (each.section == nullptr) {
+      tellUnsupported(each);
+      unused.emplace_back(each.name);
+    } else {
+      tellTaken(each);
+      ours[each.section][each.key] = ourValueOf(each, top[each.name]);
+    }
   }
-  top = rest;
+  top = ours;
   return unused;
 }
 

@@ -11,6 +11,11 @@ constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
 constexpr double kWorkLimit = 0.1;      // [s] of work in a row before scans that wait are skipped
 constexpr std::size_t kQueue = 100;     // scans that may wait
 
+// Apart, because the macro counts as a handful of branches.
+void warnSlow(const std::string& prefix, std::uint64_t skipped) {
+  ROS_WARN_THROTTLE(kWarningPeriod, "%s_TOO_SLOW: scan: skipped, %lu so far", prefix.c_str(), skipped);
+}
+
 }  // namespace
 
 ScanFeed::ScanFeed(ros::NodeHandle& nh, FeedSettings settings, Use use, Reset reset)
@@ -38,9 +43,7 @@ void ScanFeed::work() {
     if (!ready) return;
     const bool is_slow = (ros::SteadyTime::now() - start).toSec() > kWorkLimit;
     if (is_slow && queue_.size() >= static_cast<std::size_t>(settings_.backlog)) {
-      ++skipped_;
-      ROS_WARN_THROTTLE(kWarningPeriod, "%s_TOO_SLOW: scan: skipped, %lu so far", settings_.prefix.c_str(),
-                        skipped_);
+      warnSlow(settings_.prefix, ++skipped_);
     } else {
       take(*ready);
     }
