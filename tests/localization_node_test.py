@@ -14,60 +14,18 @@ import roslib.packages
 import rospy
 import rostest
 import tf2_msgs.msg
-import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, TransformStamped
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
 
-from kurumaisu.geometry import between, compose, wrap
+from kurumaisu.geometry import wrap
 from kurumaisu.ros.testing import Topic, deviation, pose_of, wait_for
+from kurumaisu.ros.testing_room import BEAMS, STEP, WALLS, Room, ranges_at, transform, truth
 
 DEADLINE = 40.0  # [s] of the wall clock
-STEP = 0.1  # [s] between scans
-BEAMS, ANGLE_MIN, INCREMENT = 682, -2.086214, 0.006135923
-MOUNT = np.array([0.3, 0.05, 0.1])
 EDGE, MARGIN = 0.05, 0.525  # [m] the walls lie in the middle of their cells
-# x0, y0, x1, y1 [m]: 10 x 8 m with a box and a screen
-WALLS = np.array(
-    [
-        [-5, -4, 5, -4],
-        [5, -4, 5, 4],
-        [5, 4, -5, 4],
-        [-5, 4, -5, -4],
-        [2, 1, 3, 1],
-        [3, 1, 3, 2.5],
-        [3, 2.5, 2, 2.5],
-        [2, 2.5, 2, 1],
-        [-5, 1, -3, 1.5],
-    ],
-    dtype=float,
-)
-
-
-def truth(t):
-    """The chair's pose in the room: an oval in 40 s."""
-    a = 2 * np.pi * t / 40
-    return np.array([-0.5 + 2 * np.cos(a), -1.5 + 1.2 * np.sin(a), a + 1.6])
-
-
-def ranges_at(pose):
-    """Return equation (4)'s mean readings, (BEAMS,), as the laser of the default model has them."""
-    laser = compose(pose, MOUNT)
-    angles = laser[2] + ANGLE_MIN + INCREMENT * np.arange(BEAMS)
-    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
-    edge, d = WALLS[:, 2:] - WALLS[:, :2], WALLS[:, :2] - laser[:2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        across = c * edge[:, 1] - s * edge[:, 0]
-        along = (d[:, 0] * edge[:, 1] - d[:, 1] * edge[:, 0]) / across
-        part = (d[:, 0] * s - d[:, 1] * c) / across
-    along[~((along > 0) & (part >= 0) & (part <= 1))] = np.inf
-    ranges = along.min(axis=1)
-    ranges[ranges > 5.6] = np.inf
-    return 1.004587 * ranges + 0.058826
 
 
 def room_map():
@@ -85,80 +43,30 @@ def room_map():
     return message
 
 
-def transform(parent, child, pose, stamp):
-    out = TransformStamped()
-    out.header.stamp, out.header.frame_id, out.child_frame_id = stamp, parent, child
-    out.transform.translation.x, out.transform.translation.y = pose[0], pose[1]
-    out.transform.rotation.z, out.transform.rotation.w = np.sin(pose[2] / 2), np.cos(pose[2] / 2)
-    return out
-
-
 class LocalizationNode(unittest.TestCase):
     """Every test begins anew by setting the clock back."""
 
-    begin = 20000.0  # [s] simulated time of a test's first scan
-
     @classmethod
     def setUpClass(cls):
-        cls.clock = rospy.Publisher("clock", Clock, queue_size=100)
-        cls.scan = rospy.Publisher("scan", LaserScan, queue_size=100)
-        cls.tf = rospy.Publisher("tf", tf2_msgs.msg.TFMessage, queue_size=100)
+        cls.room = Room(20000.0)
         cls.map = rospy.Publisher("map", OccupancyGrid, queue_size=1, latch=True)
         cls.initial = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=1)
-        cls.static = tf2_ros.StaticTransformBroadcaster()
-        cls.static.sendTransform(transform("base_link", "laser", MOUNT, rospy.Time(0)))
         cls.diagnostics = Topic("/diagnostics", DiagnosticArray)
         cls.poses = Topic("amcl_pose", PoseWithCovarianceStamped)
         cls.clouds = Topic("particlecloud", PoseArray)
-        cls.transforms = Topic("/tf", tf2_msgs.msg.TFMessage)
-        for publisher in (cls.clock, cls.scan, cls.tf, cls.map, cls.initial):
+        cls.room.wait_for_subscribers()
+        cls.transforms = Topic("/tf", tf2_msgs.msg.TFMessage)  # last: it would count as one of them
+        for publisher in (cls.map, cls.initial):
             wait_for(lambda p=publisher: p.get_num_connections() > 0, f"subscriber of {publisher.name}", DEADLINE)
 
     def setUp(self):
-        LocalizationNode.begin -= 1000
-        self.odom = np.array([1.0, 2.0, 0.5])
-        self.at(-1.0)
-
-    def at(self, t):
-        stamp = rospy.Time.from_sec(self.begin + t)
-        self.clock.publish(stamp)
-        return stamp
-
-    def step(self, t, *, with_tf=True, ranges=None):
-        """Publish odometry, which drives 4 % too far and turns 5 % too little, and a scan."""
-        stamp = self.at(t)
-        if with_tf:
-            self.tf.publish([transform("odom", "base_link", self.odom, stamp)])
-        message = LaserScan(
-            angle_min=ANGLE_MIN,
-            angle_increment=INCREMENT,
-            angle_max=ANGLE_MIN + INCREMENT * (BEAMS - 1),
-            range_min=0.06,
-            range_max=5.6,
-            ranges=ranges_at(truth(t)) if ranges is None else ranges,
-        )
-        message.header.stamp, message.header.frame_id = stamp, "laser"
-        self.scan.publish(message)
-        self.odom = compose(self.odom, between(truth(t), truth(t + STEP)) * [1.04, 1.04, 0.95])
-
-    def drive(self, seconds, first=0.0, **options):
-        """Drive; return the time of the last scan. Paced by the wall clock, so that nothing is skipped."""
-        times = first + np.arange(0, seconds, STEP)
-        for t in times:
-            self.step(float(t), **options)
-            time.sleep(0.02)
-        return float(times[-1])
-
-    def of_this_test(self, messages):
-        return [m for m in messages if abs(m.header.stamp.to_sec() - self.begin) < 500]
+        self.room.begin_anew()
 
     def last_pose(self, t):
         """Return amcl_pose at least as late as a time of the test."""
 
         def found():
-            late = [
-                m for m in self.of_this_test(self.poses.messages) if m.header.stamp.to_sec() - self.begin > t - 0.01
-            ]
+            late = [m for m in self.room.of_this_test(self.poses.messages) if self.room.time_of(m) > t - 0.01]
             return late[-1] if late else None
 
         return wait_for(found, f"amcl_pose at {t} s", DEADLINE)
@@ -178,7 +86,7 @@ class LocalizationNode(unittest.TestCase):
         )
 
     def assert_close(self, message, distance=0.06, turn=0.03):
-        error = pose_of(message) - truth(message.header.stamp.to_sec() - self.begin)
+        error = pose_of(message) - truth(self.room.time_of(message))
         assert np.hypot(*error[:2]) < distance, error
         assert abs(wrap(error[2])) < turn, error
 
@@ -188,17 +96,17 @@ class LocalizationNode(unittest.TestCase):
         wait_for(lambda: "NO_MAP" not in self.status().message, "the map to be taken", DEADLINE)
 
     def test_2_follows_the_chair(self):
-        last = self.drive(12.0)
+        last = self.room.drive(12.0)
         message = self.last_pose(last - 0.5)
         assert message.header.frame_id == "map"
         self.assert_close(message)
         assert deviation(message) < 0.2
-        wait_for(lambda: self.of_this_test(self.clouds.messages), "particlecloud", DEADLINE)
-        assert len(self.of_this_test(self.clouds.messages)[-1].poses) >= 100
+        wait_for(lambda: self.room.of_this_test(self.clouds.messages), "particlecloud", DEADLINE)
+        assert len(self.room.of_this_test(self.clouds.messages)[-1].poses) >= 100
         sent = [t for m in self.transforms.messages for t in m.transforms if t.header.frame_id == "map"]
-        ours = [t for t in sent if abs(t.header.stamp.to_sec() - self.begin) < 500]
+        ours = [t for t in sent if abs(self.room.time_of(t)) < 500]
         assert ours[-1].child_frame_id == "odom"
-        ahead = (ours[-1].header.stamp.to_sec() - self.begin) % STEP
+        ahead = self.room.time_of(ours[-1]) % STEP
         assert min(ahead, STEP - ahead) < 1e-3  # a scan's stamp and transform_tolerance, 0.1 s
         self.wait_for_status(0, "tracking")
         values = {item.key: item.value for item in self.status().values}
@@ -208,11 +116,11 @@ class LocalizationNode(unittest.TestCase):
         )
 
     def test_3_starts_afresh_when_the_clock_is_set_back(self):
-        last = self.drive(3.0)
+        last = self.room.drive(3.0)
         self.assert_close(self.last_pose(last - 0.5))
 
     def test_4_initial_pose_and_global_localization(self):
-        self.drive(2.0)
+        self.room.drive(2.0)
         message = PoseWithCovarianceStamped()
         message.header.frame_id = "map"
         message.pose.pose.position.x, message.pose.pose.position.y = 4.0, 3.0
@@ -220,35 +128,35 @@ class LocalizationNode(unittest.TestCase):
         message.pose.covariance[0] = message.pose.covariance[7] = message.pose.covariance[35] = 0.01
         self.initial.publish(message)
         begin = len(self.poses.messages)
-        t = self.drive(1.0, first=2.0)
+        t = self.room.drive(1.0, first=2.0)
         wrong = wait_for(lambda: self.poses.messages[begin:], "poses", DEADLINE)
         assert any(np.hypot(*(pose_of(m)[:2] - [4.0, 3.0])) < 0.8 for m in wrong)
         rospy.ServiceProxy("global_localization", Empty)()
         begin = len(self.poses.messages)
-        t = self.drive(18.0, first=3.0)
+        t = self.room.drive(18.0, first=3.0)
         assert any(deviation(m) > 0.5 for m in self.poses.messages[begin:])
         found = self.last_pose(t - 0.5)
         self.assert_close(found)
         assert deviation(found) < 0.3
 
     def test_5_an_update_at_rest_on_demand(self):
-        self.drive(2.0)
+        self.room.drive(2.0)
         self.last_pose(1.5)
         ranges = ranges_at(truth(2.0))
         for i in range(5):  # at rest
-            self.tf.publish([transform("odom", "base_link", self.odom, self.at(2.0 + i * STEP))])
+            self.room.tf.publish([transform("odom", "base_link", self.room.odom, self.room.at(2.0 + i * STEP))])
         rospy.ServiceProxy("request_nomotion_update", Empty)()
         begin = len(self.poses.messages)
-        rest = self.odom
+        rest = self.room.odom
         for i in range(5, 10):
-            self.odom = rest
-            self.step(2.0 + i * STEP, ranges=ranges)
+            self.room.odom = rest
+            self.room.step(2.0 + i * STEP, ranges=ranges)
         wait_for(lambda: len(self.poses.messages) > begin, "amcl_pose at rest", DEADLINE)
 
     def test_6_scans_without_transforms_are_counted_and_said(self):
         begin = time.monotonic()
         while time.monotonic() - begin < 4.0 and not (self.status() and "NO_TRANSFORM" in self.status().message):
-            self.step((time.monotonic() - begin), with_tf=False)
+            self.room.step((time.monotonic() - begin), with_tf=False)
             time.sleep(0.05)
         self.wait_for_status(2, "LOCALIZATION_NO_TRANSFORM")
         values = {item.key: item.value for item in self.status().values}
@@ -256,12 +164,12 @@ class LocalizationNode(unittest.TestCase):
         self.wait_for_status(2, "LOCALIZATION_NO_SCAN")
 
     def test_7_nonsense_is_dropped_and_the_rest_used(self):
-        t = self.drive(1.0)
+        t = self.room.drive(1.0)
         for i, bad in enumerate(
             ([], [1.0], [float("nan")] * BEAMS, [float("inf")] * BEAMS, [-1.0] * BEAMS, [0.0] * BEAMS)
         ):
-            self.step(t + (i + 1) * STEP, ranges=bad)
-        t = self.drive(3.0, first=t + 7 * STEP)
+            self.room.step(t + (i + 1) * STEP, ranges=bad)
+        t = self.room.drive(3.0, first=t + 7 * STEP)
         self.assert_close(self.last_pose(t - 0.5))
 
     def test_8_a_map_that_makes_no_sense_is_refused_and_said(self):
@@ -275,7 +183,7 @@ class LocalizationNode(unittest.TestCase):
         good.pose.pose.orientation.z, good.pose.pose.orientation.w = np.sin(0.8), np.cos(0.8)
         good.pose.covariance[0] = good.pose.covariance[7] = good.pose.covariance[35] = 0.01
         assert set_map(room_map(), good).success
-        t = self.drive(2.0)
+        t = self.room.drive(2.0)
         self.assert_close(self.last_pose(t - 0.5))
 
     def test_9_bad_configuration_stops_it(self):

@@ -77,19 +77,22 @@ inline k::Pose2D truth(double t) {
 const k::Fan kUrg{-2.086214, 0.006135923, 9.765625e-5, 5.6, {0.3, 0.05, 0.1}};
 constexpr int kBeams = 682;
 
-/// Every beam from where the laser is at its time.
-inline k::Scan scanAt(double t, std::mt19937& noise) {
-  k::Scan scan{t, kUrg, std::vector<float>(kBeams)};
+/// Every beam from where the laser is at its time; noise: of 3 mm, or none.
+inline k::Scan scanAt(double t, const k::Fan& fan, int beams, std::mt19937* noise) {
+  k::Scan scan{t, fan, std::vector<float>(beams)};
   std::normal_distribution<double> sigma(0, 0.003);
-  for (int i = 0; i < kBeams; ++i) {
-    const k::Pose2D laser = k::compose(truth(t + i * kUrg.time_increment), kUrg.base_from_laser);
+  for (int i = 0; i < beams; ++i) {
+    const k::Pose2D laser = k::compose(truth(t + i * fan.time_increment), fan.base_from_laser);
     const double range =
-        rangeAlong({laser.x, laser.y, laser.theta + kUrg.angle_min + kUrg.angle_increment * i});
-    scan.ranges[i] = range > kUrg.range_max ? std::numeric_limits<float>::infinity()
-                                            : static_cast<float>(range + sigma(noise));
+        rangeAlong({laser.x, laser.y, laser.theta + fan.angle_min + fan.angle_increment * i});
+    scan.ranges[i] = range > fan.range_max
+                         ? std::numeric_limits<float>::infinity()
+                         : static_cast<float>(range + (noise != nullptr ? sigma(*noise) : 0));
   }
   return scan;
 }
+
+inline k::Scan scanAt(double t, std::mt19937& noise) { return scanAt(t, kUrg, kBeams, &noise); }
 
 /// Odometry that drives 4 % too far, turns 5 % too little and drifts by -0.01 rad/s, in small steps.
 class Wheels {

@@ -65,7 +65,9 @@ PYTHON_RULES = [
 ]
 CPP_RULES = [
     Rule(
-        r"(?!.*_node\.cpp|kurumaisu/bench/drivers/|.*/messages\.(cpp|h)|base/((command|odometry|diagnostics)_(in|out)put|limits_server|master_watch|stop_request|topic_dac)\.(cpp|h)|params\.h)",
+        r"(?!.*_node\.cpp|kurumaisu/bench/drivers/|.*/messages\.(cpp|h)|params\.h"
+        r"|base/((command|odometry|diagnostics)_(in|out)put|limits_server|master_watch|stop_request|topic_dac)\.(cpp|h)"
+        r"|slam/((mapping_output|scan_feed)\.(cpp|h)|mapping_node_parameters\.h))",
         ROS_CPP,
         "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, params.h, and peers of benchmarks",
     ),

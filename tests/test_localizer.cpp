@@ -342,7 +342,7 @@ TEST(LocalizerFaults, AMapOf10000By10000Cells) {
 
 TEST(LocalizationReport, SaysWhatIsWrong) {
   k::Localizer::Estimate estimate{around({0, 0, 0}), k::Knowledge::kTracking, 0.9, 0.9, 100, 0, true};
-  const k::LocalizationState good{true, "", 0.1, 2, false, &estimate, 0, 0};
+  const k::LocalizationState good{true, "", 0.1, 2, "", &estimate, 0, 0};
   EXPECT_EQ(k::judge(good).level, 0);
   const auto expect = [&good](int level, const std::string& code,
                               const std::function<void(k::LocalizationState&)>& change) {
@@ -354,7 +354,7 @@ TEST(LocalizationReport, SaysWhatIsWrong) {
   expect(2, "LOCALIZATION_NO_MAP", [](auto& s) { s.has_map = false; });
   expect(2, "LOCALIZATION_BAD_MAP: torn", [](auto& s) { s.bad_map = "torn"; });
   expect(2, "LOCALIZATION_NO_SCAN", [](auto& s) { s.silence = 3; });
-  expect(2, "LOCALIZATION_NO_TRANSFORM", [](auto& s) { s.waiting = true; });
+  expect(2, "LOCALIZATION_NO_TRANSFORM", [](auto& s) { s.missing = "no odometry"; });
   expect(1, "no scan yet", [](auto& s) { s.estimate = nullptr; });
   expect(1, "LOCALIZATION_DROPPED", [](auto& s) { s.newly_dropped = 3; });
   expect(1, "LOCALIZATION_TOO_SLOW", [](auto& s) { s.newly_skipped = 3; });

@@ -4,13 +4,14 @@
 
 #include <cmath>
 #include <limits>
-#include <map>
 #include <random>
 #include <stdexcept>
 #include <thread>
 
+#include "mapper_values.h"
 #include "slam/mapper.h"
 #include "slam/pose.h"
+#include "slam_room.h"
 
 namespace k = kurumaisu;
 
@@ -18,36 +19,9 @@ namespace {
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-struct Wall {
-  double x0, y0, x1, y1;
-};
-
-/// 10 x 8 m around the origin, with a box and a screen that make no two corners alike.
-const std::vector<Wall> kRoom{{-5, -4, 5, -4},  {5, -4, 5, 4},  {5, 4, -5, 4},
-                              {-5, 4, -5, -4},  {2, 1, 3, 1},   {3, 1, 3, 2.5},
-                              {3, 2.5, 2, 2.5}, {2, 2.5, 2, 1}, {-5, 1, -3, 1.5}};
-
-double rangeAlong(const k::Pose2D& ray) {
-  const double c = std::cos(ray.theta);
-  const double s = std::sin(ray.theta);
-  auto nearest = static_cast<double>(kInf);
-  for (const Wall& wall : kRoom) {
-    const double ex = wall.x1 - wall.x0;
-    const double ey = wall.y1 - wall.y0;
-    const double across = c * ey - s * ex;
-    if (across == 0) continue;
-    const double dx = wall.x0 - ray.x;
-    const double dy = wall.y0 - ray.y;
-    const double along = (dx * ey - dy * ex) / across;
-    const double part = (dx * s - dy * c) / across;
-    if (along > 0 && part >= 0 && part <= 1) nearest = std::fmin(nearest, along);
-  }
-  return nearest;
-}
-
 double distanceToWall(double x, double y) {
   auto nearest = static_cast<double>(kInf);
-  for (const Wall& wall : kRoom) {
+  for (const room::Wall& wall : room::kWalls) {
     const double ex = wall.x1 - wall.x0;
     const double ey = wall.y1 - wall.y0;
     const double part = ((x - wall.x0) * ex + (y - wall.y0) * ey) / (ex * ex + ey * ey);
@@ -57,104 +31,22 @@ double distanceToWall(double x, double y) {
   return nearest;
 }
 
-/// An oval through the room, 40 s long; the chair also turns against it for a while.
-k::Pose2D truth(double t) {
-  const double a = 2 * M_PI * t / 40;
-  return {-0.5 + 2 * std::cos(a), -1.5 + 1.2 * std::sin(a), a + 0.8 * std::sin(3 * a) + 1.6};
-}
-
-/// Odometry that drives 4 % too far, turns 5 % too little and drifts by -0.01 rad/s, integrated in small
-/// steps.
-class Odometry {
- public:
-  k::Pose2D at(double t) {
-    for (; time_ + kStep / 2 < t; time_ += kStep) {
-      const k::Pose2D way = k::between(truth(time_), truth(time_ + kStep));
-      pose_ = k::compose(pose_, {1.04 * way.x, 1.04 * way.y, 0.95 * way.theta - 0.01 * kStep});
-    }
-    return pose_;
-  }
-
- private:
-  static constexpr double kStep = 1e-3;
-  double time_ = 0;
-  k::Pose2D pose_{0.7, -0.3, 2.0};
-};
-
-const k::Fan kUrg{-2.086214, 0.006135923, 9.765625e-5, 5.6, {0.3, 0.05, 0.1}};
-constexpr int kBeams = 682;
-
-/// Every beam from where the laser is at its time.
-k::Scan scanAt(double t, const k::Fan& fan, int beams, std::mt19937* noise) {
-  k::Scan scan{t, fan, std::vector<float>(beams)};
-  std::normal_distribution<double> sigma(0, 0.003);
-  for (int i = 0; i < beams; ++i) {
-    const k::Pose2D laser = k::compose(truth(t + i * fan.time_increment), fan.base_from_laser);
-    const double bearing = fan.angle_min + fan.angle_increment * i;
-    const double range = rangeAlong({laser.x, laser.y, laser.theta + bearing});
-    scan.ranges[i] = range > fan.range_max ? kInf : static_cast<float>(range + (noise ? sigma(*noise) : 0));
-  }
-  return scan;
-}
-
-/// As shipped in launch/mapping_node.yaml; written down here, so that tuning that file cannot break this
-/// test.
-std::map<std::string, double> values() {
-  return {{"match_iterations", 15},
-          {"match_every", 2},
-          {"match_reach", 1.0},
-          {"match_deviation", 0.02},
-          {"match_key_distance", 0.25},
-          {"match_key_angle", 0.17},
-          {"match_key_scans", 40},
-          {"match_prior_distance", 0.2},
-          {"match_prior_angle", 0.2},
-          {"match_prior_floor", 0.005},
-          {"match_prior_angle_floor", 0.005},
-          {"slip_gain", 0.1},
-          {"resolution", 0.05},
-          {"range", 25},
-          {"certainty", 0.6},
-          {"particles", 10},
-          {"localise_distance", 0.25},
-          {"localise_angle", 0.1745},
-          {"insert_distance", 0.5},
-          {"insert_angle", 0.5},
-          {"distance_per_distance", 0.002},
-          {"distance_per_angle", 0.0004},
-          {"angle_per_distance", 0.0008},
-          {"angle_per_angle", 0.001},
-          {"distance_floor", 0.0004},
-          {"angle_floor", 0.0002},
-          {"hit_deviation", 0.1},
-          {"hit_reach", 0.3},
-          {"hit_share", 0.95},
-          {"hit_every", 3},
-          {"likelihood_power", 0.1},
-          {"resample_below", 0.5}};
-}
-
-k::MapperSettings settings() {
-  const auto table = values();
-  return k::makeSettings([&table](const std::string& name) { return table.at(name); });
-}
-
 struct Drive {
   std::vector<k::StampedPose> trajectory;
   std::vector<k::Pose2D> online;
   k::OccupancyGrid grid;
 };
 
-Drive drive(std::uint32_t seed, double seconds, const k::Fan& fan = kUrg, int beams = kBeams) {
-  k::Mapper mapper(settings(), seed);
+Drive drive(std::uint32_t seed, double seconds, const k::Fan& fan = room::kUrg, int beams = room::kBeams) {
+  k::Mapper mapper(room::settings(), seed);
   std::mt19937 noise(7);
-  Odometry odometry;
+  room::Wheels odometry;
   Drive out;
   for (int i = 0; i < static_cast<int>(seconds * 10); ++i) {
     const double t = 0.1 * i;
     const k::Pose2D start = odometry.at(t);
     const k::Pose2D end = odometry.at(t + fan.time_increment * (beams - 1));
-    out.online.push_back(mapper.add(scanAt(t, fan, beams, &noise), start, end).map_from_base);
+    out.online.push_back(mapper.add(room::scanAt(t, fan, beams, &noise), start, end).map_from_base);
   }
   out.trajectory = mapper.trajectory();
   out.grid = mapper.grid();
@@ -163,8 +55,8 @@ Drive drive(std::uint32_t seed, double seconds, const k::Fan& fan = kUrg, int be
 
 /// The room's frame as seen from the map's: the map begins as odometry.
 k::Pose2D mapFromRoom() {
-  Odometry odometry;
-  return k::compose(odometry.at(0), k::between(truth(0), {0, 0, 0}));
+  room::Wheels odometry;
+  return k::compose(odometry.at(0), k::between(room::truth(0), {0, 0, 0}));
 }
 
 struct Error {
@@ -172,7 +64,7 @@ struct Error {
 };
 
 Error errorOf(const k::Pose2D& map_from_base, double t) {
-  const k::Pose2D error = k::between(k::compose(mapFromRoom(), truth(t)), map_from_base);
+  const k::Pose2D error = k::between(k::compose(mapFromRoom(), room::truth(t)), map_from_base);
   return {std::hypot(error.x, error.y), std::abs(k::wrapAngle(error.theta))};
 }
 
@@ -197,21 +89,22 @@ double strayShare(const k::OccupancyGrid& grid, double distance) {
 
 TEST(Deskew, GivesTheScanThatAChairAtRestWouldTake) {
   const double t = 3.0;  // turning at 0.5 rad/s
-  const k::Scan rolling = scanAt(t, kUrg, kBeams, nullptr);
-  k::Fan at_once = kUrg;
+  const k::Scan rolling = room::scanAt(t, room::kUrg, room::kBeams, nullptr);
+  k::Fan at_once = room::kUrg;
   at_once.time_increment = 0;
-  const k::Scan expected = scanAt(t, at_once, kBeams, nullptr);
-  const k::Scan got = k::deskew(rolling, k::between(truth(t), truth(t + kUrg.time_increment * (kBeams - 1))));
+  const k::Scan expected = room::scanAt(t, at_once, room::kBeams, nullptr);
+  const k::Scan got = k::deskew(
+      rolling, k::between(room::truth(t), room::truth(t + room::kUrg.time_increment * (room::kBeams - 1))));
   int skewed = 0;
   int wrong = 0;
-  for (int i = 0; i < kBeams; ++i) {
+  for (int i = 0; i < room::kBeams; ++i) {
     skewed += std::abs(rolling.ranges[i] - expected.ranges[i]) > 0.003F;
     // Both infinite is right; edges of what hides something else may fall to the neighbouring beam.
     const bool same =
         got.ranges[i] == expected.ranges[i] || std::abs(got.ranges[i] - expected.ranges[i]) < 0.002F;
     wrong += !same && !std::isnan(got.ranges[i]);
   }
-  EXPECT_GT(skewed, kBeams / 3);
+  EXPECT_GT(skewed, room::kBeams / 3);
   EXPECT_LT(wrong, 10);
 }
 
@@ -235,7 +128,7 @@ TEST(Mapper, FollowsTheChairThroughBadOdometry) {
   }
   EXPECT_LT(errorOf(out.trajectory.back().pose, 39.9).heading, 0.01);
   // The test is about something: odometry alone is far off.
-  Odometry odometry;
+  room::Wheels odometry;
   EXPECT_GT(errorOf(odometry.at(39.9), 39.9).heading, 0.15);
 }
 
@@ -258,7 +151,7 @@ TEST(Mapper, PutsEveryBeamOfAClockwiseFanWhereItPoints) {
 
 TEST(Mapper, BeamsWithoutReturnClearAndUnknownOnesDoNot) {
   for (const bool no_return : {true, false}) {
-    k::Mapper mapper(settings(), 1);
+    k::Mapper mapper(room::settings(), 1);
     k::Scan scan{0, {-1.0, 0.01, 0, 4.0, {0, 0, 0}}, std::vector<float>(201, 2.0F)};
     for (int i = 80; i < 120; ++i) scan.ranges[i] = no_return ? kInf : std::nanf("");
     mapper.add(scan, {0, 0, 0}, {0, 0, 0});
@@ -293,10 +186,10 @@ TEST(Mapper, IsTheSameForASeedInAnyThread) {
 }
 
 TEST(Mapper, RefusesWhatMakesNoSense) {
-  k::Mapper mapper(settings(), 1);
+  k::Mapper mapper(room::settings(), 1);
   EXPECT_TRUE(mapper.trajectory().empty());
   EXPECT_EQ(mapper.grid().width, 0);
-  const k::Scan scan = scanAt(1.0, kUrg, kBeams, nullptr);
+  const k::Scan scan = room::scanAt(1.0, room::kUrg, room::kBeams, nullptr);
   mapper.add(scan, {0, 0, 0}, {0, 0, 0});
   EXPECT_THROW(mapper.add(scan, {0, 0, 0}, {0, 0, 0}), std::invalid_argument);
   k::Scan bad = scan;
@@ -314,17 +207,18 @@ TEST(Mapper, RefusesWhatMakesNoSense) {
 }
 
 TEST(Mapper, SurvivesScansThatSeeNothing) {
-  k::Mapper mapper(settings(), 1);
+  k::Mapper mapper(room::settings(), 1);
   for (int i = 0; i < 20; ++i) {
     const k::Pose2D odom{0.2 * i, 0, 0};
-    const auto estimate = mapper.add({0.1 * i, kUrg, std::vector<float>(kBeams, kInf)}, odom, odom);
+    const auto estimate =
+        mapper.add({0.1 * i, room::kUrg, std::vector<float>(room::kBeams, kInf)}, odom, odom);
     EXPECT_NEAR(estimate.map_from_base.x, odom.x, 0.1);
   }
 }
 
 TEST(Settings, EveryKeyIsNamedWhenItIsWrong) {
   for (const std::string& name : k::settingNames()) {
-    auto table = values();
+    auto table = room::values();
     table[name] = -1;
     try {
       k::makeSettings([&table](const std::string& key) { return table.at(key); });
@@ -336,7 +230,7 @@ TEST(Settings, EveryKeyIsNamedWhenItIsWrong) {
 }
 
 TEST(Settings, CountsAreWhole) {
-  auto table = values();
+  auto table = room::values();
   table["particles"] = 2.5;
   EXPECT_THROW(k::makeSettings([&table](const std::string& key) { return table.at(key); }),
                std::invalid_argument);

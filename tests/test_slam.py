@@ -13,6 +13,7 @@ import yaml
 from recordings import full_run, write_bag
 
 from kurumaisu import _slam, map_command, maps, slam
+from kurumaisu.critic.write_csv import write_csv_run
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose
 from kurumaisu.params import shipped
@@ -190,6 +191,10 @@ def test_command_writes_map_picture_and_path(tmp_path: Path, capsys: pytest.Capt
     assert (folder / "map.png").read_bytes().startswith(b"\x89PNG")
     path = np.loadtxt(folder / "trajectory.csv", delimiter=",", skiprows=1)
     assert path.shape == (37, 4)
+    sure = np.loadtxt(folder / "uncertainty.csv", delimiter=",", skiprows=1)
+    assert sure.shape[1] == 10
+    assert (sure[:, [4, 6, 9]] >= 0).all()
+    assert np.isin(np.round(sure[:, 0], 3), np.round(path[:, 0], 3)).all()
     meta = yaml.safe_load((folder / "map.yaml").read_text(encoding="utf-8"))
     assert (folder / meta["image"]).exists()
 
@@ -198,8 +203,39 @@ def test_command_maps_a_bag_as_the_critic_reads_it(tmp_path: Path, capsys: pytes
     """The full run of the readers' tests: a few scans of a wall, with voltages, so of our own laser."""
     write_bag(tmp_path / "drive.bag", full_run())
     assert map_command.main([str(tmp_path / "drive.bag"), "-o", str(tmp_path / "map")]) == 0
-    assert "drive: " in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "drive: " in out
+    assert "error: " not in out  # nobody says where its pose is
+    write_csv_run(tmp_path / "drives" / "run_1", full_run())
+    assert map_command.main([str(tmp_path / "drives"), "-o", str(tmp_path / "map")]) == 0
+    assert "error: " in capsys.readouterr().out  # random poses and scans, so of any size
     assert (tmp_path / "map" / "map.pgm").exists()
+
+
+def test_the_error_is_that_of_the_path_after_the_best_fit() -> None:
+    t = np.linspace(0, 10, 50)
+    path = np.column_stack([t, np.cos(t), np.sin(t), t])
+    moved = compose(np.broadcast_to([3.0, -2.0, 1.0], (50, 3)), path[:, 1:])
+    assert "error: 0.000 m, 0.00 degrees (RMS, 50 scans)" in map_command.error_of(path, np.column_stack([t, moved]))
+    moved[25] += [0.5, 0, 0]
+    assert "error: 0.07" in map_command.error_of(path, np.column_stack([t, moved]))
+    assert map_command.error_of(path, None) == ""
+    assert "other times" in map_command.error_of(path, np.column_stack([t + 100, moved]))
+
+
+def test_command_goes_on_from_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The same drive again, in the map it made: both paths agree in one frame, though the start was told wrong."""
+    log = str(DATASETS / "localization_demo.rawlog")
+    assert map_command.main([log, "-o", str(tmp_path / "a")]) == 0
+    first = np.loadtxt(tmp_path / "a" / "trajectory.csv", delimiter=",", skiprows=1)
+    x, y, theta = first[0, 1:] + [0.2, -0.2, 0.05]
+    start = ["--start", str(tmp_path / "a" / "map.simplemap"), "--at", f"{x}", f"{y}", f"{theta}"]
+    assert map_command.main([log, "-o", str(tmp_path / "b"), *start]) == 0
+    second = np.loadtxt(tmp_path / "b" / "trajectory.csv", delimiter=",", skiprows=1)
+    assert np.hypot(*(second - first)[:, 1:3].T).max() < 0.15
+    capsys.readouterr()
+    assert map_command.main([log, "-o", str(tmp_path / "c"), *start[:2], "--at", "500", "0", "0"]) == 2
+    assert "scan 0: the map to go on from explains 0 %" in capsys.readouterr().err
 
 
 def test_command_refuses_bad_input(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -213,6 +249,8 @@ def test_command_refuses_bad_input(tmp_path: Path, capfd: pytest.CaptureFixture[
         ([demo, "--seed", "-1"], "--seed: must be"),
         ([demo, "--settings", str(tmp_path / "none.yaml")], "none.yaml: No such file"),
         ([demo, "-o", str(blocked / "folder")], "folder: Not a directory"),
+        ([demo, "--start", str(tmp_path / "none.simplemap")], "none.simplemap: cannot be read"),
+        ([demo, "--start", str(blocked)], "is no simplemap to go on from"),
     ):
         assert map_command.main(arguments) == 2
         out, err = capfd.readouterr()

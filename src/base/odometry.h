@@ -5,19 +5,10 @@
 #include <Eigen/Core>
 #include <string>
 
+#include "model/rate_noise.h"
 #include "model/unicycle.h"
 
 namespace kurumaisu {
-
-/// Noise of the rates as the critic measures it, the model file's base.process_noise: on a moving chair
-/// v + sd_v g n_v and w + sd_w g n_w, where n are Ornstein-Uhlenbeck processes of variance 1 and time constant
-/// tau, and g = 1 + growth (|v| + |w|) / 0.8.
-struct RateNoise {
-  double sd_v = 0;    ///< [m/s]
-  double sd_w = 0;    ///< [rad/s]
-  double tau = 1;     ///< [s]
-  double growth = 0;  ///< [1]
-};
 
 /// Variances that a metre driven and a radian turned add, linear, so that the interval's length does not
 /// matter; and the noise that was measured.

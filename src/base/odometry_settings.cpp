@@ -5,6 +5,8 @@
 #include <array>
 #include <map>
 
+#include "model_file.h"
+
 namespace kurumaisu {
 namespace {
 
@@ -13,13 +15,6 @@ constexpr std::array<const char*, 3> kOfTheReference{"base.clock_scale", "base.m
 
 bool isOfTheReference(const std::string& id) {
   return std::find(kOfTheReference.begin(), kOfTheReference.end(), id) != kOfTheReference.end();
-}
-
-RateNoise readRateNoise(Section parameters) {
-  const RateNoise noise{parameters.atLeast("sd_v", 0), parameters.atLeast("sd_w", 0),
-                        parameters.above("tau", 0), parameters.atLeast("growth", 0)};
-  parameters.end();
-  return noise;
 }
 
 OdometryNoise readNoise(Section section, const KnownEffects& known) {

@@ -10,12 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu import slam
+from kurumaisu import slam, slam_score
 from kurumaisu.critic.reading import read_recording
 from kurumaisu.critic.reference import scan_log
 from kurumaisu.errors import Error, one_line
+from kurumaisu.geometry import interpolate
 from kurumaisu.maps import draw_map, save_map
 from kurumaisu.params import shipped
+from kurumaisu.types import FloatArray
+
+_LEAST_POSES = 3  # to fit two paths to each other
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -25,51 +29,108 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("-o", "--output", type=Path, default=Path("out/map"), metavar="FOLDER")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the particle filter (1)")
     parser.add_argument("--settings", type=Path, metavar="FILE", help="as launch/mapping_node.yaml, the default")
+    parser.add_argument("--start", type=Path, metavar="SIMPLEMAP", help="go on from this map")
+    parser.add_argument(
+        "--at", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "THETA"), help="where in it (0 0 0)"
+    )
+    parser.add_argument(
+        "--within",
+        type=float,
+        nargs=2,
+        default=(0.3, 0.2),
+        metavar=("DISTANCE", "ANGLE"),
+        help="how well that is known: deviations, 1 m and 0.5 rad at most (0.3 0.2)",
+    )
     options = parser.parse_args(arguments)
     try:
         if not 0 <= options.seed < 2**32:
             raise Error(f"--seed: must be 0 to 4294967295: {options.seed}")
         settings = slam.load_mapping_settings(options.settings or shipped("launch/mapping_node.yaml"))
-        report(read_log(options.log), settings, options.seed, options.output)
+        log, truth = read_log(options.log)
+        distance, angle = options.within
+        start = None
+        if options.start is not None:
+            start = slam.Start(options.start, np.array(options.at), np.array([distance, distance, angle]))
+        report(log, truth, settings, options.seed, start, options.output)
     except Error as error:
         print(f"map: {one_line(error)}", file=sys.stderr)
         return 2
     return 0
 
 
-def read_log(path: Path) -> slam.ScanLog:
-    """Read the scans and odometry of a recording of one run. Raise Error naming what is wrong with it."""
+def read_log(path: Path) -> tuple[slam.ScanLog, FloatArray | None]:
+    """Read the scans and odometry of a recording of one run, and the true poses, if it has any.
+
+    The latter as (m, 4) of t, x, y, theta. Raise Error naming what is wrong with it.
+    """
     if path.suffix != ".bag" and not path.is_dir():
-        return slam.read_rawlog(path)
+        return slam.read_rawlog(path), None
     recording = read_recording(path)
     if len(recording.runs) != 1:
         raise Error(f"{path}: has {len(recording.runs)} runs; a map is made of one")
-    return scan_log(recording, recording.runs[0])
+    run = recording.runs[0]
+    truth = None if run.pose is None else np.column_stack([run.pose.t, run.pose.values[:, :3]])
+    return scan_log(recording, run), truth
 
 
-def report(log: slam.ScanLog, settings: slam.MapperSettings, seed: int, folder: Path) -> slam.MappingResult:
-    """Map a log, write map.pgm, map.yaml, map.png and trajectory.csv, and say on stdout what came out."""
+def report(
+    log: slam.ScanLog,
+    truth: FloatArray | None,
+    settings: slam.MapperSettings,
+    seed: int,
+    start: slam.Start | None,
+    folder: Path,
+) -> slam.MappingResult:
+    """Map a log, write the map, a picture and the path to a folder, and say on stdout what came out."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise Error(f"{folder}: {error.strerror}") from error
-    start = time.process_time()
-    result = slam.map_scans(settings, log, seed, show_progress)
-    seconds = time.process_time() - start
+    before = time.process_time()
+    result = slam.map_scans(settings, log, seed, show_progress, start, folder / "map.simplemap")
+    seconds = time.process_time() - before
     path = result.trajectory
     save_map(result.grid, folder / "map")
-    odometry = np.column_stack([log.times, log.odom])  # its frame is the map's at the first scan
-    draw_map(result.grid, path, folder / "map.png", odometry, "odometry")
-    np.savetxt(folder / "trajectory.csv", path, fmt="%.6f", delimiter=",", header="t,x,y,theta", comments="")
+    if start is None:  # odometry's frame is the map's at the first scan
+        draw_map(result.grid, path, folder / "map.png", np.column_stack([log.times, log.odom]), "odometry")
+    else:
+        draw_map(result.grid, path, folder / "map.png")
+    _save_table(folder / "trajectory.csv", path, "t,x,y,theta")
+    _save_table(folder / "uncertainty.csv", result.nodes, "t,x,y,theta,xx,xy,yy,xt,yt,tt")
     way = np.hypot(np.diff(path[:, 1]), np.diff(path[:, 2])).sum()
     left, right, bottom, top = result.grid.extent
     print(
         f"{log.name}: {len(path)} scans, {path[-1, 0] - path[0, 0]:.1f} s, {way:.1f} m driven, seed {seed}\n"
         f"map: {right - left:.1f} x {top - bottom:.1f} m at {result.grid.resolution:g} m\n"
+        f"{error_of(path, truth)}"
         f"work: {1000 * seconds / len(path):.1f} ms of processor time per scan\n"
-        f"written: map.pgm, map.yaml, map.png, trajectory.csv in {folder}"
+        f"written: map.pgm, map.yaml, map.simplemap, map.png, trajectory.csv, uncertainty.csv in {folder}"
     )
     return result
+
+
+def error_of(path: FloatArray, truth: FloatArray | None) -> str:
+    """Return a line on how far a path (n, 4) is from the true one (m, 4), or nothing where there is none.
+
+    After the rigid motion that fits them best: the map's frame is its own.
+    """
+    if truth is None:
+        return ""
+    inside = (path[:, 0] >= truth[0, 0]) & (path[:, 0] <= truth[-1, 0])
+    if inside.sum() < _LEAST_POSES:
+        return "error: the recording has a true pose, but at other times\n"
+    at = interpolate(truth[:, 0], truth[:, 1:], path[inside, 0])
+    position, heading = slam_score.trajectory_error(path[inside, 1:], at)
+    return f"error: {position:.3f} m, {np.degrees(heading):.2f} degrees (RMS, {inside.sum()} scans)\n"
+
+
+def _save_table(path: Path, table: FloatArray, header: str) -> None:
+    try:
+        np.savetxt(
+            path, table, fmt=["%.6f"] * 4 + ["%.9g"] * (table.shape[1] - 4), delimiter=",", header=header, comments=""
+        )
+    except OSError as error:
+        raise Error(f"{path}: {error.strerror}") from error
 
 
 def show_progress(done: int, total: int) -> None:

@@ -42,10 +42,22 @@ class MappingResult:
 
     trajectory: map_from_base at every scan, (n, 4) of t [s], x, y [m], theta [rad, unwrapped]; the path of
     the likeliest particle in the light of the whole log, so fit as a reference for the drive.
+    nodes: the same where the filter ran, (m, 10), with the covariance of the particles around it: xx, xy, yy, xt,
+    yt, tt.
     """
 
     trajectory: FloatArray
     grid: Grid
+    nodes: FloatArray
+
+
+@dataclass(frozen=True)
+class Start:
+    """A simplemap to go on from, and where the chair is in it: pose (3,) [m, m, rad], with its deviations (3,)."""
+
+    path: Path
+    pose: FloatArray
+    deviations: FloatArray
 
 
 def load_mapping_settings(path: Path) -> MapperSettings:
@@ -110,15 +122,19 @@ def map_scans(
     log: ScanLog,
     seed: int,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    start: Start | None = None,
+    simplemap: Path | None = None,
 ) -> MappingResult:
-    """Map a log; progress is called with the number of scans done and the total.
+    """Map a log, or go on from a map; progress is called with the number of scans done and the total.
 
-    Equal arguments give equal results, bit by bit. Raise Error naming the log and the scan that makes no
-    sense.
+    simplemap: MRPT's simplemap is written there. Equal arguments give equal results, bit by bit. Raise Error naming
+    the log and the scan that makes no sense, the map that cannot be gone on from, or the file that cannot be written.
     """
     try:
         mapper = _slam.Mapper(mapper_settings, seed)
-    except ValueError as error:
+        if start is not None:
+            mapper.resume(str(start.path), mapper_settings, start.pose.tolist(), start.deviations.tolist())
+    except (RuntimeError, ValueError) as error:
         raise Error(f"mapper: {error}") from error
     total = len(log.times)
     for i in range(total):
@@ -130,4 +146,9 @@ def map_scans(
     trajectory = mapper.trajectory()
     trajectory[:, 3] = np.unwrap(trajectory[:, 3])
     cells, resolution, (x, y) = mapper.grid()
-    return MappingResult(trajectory, Grid(cells, resolution, x, y))
+    if simplemap is not None:
+        try:
+            mapper.write_simplemap(str(simplemap))
+        except RuntimeError as error:
+            raise Error(str(error)) from error
+    return MappingResult(trajectory, Grid(cells, resolution, x, y), mapper.nodes())

@@ -69,6 +69,25 @@ py::tuple grid(const k::Mapper& mapper) {
   return py::make_tuple(cells, grid.resolution, std::array<double, 2>{grid.x, grid.y});
 }
 
+/// Rows of t, x, y, theta, and the covariance's xx, xy, yy, xt, yt, tt.
+py::array_t<double> nodes(const k::Mapper& mapper) {
+  const auto path = mapper.nodes();
+  py::array_t<double> out({static_cast<py::ssize_t>(path.size()), static_cast<py::ssize_t>(10)});
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const auto& [stamp, pose, c] = path[i];
+    const std::array<double, 10> row{stamp, pose.x, pose.y, pose.theta, c[0], c[1], c[4], c[2], c[5], c[8]};
+    std::copy(row.begin(), row.end(), out.mutable_data(static_cast<py::ssize_t>(i), 0));
+  }
+  return out;
+}
+
+void resume(k::Mapper& mapper, const std::string& path, const py::dict& settings, const Triple& pose,
+            const Triple& deviations) {
+  k::Gaussian start{poseOf(pose), Eigen::Matrix3d::Zero()};
+  for (int i = 0; i < 3; ++i) start.covariance(i, i) = deviations[i] * deviations[i];
+  mapper.resume(k::savedMapOf(k::readSimplemap(path), settingsOf(settings)), start);
+}
+
 py::tuple readRawlog(const std::string& path) {
   k::LaserLog log{};
   {
@@ -128,7 +147,19 @@ PYBIND11_MODULE(_slam, m) {
       .def("grid", &grid,
            "Cells (height, width) from the lower left corner: 0 free to 100 occupied, -1 never seen; "
            "resolution "
-           "[m]; the corner's x, y [m].");
+           "[m]; the corner's x, y [m].")
+      .def("nodes", &nodes,
+           "The likeliest particle's path where the filter ran, (n, 10) of t, x, y, theta, and the "
+           "covariance of the "
+           "particles around it: xx, xy, yy, xt, yt, tt.")
+      .def(
+          "write_simplemap",
+          [](const k::Mapper& mapper, const std::string& path) { k::writeSimplemap(path, mapper.keys()); },
+          py::arg("path"), "Write MRPT's simplemap. Raise RuntimeError naming the file.")
+      .def("resume", &resume, py::arg("path"), py::arg("settings"), py::arg("pose"), py::arg("deviations"),
+           "Go on from a simplemap; the chair is about at map_from_base [m, m, rad], with those deviations. "
+           "Before any "
+           "scan. Raise RuntimeError naming the file, or ValueError for what makes no sense.");
 
   m.def("read_rawlog", &readRawlog, py::arg("path"),
         "Times (n,) [s], odom_from_base (n, 3) at the scans, ranges (n, beams) [m], the fan. Raise "

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace kurumaisu {
 
@@ -29,6 +30,26 @@ void setBounded(const ValueOf& value_of, const std::string& name, Member& member
     text << name << ": must be a whole number: " << value;
     throw std::invalid_argument(text.str());
   }
+}
+
+/// Names of the settings that visit(settings, visitor) goes through, calling visitor(name, member, lower, upper).
+template <typename Settings, typename Visit>
+std::vector<std::string> namesOf(Visit&& visit) {
+  std::vector<std::string> names;
+  Settings settings{};
+  visit(settings,
+        [&names](const char* name, const auto& /*member*/, double, double) { names.emplace_back(name); });
+  return names;
+}
+
+/// The settings themselves, each within its bounds. Throws as setBounded() does.
+template <typename Settings, typename Visit>
+Settings made(Visit&& visit, const ValueOf& value_of) {
+  Settings settings{};
+  visit(settings, [&value_of](const char* name, auto& member, double lower, double upper) {
+    setBounded(value_of, name, member, lower, upper);
+  });
+  return settings;
 }
 
 }  // namespace kurumaisu

@@ -7,8 +7,10 @@
 #include <mrpt/obs/CActionCollection.h>
 #include <mrpt/obs/CActionRobotMovement2D.h>
 #include <mrpt/obs/CSensoryFrame.h>
+#include <mrpt/poses/CPosePDFGaussian.h>
 #include <mrpt/random.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -40,9 +42,7 @@ mrpt::maps::TSetOfMetricMapInitializers mapDefinition(const MapperSettings& s) {
   // It grows as scans come in.
   grid.min_x = grid.min_y = -1;
   grid.max_x = grid.max_y = 1;
-  grid.insertionOpts.maxDistanceInsertion = static_cast<float>(s.range);
-  grid.insertionOpts.maxOccupancyUpdateCertainty = static_cast<float>(s.certainty);
-  grid.insertionOpts.considerInvalidRangesAsFreeSpace = false;  // insertionObservation() says what is free
+  setInsertion(grid.insertionOpts, s);
   grid.likelihoodOpts.likelihoodMethod = COccupancyGridMap2D::lmLikelihoodField_Thrun;
   grid.likelihoodOpts.LF_stdHit = static_cast<float>(s.hit_deviation);
   grid.likelihoodOpts.LF_zHit = static_cast<float>(s.hit_share);
@@ -56,7 +56,8 @@ mrpt::maps::TSetOfMetricMapInitializers mapDefinition(const MapperSettings& s) {
   return maps;
 }
 
-mrpt::obs::CActionCollection action(const MapperSettings& s, const Pose2D& motion) {
+mrpt::obs::CActionCollection action(const MapperSettings& s, const Pose2D& motion,
+                                    const Eigen::Matrix3d& more) {
   mrpt::obs::CActionRobotMovement2D::TMotionModelOptions model;
   model.modelSelection = mrpt::obs::CActionRobotMovement2D::mmGaussian;
   model.gaussianModel.a1 = static_cast<float>(s.distance_per_distance);
@@ -67,12 +68,31 @@ mrpt::obs::CActionCollection action(const MapperSettings& s, const Pose2D& motio
   model.gaussianModel.minStdPHI = static_cast<float>(s.angle_floor);
   mrpt::obs::CActionRobotMovement2D movement;
   movement.computeFromOdometry({motion.x, motion.y, wrapAngle(motion.theta)}, model);
+  auto& drawn = dynamic_cast<mrpt::poses::CPosePDFGaussian&>(*movement.poseChange);
+  for (int i = 0; i < 9; ++i) drawn.cov(i / 3, i % 3) += more(i / 3, i % 3);
   mrpt::obs::CActionCollection actions;
   actions.insert(movement);
   return actions;
 }
 
 Pose2D poseOf(const mrpt::math::TPose3D& pose) { return {pose.x, pose.y, pose.yaw}; }
+
+/// No cell of a map that was read is beyond doubt: what was moved since must not take hours to vanish.
+constexpr double kDoubt = 0.1;
+
+void fill(COccupancyGridMap2D& grid, const OccupancyGrid& map) {
+  const double right = map.x + map.width * map.resolution;
+  const double top = map.y + map.height * map.resolution;
+  grid.setSize(static_cast<float>(map.x), static_cast<float>(right), static_cast<float>(map.y),
+               static_cast<float>(top), static_cast<float>(map.resolution));
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const double cell = map.cells[static_cast<std::size_t>(y) * map.width + x];
+      if (cell < 0) continue;
+      grid.setCell(x, y, static_cast<float>(std::clamp(1 - cell / 100, kDoubt, 1 - kDoubt)));
+    }
+  }
+}
 
 }  // namespace
 
@@ -97,9 +117,31 @@ Filter::Filter(const MapperSettings& settings, std::uint32_t seed, const Pose2D&
 }
 Filter::~Filter() = default;
 
-void Filter::localise(const Scan& scan, const Pose2D& motion) {
+void Filter::resume(const OccupancyGrid& map, const Gaussian& map_from_base) {
   seedRandom();
-  const auto actions = action(settings_, motion);
+  const Eigen::LLT<Eigen::Matrix3d> root(map_from_base.covariance);
+  const COccupancyGridMap2D* first = nullptr;
+  for (auto& particle : particles_->pdf.m_particles) {
+    auto& random = mrpt::random::getRandomGenerator();
+    const Eigen::Vector3d draw(random.drawGaussian1D_normalized(), random.drawGaussian1D_normalized(),
+                               random.drawGaussian1D_normalized());
+    const Eigen::Vector3d off = root.matrixL() * draw;
+    const Pose2D& mean = map_from_base.mean;
+    particle.d->robotPath.back() =
+        mrpt::math::TPose3D(mean.x + off(0), mean.y + off(1), 0, wrapAngle(mean.theta + off(2)), 0, 0);
+    auto& grid = *particle.d->mapTillNow.mapByClass<COccupancyGridMap2D>();
+    if (first == nullptr) {
+      fill(grid, map);
+      first = &grid;
+    } else {
+      grid.copyMapContentFrom(*first);
+    }
+  }
+}
+
+void Filter::localise(const Scan& scan, const Pose2D& motion, const Eigen::Matrix3d& more) {
+  seedRandom();
+  const auto actions = action(settings_, motion, more);
   mrpt::obs::CSensoryFrame frame;
   frame.insert(likelihoodObservation(scan));
   particles_->filter.executeOn(particles_->pdf, &actions, &frame);
@@ -126,12 +168,14 @@ std::vector<Pose2D> Filter::bestPath() const {
   return path;
 }
 
-std::array<double, 9> Filter::covariance() const {
-  const Pose2D centre = bestPose();
+std::size_t Filter::nodes() const { return particles_->best().robotPath.size(); }
+
+std::array<double, 9> Filter::covarianceAt(std::size_t node) const {
+  const Pose2D centre = poseOf(particles_->best().robotPath.at(node));
   std::array<double, 9> sum{};
   double total = 0;
   for (const auto& particle : particles_->pdf.m_particles) {
-    const Pose2D pose = poseOf(particle.d->robotPath.back());
+    const Pose2D pose = poseOf(particle.d->robotPath.at(node));
     const std::array<double, 3> offset{pose.x - centre.x, pose.y - centre.y,
                                        wrapAngle(pose.theta - centre.theta)};
     const double weight = std::exp(particle.log_w);
@@ -139,6 +183,31 @@ std::array<double, 9> Filter::covariance() const {
     for (int i = 0; i < 9; ++i) sum[i] += weight * offset[i / 3] * offset[i % 3];
   }
   for (double& value : sum) value /= total;
+  return sum;
+}
+
+std::vector<std::array<double, 9>> Filter::pathCovariances() const {
+  std::vector<std::array<double, 9>> out;
+  for (std::size_t node = 0; node < nodes(); ++node) out.push_back(covarianceAt(node));
+  return out;
+}
+
+std::vector<Weighted> Filter::particles() const {
+  std::vector<Weighted> out;
+  double total = 0;
+  for (const auto& particle : particles_->pdf.m_particles) {
+    out.push_back({poseOf(particle.d->robotPath.back()), std::exp(particle.log_w)});
+    total += out.back().weight;
+  }
+  for (Weighted& each : out) each.weight /= total;
+  return out;
+}
+
+double Filter::entropy() const {
+  double sum = 0;
+  for (const Weighted& each : particles()) {
+    if (each.weight > 0) sum -= each.weight * std::log(each.weight);
+  }
   return sum;
 }
 

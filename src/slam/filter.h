@@ -18,20 +18,31 @@ class Filter {
   Filter(const MapperSettings& settings, std::uint32_t seed, const Pose2D& map_from_base);
   ~Filter();
 
-  /// Moves the particles by a motion with the settings' noise and weighs them by a de-skewed scan.
-  void localise(const Scan& scan, const Pose2D& motion);
+  /// Goes on in a map, with particles spread around a pose. Before anything else.
+  void resume(const OccupancyGrid& map, const Gaussian& map_from_base);
+
+  /// Moves the particles by a motion with the settings' noise, and more of it (along base's axes at the start), and
+  /// weighs them by a de-skewed scan.
+  void localise(const Scan& scan, const Pose2D& motion, const Eigen::Matrix3d& more);
   /// Adds a de-skewed scan to every particle's map, at its last pose.
   void insert(const Scan& scan);
 
   Pose2D bestPose() const;
   /// Poses of the likeliest particle: at the start and after every localise().
   std::vector<Pose2D> bestPath() const;
-  std::array<double, 9> covariance() const;
+  /// Spread of all particles around the likeliest at every node of its path. Where they have one ancestor it is 0.
+  std::vector<std::array<double, 9>> pathCovariances() const;
+  std::array<double, 9> covariance() const { return covarianceAt(nodes() - 1); }
+  std::vector<Weighted> particles() const;
+  /// Of the particles' weights [nat].
+  double entropy() const;
   OccupancyGrid grid() const;
 
  private:
   struct Particles;
   void seedRandom();
+  std::size_t nodes() const;
+  std::array<double, 9> covarianceAt(std::size_t node) const;
 
   MapperSettings settings_;
   std::uint32_t seed_;

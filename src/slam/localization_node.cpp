@@ -11,17 +11,17 @@
 #include <ros/ros.h>
 #include <std_srvs/Empty.h>
 #include <tf2_ros/transform_broadcaster.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <cmath>
-#include <ctime>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "slam/localization_node_settings.h"
 #include "slam/localization_report.h"
 #include "slam/messages.h"
 #include "slam/pose.h"
+#include "slam/scan_feed.h"
 
 namespace k = kurumaisu;
 
@@ -30,55 +30,17 @@ namespace {
 using PoseMessage = geometry_msgs::PoseWithCovarianceStamped;
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
-constexpr double kWarningPeriod = 5.0;    // [s] of throttled warnings
 constexpr double kPollPeriod = 0.01;      // [s] between looks whether scans have their transforms
-constexpr double kWorkLimit = 0.1;        // [s] of work in a row before scans that wait are skipped
 constexpr double kAskPeriod = 1.0;        // [s] between two calls of static_map
-constexpr std::size_t kQueue = 100;       // scans and odometry that may wait
+constexpr std::size_t kQueue = 100;       // odometry that may wait
 constexpr double kOdometryMemory = 10.0;  // [s] of covariances
 constexpr double kOdometryGap = 0.2;      // [s] a covariance holds for scans so near at most
 constexpr double kAhead = 10.0;  // [s] an initial pose stamped farther in the future is of another clock
 
-geometry_msgs::Pose messageOf(const k::Pose2D& pose) {
-  geometry_msgs::Pose out;
-  out.position.x = pose.x;
-  out.position.y = pose.y;
-  out.orientation.z = std::sin(pose.theta / 2);
-  out.orientation.w = std::cos(pose.theta / 2);
-  return out;
-}
-
-k::Pose2D planarOf(const geometry_msgs::Pose& pose) {
-  geometry_msgs::Transform transform;
-  transform.translation.x = pose.position.x;
-  transform.translation.y = pose.position.y;
-  transform.rotation = pose.orientation;
-  return k::planar(transform).pose;
-}
-
-/// x, y, heading of a ROS covariance of 6 x 6.
-Eigen::Matrix3d planarOf(const boost::array<double, 36>& values) {
-  constexpr std::array<int, 3> kRows{0, 1, 5};
-  Eigen::Matrix3d out;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) out(i, j) = values[6 * kRows[i] + kRows[j]];
-  }
-  return out;
-}
-
-k::OccupancyGrid gridOf(const nav_msgs::OccupancyGrid& map) {
-  return {static_cast<double>(map.info.resolution), 0,       0, static_cast<int>(map.info.width),
-          static_cast<int>(map.info.height),        map.data};
-}
-
-// Apart, because the macros count as a handful of branches each.
+// Apart, because the macro counts as a handful of branches.
 void warnFrame(const std::string& frame, const std::string& taken_for) {
   ROS_WARN("LOCALIZATION_MAP_FRAME: the map is in %s, and taken for one in %s", frame.c_str(),
            taken_for.c_str());
-}
-
-void warnSlow(std::uint64_t skipped) {
-  ROS_WARN_THROTTLE(kWarningPeriod, "LOCALIZATION_TOO_SLOW: scan: skipped, %lu so far", skipped);
 }
 
 class LocalizationNode {
@@ -86,20 +48,18 @@ class LocalizationNode {
   LocalizationNode(ros::NodeHandle& nh, k::LocalizationNodeSettings settings);
 
  private:
-  void onScan(const sensor_msgs::LaserScan::ConstPtr& scan);
   void onOdometry(const nav_msgs::Odometry& odometry);
   void onMap(const nav_msgs::OccupancyGrid& map);
   void onInitialPose(const PoseMessage& message);
   bool setMap(nav_msgs::SetMap::Request& request, nav_msgs::SetMap::Response& response);
   void advertise(ros::NodeHandle& nh);
   void askForMap();
-  void work();
   void add(const k::ScanQueue::Ready& ready);
   void publish(const k::ScanQueue::Ready& ready, const k::Localizer::Estimate& estimate, bool is_news);
   void publishCloud(const ros::Time& stamp);
   void save(const k::Gaussian& pose);
   void begin();
-  void reset(const char* why);
+  void reset();
   std::optional<Eigen::Matrix3d> covarianceAt(const ros::Time& stamp) const;
   bool setPose(const PoseMessage& message);
   void diagnose(Status& status);
@@ -111,32 +71,33 @@ class LocalizationNode {
   std::optional<k::Localizer> localizer_;
   std::optional<k::Localizer::Estimate> estimate_;
   std::map<ros::Time, Eigen::Matrix3d> covariances_;  ///< of odometry
-  ros::Time last_scan_, last_clock_, last_transform_;
-  ros::SteadyTime came_ = ros::SteadyTime::now(), taken_ = came_;  ///< the last scan, and the last one used
+  ros::Time last_transform_;
   ros::SteadyTime last_cloud_, last_save_;
-  std::uint64_t skipped_ = 0, scans_ = 0, reported_skipped_ = 0, reported_dropped_ = 0;
-  double work_seconds_ = 0;  ///< of processor time, for all scans
-  tf2_ros::Buffer buffer_;
-  tf2_ros::TransformListener listener_{buffer_};
-  k::ScanQueue queue_;
+  std::uint64_t reported_skipped_ = 0, reported_dropped_ = 0;
   tf2_ros::TransformBroadcaster broadcaster_;
   diagnostic_updater::Updater diagnostics_;
   ros::Publisher pose_, cloud_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
+  k::ScanFeed feed_;
   std::vector<ros::SteadyTimer> timers_;
 };
 
 LocalizationNode::LocalizationNode(ros::NodeHandle& nh, k::LocalizationNodeSettings settings)
     : settings_(std::move(settings)),
       nh_(nh),
-      queue_(buffer_, {settings_.odom_frame, settings_.base_frame, settings_.transform_deadline},
-             settings_.chair.laser, "LOCALIZATION", kQueue) {
+      feed_(
+          nh,
+          {{settings_.odom_frame, settings_.base_frame, settings_.transform_deadline},
+           settings_.chair.laser,
+           "LOCALIZATION",
+           settings_.backlog,
+           1},
+          [this](const k::ScanQueue::Ready& ready) { add(ready); }, [this](const char*) { reset(); }) {
   diagnostics_.setHardwareID("none");
   diagnostics_.add("localization", this, &LocalizationNode::diagnose);
   pose_ = nh.advertise<PoseMessage>("amcl_pose", 2, true);
   cloud_ = nh.advertise<geometry_msgs::PoseArray>("particlecloud", 2, true);
-  subscribers_.push_back(nh.subscribe("scan", kQueue, &LocalizationNode::onScan, this));
   subscribers_.push_back(nh.subscribe("odom", kQueue, &LocalizationNode::onOdometry, this));
   subscribers_.push_back(nh.subscribe("initialpose", 2, &LocalizationNode::onInitialPose, this));
   if (settings_.map_topic) subscribers_.push_back(nh.subscribe("map", 1, &LocalizationNode::onMap, this));
@@ -146,7 +107,7 @@ LocalizationNode::LocalizationNode(ros::NodeHandle& nh, k::LocalizationNodeSetti
     timers_.push_back(
         nh.createSteadyTimer(ros::WallDuration(period), [call](const ros::SteadyTimerEvent&) { call(); }));
   };
-  every(kPollPeriod, [this] { work(); });
+  every(kPollPeriod, [this] { feed_.work(); });
   every(kAskPeriod, [this] {
     diagnostics_.force_update();  // update() waits for a time that may have been set back
     if (!settings_.map_topic && !map_) askForMap();
@@ -168,15 +129,8 @@ void LocalizationNode::advertise(ros::NodeHandle& nh) {
   services_.push_back(nh.advertiseService("set_map", &LocalizationNode::setMap, this));
 }
 
-void LocalizationNode::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) {
-  if (scan->header.stamp + ros::Duration(k::kTimeJump) < last_scan_)
-    reset("a scan is older than the last one");
-  came_ = ros::SteadyTime::now();
-  queue_.push(scan);
-}
-
 void LocalizationNode::onOdometry(const nav_msgs::Odometry& odometry) {
-  const Eigen::Matrix3d covariance = planarOf(odometry.pose.covariance);
+  const Eigen::Matrix3d covariance = k::planarOf(odometry.pose.covariance);
   if (!covariance.allFinite() || !(covariance(0, 0) > 0)) return;  // it has none
   covariances_[odometry.header.stamp] = covariance;
   const ros::Time& newest = covariances_.rbegin()->first;
@@ -225,8 +179,8 @@ void LocalizationNode::begin() {
   bad_map_.clear();
   if (!map_) return;
   try {
-    localizer_.emplace(settings_.localizer, settings_.chair, settings_.seed, gridOf(*map_),
-                       planarOf(map_->info.origin));
+    localizer_.emplace(settings_.localizer, settings_.chair, settings_.seed, k::gridOf(*map_),
+                       k::planarOf(map_->info.origin));
     if (settings_.known_start) localizer_->setPose(settings_.start);
   } catch (const std::exception& error) {
     bad_map_ = error.what();
@@ -240,7 +194,7 @@ void LocalizationNode::onInitialPose(const PoseMessage& message) {
 
 bool LocalizationNode::setPose(const PoseMessage& message) {
   const std::string& frame = message.header.frame_id;
-  const k::Gaussian pose{planarOf(message.pose.pose), planarOf(message.pose.covariance)};
+  const k::Gaussian pose{k::planarOf(message.pose.pose), k::planarOf(message.pose.covariance)};
   const bool finite =
       std::isfinite(pose.mean.x + pose.mean.y + pose.mean.theta) && pose.covariance.allFinite();
   if (!localizer_ || !finite || (!frame.empty() && frame != settings_.map_frame)) return false;
@@ -249,37 +203,14 @@ bool LocalizationNode::setPose(const PoseMessage& message) {
   return true;
 }
 
-void LocalizationNode::work() {
-  const ros::Time now = ros::Time::now();
-  if (now + ros::Duration(k::kTimeJump) < last_clock_) reset("time ran backwards");
-  last_clock_ = now;
-  const ros::SteadyTime begin = ros::SteadyTime::now();
-  std::optional<k::ScanQueue::Ready> ready;
-  while (ros::ok() && (ready = queue_.next())) {
-    const bool is_slow = (ros::SteadyTime::now() - begin).toSec() > kWorkLimit;
-    if (is_slow && queue_.size() >= static_cast<std::size_t>(settings_.backlog)) {
-      warnSlow(++skipped_);
-    } else {
-      add(*ready);
-    }
-  }
-}
-
-void LocalizationNode::add(const k::ScanQueue::Ready& ready) try {
-  taken_ = ros::SteadyTime::now();
-  last_scan_ = ready.stamp;
+void LocalizationNode::add(const k::ScanQueue::Ready& ready) {
   if (!localizer_) return;
-  const std::clock_t start = std::clock();
   const auto estimate =
       localizer_->add(ready.scan, {ready.scan.stamp, ready.start, covarianceAt(ready.stamp)}, ready.end);
-  work_seconds_ += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-  ++scans_;
   const bool is_news = !estimate_ || estimate_->knowledge != estimate.knowledge;
   if (is_news) ROS_INFO("localization: %s", k::nameOf(estimate.knowledge));
   estimate_ = estimate;
   publish(ready, estimate, is_news);
-} catch (const std::invalid_argument& error) {
-  queue_.refuse(error.what());
 }
 
 void LocalizationNode::publish(const k::ScanQueue::Ready& ready, const k::Localizer::Estimate& estimate,
@@ -295,12 +226,7 @@ void LocalizationNode::publish(const k::ScanQueue::Ready& ready, const k::Locali
   PoseMessage message;
   message.header.stamp = ready.stamp;
   message.header.frame_id = settings_.map_frame;
-  message.pose.pose = messageOf(estimate.map_from_base.mean);
-  constexpr std::array<int, 3> kRows{0, 1, 5};
-  for (int i = 0; i < 9; ++i) {
-    message.pose.covariance[6 * kRows[i / 3] + kRows[i % 3]] =
-        estimate.map_from_base.covariance(i / 3, i % 3);
-  }
+  message.pose = k::messageOf(estimate.map_from_base);
   pose_.publish(message);
   publishCloud(ready.stamp);
   if (estimate.knowledge == k::Knowledge::kTracking) save(estimate.map_from_base);
@@ -313,7 +239,7 @@ void LocalizationNode::publishCloud(const ros::Time& stamp) {
   geometry_msgs::PoseArray cloud;
   cloud.header.stamp = stamp;
   cloud.header.frame_id = settings_.map_frame;
-  for (const auto& [pose, weight] : localizer_->particles()) cloud.poses.push_back(messageOf(pose));
+  for (const auto& [pose, weight] : localizer_->particles()) cloud.poses.push_back(k::messageOf(pose));
   cloud_.publish(cloud);
 }
 
@@ -329,30 +255,23 @@ void LocalizationNode::save(const k::Gaussian& pose) {
   private_.setParam("initial_cov_aa", pose.covariance(2, 2));
 }
 
-void LocalizationNode::reset(const char* why) {
-  ROS_WARN("LOCALIZATION_TIME_RESET: %s: localisation starts afresh", why);
-  buffer_.clear();
-  queue_.forgetAfter(ros::Time::now() + ros::Duration(k::kTimeJump));
+void LocalizationNode::reset() {
   covariances_.clear();
-  last_scan_ = last_transform_ = ros::Time();
+  last_transform_ = ros::Time();
   begin();
 }
 
 void LocalizationNode::diagnose(Status& status) {
-  const ros::SteadyTime now = ros::SteadyTime::now();
-  const double silence = (now - came_).toSec();
-  const bool waiting = silence < settings_.silence && (now - taken_).toSec() > settings_.silence;
-  const std::uint64_t dropped = queue_.dropped().all();
+  const auto& queue = feed_.queue();
+  const std::uint64_t lost = queue.dropped().no_transform + queue.dropped().bad_scan;
   const k::LocalizationState state{map_.has_value(),
                                    bad_map_,
-                                   silence,
+                                   feed_.silence(),
                                    settings_.silence,
-                                   waiting,
+                                   feed_.missing(settings_.silence),
                                    estimate_ ? &*estimate_ : nullptr,
-                                   dropped - reported_dropped_,
-                                   skipped_ - reported_skipped_};
-  reported_dropped_ = dropped;
-  reported_skipped_ = skipped_;
+                                   lost - std::exchange(reported_dropped_, lost),
+                                   feed_.skipped() - std::exchange(reported_skipped_, feed_.skipped())};
   const k::LocalizationVerdict verdict = k::judge(state);
   status.summary(static_cast<unsigned char>(verdict.level), verdict.summary);
   if (estimate_) {
@@ -361,13 +280,13 @@ void LocalizationNode::diagnose(Status& status) {
     status.add("usual fit", estimate_->fit_usual);
     status.add("particles", estimate_->particles);
   }
-  status.add("scans", scans_);
-  status.add("dropped without transform", queue_.dropped().no_transform);
-  status.add("dropped as senseless", queue_.dropped().bad_scan);
-  status.add("skipped", skipped_ + queue_.dropped().too_slow);
-  status.add("last dropped", queue_.reason());
+  status.add("scans", feed_.used());
+  status.add("dropped without transform", queue.dropped().no_transform);
+  status.add("dropped as senseless", queue.dropped().bad_scan);
+  status.add("skipped", feed_.skipped());
+  status.add("last dropped", queue.reason());
   status.add("processor time per scan [ms]",
-             scans_ > 0 ? 1000 * work_seconds_ / static_cast<double>(scans_) : 0);
+             feed_.used() > 0 ? 1000 * feed_.seconds() / static_cast<double>(feed_.used()) : 0);
 }
 
 }  // namespace

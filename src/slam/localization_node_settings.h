@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <string>
 
 #include "slam/localizer.h"
@@ -32,14 +31,10 @@ struct LocalizationNodeSettings {
 };
 
 /// base.process_noise among the effects of a model file; the others concern the simulator and the critic.
-inline ProcessNoise readProcessNoise(Section model) {
-  ProcessNoise noise{0, 0, 1, 0};
+inline RateNoise readProcessNoise(Section model) {
+  RateNoise noise;
   for (Section& effect : model.sections("effects")) {
-    if (effect.text("id") != "base.process_noise") continue;
-    Section parameters = effect.section("parameters");
-    noise = {parameters.atLeast("sd_v", 0), parameters.atLeast("sd_w", 0), parameters.above("tau", 0),
-             parameters.atLeast("growth", 0)};
-    parameters.end();
+    if (effect.text("id") == "base.process_noise") noise = readRateNoise(effect.section("parameters"));
   }
   return noise;
 }
@@ -81,14 +76,8 @@ inline LocalizationNodeSettings readLocalizationNodeSettings(const std::string& 
   out.start = readStart(top);
   out.seed = static_cast<std::uint32_t>(top.integer("seed", 0));
   out.chair = {readLaserError(model), readProcessNoise(model)};
-  std::map<std::string, double> values;
-  for (const std::string& key : localizerSettingNames()) values[key] = top.number(key);
+  out.localizer = readNamed(top, localizerSettingNames(), makeLocalizerSettings);
   top.end();
-  try {
-    out.localizer = makeLocalizerSettings([&values](const std::string& key) { return values.at(key); });
-  } catch (const std::invalid_argument& error) {
-    throw top.error("", error.what());
-  }
   return out;
 }
 

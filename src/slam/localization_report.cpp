@@ -39,8 +39,7 @@ const char* nameOf(Knowledge knowledge) {
 LocalizationVerdict judge(const LocalizationState& state) {
   if (!state.bad_map.empty()) return {2, "LOCALIZATION_BAD_MAP: " + state.bad_map};
   if (!state.has_map) return {2, "LOCALIZATION_NO_MAP: none has come"};
-  if (state.waiting)
-    return {2, "LOCALIZATION_NO_TRANSFORM: scans come, but no odometry for them, or no place of the laser"};
+  if (!state.missing.empty()) return {2, "LOCALIZATION_NO_TRANSFORM: scans come, but " + state.missing};
   if (state.silence > state.silence_limit) return {2, "LOCALIZATION_NO_SCAN: none came lately"};
   if (state.estimate == nullptr) return {1, "no scan yet"};
   if (state.estimate->knowledge == Knowledge::kLost) return {2, lost(*state.estimate)};

@@ -14,7 +14,7 @@ struct LocalizationState {
   std::string bad_map;                         ///< why the last map was refused, or empty
   double silence;                              ///< since the last scan came [s]
   double silence_limit;                        ///< [s]
-  bool waiting;                                ///< scans came since, but without transforms
+  std::string missing;                         ///< what scans wait for in vain, or empty
   const Localizer::Estimate* estimate;         ///< of the last scan; null before the first
   std::uint64_t newly_dropped, newly_skipped;  ///< since the last diagnostics
 };

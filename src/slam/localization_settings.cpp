@@ -56,22 +56,15 @@ void visitSettings(LocalizerSettings& s, Visit&& visit) {
   visitRecovery(s.recovery, visit);
 }
 
+/// visitSettings() as a value that templates take.
+constexpr auto kVisit = [](LocalizerSettings& settings, auto&& visit) { visitSettings(settings, visit); };
+
 }  // namespace
 
-std::vector<std::string> localizerSettingNames() {
-  std::vector<std::string> names;
-  LocalizerSettings settings{};
-  visitSettings(settings, [&names](const char* name, const auto& /*member*/, double, double) {
-    names.emplace_back(name);
-  });
-  return names;
-}
+std::vector<std::string> localizerSettingNames() { return namesOf<LocalizerSettings>(kVisit); }
 
 LocalizerSettings makeLocalizerSettings(const ValueOf& value_of) {
-  LocalizerSettings settings{};
-  visitSettings(settings, [&value_of](const char* name, auto& member, double lower, double upper) {
-    setBounded(value_of, name, member, lower, upper);
-  });
+  const auto settings = made<LocalizerSettings>(kVisit, value_of);
   if (settings.max_particles < settings.min_particles) {
     throw std::invalid_argument("max_particles: must be at least min_particles: " +
                                 std::to_string(settings.max_particles));

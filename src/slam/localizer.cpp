@@ -286,7 +286,7 @@ class Localizer::Impl {
   }
 
   LocalizerSettings settings_;
-  ProcessNoise process_;
+  RateNoise process_;
   Field field_;
   Sensor sensor_;
   Particles particles_;

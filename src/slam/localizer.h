@@ -22,7 +22,7 @@ enum class Knowledge {
 /// What the chair is and has: of the model file.
 struct Chair {
   LaserError laser;
-  ProcessNoise process;
+  RateNoise process;
 };
 
 /// Follows a chair in a map.

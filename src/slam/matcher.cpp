@@ -82,7 +82,7 @@ Matcher::Match Matcher::add(const Scan& scan, const Pose2D& motion) {
     started_ = true;
     pose_ = key_pose_ = start;
     insert(scan);
-    return {pose_, Eigen::Matrix3d::Zero()};
+    return {pose_, Eigen::Matrix3d::Zero(), true};
   }
   Points points;
   const Points all = pointsOf(scan);
@@ -112,7 +112,7 @@ Matcher::Match Matcher::align(const Points& points, const Pose2D& start, const P
   for (int i = 0; i < settings_.iterations; ++i) {
     Eigen::Vector3d gradient;
     if (!linearise(points, pose, reach, information, gradient)) {
-      return {start, prior.cwiseInverse().asDiagonal()};
+      return {start, prior.cwiseInverse().asDiagonal(), false};
     }
     information += prior.asDiagonal();
     gradient +=
@@ -123,7 +123,7 @@ Matcher::Match Matcher::align(const Points& points, const Pose2D& start, const P
     // The first rounds catch an odometry that slipped, the last see true pairs only.
     reach = step.norm() < kSettled ? least : std::fmax(least, kShrink * reach);
   }
-  return {pose, information.inverse()};
+  return {pose, information.inverse(), true};
 }
 
 bool Matcher::linearise(const Points& points, const Pose2D& pose, double reach, Eigen::Matrix3d& information,

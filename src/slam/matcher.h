@@ -23,6 +23,7 @@ class Matcher {
   struct Match {
     Pose2D pose;                 ///< of base
     Eigen::Matrix3d covariance;  ///< of the pose given the last one: x, y [m], heading [rad], in this frame
+    bool found;                  ///< in the scan; else odometry alone says where it is
   };
 
   /// Pose of base at a de-skewed scan; motion: what odometry says of the way since the last scan.

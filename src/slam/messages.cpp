@@ -4,6 +4,7 @@
 #include <ros/console.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -15,6 +16,8 @@ namespace {
 
 constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
 constexpr double kLevel = 0.99;  // cosine of the tilt beyond which a laser does not measure in the plane
+
+constexpr std::array<int, 3> kRows{0, 1, 5};  // x, y, yaw among six
 
 }  // namespace
 
@@ -34,6 +37,59 @@ geometry_msgs::TransformStamped stamped(const Pose2D& pose, const ros::Time& sta
   out.transform.translation.y = pose.y;
   out.transform.rotation.z = std::sin(pose.theta / 2);
   out.transform.rotation.w = std::cos(pose.theta / 2);
+  return out;
+}
+
+geometry_msgs::Pose messageOf(const Pose2D& pose) {
+  geometry_msgs::Pose out;
+  out.position.x = pose.x;
+  out.position.y = pose.y;
+  out.orientation.z = std::sin(pose.theta / 2);
+  out.orientation.w = std::cos(pose.theta / 2);
+  return out;
+}
+
+geometry_msgs::PoseWithCovariance messageOf(const Gaussian& pose) {
+  geometry_msgs::PoseWithCovariance out;
+  out.pose = messageOf(pose.mean);
+  for (int i = 0; i < 9; ++i) out.covariance[6 * kRows[i / 3] + kRows[i % 3]] = pose.covariance(i / 3, i % 3);
+  return out;
+}
+
+Pose2D planarOf(const geometry_msgs::Pose& pose) {
+  geometry_msgs::Transform transform;
+  transform.translation.x = pose.position.x;
+  transform.translation.y = pose.position.y;
+  transform.rotation = pose.orientation;
+  return planar(transform).pose;
+}
+
+Eigen::Matrix3d planarOf(const boost::array<double, 36>& values) {
+  Eigen::Matrix3d out;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) out(i, j) = values[6 * kRows[i] + kRows[j]];
+  }
+  return out;
+}
+
+OccupancyGrid gridOf(const nav_msgs::OccupancyGrid& map) {
+  // A float: 0.05 comes as 0.0500000007.
+  const double resolution = std::nearbyint(static_cast<double>(map.info.resolution) * 1e6) / 1e6;
+  return {resolution, 0, 0, static_cast<int>(map.info.width), static_cast<int>(map.info.height), map.data};
+}
+
+nav_msgs::OccupancyGrid messageOf(const OccupancyGrid& grid, const ros::Time& stamp,
+                                  const std::string& frame) {
+  nav_msgs::OccupancyGrid out;
+  out.header.stamp = out.info.map_load_time = stamp;
+  out.header.frame_id = frame;
+  out.info.resolution = static_cast<float>(grid.resolution);
+  out.info.width = grid.width;
+  out.info.height = grid.height;
+  out.info.origin.position.x = grid.x;
+  out.info.origin.position.y = grid.y;
+  out.info.origin.orientation.w = 1;
+  out.data = grid.cells;
   return out;
 }
 
@@ -80,15 +136,16 @@ bool ScanQueue::has(const sensor_msgs::LaserScan& scan, std::string* why) const 
 
 std::optional<ScanQueue::Ready> ScanQueue::next() {
   while (!waiting_.empty()) {
+    // Out of the queue first: whatever is thrown, the next round is about the next scan.
     const Waiting front = waiting_.front();
+    waiting_.pop_front();
     std::string why;
     try {
-      if (has(*front.scan, &why)) {
-        waiting_.pop_front();
-        return ready(*front.scan);
+      if (has(*front.scan, &why)) return ready(*front.scan);
+      if ((ros::SteadyTime::now() - front.since).toSec() < frames_.deadline) {
+        waiting_.push_front(front);
+        return std::nullopt;
       }
-      if ((ros::SteadyTime::now() - front.since).toSec() < frames_.deadline) return std::nullopt;
-      waiting_.pop_front();
       drop(dropped_.no_transform, "NO_TRANSFORM",
            "none of " + front.scan->header.frame_id + " and " + frames_.base + " to " + frames_.odom +
                " at " + std::to_string(front.scan->header.stamp.toSec()) + " s within transform_deadline" +
@@ -96,7 +153,6 @@ std::optional<ScanQueue::Ready> ScanQueue::next() {
     } catch (const tf2::TransformException& error) {
       drop(dropped_.no_transform, "NO_TRANSFORM", error.what());
     } catch (const std::exception& error) {  // std::runtime_error: a time out of ros::Time's range
-      if (!waiting_.empty() && waiting_.front().scan == front.scan) waiting_.pop_front();
       refuse(error.what());
     }
   }

@@ -2,7 +2,9 @@
 // What the nodes make of ROS's scans and transforms. For them only.
 #pragma once
 
+#include <geometry_msgs/PoseWithCovariance.h>
 #include <geometry_msgs/TransformStamped.h>
+#include <nav_msgs/OccupancyGrid.h>
 #include <sensor_msgs/LaserScan.h>
 #include <tf2_ros/buffer.h>
 
@@ -12,6 +14,8 @@
 #include <string>
 
 #include "model/laser_error.h"
+#include "slam/gaussian.h"
+#include "slam/occupancy.h"
 #include "slam/scan.h"
 
 namespace kurumaisu {
@@ -28,6 +32,17 @@ Planar planar(const geometry_msgs::Transform& transform);
 
 geometry_msgs::TransformStamped stamped(const Pose2D& pose, const ros::Time& stamp, const std::string& parent,
                                         const std::string& child);
+
+geometry_msgs::Pose messageOf(const Pose2D& pose);
+geometry_msgs::PoseWithCovariance messageOf(const Gaussian& pose);
+Pose2D planarOf(const geometry_msgs::Pose& pose);
+/// x, y, heading of a ROS covariance of 6 x 6.
+Eigen::Matrix3d planarOf(const boost::array<double, 36>& values);
+
+/// The cells, with the lower left corner at the origin: where that is the caller knows.
+OccupancyGrid gridOf(const nav_msgs::OccupancyGrid& map);
+nav_msgs::OccupancyGrid messageOf(const OccupancyGrid& grid, const ros::Time& stamp,
+                                  const std::string& frame);
 
 /// A scan without the mean error of its readings. Throws std::invalid_argument for a laser that does not look into the
 /// plane.

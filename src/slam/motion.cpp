@@ -57,7 +57,7 @@ double integrated(double time, double tau) {
 }  // namespace
 
 Gaussian motionBetween(const Odometry& first, const Odometry& second, const MotionSettings& settings,
-                       const ProcessNoise& process) {
+                       const RateNoise& process) {
   Pose2D motion = between(first.pose, second.pose);
   motion.theta = wrapAngle(motion.theta);
   const double way = std::hypot(motion.x, motion.y);

@@ -5,18 +5,11 @@
 #include <Eigen/Core>
 #include <optional>
 
+#include "model/rate_noise.h"
 #include "slam/localization_settings.h"
 #include "slam/particles.h"
 
 namespace kurumaisu {
-
-/// base.process_noise of the model file: what floor, tyres and casters add to the rates of a moving chair.
-struct ProcessNoise {
-  double sd_v;    ///< [m/s]
-  double sd_w;    ///< [rad/s]
-  double tau;     ///< time in which it changes [s]
-  double growth;  ///< with the rates [-]
-};
 
 /// Odometry at one time, with the covariance that it gives of itself, if it does.
 struct Odometry {
@@ -30,7 +23,7 @@ struct Odometry {
 /// Its noise is the growth of odometry's covariance, or that of the settings where it has none or one that
 /// does not grow; with the floors and the process noise added.
 Gaussian motionBetween(const Odometry& first, const Odometry& second, const MotionSettings& settings,
-                       const ProcessNoise& process);
+                       const RateNoise& process);
 
 /// Where a motion takes a pose, and how uncertain that is.
 Gaussian moved(const Gaussian& pose, const Gaussian& motion);

@@ -2,27 +2,15 @@
 // MRPT's Monte Carlo localisation with its adaptive number of particles. No MRPT type in this header.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <vector>
 
-#include "model/unicycle.h"
+#include "slam/gaussian.h"
 #include "slam/localization_settings.h"
 
 namespace kurumaisu {
-
-/// A pose and how certain it is: x, y [m], heading [rad].
-struct Gaussian {
-  Pose2D mean{0, 0, 0};
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-};
-
-struct Weighted {
-  Pose2D pose;
-  double weight;  ///< they sum up to 1
-};
 
 /// Equal seeds and calls give equal particles, bit by bit.
 class Particles {

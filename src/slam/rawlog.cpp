@@ -17,14 +17,13 @@
 #include <optional>
 #include <stdexcept>
 
+#include "slam/observation.h"
 #include "slam/pose.h"
 
 namespace kurumaisu {
 namespace {
 
 using mrpt::obs::CObservation2DRangeScan;
-
-constexpr double kLevel = 0.1;  // [rad] a laser tilted by more does not measure in the plane
 
 /// The decompressed bytes. In memory, because only there the end of the last object can be told from a file
 /// that was cut off.
@@ -45,21 +44,6 @@ std::vector<std::uint8_t> contents(const std::string& path) {
 }
 
 Pose2D poseOf(const mrpt::poses::CPose2D& pose) { return {pose.x(), pose.y(), pose.phi()}; }
-
-Fan fanOf(const CObservation2DRangeScan& scan) {
-  const auto& mount = scan.sensorPose;
-  const bool upside_down = std::abs(wrapAngle(mount.roll() - M_PI)) < kLevel;
-  if (std::abs(mount.pitch()) > kLevel || (!upside_down && std::abs(mount.roll()) > kLevel)) {
-    throw std::runtime_error("the laser is tilted");
-  }
-  const double turn = scan.rightToLeft != upside_down ? 1 : -1;
-  const double aperture = scan.aperture;
-  return {-turn * aperture / 2,
-          turn * aperture / static_cast<double>(scan.getScanSize() - 1),
-          0,
-          scan.maxRange,
-          {mount.x(), mount.y(), mount.yaw()}};
-}
 
 class Reader {
  public:
@@ -104,7 +88,6 @@ class Reader {
 
   void observe(const CObservation2DRangeScan& scan) {
     if (!label_) {
-      if (scan.getScanSize() < 2) throw std::runtime_error("has a scan of fewer than 2 beams");
       label_ = scan.sensorLabel;
       log_.fan = fanOf(scan);
       log_.beams = scan.getScanSize();
@@ -121,20 +104,6 @@ class Reader {
     log_.times.push_back(time);
     log_.odom.push_back(odom_);
     log_.ranges.push_back(rangesOf(scan));
-  }
-
-  static std::vector<float> rangesOf(const CObservation2DRangeScan& scan) {
-    std::vector<float> ranges(scan.getScanSize());
-    for (std::size_t i = 0; i < ranges.size(); ++i) {
-      const float range = scan.getScanRange(i);
-      const bool none = range >= scan.maxRange;
-      if (none) {
-        ranges[i] = std::numeric_limits<float>::infinity();
-      } else {
-        ranges[i] = scan.getScanRangeValidity(i) ? range : std::numeric_limits<float>::quiet_NaN();
-      }
-    }
-    return ranges;
   }
 
   LaserLog log_{};

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "slam/settings.h"
 
-#include "slam/bounded.h"
-
 namespace kurumaisu {
 namespace {
 
@@ -20,13 +18,17 @@ void visitSettings(MapperSettings& s, Visit&& visit) {
   visit("match_prior_angle", s.match.prior_angle, 0, 10);
   visit("match_prior_floor", s.match.prior_floor, 1e-6, 10);
   visit("match_prior_angle_floor", s.match.prior_angle_floor, 1e-6, 10);
+  visit("jump_speed", s.jump_speed, 0.1, 1000);
+  visit("jump_turn", s.jump_turn, 0.1, 1000);
   visit("slip_gain", s.slip_gain, 0, 1);
   visit("resolution", s.resolution, 0.005, 1);
   visit("range", s.range, 0.1, 200);
   visit("certainty", s.certainty, 0.51, 0.99);
+  visit("most_cells", s.most_cells, 1e4, 1e9);
   visit("particles", s.particles, 1, 10000);
   visit("localise_distance", s.localise_distance, 0, 100);
   visit("localise_angle", s.localise_angle, 0, 10);
+  visit("localise_time", s.localise_time, 0, 1e6);
   visit("insert_distance", s.insert_distance, 0, 100);
   visit("insert_angle", s.insert_angle, 0, 10);
   visit("distance_per_distance", s.distance_per_distance, 0, 10);
@@ -43,23 +45,13 @@ void visitSettings(MapperSettings& s, Visit&& visit) {
   visit("resample_below", s.resample_below, 0, 1);
 }
 
+/// visitSettings() as a value that templates take.
+constexpr auto kVisit = [](MapperSettings& settings, auto&& visit) { visitSettings(settings, visit); };
+
 }  // namespace
 
-std::vector<std::string> settingNames() {
-  std::vector<std::string> names;
-  MapperSettings settings{};
-  visitSettings(settings, [&names](const char* name, const auto& /*member*/, double, double) {
-    names.emplace_back(name);
-  });
-  return names;
-}
+std::vector<std::string> settingNames() { return namesOf<MapperSettings>(kVisit); }
 
-MapperSettings makeSettings(const std::function<double(const std::string&)>& value_of) {
-  MapperSettings settings{};
-  visitSettings(settings, [&value_of](const char* name, auto& member, double lower, double upper) {
-    setBounded(value_of, name, member, lower, upper);
-  });
-  return settings;
-}
+MapperSettings makeSettings(const ValueOf& value_of) { return made<MapperSettings>(kVisit, value_of); }
 
 }  // namespace kurumaisu

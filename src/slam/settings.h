@@ -2,9 +2,10 @@
 // Settings of the mapper. They have no defaults: the values are in launch/mapping_node.yaml.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
+
+#include "slam/bounded.h"
 
 namespace kurumaisu {
 
@@ -25,15 +26,19 @@ struct MatchSettings {
 
 struct MapperSettings {
   MatchSettings match;
-  double slip_gain;  ///< share of odometry's rate of error, per scan, that is learnt for the next [-]
+  double jump_speed;  ///< odometry that goes faster has jumped [m/s]
+  double jump_turn;   ///< or turns faster [rad/s]
+  double slip_gain;   ///< share of odometry's rate of error, per scan, that is learnt for the next [-]
 
   double resolution;  ///< of the grid [m]
   double range;       ///< readings beyond are not mapped; beams without a return clear so far [m]
   double certainty;   ///< of one reading for its cell [-], 0.5 to 1
+  double most_cells;  ///< of a map; a scan that would make it larger does not go in
 
   int particles;
   double localise_distance;  ///< the filter runs after so much way [m]
   double localise_angle;     ///< or so much turn [rad]
+  double localise_time;      ///< or so much time, at rest as well [s]; 0 = never for time alone
   double insert_distance;    ///< the map grows after so much way [m]
   double insert_angle;       ///< or so much turn [rad]
 
@@ -57,6 +62,6 @@ std::vector<std::string> settingNames();
 
 /// Settings from a function that gives the value for a name. Throws std::invalid_argument naming the key that
 /// is out of its bounds (or is no whole number where one is needed); what the function throws passes through.
-MapperSettings makeSettings(const std::function<double(const std::string&)>& value_of);
+MapperSettings makeSettings(const ValueOf& value_of);
 
 }  // namespace kurumaisu
