@@ -102,8 +102,25 @@ class Peer:
         """Compile drivers/<name>.cpp. Raise Error with the compiler's words if that fails."""
         program = folder / name
         include, search = prefix / "include", prefix / "lib"
-        command = ["g++", "-O2", "-w", "-std=c++17", f"-I{include}", f"-I{include / name}", str(_DRIVERS / f"{name}.cpp")]
-        _call([*command, f"-L{search}", *(f"-l{library}" for library in libraries), f"-Wl,-rpath,{search}", "-o", str(program)])
+        command = [
+            "g++",
+            "-O2",
+            "-w",
+            "-std=c++17",
+            f"-I{include}",
+            f"-I{include / name}",
+            str(_DRIVERS / f"{name}.cpp"),
+        ]
+        _call(
+            [
+                *command,
+                f"-L{search}",
+                *(f"-l{library}" for library in libraries),
+                f"-Wl,-rpath,{search}",
+                "-o",
+                str(program),
+            ]
+        )
         return cls(program, folder)
 
     def run(self, log: ScanLog, settings: Mapping[str, float | str]) -> tuple[Run, FloatArray]:
@@ -126,7 +143,13 @@ def gmapping(peer: Peer, log: ScanLog, seed: int) -> tuple[Run, FloatArray, Grid
 
 
 def amcl(
-    peer: Peer, log: ScanLog, grid: MapFile, settings: Mapping[str, float | str], start: FloatArray, sd: FloatArray, seed: int
+    peer: Peer,
+    log: ScanLog,
+    grid: MapFile,
+    settings: Mapping[str, float | str],
+    start: FloatArray,
+    sd: FloatArray,
+    seed: int,
 ) -> tuple[Run, FloatArray]:
     """Localise a log from a start (3,) of deviations sd (3,). Return costs and poses (n, 3) at all scans."""
     given = peer.folder / "map"

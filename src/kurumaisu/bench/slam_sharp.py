@@ -6,9 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_dilation, distance_transform_edt, label
+from scipy.ndimage import label
 
 from kurumaisu.maps import Grid
+from kurumaisu.types import BoolArray
 
 _WALL = 65  # [%] as in map_server
 _FREE = 20
@@ -36,15 +37,18 @@ def sharpness(grid: Grid) -> Sharpness:
     return Sharpness(entropy, _thickness(walls) * grid.resolution, _double(grid, walls))
 
 
-def _thickness(walls: np.ndarray) -> float:
-    """Return the cells of walls by those of their middle lines, which are where no neighbour lies deeper."""
+def _thickness(walls: BoolArray) -> float:
+    """Return the mean over wall cells of how many lie in a row, across or along, whichever are fewer."""
     if not walls.any():
         return float("nan")
-    depth = distance_transform_edt(np.pad(walls, 1))[1:-1, 1:-1]
-    return float(2 * np.mean(depth[walls]) * 2 - 1) if depth.max() > 1 else 1.0
+    rows = []
+    for structure in ([[0, 0, 0], [1, 1, 1], [0, 0, 0]], [[0, 1, 0], [0, 1, 0], [0, 1, 0]]):
+        parts, _ = label(walls, structure=np.array(structure))
+        rows.append(np.bincount(parts.ravel())[parts[walls]])
+    return float(np.mean(np.minimum(*rows)))
 
 
-def _double(grid: Grid, walls: np.ndarray) -> float:
+def _double(grid: Grid, walls: BoolArray) -> float:
     """Return the share of wall cells with another wall within reach behind a free cell."""
     reach = round(_NEAR / grid.resolution)
     free = (grid.cells >= 0) & (grid.cells < _FREE)
@@ -62,11 +66,11 @@ def _double(grid: Grid, walls: np.ndarray) -> float:
     return float(np.mean(found[walls])) if walls.any() else float("nan")
 
 
-def _shifted(cells: np.ndarray, y: int, x: int, high: int, wide: int) -> tuple[np.ndarray, np.ndarray]:
+def _shifted(cells: BoolArray, y: int, x: int, high: int, wide: int) -> tuple[BoolArray, BoolArray]:
     """Return cells from (y, x) on, and those at (high, wide), cut to a common shape."""
     height, width = cells.shape[0] - high, cells.shape[1] - wide
     return cells[y : y + height, x : x + width], cells[high : high + height, wide : wide + width]
 
 
-def _mark(found: np.ndarray, pair: np.ndarray, y: int, x: int) -> None:
+def _mark(found: BoolArray, pair: BoolArray, y: int, x: int) -> None:
     found[y : y + pair.shape[0], x : x + pair.shape[1]] |= pair

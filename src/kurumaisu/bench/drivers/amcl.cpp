@@ -62,8 +62,8 @@ class Amcl {
     const double alpha1 = from.number("odom_alpha1"), alpha2 = from.number("odom_alpha2");
     const double alpha3 = from.number("odom_alpha3"), alpha4 = from.number("odom_alpha4");
     const bool corrected = from.text("odom_model_type") == "diff-corrected";
-    odom_.SetModel(corrected ? amcl::ODOM_MODEL_DIFF_CORRECTED : amcl::ODOM_MODEL_DIFF, alpha1, alpha2, alpha3, alpha4,
-                   0.2);
+    odom_.SetModel(corrected ? amcl::ODOM_MODEL_DIFF_CORRECTED : amcl::ODOM_MODEL_DIFF, alpha1, alpha2,
+                   alpha3, alpha4, 0.2);
     const int least = static_cast<int>(from.number("min_particles"));
     const int most = static_cast<int>(from.number("max_particles"));
     const double slow = from.number("recovery_alpha_slow"), fast = from.number("recovery_alpha_fast");
@@ -114,9 +114,11 @@ class Amcl {
     data.ranges = new double[log_.beams][2];  // its destructor frees it
     for (std::size_t i = 0; i < log_.beams; ++i) {
       const double range = log_.ranges(scan)[i];
-      data.ranges[i][0] = range <= log_.range_min ? log_.range_max
-                                                  : (range > log_.range_max ? std::numeric_limits<float>::max() : range);
-      data.ranges[i][1] = wrap(log_.base_from_laser.theta + log_.angle_min + log_.angle_increment * double(i));
+      data.ranges[i][0] = range <= log_.range_min
+                              ? log_.range_max
+                              : (range > log_.range_max ? std::numeric_limits<float>::max() : range);
+      data.ranges[i][1] =
+          wrap(log_.base_from_laser.theta + log_.angle_min + log_.angle_increment * double(i));
     }
     laser_.UpdateSensor(filter_, &data);
   }

@@ -25,10 +25,13 @@ void configure(GridSlamProcessor& slam, Arguments& from, const Settings& setting
                const OrientedPoint& start) {
   const double range = log.range_max - 0.01;  // as slam_gmapping's defaults of maxRange and maxUrange
   slam.setMatchingParameters(range, range, from.number("sigma"), static_cast<int>(from.number("kernelSize")),
-                             from.number("lstep"), from.number("astep"), static_cast<int>(from.number("iterations")),
-                             from.number("lsigma"), from.number("ogain"), static_cast<unsigned>(from.number("lskip")));
-  slam.setMotionModelParameters(from.number("srr"), from.number("srt"), from.number("str"), from.number("stt"));
-  slam.setUpdateDistances(from.number("linearUpdate"), from.number("angularUpdate"), from.number("resampleThreshold"));
+                             from.number("lstep"), from.number("astep"),
+                             static_cast<int>(from.number("iterations")), from.number("lsigma"),
+                             from.number("ogain"), static_cast<unsigned>(from.number("lskip")));
+  slam.setMotionModelParameters(from.number("srr"), from.number("srt"), from.number("str"),
+                                from.number("stt"));
+  slam.setUpdateDistances(from.number("linearUpdate"), from.number("angularUpdate"),
+                          from.number("resampleThreshold"));
   slam.setUpdatePeriod(from.number("temporalUpdate"));
   slam.setgenerateMap(false);
   const double half = settings.extent;
@@ -50,8 +53,8 @@ std::vector<double> readings(const Log& log, std::size_t scan) {
 }
 
 /// The map of the best particle, as slam_gmapping publishes it.
-Cells mapOf(const GridSlamProcessor& slam, const GMapping::RangeSensor& laser, const std::vector<double>& angles,
-            const Settings& settings, double range) {
+Cells mapOf(const GridSlamProcessor& slam, const GMapping::RangeSensor& laser,
+            const std::vector<double>& angles, const Settings& settings, double range) {
   GMapping::ScanMatcher matcher;
   matcher.setLaserParameters(static_cast<unsigned>(angles.size()), const_cast<double*>(angles.data()),
                              laser.getPose());
@@ -60,7 +63,8 @@ Cells mapOf(const GridSlamProcessor& slam, const GMapping::RangeSensor& laser, c
   matcher.setgenerateMap(true);
   const double half = settings.extent;
   GMapping::ScanMatcherMap map(GMapping::Point(0, 0), -half, -half, half, half, settings.delta);
-  for (auto* node = slam.getParticles()[slam.getBestParticleIndex()].node; node != nullptr; node = node->parent) {
+  for (auto* node = slam.getParticles()[slam.getBestParticleIndex()].node; node != nullptr;
+       node = node->parent) {
     if (node->reading == nullptr) continue;
     matcher.invalidateActiveArea();
     matcher.computeActiveArea(map, node->pose, &(*node->reading)[0]);
@@ -86,8 +90,8 @@ void run(int count, char** words) {
   const double width = log.angle_increment * static_cast<double>(log.beams - 1);
   const Pose centred = compose(log.base_from_laser, {0, 0, log.angle_min + width / 2});
   const double start_of_work = processorTime();
-  GMapping::RangeSensor laser("FLASER", static_cast<unsigned>(log.beams), log.angle_increment, OrientedPoint(0, 0, 0), 0.0,
-                              log.range_max - 0.01);
+  GMapping::RangeSensor laser("FLASER", static_cast<unsigned>(log.beams), log.angle_increment,
+                              OrientedPoint(0, 0, 0), 0.0, log.range_max - 0.01);
   std::ostringstream chatter;
   GridSlamProcessor slam(chatter);
   GMapping::SensorMap sensors;
@@ -110,7 +114,8 @@ void run(int count, char** words) {
     chatter.str("");
   }
   std::vector<double> poses(3 * log.scans, std::nan(""));
-  for (auto* node = slam.getParticles()[slam.getBestParticleIndex()].node; node != nullptr; node = node->parent) {
+  for (auto* node = slam.getParticles()[slam.getBestParticleIndex()].node; node != nullptr;
+       node = node->parent) {
     if (node->reading == nullptr) continue;
     std::size_t i = 0;
     while (i + 1 < log.scans && log.time(i) < node->reading->getTime() - 1e-6) ++i;
