@@ -7,7 +7,7 @@ setup(
         packages=find_packages("src", include=["kurumaisu", "kurumaisu.*"]),
         package_dir={"": "src"},
         package_data={
-            "kurumaisu.bench": ["drivers/*.cpp"],
+            "kurumaisu.bench": ["drivers/*.cpp", "drivers/*.h"],
             "kurumaisu.critic": ["*.json", "*.html"],
             "kurumaisu": ["py.typed"],
         },

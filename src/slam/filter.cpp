@@ -50,7 +50,7 @@ mrpt::maps::TSetOfMetricMapInitializers mapDefinition(const MapperSettings& s) {
   grid.likelihoodOpts.LF_maxRange = static_cast<float>(s.range);
   grid.likelihoodOpts.LF_maxCorrsDistance = static_cast<float>(s.hit_reach);
   grid.likelihoodOpts.LF_decimation = static_cast<std::uint32_t>(s.hit_every);
-  grid.likelihoodOpts.enableLikelihoodCache = true;
+  grid.likelihoodOpts.enableLikelihoodCache = false;
   mrpt::maps::TSetOfMetricMapInitializers maps;
   maps.push_back(grid);
   return maps;

@@ -20,7 +20,10 @@ constexpr int kPatience = 8;          // scans before a new pose is doubted
 constexpr double kNearby = 0.3;       // [m] around a doubted pose is searched first
 constexpr double kNearbyTurn = 0.15;  // [rad]
 constexpr double kSearchAgain = 3;    // times found_way after which a search that led to nothing is repeated
-constexpr double kHeadStart = 5;     // log-odds of the place where the chair was believed to be, when doubted
+constexpr double kHeadStart = 5;  // log-odds of the place where the chair was believed to be, when doubted
+// A doubted pose is believed again when its fit is as usual but for this: from the wrong corridor nine of ten
+// readings are explained too. Else a search decides.
+constexpr double kLessThanUsual = 0.03;
 constexpr double kTurnPerWay = 0.5;  // [m/rad] a turn shows as much as so much way
 
 void check(const Scan& scan, const Odometry& start, const Pose2D& end, const std::optional<Odometry>& last) {
@@ -100,6 +103,7 @@ class Localizer::Impl {
     }
     if (update) once_ = false;
     estimate.knowledge = told(estimate.map_from_base);
+    estimate.map_from_base.covariance.topLeftCorner<2, 2>() += ofMap() * Eigen::Matrix2d::Identity();
     if (estimate.knowledge == Knowledge::kAmbiguous) blur(estimate.map_from_base.covariance);
     estimate.fit = health_.fast;
     estimate.fit_usual = health_.slow;
@@ -159,16 +163,16 @@ class Localizer::Impl {
     }
     look(beams, estimate);
     if (doubted_for_ > 0) ++doubted_for_;
-    const auto& recovery = settings_.recovery;
-    const double enough = (health_.fast >= recovery.found_fit ? 1 : kSearchAgain) * recovery.found_way;
-    if (travelled_ >= enough) doubted_for_ = 0;
-    if (!health_.doubtful(settings_.recovery)) return;
-    if (doubted_for_ == 0) {
-      widen(estimate.map_from_base);
-    } else if (doubted_for_ > kPatience) {
+    const double way = doubted_for_ > 0 ? travelled_ / settings_.recovery.found_way : 0;
+    if (way >= 1 && health_.fast >= restored_) doubted_for_ = 0;
+    const bool unsettled = doubted_for_ > 0 && way >= kSearchAgain;
+    const bool doubtful = health_.doubtful(settings_.recovery);
+    if (unsettled || (doubtful && doubted_for_ > kPatience)) {
       known_ = true;
       start(Knowledge::kLost);
       lose(beams, estimate);
+    } else if (doubtful && doubted_for_ == 0) {
+      widen(estimate.map_from_base);
     }
   }
 
@@ -183,6 +187,7 @@ class Localizer::Impl {
         Eigen::Vector3d(kNearby * kNearby, kNearby * kNearby, kNearbyTurn * kNearbyTurn);
     settle(pose);
     doubted_for_ = 1;
+    restored_ = std::fmax(settings_.recovery.found_fit, health_.slow - kLessThanUsual);
   }
 
   /// Goes on with the search for the places of one scan; when done, they are moved to where they would be by now.
@@ -241,6 +246,10 @@ class Localizer::Impl {
     estimate.map_from_base = pose_;
     estimate.particles = static_cast<int>(places_.size());
   }
+
+  /// Variance of a wall's place in its cell [m^2]. All readings of a wall share it, now and later, so that no
+  /// filter averages it out.
+  double ofMap() const { return field_.resolution() * field_.resolution() / 12; }
 
   /// Never so narrow that it looks certain.
   void blur(Eigen::Matrix3d& covariance) const {
@@ -301,6 +310,7 @@ class Localizer::Impl {
   Pose2D doubted_{0, 0, 0};
   bool known_ = false;     ///< there was a pose before the search
   bool verified_ = false;  ///< the places have held against those of a second search
+  double restored_ = 1;    ///< fit from which a doubted pose is believed again
   int doubted_for_ = 0;    ///< scans since the pose was first doubted; 0 = it is not
   bool once_ = false;
   double blind_ = 0;      ///< driven since a scan had readings [m]

@@ -29,10 +29,12 @@ constexpr double kConverged = 1e-5;  // step [m, rad]
 constexpr double kSettled = 2e-3;    // step [m, rad] after which nothing far off is left to be caught
 constexpr double kShrink = 0.7;      // of the reach, from round to round
 
+std::int64_t keyOf(std::int64_t x, std::int64_t y) { return x * (std::int64_t{1} << 32) + y; }
+
 std::int64_t cellOf(const Eigen::Vector2d& point, double size) {
   const auto x = static_cast<std::int64_t>(std::floor(point.x() / size));
   const auto y = static_cast<std::int64_t>(std::floor(point.y() / size));
-  return x * (std::int64_t{1} << 32) + y;
+  return keyOf(x, y);
 }
 
 Eigen::Vector2d apply(const Pose2D& pose, const Eigen::Vector2d& point) {
@@ -107,8 +109,8 @@ Matcher::Match Matcher::align(const Points& points, const Pose2D& start, const P
                               1 / (angle_sd * angle_sd));
   Pose2D pose = start;
   Eigen::Matrix3d information = prior.asDiagonal();
-  const double least = 3 * settings_.deviation;
-  double reach = std::fmax(least, settings_.reach);
+  const double least = leastReach();
+  double reach = farReach();
   for (int i = 0; i < settings_.iterations; ++i) {
     Eigen::Vector3d gradient;
     if (!linearise(points, pose, reach, information, gradient)) {
@@ -154,13 +156,22 @@ bool Matcher::linearise(const Points& points, const Pose2D& pose, double reach, 
 
 const Matcher::Line* Matcher::nearest(const Eigen::Vector2d& point, const Eigen::Vector2d& eye,
                                       double reach) const {
+  const Line* near = nearestOf(near_, leastReach(), point, eye, std::fmin(reach, leastReach()));
+  if (near != nullptr || reach <= leastReach()) return near;
+  return nearestOf(far_, farReach(), point, eye, reach);
+}
+
+/// size: of the squares [m], at least reach.
+const Matcher::Line* Matcher::nearestOf(const Cells& cells, double size, const Eigen::Vector2d& point,
+                                        const Eigen::Vector2d& eye, double reach) {
   const Line* best = nullptr;
   double best_square = reach * reach;
+  const auto x = static_cast<std::int64_t>(std::floor(point.x() / size));
+  const auto y = static_cast<std::int64_t>(std::floor(point.y() / size));
   for (int dx = -1; dx <= 1; ++dx) {
     for (int dy = -1; dy <= 1; ++dy) {
-      const auto cell =
-          cells_.find(cellOf(point + settings_.reach * Eigen::Vector2d(dx, dy), settings_.reach));
-      if (cell == cells_.end()) continue;
+      const auto cell = cells.find(keyOf(x + dx, y + dy));
+      if (cell == cells.end()) continue;
       for (const Line& line : cell->second) {
         const double square = (line.point - point).squaredNorm();
         // A wall has two faces: the one that looks away is not the one seen.
@@ -193,13 +204,15 @@ void Matcher::insert(const Scan& scan) {
 }
 
 void Matcher::rebuild() {
-  cells_.clear();
+  far_.clear();
+  near_.clear();
   std::unordered_set<std::int64_t> taken;
   // Oldest first: what was seen first holds the drift down.
   for (const auto& key : keys_) {
     for (const Line& line : key) {
       if (!taken.insert(cellOf(line.point, kThinning)).second) continue;
-      cells_[cellOf(line.point, settings_.reach)].push_back(line);
+      far_[cellOf(line.point, farReach())].push_back(line);
+      near_[cellOf(line.point, leastReach())].push_back(line);
     }
   }
 }

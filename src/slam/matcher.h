@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <unordered_map>
@@ -36,12 +37,20 @@ class Matcher {
     Eigen::Vector2d normal;  ///< towards the laser that saw it
   };
 
+  /// Lines by the squares they lie in: a search looks at nine of them.
+  using Cells = std::unordered_map<std::int64_t, std::vector<Line>>;
+
   Match align(const Points& points, const Pose2D& start, const Pose2D& motion) const;
   bool linearise(const Points& points, const Pose2D& pose, double reach, Eigen::Matrix3d& information,
                  Eigen::Vector3d& gradient) const;
   const Line* nearest(const Eigen::Vector2d& point, const Eigen::Vector2d& eye, double reach) const;
+  static const Line* nearestOf(const Cells& cells, double size, const Eigen::Vector2d& point,
+                               const Eigen::Vector2d& eye, double reach);
   void insert(const Scan& scan);
   void rebuild();
+  /// Reach of the last rounds, and of the first one [m].
+  double leastReach() const { return 3 * settings_.deviation; }
+  double farReach() const { return std::fmax(leastReach(), settings_.reach); }
 
   MatchSettings settings_;
   bool started_ = false;
@@ -49,7 +58,7 @@ class Matcher {
   Pose2D key_pose_{0, 0, 0};
   Pose2D base_from_laser_{0, 0, 0};
   std::deque<std::vector<Line>> keys_;
-  std::unordered_map<std::int64_t, std::vector<Line>> cells_;
+  Cells far_, near_;  ///< the same lines, in squares of the two reaches
 };
 
 }  // namespace kurumaisu

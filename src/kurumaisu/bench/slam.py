@@ -1,20 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mapping of a simulated round: path and map against the truth, with the laser's mean error left in or taken out."""
+"""Mapping and localisation of simulated and recorded drives, next to gmapping and AMCL where they are at hand."""
 
 from __future__ import annotations
 
 import argparse
+import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from kurumaisu import slam, slam_score
-from kurumaisu._core import LaserError, integrate
+from kurumaisu._core import LaserError
+from kurumaisu.bench import slam_office
+from kurumaisu.bench.slam_fresh import drives, fresh
+from kurumaisu.bench.slam_localise_office import office_logs
+from kurumaisu.bench.slam_models import models
+from kurumaisu.bench.slam_peers import Peer
+from kurumaisu.bench.slam_real import real
+from kurumaisu.bench.slam_roam import log_of
 from kurumaisu.bench.table import Table
 from kurumaisu.driving import Driver, load_route
-from kurumaisu.params import Laser, load_model, shipped
+from kurumaisu.localization import load_localizer_settings
+from kurumaisu.map_file import read_map
+from kurumaisu.params import load_model, shipped
 from kurumaisu.sim.chair import ChairSimulator, Command
 from kurumaisu.sim.scanner import Scan
 from kurumaisu.sim.settings import load_dynamics, with_effects
@@ -22,24 +33,92 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world import World, load_world
 
 _COMMAND_EVERY = 10  # simulator steps
+_DRIVES, _LONG = 3, 300.0  # fresh drives and their time [s]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print a row per variant: median and worst over the seeds."""
-    parser = argparse.ArgumentParser(prog="bench slam")
+    """Print the tables that were asked for. Return 1 if a bound is broken."""
+    options = _parser().parse_args(arguments)
+    if options.office is None and options.only in ("mapping", "localisation"):
+        _parser().error(f"--only {options.only} needs the folder of recordings with the truth")
+    told: list[str] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        gmapping = options.gmapping and Peer.compiled("gmapping", options.gmapping, ["gridfastslam"], folder)
+        if options.only in (None, "building"):
+            _building(options.seeds, options.seconds)
+        if options.office is not None and options.only in (None, "mapping", "localisation"):
+            told += _office(options, gmapping, folder)
+        if options.only in (None, "fresh", "models"):
+            told += _fresh(options)
+        if options.only in (None, "real"):
+            real(options.recordings, gmapping, folder, options.pictures)
+    print()
+    for line in told:
+        print(line)
+    return 1 if any(line.startswith("BROKEN") for line in told) else 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="bench slam", description=__doc__)
+    parser.add_argument("office", type=Path, nargs="?", help="folder of bags with ground_truth, and truth_map.yaml")
+    parser.add_argument("--mount", type=float, nargs=3, default=[0.25, 0.0, 0.0], help="base_from_laser in those bags")
+    parser.add_argument("--gmapping", type=Path, metavar="PREFIX", help="where openslam_gmapping is installed")
+    parser.add_argument("--amcl", type=Path, metavar="PREFIX", help="where AMCL's libraries are installed")
+    parser.add_argument("--recordings", type=Path, metavar="DIR", help="of real recordings, as for scripts/real")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="draw the maps of real recordings")
     parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--peer-seeds", type=int, default=10, help="of gmapping, a minute each")
     parser.add_argument("--seconds", type=float, default=240.0, help="of the round at most")
-    options = parser.parse_args(arguments)
+    parser.add_argument("--fresh-seed", type=int, default=101, help="of the fresh drives")
+    parser.add_argument("--starts", type=int, default=20, help="unknown ones, on fresh drives")
+    parser.add_argument("--kidnaps", type=int, default=10, help="on fresh drives")
+    parser.add_argument("--only", choices=("building", "mapping", "localisation", "fresh", "models", "real"))
+    return parser
+
+
+def _office(options: argparse.Namespace, gmapping: Peer | None, folder: Path) -> list[str]:
+    told: list[str] = []
+    grid = read_map(options.office / "truth_map.yaml")
+    logs = list(office_logs(options.office, options.mount))
+    if options.only != "localisation":
+        told += slam_office.mapping(logs, grid, options.seeds, gmapping, options.peer_seeds, folder)
+    if options.only != "mapping":
+        amcl = options.amcl and Peer.compiled("amcl", options.amcl, ["amcl_sensors"], folder)
+        settings = load_localizer_settings(shipped("launch/localization_node.yaml"))
+        told += slam_office.localisation(logs, grid, settings, options.seeds, amcl)
+    return told
+
+
+def _fresh(options: argparse.Namespace) -> list[str]:
+    told: list[str] = []
+    settings = load_localizer_settings(shipped("launch/localization_node.yaml"))
+    model = with_effects(load_model(shipped("launch/md100.yaml")), shipped("launch/uneven_floor.yaml"))
+    noise, error = model.effects[-1].parameters, model.laser.error
+    process = (noise["sd_v"], noise["sd_w"], noise["tau"], noise["growth"])
+    maps = {"building": shipped("worlds/maps/building.yaml")}
+    if options.office is not None:
+        maps["office"] = options.office / "truth_map.yaml"
+    for name, path in maps.items():
+        grid = read_map(path)
+        logs = drives(grid, options.fresh_seed, _DRIVES, _LONG)
+        if options.only != "models":
+            told += fresh(name, logs, grid, settings, error, options.fresh_seed, (options.starts, options.kidnaps))
+        if options.only != "fresh":
+            models(f"{name}, {_DRIVES} fresh drives: median (worst)", logs, grid, settings, error, process)
+    return told
+
+
+def _building(seeds: int, seconds: float) -> None:
     world = load_world(shipped("worlds/building.world"))
     laser = load_model(shipped("launch/md100.yaml")).laser
-    rounds = [drive(world, seed, options.seconds) for seed in range(1, options.seeds + 1)]
-    title = f"round in {world.name}, uneven floor, {options.seeds} seeds: median (worst)"
+    rounds = [drive(world, seed, seconds) for seed in range(1, seeds + 1)]
+    title = f"round in {world.name}, uneven floor, {seeds} seeds: median (worst)"
     table = Table(title, "path by", "position [m]     ", "heading [deg]    ", "map to wall [m]  ", "CPU [ms/scan]")
     table.row("odometry", *_spread([slam_score.trajectory_error(log.odom, truth) for log, truth in rounds]), "-", "-")
     for name, error in (("filter, readings as they are", None), ("filter, mean error taken out", laser.error)):
         results = [_mapped(log, truth, error, seed, world) for seed, (log, truth) in enumerate(rounds, start=1)]
         table.row(name, *_spread(results))
-    return 0
 
 
 def drive(world: World, seed: int, seconds: float) -> tuple[slam.ScanLog, FloatArray]:
@@ -58,23 +137,8 @@ def drive(world: World, seed: int, seconds: float) -> tuple[slam.ScanLog, FloatA
         observation = simulator.step(Command(*volts, float(np.sign(v)), float(np.sign(w))))
         if observation.scan is not None:
             scans.append(observation.scan)
-    return _log(model.laser, np.array(commands), simulator.step_time, scans), np.array([scan.pose for scan in scans])
-
-
-def _log(laser: Laser, commands: FloatArray, step: float, scans: Sequence[Scan]) -> slam.ScanLog:
-    """Return scans with the odometry that integrates the commands (n, 2), each held for a step."""
-    odom = integrate(commands[:, 0], commands[:, 1], np.full(len(commands), step))
-    at = step * np.arange(len(odom))
-    fan = slam.Fan(
-        angle_min=laser.angle_min,
-        angle_increment=laser.angle_increment,
-        time_increment=laser.time_increment,
-        range_max=laser.range_max,
-        base_from_laser=(laser.mount.x, laser.mount.y, laser.mount.yaw),
-    )
-    times = np.array([scan.time for scan in scans])
-    ranges = np.array([scan.ranges for scan in scans], dtype=np.float32)
-    return slam.scan_log("round", times, ranges, fan, at, odom)
+    log = log_of(model.laser, np.array(commands), simulator.step_time, scans)
+    return log, np.array([scan.pose for scan in scans])
 
 
 def _mapped(

@@ -35,20 +35,20 @@ class Found:
     slowest: float
 
 
-def from_nowhere(make: Make, logs: Logs, case: int) -> Found:
+def from_nowhere(make: Make, logs: Logs, case: int, first_seed: int = _FIRST_SEED) -> Found:
     """Follow two minutes of a log from a random scan on, the start unknown."""
     log, truth = logs[case % len(logs)]
-    rng = np.random.default_rng(_FIRST_SEED + case)
+    rng = np.random.default_rng(first_seed + case)
     begin = int(rng.integers(50, len(log.times) - _SCANS - 50))
     localizer = make(case + 1)
     localizer.forget()
     return _judge(*_run(localizer, log, truth, begin, np.zeros(3), 0.0))
 
 
-def carried_away(make: Make, logs: Logs, case: int) -> Found:
+def carried_away(make: Make, logs: Logs, case: int, first_seed: int = _FIRST_SEED) -> Found:
     """Follow 15 s of a log, then two minutes from elsewhere in it, as if the chair had been put there."""
     log, truth = logs[case % len(logs)]
-    rng = np.random.default_rng(_FIRST_SEED + case)
+    rng = np.random.default_rng(first_seed + case)
     there = int(rng.integers(50, len(log.times) - _SCANS - 50))
     far = np.hypot(*(truth[_BEFORE:] - truth[there])[:, :2].T) > _FAR
     here = int(rng.choice(np.flatnonzero(far)))
