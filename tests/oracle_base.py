@@ -242,7 +242,7 @@ def caster_reversal(p, drive):
                 kicked_to, since = last_side, 0.0
             last_way = way
         travelled = abs(v) * drive.dt
-        kick = p["kick"] * math.exp(-(since + travelled / 2) / p["length"]) if v != 0 else 0.0
+        kick = p["kick"] * math.exp(-(since + travelled / 2) / p["length"]) if abs(v) > 1e-3 else 0.0
         out.append(w + kicked_to * kick)
         since += travelled
         if w != 0:
@@ -256,19 +256,31 @@ def dac_zero_f(p, v_f, v_s, _signs):
 
 
 @_volts("base.dac_zero_s")
-def dac_zero_s(p, v_f, v_s, _signs):
-    return v_f, [v + p["offset"] for v in v_s]
+def dac_zero_s(p, v_f, v_s, signs):
+    """With rests, whoever is told to turn to one side by volts that stand for the other does not turn."""
+
+    def shifted(v, sign):
+        v += p["offset"]
+        if p["rests"] < 0.5 or not sign > 0 and not sign < 0:
+            return v
+        side = _LAWS["steering"]["positive" if sign > 0 else "negative"]
+        return 0.0 if (v - side["intercept"]) / side["slope"] * sign < 0 else v
+
+    return v_f, [shifted(v, sign) for v, sign in zip(v_s, signs, strict=True)]
 
 
 @_volts("base.dac_quantisation")
 def dac_quantisation(p, v_f, v_s, _signs):
-    """The nearest of two neighbouring steps."""
+    """Climb from level to level, half a step below 0 on, while the next one is not farther than what is asked for."""
 
-    def nearest(v):
-        below = math.floor(v / p["step"]) * p["step"]
-        return below if v - below < p["step"] / 2 else below + p["step"]
+    def reached(size):
+        level = (p["phase"] - 3) * p["step"]
+        while level + p["step"] / 2 <= size:
+            level += p["step"]
+        return max(level - p["cut"] * p["step"] / 2, 0.0)
 
-    return ([nearest(v) for v in volts] if p["step"] > 0 else volts for volts in (v_f, v_s))
+    return ([math.copysign(reached(abs(v)), v) if v else 0.0 for v in volts] if p["step"] > 0 else volts
+            for volts in (v_f, v_s))  # fmt: skip
 
 
 @_volts("base.steering_law")
