@@ -261,7 +261,7 @@ def dac_zero_s(p, v_f, v_s, signs):
 
     def shifted(v, sign):
         v += p["offset"]
-        if p["rests"] < 0.5 or not sign > 0 and not sign < 0:
+        if p["rests"] < 0.5 or (not sign > 0 and not sign < 0):
             return v
         side = _LAWS["steering"]["positive" if sign > 0 else "negative"]
         return 0.0 if (v - side["intercept"]) / side["slope"] * sign < 0 else v
@@ -270,7 +270,7 @@ def dac_zero_s(p, v_f, v_s, signs):
 
 
 @_volts("base.dac_quantisation")
-def dac_quantisation(p, v_f, v_s, _signs):
+def dac_quantisation(p, v_f, v_s, signs):
     """Climb from level to level, half a step below 0 on, while the next one is not farther than what is asked for."""
 
     def reached(size):
@@ -279,8 +279,12 @@ def dac_quantisation(p, v_f, v_s, _signs):
             level += p["step"]
         return max(level - p["cut"] * p["step"] / 2, 0.0)
 
-    return ([math.copysign(reached(abs(v)), v) if v else 0.0 for v in volts] if p["step"] > 0 else volts
-            for volts in (v_f, v_s))  # fmt: skip
+    if p["step"] == 0:
+        return v_f, v_s
+    v_f, v_s = ([math.copysign(reached(abs(v)), v) if v else 0.0 for v in volts] for volts in (v_f, v_s))
+    if p["rests"] < 0.5:  # a turn is never just 0 V
+        v_s = [1e-12 if v == 0 and sign in (-1, 1) else v for v, sign in zip(v_s, signs, strict=True)]
+    return v_f, v_s
 
 
 @_volts("base.steering_law")

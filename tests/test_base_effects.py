@@ -193,9 +193,17 @@ def test_dac_zero_and_steps():
 )  # fmt: skip
 def test_steps_are_rounded_or_have_no_zero_or_cut(form, expected):
     it = effects.Volts(np.array([0.101, 0.0]), np.array([-0.1234, 0.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]))
-    values = {"step": 0.005, "phase": form[0], "cut": form[1]}
+    values = {"step": 0.005, "phase": form[0], "cut": form[1], "rests": 0.0}
     steps = effects.by_id("base.dac_quantisation")(values, CONTEXT).apply(it)
     np.testing.assert_allclose([*steps.v_f, *steps.v_s], expected)
+
+
+@pytest.mark.parametrize(("rests", "rate"), [(0.0, -0.169476 / 0.469278), (1.0, 0.0)])
+def test_a_turn_of_no_volts_goes_on_or_rests(rests, rate):
+    effect = EffectSetting("base.dac_quantisation", {"step": 0.01, "phase": 0.0, "cut": 0.0, "rests": rests})
+    plant = Plant(replace(MODEL, effects=(effect,)), DT, np.random.default_rng(0))
+    w = plant.from_rates(np.zeros(2), np.array([-0.36, 0.0])).w
+    np.testing.assert_allclose(w, [rate, 0.0], atol=1e-9)
 
 
 def test_a_voltage_beyond_its_branch_is_the_other_side_or_rest():

@@ -26,6 +26,7 @@ LONGEST = 100_000.0  # [s] a day: what is longer has its times in another unit, 
 # variables), while over long ones it averages out.
 _ROLLS = 0.2  # [s] for which a chair may move on after it was asked to rest
 _STILL = 0.1  # share of the noise of a moving chair that one at rest may have
+_ROUNDING = 1e-9  # [m/s], [rad/s]
 _USUAL_V, _USUAL_W = 0.8, 0.8  # [m/s], [rad/s]
 POSE_INTERVAL = {"voltage": 0.1, "command": 0.1, "odom": 2.0}
 
@@ -230,4 +231,6 @@ def _mean_rates(times: FloatArray, values: FloatArray, edges: FloatArray) -> Flo
     """Return the mean over each cell of the grid of samples held until the next; 0 before the first."""
     knots = np.append(times, max(edges[-1], times[-1]) + GRID)
     integral = np.concatenate([[0.0], np.cumsum(values * np.diff(knots))])
-    return np.asarray(np.diff(np.interp(edges, knots, integral)) / GRID)
+    means = np.diff(np.interp(edges, knots, integral)) / GRID
+    # Differences of sums leave rests that are not quite 0: by the law, turns that stand for the volts of a threshold.
+    return np.asarray(np.where(np.abs(means) < _ROUNDING, 0.0, means))

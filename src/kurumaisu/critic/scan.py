@@ -121,7 +121,8 @@ class Screen:
             value = term.null + float(x) * term.step * term.parameter.scale
             if not term.parameter.lower <= value <= term.parameter.upper:
                 return None
-            start[term.key] = value
+            if not term.rough or term.key in self.centre.start:  # else it is searched for
+                start[term.key] = value
         step = -known
         step[use] += offsets
         gained = float(self.b @ step) - 0.5 * float(step @ gram @ step)

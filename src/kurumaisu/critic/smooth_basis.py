@@ -66,7 +66,8 @@ class Basis:
 def bases(drives: Sequence[Drive], model: Model, settings: Sequence[EffectSetting]) -> Iterator[Basis]:
     """Yield the curves over every covariate that varies in these drives, as simulated with some effects."""
     motions = [replay.motion(drive, model, settings) for drive in drives]
-    extras = set.intersection(*(set(drive.known) for drive in drives)) - {"x", "y", "heading", "v_f", "v_s", effects.LATE}
+    usual = {"x", "y", "heading", "v_f", "v_s", effects.LATE}
+    extras = set.intersection(*(set(drive.known) for drive in drives)) - usual
     # Rows of odometry are no commands: the time since the last one says how the rows are spaced, and nothing else.
     measured = any(drive.source == "odom" for drive in drives)
     for name in (*effects.COVARIATES, *sorted(extras)):
