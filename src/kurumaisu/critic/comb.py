@@ -9,33 +9,37 @@ it tells what any change would explain.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu.critic import replay
 from kurumaisu.critic.catalogue import Term, settings_of
-from kurumaisu.critic.drive import GRID, Drive, split
+from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.noise import Noise, whitened
 from kurumaisu.critic.smooth_columns import Sensitivity
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
-_BIN = 0.2  # [s] for which a change of the rates is held
-_PIECE = 60.0  # [s] of a drive that is weighed at once
-_PIECES = 8  # at most: a first value needs no more
-_ALIKE = (0.6, 0.9)  # correlation of neighbouring sizes: below, there is one between them; above, they may be farther
+_CELLS = 20  # of the grid for which a change of the rates is held
+_TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a first value needs no more
+_ALIKE = (0.4, 0.8)  # correlation of neighbouring sizes: below, there is one between them; above, they may be farther
 _SHOWS = 3.0  # whitened norm below which nobody can see a size
 _GROWTH = (1e-4, 0.3)  # from one size to the next, as a share: least and most
-_SIZES = 900  # at most
+_SIZES = 500  # at most
 _BEST = 8  # that are tried
+
+
+Way = tuple[object, ...]  # an effect's parameter, with the form in which it acts
+Walked = dict[Way, list[tuple[float, Sequence[FloatArray]]]]
 
 
 @dataclass(frozen=True)
 class _Size:
-    """A value with what it adds to v and w in all bins, (bins,); gram @ that; and its squared whitened norm."""
+    """A value; what it adds to v and w in the bins of each drive, and of all, (bins,); gram @ that; its square."""
 
     value: float
+    changes: Sequence[FloatArray]
     change: FloatArray
     gram: FloatArray
     square: float
@@ -44,47 +48,42 @@ class _Size:
 class Comb:
     """What changes of the rates explain in some drives, about the model without effects."""
 
-    def __init__(self, drives: Sequence[Drive], model: Model, noise: Noise) -> None:
-        self._drives, self._model = drives, model
-        self._plain = [replay.motion(drive, model, ()) for drive in drives]
-        self._rows: list[tuple[int, slice]] = []  # of the whole residual: the drive, and the rows of the piece
-        self._bins: list[tuple[int, int, int]] = []  # of each piece: the drive, its first cell, cells for each bin
+    def __init__(self, drives: Sequence[Drive], model: Model, noise: Noise, walked: Walked) -> None:
+        """Take the beginnings of the drives; walked: what sizes have been found to do, whatever the noise."""
+        self._model, self._walked = model, walked
+        share = max(_TOTAL / len(drives), _LEAST)
+        self._drives = [_begin(drive, share) for drive in drives[: int(_TOTAL / share)]]
+        self._plain = [replay.motion(drive, model, ()) for drive in self._drives]
         self._columns: list[FloatArray] = []
-        self._grams: list[FloatArray] = []
-        self._known: dict[tuple[object, ...], list[_Size]] = {}
-        for i, drive in enumerate(drives):
-            parts = max(1, round((drive.times[-1] - drive.times[0]) / _PIECE))
-            at = 0
-            for piece in split(drive, parts):
-                count = 3 * (len(piece.times) - 1)
-                if len(self._columns) < _PIECES:
-                    self._add(i, piece, noise, slice(at, at + count))
-                at += count
+        for drive, plain in zip(self._drives, self._plain, strict=True):
+            held = np.repeat(np.eye(-(-len(drive.v) // _CELLS)), _CELLS, axis=0)[: len(drive.v)]
+            sensitivity = Sensitivity(drive, plain)
+            both = np.column_stack([sensitivity.increments(channel, held) for channel in ("v", "w")])
+            self._columns.append(whitened(drive, both, noise)[0])
+        self._grams = [columns.T @ columns for columns in self._columns]
+        self._known: dict[Way, list[_Size]] = {}
 
-    def _add(self, i: int, piece: Drive, noise: Noise, rows: slice) -> None:
-        cells = round(_BIN / GRID)
-        first = max(0, int((piece.times[0] - piece.start) / GRID))
-        last = min(len(piece.v), int((piece.times[-1] - piece.start) / GRID) + 1)
-        count = -(-(last - first) // cells)
-        held = np.zeros((len(piece.v), count))
-        held[np.arange(first, last), (np.arange(first, last) - first) // cells] = 1.0
-        sensitivity = Sensitivity(piece, self._plain[i])
-        both = np.column_stack([sensitivity.increments(channel, held) for channel in ("v", "w")])
-        self._columns.append(whitened(piece, both, noise)[0])
-        self._grams.append(self._columns[-1].T @ self._columns[-1])
-        self._rows.append((i, rows))
-        self._bins.append((i, first, last))
+    def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[tuple[float, float]]:
+        """Return the most promising values of a term beside fixed ones, and how far the next ones are from each.
 
-    def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[float]:
-        """Return the most promising values of a term beside fixed ones; residual: whitened, of each drive."""
+        residual: whitened, of each drive.
+        """
         key = (term.key, *((other.key, other.parameter.lower) for other in fixed))
         if key not in self._known:
-            self._known[key] = list(self._walk(term, fixed))
+            if key in self._walked:
+                self._known[key] = [self._marked(value, changes) for value, changes in self._walked[key]]
+            else:
+                self._known[key] = list(self._walk(term, fixed))
+                self._walked[key] = [(size.value, size.changes) for size in self._known[key]]
         sizes = self._known[key]
-        pull = np.concatenate([c.T @ residual[i][rows] for c, (i, rows) in zip(self._columns, self._rows, strict=True)])
+        if not sizes:
+            return []
+        pull = np.concatenate([c.T @ r[: len(c)] for c, r in zip(self._columns, residual, strict=False)])
         gained = np.array([float(size.change @ pull) - 0.5 * size.square for size in sizes])
         peaks = np.flatnonzero((gained >= np.append(gained[1:], -np.inf)) & (gained >= np.append(-np.inf, gained[:-1])))
-        return [sizes[k].value for k in peaks[np.argsort(-gained[peaks])][:_BEST]]
+        best = peaks[np.argsort(-gained[peaks])][:_BEST]
+        apart = np.diff([size.value for size in sizes], append=1.1 * sizes[-1].value)
+        return [(sizes[k].value, float(abs(apart[k]))) for k in best]
 
     def _walk(self, term: Term, fixed: Sequence[Term]) -> Iterator[_Size]:
         """Yield sizes from where they show on, as far apart as their marks differ."""
@@ -110,20 +109,26 @@ class Comb:
     def _marked(self, value: float, changes: Sequence[FloatArray]) -> _Size:
         gram = np.concatenate([gram @ change for gram, change in zip(self._grams, changes, strict=True)])
         change = np.concatenate(changes)
-        return _Size(value, change, gram, float(change @ gram))
+        return _Size(value, changes, change, gram, float(change @ gram))
 
     def _change(self, term: Term, fixed: Sequence[Term], value: float) -> list[FloatArray]:
         terms = (term, *fixed)
         settings = settings_of(terms, np.array([value, *(other.parameter.lower for other in fixed)]))
         moved = [replay.motion(drive, self._model, settings) for drive in self._drives]
-        out = []
-        for i, first, last in self._bins:
-            differences = (moved[i].v - self._plain[i].v, moved[i].w - self._plain[i].w)
-            out.append(np.concatenate([_means(d[first:last]) for d in differences]))
-        return out
+        pairs = zip(moved, self._plain, strict=True)
+        return [np.concatenate([_means(a.v - b.v), _means(a.w - b.w)]) for a, b in pairs]
+
+
+def _begin(drive: Drive, seconds: float) -> Drive:
+    """Return so much of a drive from its start on."""
+    count = max(int(np.searchsorted(drive.times, drive.times[0] + seconds, side="right")), 3)
+    cells = min(int((drive.times[:count][-1] - drive.start) / GRID) + 2, len(drive.v))
+    known = {name: values[:cells] for name, values in drive.known.items()}
+    short = replace(drive, v=drive.v[:cells], w=drive.w[:cells], known=known)
+    return short.seen_at(drive.times[:count], drive.poses[:count])
 
 
 def _means(values: FloatArray) -> FloatArray:
     """Return the means over bins; the last one may be short."""
-    starts = np.arange(0, len(values), round(_BIN / GRID))
+    starts = np.arange(0, len(values), _CELLS)
     return np.asarray(np.add.reduceat(values, starts) / np.diff(np.append(starts, len(values))))

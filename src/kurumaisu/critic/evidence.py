@@ -11,7 +11,7 @@ import numpy as np
 
 from kurumaisu.critic import replay, solve
 from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalogue, roughened, settings_of, showing
-from kurumaisu.critic.comb import Comb
+from kurumaisu.critic.comb import Comb, Walked
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.noise import Noise, whitened
 from kurumaisu.critic.prior import Z_USUAL, occam, occam_plane
@@ -22,6 +22,7 @@ _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
 _STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a refit may start
 _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
 _ROUGH_DERIVATIVE = 1e-4  # the same of what has a comb of likely values: right between its teeth
+_PLACES = 25  # that are tried on a tooth of a comb
 _ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
 
 
@@ -70,12 +71,16 @@ class Problem:
         self.noise = noise
         self._terms = terms
         self.ids = ids
+        self._walked: Walked = {}
 
     def changed(
         self, *, drives: Sequence[Drive] | None = None, model: Model | None = None, noise: Noise | None = None
     ) -> Problem:
         """Return the problem, with the same terms, of other drives, another model or another noise."""
-        return Problem(drives or self.drives, model or self.model, noise or self.noise, self.terms, self.ids)
+        other = Problem(drives or self.drives, model or self.model, noise or self.noise, self.terms, self.ids)
+        if drives is None:
+            other._walked = self._walked
+        return other
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
@@ -166,26 +171,32 @@ class Problem:
         for i, term in enumerate(terms):
             if term.key in start or term.shape or term.fixed:
                 continue
-            guesses = self._guesses(terms, values, term)
-            tried = [np.where(np.arange(len(values)) == i, guess, values) for guess in guesses]
-            inside = [guess for guess in tried if lower[i] <= guess[i] <= upper[i]] or [values]
-            values = min(inside, key=lambda guess: float(np.sum(self.residual(terms, guess) ** 2)))
+            steps = [sign * n * term.step * term.parameter.scale for n in _STARTS for sign in (1, -1)]
+            values = self._rough_start(terms, values, i) if term.rough else values
+            values = self._nearest(terms, values, i, [term.null + step for step in steps])
         return values
 
-    def _guesses(self, terms: Sequence[Term], values: FloatArray, term: Term) -> list[float]:
-        """Return first values of a term beside others."""
-        steps = [sign * n * term.step * term.parameter.scale for n in _STARTS for sign in (1, -1)]
-        guesses = [term.null + step for step in steps]
-        if not term.rough:
-            return guesses
+    def _nearest(self, terms: Sequence[Term], values: FloatArray, i: int, guesses: Iterable[float]) -> FloatArray:
+        """Return values with the best of some guesses of one of them, or of itself where it is not null."""
+        p, own = terms[i].parameter, values[i]
+        inside = [guess for guess in guesses if p.lower <= guess <= p.upper]
+        inside += [own] if own != terms[i].null or not inside else []
+        tried = [np.where(np.arange(len(values)) == i, guess, values) for guess in inside]
+        return min(tried, key=lambda guess: float(np.sum(self.residual(terms, guess) ** 2)))
+
+    def _rough_start(self, terms: Sequence[Term], values: FloatArray, i: int) -> FloatArray:
+        """Return values with the best tooth of a comb of likely ones, and the best place on it."""
         settings = settings_of(terms, values)
         residual = [self._whitened(drive, settings) for drive in self.drives]
-        form = [other for other in terms if other.id == term.id and other.fixed]
-        return guesses + self._comb.starts(term, form, residual)
+        form = [other for other in terms if other.id == terms[i].id and other.fixed]
+        apart = dict(self._comb.starts(terms[i], form, residual))
+        found = self._nearest(terms, values, i, apart)
+        places = np.linspace(-1.0, 1.0, _PLACES) * apart.get(float(found[i]), 0.0)
+        return self._nearest(terms, found, i, found[i] + places[places != 0])
 
     @cached_property
     def _comb(self) -> Comb:
-        return Comb(self.drives, self.model, self.noise)
+        return Comb(self.drives, self.model, self.noise, self._walked)
 
     def _occam(self, chosen: Sequence[Candidate], terms: Sequence[Term], solution: solve.Solution) -> float:
         """Return what the set costs, in nats: Laplace's approximation about the fit, with the prior of each signal."""
