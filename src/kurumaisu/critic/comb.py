@@ -25,7 +25,7 @@ _CELLS = 20  # of the grid for which a change of the rates is held
 _TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a first value needs no more
 _ALIKE = (0.4, 0.8)  # correlation of neighbouring sizes: below, there is one between them; above, they may be farther
 _SHOWS = 3.0  # whitened norm below which nobody can see a size
-_GROWTH = (1e-4, 0.3)  # from one size to the next, as a share: least and most
+_GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
 _SIZES = 500  # at most
 _BEST = 8  # that are tried
 
@@ -86,13 +86,19 @@ class Comb:
         return [(sizes[k].value, float(abs(apart[k]))) for k in best]
 
     def _walk(self, term: Term, fixed: Sequence[Term]) -> Iterator[_Size]:
-        """Yield sizes from where they show on, as far apart as their marks differ."""
-        p, size, growth = term.parameter, term.step * term.parameter.scale / 4, _GROWTH[1]
+        """Yield sizes from where they show on, as far apart as their marks differ; either way where there are two."""
+        p = term.parameter
+        for sign, room in ((-1.0, term.null - p.lower), (1.0, p.upper - term.null)):
+            if room > 0:
+                yield from self._one_way(term, fixed, sign, room)
+
+    def _one_way(self, term: Term, fixed: Sequence[Term], sign: float, room: float) -> Iterator[_Size]:
+        size, growth = abs(term.step) * term.parameter.scale / 4, _GROWTH[1]
         before: _Size | None = None
         for _ in range(_SIZES):
-            value = term.null + size
-            if not p.lower <= value <= p.upper:
+            if size > room:
                 return
+            value = term.null + sign * size
             here = self._marked(value, self._change(term, fixed, value))
             if here.square < _SHOWS**2:
                 size *= 1 + _GROWTH[1] / 2

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -87,7 +87,9 @@ def _rivals(problem: Problem, design: Design, fits: Sequence[tuple[Fit, float]])
         y, columns = beside(problem, fit, design.columns)
         for curve, gram, b in _parts(design, y, columns):
             found = belief(gram, b, curve.basis.priors)
-            yield Rival(fit, curve, found, worth + found.nats + share)
+            # All curves of a kind that the data chose from share what one has.
+            chosen = replace(found, nats=found.nats - float(np.log(curve.basis.ways)))
+            yield Rival(fit, curve, chosen, worth + chosen.nats + share)
 
 
 def _parts(design: Design, y: FloatArray, columns: FloatArray) -> Iterator[tuple[Curve, FloatArray, FloatArray]]:
