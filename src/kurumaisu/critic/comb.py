@@ -24,25 +24,22 @@ from kurumaisu.types import FloatArray
 _CELLS = 20  # of the grid for which a change of the rates is held
 _TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a first value needs no more
 _ALIKE = (0.4, 0.8)  # correlation of neighbouring sizes: below, there is one between them; above, they may be farther
-_SHOWS = 3.0  # whitened norm below which nobody can see a size
 _GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
 _SIZES = 500  # at most
-_BEST = 8  # that are tried
+_BEST = 6  # that are tried
 
 
 Way = tuple[object, ...]  # an effect's parameter, with the form in which it acts
-Walked = dict[Way, list[tuple[float, Sequence[FloatArray]]]]
+Walked = dict[Way, tuple[FloatArray, FloatArray]]  # sizes (k,), and what each changes, (k, bins)
 
 
 @dataclass(frozen=True)
-class _Size:
-    """A value; what it adds to v and w in the bins of each drive, and of all, (bins,); gram @ that; its square."""
+class Start:
+    """A value; how far the next one that was weighed is from it; what it explains, in nats, as far as lines go."""
 
     value: float
-    changes: Sequence[FloatArray]
-    change: FloatArray
-    gram: FloatArray
-    square: float
+    apart: float
+    nats: float
 
 
 class Comb:
@@ -61,68 +58,64 @@ class Comb:
             both = np.column_stack([sensitivity.increments(channel, held) for channel in ("v", "w")])
             self._columns.append(whitened(drive, both, noise)[0])
         self._grams = [columns.T @ columns for columns in self._columns]
-        self._known: dict[Way, list[_Size]] = {}
+        self._squares: dict[Way, FloatArray] = {}
 
-    def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[tuple[float, float]]:
-        """Return the most promising values of a term beside fixed ones, and how far the next ones are from each.
-
-        residual: whitened, of each drive.
-        """
+    def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[Start]:
+        """Return the most promising values of a term beside fixed ones; residual: of each drive, whitened."""
         key = (term.key, *((other.key, other.parameter.lower) for other in fixed))
-        if key not in self._known:
-            if key in self._walked:
-                self._known[key] = [self._marked(value, changes) for value, changes in self._walked[key]]
-            else:
-                self._known[key] = list(self._walk(term, fixed))
-                self._walked[key] = [(size.value, size.changes) for size in self._known[key]]
-        sizes = self._known[key]
-        if not sizes:
+        if key not in self._walked:
+            found = list(self._walk(term, fixed))
+            self._walked[key] = np.array([value for value, _ in found]), np.array([change for _, change in found])
+        values, changes = self._walked[key]
+        if not len(values):
             return []
+        if key not in self._squares:
+            parts = zip(self._grams, self._parts(changes), strict=True)
+            self._squares[key] = np.sum([np.sum((own @ gram) * own, axis=1) for gram, own in parts], axis=0)
         pull = np.concatenate([c.T @ r[: len(c)] for c, r in zip(self._columns, residual, strict=False)])
-        gained = np.array([float(size.change @ pull) - 0.5 * size.square for size in sizes])
+        gained = changes @ pull - 0.5 * self._squares[key]
         peaks = np.flatnonzero((gained >= np.append(gained[1:], -np.inf)) & (gained >= np.append(-np.inf, gained[:-1])))
         best = peaks[np.argsort(-gained[peaks])][:_BEST]
-        apart = np.diff([size.value for size in sizes], append=1.1 * sizes[-1].value)
-        return [(sizes[k].value, float(abs(apart[k]))) for k in best]
+        apart = np.abs(np.diff(values, append=1.1 * values[-1]))
+        return [Start(float(values[k]), float(apart[k]), float(gained[k])) for k in best]
 
-    def _walk(self, term: Term, fixed: Sequence[Term]) -> Iterator[_Size]:
-        """Yield sizes from where they show on, as far apart as their marks differ; either way where there are two."""
+    def _parts(self, changes: FloatArray) -> list[FloatArray]:
+        """Return what belongs to each drive of changes (k, bins)."""
+        return np.split(changes, np.cumsum([len(gram) for gram in self._grams])[:-1], axis=1)
+
+    def _walk(self, term: Term, fixed: Sequence[Term]) -> Iterator[tuple[float, FloatArray]]:
+        """Yield sizes with what they change, as far apart as that differs; either way where there are two."""
         p = term.parameter
         for sign, room in ((-1.0, term.null - p.lower), (1.0, p.upper - term.null)):
             if room > 0:
                 yield from self._one_way(term, fixed, sign, room)
 
-    def _one_way(self, term: Term, fixed: Sequence[Term], sign: float, room: float) -> Iterator[_Size]:
-        size, growth = abs(term.step) * term.parameter.scale / 4, _GROWTH[1]
-        before: _Size | None = None
+    def _one_way(
+        self, term: Term, fixed: Sequence[Term], sign: float, room: float
+    ) -> Iterator[tuple[float, FloatArray]]:
+        size, growth = abs(term.step) * term.parameter.scale / 2, _GROWTH[1]
+        before: FloatArray | None = None
         for _ in range(_SIZES):
             if size > room:
                 return
             value = term.null + sign * size
-            here = self._marked(value, self._change(term, fixed, value))
-            if here.square < _SHOWS**2:
-                size *= 1 + _GROWTH[1] / 2
-                continue
-            alike = 1.0 if before is None else float(before.gram @ here.change) / np.sqrt(before.square * here.square)
+            here = self._change(term, fixed, value)
+            alike = 1.0 if before is None else _alike(before, here)
             if alike < _ALIKE[0] and growth > _GROWTH[0]:
                 size, growth = size / (1 + growth) * (1 + growth / 2), growth / 2
                 continue
-            yield here
+            yield value, here
             before = here
             growth = min(1.5 * growth, _GROWTH[1]) if alike > _ALIKE[1] else growth
             size *= 1 + growth
 
-    def _marked(self, value: float, changes: Sequence[FloatArray]) -> _Size:
-        gram = np.concatenate([gram @ change for gram, change in zip(self._grams, changes, strict=True)])
-        change = np.concatenate(changes)
-        return _Size(value, changes, change, gram, float(change @ gram))
-
-    def _change(self, term: Term, fixed: Sequence[Term], value: float) -> list[FloatArray]:
+    def _change(self, term: Term, fixed: Sequence[Term], value: float) -> FloatArray:
+        """Return what a value adds to v and w in the bins of all drives, (bins,)."""
         terms = (term, *fixed)
         settings = settings_of(terms, np.array([value, *(other.parameter.lower for other in fixed)]))
         moved = [replay.motion(drive, self._model, settings) for drive in self._drives]
         pairs = zip(moved, self._plain, strict=True)
-        return [np.concatenate([_means(a.v - b.v), _means(a.w - b.w)]) for a, b in pairs]
+        return np.concatenate([_means(rate) for a, b in pairs for rate in (a.v - b.v, a.w - b.w)])
 
 
 def _begin(drive: Drive, seconds: float) -> Drive:
@@ -138,3 +131,8 @@ def _means(values: FloatArray) -> FloatArray:
     """Return the means over bins; the last one may be short."""
     starts = np.arange(0, len(values), _CELLS)
     return np.asarray(np.add.reduceat(values, starts) / np.diff(np.append(starts, len(values))))
+
+
+def _alike(one: FloatArray, other: FloatArray) -> float:
+    norms = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(one @ other) / norms if norms else 1.0

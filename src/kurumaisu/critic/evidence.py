@@ -22,7 +22,8 @@ _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
 _STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a refit may start
 _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
 _ROUGH_DERIVATIVE = 1e-4  # the same of what has a comb of likely values: right between its teeth
-_PLACES = 25  # that are tried on a tooth of a comb
+_PLACES = 17  # that are tried on a tooth of a comb
+_HOPE = 4.0  # [nat] less is not worth a closer look: a tooth costs more
 _ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
 
 
@@ -189,7 +190,10 @@ class Problem:
         settings = settings_of(terms, values)
         residual = [self._whitened(drive, settings) for drive in self.drives]
         form = [other for other in terms if other.id == terms[i].id and other.fixed]
-        apart = dict(self._comb.starts(terms[i], form, residual))
+        starts = self._comb.starts(terms[i], form, residual)
+        if not starts or starts[0].nats < _HOPE:
+            return np.where(np.arange(len(values)) == i, starts[0].value if starts else values[i], values)
+        apart = {start.value: start.apart for start in starts}
         found = self._nearest(terms, values, i, apart)
         places = np.linspace(-1.0, 1.0, _PLACES) * apart.get(float(found[i]), 0.0)
         return self._nearest(terms, found, i, found[i] + places[places != 0])

@@ -129,7 +129,5 @@ BASE: dict[str, Hidden] = {
     "base.sign": Hidden(
         *_of("events", ev.sign), 1.0, False, 1.0, lambda _: {}, lambda rng: {"kind": float(rng.integers(4))}, False
     ),
-    "base.steering_law": Hidden(
-        *_of("volts", ev.steering_law), 1.0, False, 1.0, lambda _: {"flip": 1.0}, scaled=False
-    ),
+    "base.steering_law": Hidden(*_of("volts", ev.steering_law), 1.0, False, 1.0, lambda _: {"flip": 1.0}, scaled=False),
 }
