@@ -71,11 +71,20 @@ def _each(rule):
     return all_steps
 
 
+def wheels_off(curvature, half, v, w):
+    """Each wheel's speed times its own radius: the right one larger, the left one smaller."""
+    if half == 0:
+        return v, 0.0, w + curvature * v
+    right, left = (v + side * w * half for side in (1, -1))
+    right, left = right * (1 + curvature * half), left * (1 - curvature * half)
+    return (right + left) / 2, 0.0, (right - left) / (2 * half)
+
+
 for _name, _rule in {
     "base.gain_v": lambda p, v, w: (v + p["gain"] * v, 0.0, w),
     "base.gain_w": lambda p, v, w: (v, 0.0, w + p["gain"] * w),
     "base.left_right_gain": lambda p, v, w: (v, 0.0, w + p["asymmetry"] * abs(w)),
-    "base.veer": lambda p, v, w: (v, 0.0, w + p["curvature"] * v),
+    "base.veer": lambda p, v, w: wheels_off(p["curvature"], p["apart"] / 2, v, w),
     "base.reverse_gain": lambda p, v, w: (v * (1 + p["gain"]) if v < 0 else v, 0.0, w),
     "base.curvature_v": lambda p, v, w: (0.0 if p["curvature"] * abs(v) > 1 else v - p["curvature"] * v * abs(v), 0, w),
     "base.curvature_w": lambda p, v, w: (v, 0, 0.0 if p["curvature"] * abs(w) > 1 else w - p["curvature"] * w * abs(w)),

@@ -187,8 +187,9 @@ def candidates(terms: Sequence[Term], model: Model, ids: frozenset[str] | None =
         subsets = [subset for size in sizes for subset in combinations(amplitudes, size)]
         forms = () if effect.id in own else effect.forms
         for terms_of, ways, usual in _forms(effect, forms):
-            # Nobody has looked at what an unusual form does at large sizes: its sizes are all tried.
-            ways_of = [subset if usual else tuple(replace(term, rough=True) for term in subset) for subset in subsets]
+            # Volts go through thresholds: what an unusual form makes of large sizes, nobody has looked at.
+            simple = usual or not issubclass(effect, effects.VoltageEffect)
+            ways_of = [subset if simple else tuple(replace(term, rough=True) for term in subset) for subset in subsets]
             found += [
                 Candidate(effect.id, (*own_terms, *shapes, *terms_of), ways * len(subsets), usual)
                 for own_terms in ways_of
