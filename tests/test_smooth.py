@@ -133,9 +133,7 @@ def test_a_curve_and_an_effect_of_the_catalogue_are_fitted_together():
     assert size[1] < abs(case.size) * 1.05
     assert size[2] > abs(case.size) * 0.95
     left = [d.measured - problem.simulated(d, extension.settings) for d in problem.drives]
-    white = np.concatenate(
-        [smooth.whitened(d, r.reshape(-1, 1), problem.noise)[0] for d, r in zip(problem.drives, left, strict=True)]
-    )
+    white = np.concatenate([problem.whitened(d, r.reshape(-1, 1)) for d, r in zip(problem.drives, left, strict=True)])
     assert float(np.mean(white**2)) == pytest.approx(1.07, abs=0.07)
 
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import dblquad
 
 from kurumaisu import geometry
-from kurumaisu._core import whiten
+from kurumaisu._core import Whitener
 
 NOISE = {
     "position_sd": 0.01,
@@ -58,12 +58,15 @@ def joint_covariance(times, poses, noise, activity):
 
 @pytest.mark.parametrize("slow", [[0.0, 0.0, 0.0], [0.02, 0.0, 0.03]], ids=["one colour", "two colours"])
 @pytest.mark.parametrize("activity", [[1, 1, 1, 1, 1, 1], [1.5, 0.0, 0.1, 1.0, 2.0, 0.3]], ids=["steady", "gated"])
-def test_against_the_joint_covariance(slow, activity):
+@pytest.mark.parametrize("count", [1, 2, 11])  # columns go through the filter several at a time
+def test_against_the_joint_covariance(slow, activity, count):
     times, poses = run(6, 1)
-    columns = np.random.default_rng(2).normal(size=(18, 3))
+    columns = np.random.default_rng(2).normal(size=(18, count))
     noise = {**NOISE, "process_sd": [NOISE["process_sd"][0], slow]}
-    white, log_determinants = whiten(poses, times, columns, np.array(activity, dtype=float), **noise)
+    whitener = Whitener(poses, times, np.array(activity, dtype=float), **noise)
+    white, log_determinants = whitener.whiten(columns), whitener.log_determinants
     cov = joint_covariance(times, poses, noise, activity)
+    np.testing.assert_allclose(whitener.gram(columns), white.T @ white, rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(white.T @ white, columns.T @ np.linalg.solve(cov, columns), rtol=1e-5)
     assert log_determinants.sum() == pytest.approx(np.linalg.slogdet(cov)[1], abs=1e-4)
 
@@ -71,9 +74,9 @@ def test_against_the_joint_covariance(slow, activity):
 def test_short_steps_do_not_cancel():
     times = np.arange(50) * 1e-4
     poses = np.zeros((50, 3))
-    white, log_determinants = whiten(poses, times, np.ones((147, 1)), np.ones(49), **NOISE)
-    assert np.isfinite(white).all()
-    assert np.isfinite(log_determinants).all()
+    whitener = Whitener(poses, times, np.ones(49), **NOISE)
+    assert np.isfinite(whitener.whiten(np.ones((147, 1)))).all()
+    assert np.isfinite(whitener.log_determinants).all()
 
 
 @pytest.mark.parametrize(
@@ -81,7 +84,6 @@ def test_short_steps_do_not_cancel():
     [
         ({"times": np.zeros(7)}, "times must increase"),
         ({"times": np.arange(6.0)}, "same length"),
-        ({"columns": np.zeros((17, 1))}, "three rows per increment"),
         ({"poses": np.zeros((7, 2))}, "shape"),
         ({"activity": np.ones(5)}, "one factor per increment"),
         ({"activity": -np.ones(6)}, "none negative"),
@@ -96,10 +98,15 @@ def test_bad_input_is_refused(change, message):
     arguments = {
         "poses": poses,
         "times": times,
-        "columns": np.zeros((18, 1)),
         "activity": np.ones(6),
         **NOISE,
         **change,
     }
     with pytest.raises(ValueError, match=message):
-        whiten(**arguments)
+        Whitener(**arguments)
+
+
+def test_columns_of_another_drive_are_refused():
+    times, poses = run(6, 1)
+    with pytest.raises(ValueError, match="three rows per increment"):
+        Whitener(poses, times, np.ones(6), **NOISE).whiten(np.zeros((17, 1)))

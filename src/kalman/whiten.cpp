@@ -57,12 +57,11 @@ Jacobians jacobians(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return j;
 }
 
-void check(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
-           const Eigen::VectorXd& activity, const MotionNoise& noise) {
+void check(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::VectorXd& activity,
+           const MotionNoise& noise) {
   const Eigen::Index n = poses.rows() - 1;
   if (n < 1 || poses.cols() != 3) throw std::invalid_argument("poses must have shape (n + 1, 3), n > 0");
   if (times.size() != n + 1) throw std::invalid_argument("times and poses must have the same length");
-  if (columns.rows() != 3 * n) throw std::invalid_argument("columns must have three rows per increment");
   if (!((times.tail(n) - times.head(n)).array() > 0).all()) {
     throw std::invalid_argument("times must increase");
   }
@@ -76,8 +75,11 @@ void check(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eig
 }
 
 template <int kColours>
-Whitened filter(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
-                const Eigen::VectorXd& activity, const MotionNoise& noise) {
+std::vector<Whitener::Step<3 + 3 * kColours>> filter(const Eigen::MatrixXd& poses,
+                                                     const Eigen::VectorXd& times,
+                                                     const Eigen::VectorXd& activity,
+                                                     const MotionNoise& noise,
+                                                     Eigen::MatrixX3d& log_determinants) {
   constexpr int kSize = 3 + 3 * kColours;
   const Eigen::Index n = poses.rows() - 1;
   const Matrix3 pose_cov = Eigen::Vector3d(noise.position_sd, noise.position_sd, noise.heading_sd)
@@ -94,14 +96,16 @@ Whitened filter(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, cons
     cov.template block<3, 3>(3 + 3 * c, 3 + 3 * c) = rate_cov[c];
   }
 
-  Whitened out{Eigen::MatrixXd(columns.rows(), columns.cols()), Eigen::MatrixX3d(n, 3)};
-  using Mean = Eigen::Matrix<double, kSize, Eigen::Dynamic>;
-  Mean mean = Mean::Zero(kSize, columns.cols());
-  Eigen::Matrix<double, 3, Eigen::Dynamic> innovation(3, columns.cols());
-
+  std::vector<Whitener::Step<kSize>> steps(static_cast<std::size_t>(n));
+  double dt = 0.0;  // of the processes as worked out last: many increments are alike
+  std::array<OuStep, kColours> processes{};
   for (Eigen::Index k = 0; k < n; ++k) {
     Jacobians j = jacobians(poses.row(k).transpose(), poses.row(k + 1).transpose());
     j.motion *= activity[k];
+    if (times[k + 1] - times[k] != dt) {
+      dt = times[k + 1] - times[k];
+      for (int c = 0; c < kColours; ++c) processes[c] = ouStep(dt, colours[c].tau);
+    }
 
     // Next state (e_{k+1}, u_{k+1}): a new pose error, and rate errors that decay; h: the state to this increment.
     Increments<kColours> h;
@@ -113,7 +117,7 @@ Whitened filter(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, cons
     shared.template topRows<3>() = pose_cov * j.to.transpose();
     Matrix3 fresh = j.to * pose_cov * j.to.transpose();
     for (int c = 0; c < kColours; ++c) {
-      const OuStep ou = ouStep(times[k + 1] - times[k], colours[c].tau);
+      const OuStep& ou = processes[c];
       h.template middleCols<3>(3 + 3 * c) = ou.reach * j.motion;
       q.template block<3, 3>(3 + 3 * c, 3 + 3 * c) = ou.var_u * rate_cov[c];
       keep.template segment<3>(3 + 3 * c).setConstant(ou.decay);
@@ -124,28 +128,130 @@ Whitened filter(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, cons
     const Eigen::Matrix<double, kSize, 3> seen = cov * h.transpose();
     const Eigen::LLT<Matrix3> llt(h * seen + fresh);
     if (llt.info() != Eigen::Success) throw std::invalid_argument("the increments' covariance is singular");
-    innovation.noalias() = columns.middleRows(3 * k, 3) - h * mean;
-    out.columns.middleRows(3 * k, 3) = llt.matrixL().solve(innovation);
-    out.log_determinants.row(k) = 2.0 * llt.matrixLLT().diagonal().array().log().transpose();
-
+    log_determinants.row(k) = 2.0 * llt.matrixLLT().diagonal().array().log().transpose();
     const Eigen::Matrix<double, kSize, 3> cross = keep.asDiagonal() * seen + shared;
     const Eigen::Matrix<double, kSize, 3> gain = llt.solve(cross.transpose()).transpose();
-    mean = (keep.asDiagonal() * mean).eval();
-    mean.noalias() += gain * innovation;
+    const Matrix3 lower = llt.matrixL().solve(Matrix3::Identity());
     cov = (keep.asDiagonal() * cov * keep.asDiagonal()).eval() + q - gain * cross.transpose();
     cov = 0.5 * (cov + cov.transpose()).eval();
+
+    Whitener::Step<kSize>& step = steps[static_cast<std::size_t>(k)];
+    for (int i = 0; i < kSize; ++i) {
+      for (int r = 0; r < 3; ++r) {
+        step.seen[r][i] = h(r, i);
+        step.gain[i][r] = gain(i, r);
+      }
+      step.keep[i] = keep[i];
+    }
+    step.lower = {lower(0, 0), lower(1, 0), lower(1, 1), lower(2, 0), lower(2, 1), lower(2, 2)};
   }
-  return out;
+  return steps;
+}
+
+constexpr Eigen::Index kLargest = 9;  // numbers in a state
+constexpr Eigen::Index kLane = 8;     // columns that go through a step side by side
+
+/// Filters some columns by one increment: `in` and `out` are rows of so many numbers, three of them; mean: of the state.
+template <int kSize, int kColumns>
+void filterLane(const Whitener::Step<kSize>& step, const double* in, Eigen::Index in_stride, double* out,
+                Eigen::Index out_stride, double* mean) {
+  using Lane = Eigen::Array<double, 1, kColumns>;
+  std::array<Lane, kSize> state;
+  for (int i = 0; i < kSize; ++i) state[i] = Eigen::Map<const Lane>(mean + i * kColumns);
+  std::array<Lane, 3> innovation;
+  for (int r = 0; r < 3; ++r) {
+    innovation[r] = Eigen::Map<const Lane>(in + r * in_stride);
+    for (int i = 0; i < kSize; ++i) innovation[r] -= step.seen[r][i] * state[i];
+  }
+  const auto& [l00, l10, l11, l20, l21, l22] = step.lower;
+  Eigen::Map<Lane>{out} = l00 * innovation[0];
+  Eigen::Map<Lane>{out + out_stride} = l10 * innovation[0] + l11 * innovation[1];
+  Eigen::Map<Lane>{out + 2 * out_stride} = l20 * innovation[0] + l21 * innovation[1] + l22 * innovation[2];
+  for (int i = 0; i < kSize; ++i) {
+    const auto& gain = step.gain[i];
+    Eigen::Map<Lane>{mean + i* kColumns} =
+        step.keep[i] * state[i] + gain[0] * innovation[0] + gain[1] * innovation[1] + gain[2] * innovation[2];
+  }
+}
+
+/// Filters m columns by one increment.
+template <int kSize>
+void filterStep(const Whitener::Step<kSize>& step, const double* in, Eigen::Index in_stride, double* out,
+                Eigen::Index m, double* mean) {
+  Eigen::Index at = 0;
+  for (; at + kLane <= m; at += kLane) {
+    filterLane<kSize, kLane>(step, in + at, in_stride, out + at, m, mean + kSize * at);
+  }
+  for (; at + 2 <= m; at += 2) filterLane<kSize, 2>(step, in + at, in_stride, out + at, m, mean + kSize * at);
+  if (at < m) filterLane<kSize, 1>(step, in + at, in_stride, out + at, m, mean + kSize * at);
+}
+
+/// Adds the products of all pairs of m columns of some rows to the upper triangle of a gram.
+void addProducts(const Rows& rows, Rows& gram) {
+  const Eigen::Index m = gram.rows();
+  for (Eigen::Index i = 0; i < m; ++i) {
+    for (Eigen::Index r = 0; r < rows.rows(); r += 3) {
+      gram.row(i).tail(m - i) += rows(r, i) * rows.row(r).tail(m - i) +
+                                 rows(r + 1, i) * rows.row(r + 1).tail(m - i) +
+                                 rows(r + 2, i) * rows.row(r + 2).tail(m - i);
+    }
+  }
 }
 
 }  // namespace
 
-Whitened whiten(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
-                const Eigen::VectorXd& activity, const MotionNoise& noise) {
-  check(poses, times, columns, activity, noise);
-  const bool two = (noise.slow.sd.array() > 0).any();
-  return two ? filter<2>(poses, times, columns, activity, noise)
-             : filter<1>(poses, times, columns, activity, noise);
+Whitener::Whitener(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times,
+                   const Eigen::VectorXd& activity, const MotionNoise& noise) {
+  check(poses, times, activity, noise);
+  log_determinants_.resize(poses.rows() - 1, 3);
+  if ((noise.slow.sd.array() > 0).any()) {
+    steps_ = filter<2>(poses, times, activity, noise, log_determinants_);
+  } else {
+    steps_ = filter<1>(poses, times, activity, noise, log_determinants_);
+  }
+}
+
+void Whitener::requireRows(const Eigen::Ref<const Rows>& columns) const {
+  if (columns.rows() != 3 * log_determinants_.rows()) {
+    throw std::invalid_argument("columns must have three rows per increment");
+  }
+}
+
+Rows Whitener::whiten(const Eigen::Ref<const Rows>& columns) const {
+  requireRows(columns);
+  const Eigen::Index m = columns.cols();
+  Rows out(columns.rows(), m);
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(kLargest * m);
+  std::visit(
+      [&](const auto& steps) {
+        Eigen::Index row = 0;
+        for (const auto& step : steps) {
+          filterStep(step, columns.row(row).data(), columns.outerStride(), out.row(row).data(), m,
+                     mean.data());
+          row += 3;
+        }
+      },
+      steps_);
+  return out;
+}
+
+Rows Whitener::gram(const Eigen::Ref<const Rows>& columns) const {
+  requireRows(columns);
+  const Eigen::Index m = columns.cols();
+  Rows out = Rows::Zero(m, m);
+  Rows white(3, m);
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(kLargest * m);
+  std::visit(
+      [&](const auto& steps) {
+        Eigen::Index row = 0;
+        for (const auto& step : steps) {
+          filterStep(step, columns.row(row).data(), columns.outerStride(), white.data(), m, mean.data());
+          addProducts(white, out);
+          row += 3;
+        }
+      },
+      steps_);
+  return out.selfadjointView<Eigen::Upper>();
 }
 
 }  // namespace kurumaisu

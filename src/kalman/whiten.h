@@ -3,6 +3,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <variant>
+#include <vector>
 
 namespace kurumaisu {
 
@@ -21,21 +24,49 @@ struct MotionNoise {
   Colour slow;
 };
 
-/// Whitened columns (rows: 3 per increment) and, per increment, the log variances of dx, of dy given dx, and of dtheta
-/// given both, all given the increments before it; their sum is the log determinant of the joint covariance.
-struct Whitened {
-  Eigen::MatrixXd columns;
-  Eigen::MatrixX3d log_determinants;
-};
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Whitens columns of residual increments: L^-1 X with L L' the joint covariance of all increments of a run.
 ///
-/// poses: (n + 1, 3) reference x, y, theta; times: n + 1, increasing [s]; columns: (3 n, m), row 3k..3k+2 being
-/// dx, dy [m] and dtheta [rad] of increment k in the body frame at pose k. The error of pose k is shared by the
-/// increments k - 1 and k; it lives in the map frame, so its share rotates with the robot. Cost O(n m).
-/// activity: (n,) factors on the noise of the rates during each increment, 0 for a robot that is held at rest.
-/// Throws std::invalid_argument for shapes that do not fit, times that do not increase, or noise that is not positive.
-Whitened whiten(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::MatrixXd& columns,
-                const Eigen::VectorXd& activity, const MotionNoise& noise);
+/// The error of pose k is shared by the increments k - 1 and k; it lives in the map frame, so its share rotates with
+/// the robot. What the filter does depends on no column: it is worked out once, O(n), for any number of columns.
+class Whitener {
+ public:
+  /// poses: (n + 1, 3) reference x, y, theta; times: n + 1, increasing [s]; activity: (n,) factors on the noise of the
+  /// rates during each increment, 0 for a robot that is held at rest.
+  /// Throws std::invalid_argument for shapes that do not fit, times that do not increase, or noise that is not
+  /// positive.
+  Whitener(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::VectorXd& activity,
+           const MotionNoise& noise);
+
+  /// Columns (3 n, m), row 3k..3k+2 being dx, dy [m] and dtheta [rad] of increment k in the body frame at pose k; O(n m).
+  /// Throws std::invalid_argument for another number of rows.
+  Rows whiten(const Eigen::Ref<const Rows>& columns) const;
+
+  /// Products (m, m) of all pairs of such columns, whitened: what whiten(X)' whiten(X) is, without room for them.
+  Rows gram(const Eigen::Ref<const Rows>& columns) const;
+
+  /// Per increment, the log variances of dx, of dy given dx, and of dtheta given both, all given the increments before
+  /// it; their sum is the log determinant of the joint covariance.
+  const Eigen::MatrixX3d& logDeterminants() const { return log_determinants_; }
+
+  /// One increment of the filter whose state has `size` numbers: errors of the pose and of the rates.
+  template <int size>
+  struct Step {
+    std::array<std::array<double, size>, 3> seen;  ///< state to increment
+    std::array<std::array<double, 3>, size> gain;  ///< innovation to the next state
+    std::array<double, size> keep;                 ///< share of the state that the next one keeps
+    std::array<double, 6> lower;                   ///< innovation to whitened: rows of a lower triangle
+  };
+
+ private:
+  using OneColour = std::vector<Step<6>>;
+  using TwoColours = std::vector<Step<9>>;
+
+  void requireRows(const Eigen::Ref<const Rows>& columns) const;
+
+  std::variant<OneColour, TwoColours> steps_;
+  Eigen::MatrixX3d log_determinants_;
+};
 
 }  // namespace kurumaisu

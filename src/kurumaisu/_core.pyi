@@ -65,22 +65,28 @@ class LaserError:
     def deviation(self, r: FloatArray) -> FloatArray: ...
     def reading(self, r: FloatArray, standard_normal: FloatArray) -> FloatArray: ...
 
-def whiten(
-    poses: FloatArray,
-    times: FloatArray,
-    columns: FloatArray,
-    activity: FloatArray,
-    *,
-    position_sd: float,
-    heading_sd: float,
-    process_sd: Sequence[Sequence[float]],
-    process_tau: Sequence[float],
-) -> tuple[FloatArray, FloatArray]: ...
+class Whitener:
+    def __init__(
+        self,
+        poses: FloatArray,
+        times: FloatArray,
+        activity: FloatArray,
+        *,
+        position_sd: float,
+        heading_sd: float,
+        process_sd: Sequence[Sequence[float]],
+        process_tau: Sequence[float],
+    ) -> None: ...
+    def whiten(self, columns: FloatArray) -> FloatArray: ...
+    def gram(self, columns: FloatArray) -> FloatArray: ...
+    @property
+    def log_determinants(self) -> FloatArray: ...
 
 class Scene:
     def __init__(self, segments: FloatArray) -> None: ...
     def __len__(self) -> int: ...
     def cast(self, poses: FloatArray, bearings: FloatArray, max_range: float) -> FloatArray: ...
+    def meet(self, poses: FloatArray, bearings: FloatArray) -> tuple[FloatArray, IntArray]: ...
     def cast_fan(
         self, origin: FloatArray | Sequence[float], first: float, increment: float, samples: int, max_range: float
     ) -> tuple[FloatArray, IntArray]: ...

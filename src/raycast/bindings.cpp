@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <vector>
 
@@ -28,26 +29,58 @@ std::vector<Segment> segmentsOf(const Array& array) {
   return segments;
 }
 
-Array castBeams(const Scene& scene, const Array& poses, const Array& bearings, double max_range) {
-  const bool one_pose = poses.ndim() == 1;
+/// Poses (n, 3), or one pose (3,), of beams along bearings (n,).
+std::vector<Pose2D> originsOf(const Array& poses, const Array& bearings) {
   if (bearings.ndim() != 1) throw std::invalid_argument("bearings must have shape (n,)");
   if (poses.ndim() > 2 || poses.ndim() < 1 || poses.shape(poses.ndim() - 1) != 3 ||
-      (!one_pose && poses.shape(0) != bearings.size())) {
+      (poses.ndim() == 2 && poses.shape(0) != bearings.size())) {
     throw std::invalid_argument("poses must have shape (3,), or (n, 3) with one row per bearing");
   }
-  if (!(max_range >= 0)) throw std::invalid_argument("max_range must not be negative");
   std::vector<Pose2D> origins;
   for (py::ssize_t i = 0; i < poses.size(); i += 3) {
     origins.push_back({poses.data()[i], poses.data()[i + 1], poses.data()[i + 2]});
   }
+  return origins;
+}
+
+Array castBeams(const Scene& scene, const Array& poses, const Array& bearings, double max_range) {
+  const std::vector<Pose2D> origins = originsOf(poses, bearings);
+  if (!(max_range >= 0)) throw std::invalid_argument("max_range must not be negative");
   Array out(bearings.size());
   double* ranges = out.mutable_data();
   {
     const py::gil_scoped_release release;
-    scene.cast(origins.data(), one_pose, bearings.data(), static_cast<std::size_t>(bearings.size()),
+    scene.cast(origins.data(), poses.ndim() == 1, bearings.data(), static_cast<std::size_t>(bearings.size()),
                max_range, ranges);
   }
   return out;
+}
+
+py::tuple tupleOf(const std::vector<Hit>& hits) {
+  Array ranges(static_cast<py::ssize_t>(hits.size()));
+  py::array_t<std::int64_t> segments(static_cast<py::ssize_t>(hits.size()));
+  double* range = ranges.mutable_data();
+  std::int64_t* segment = segments.mutable_data();
+  for (const Hit& hit : hits) {
+    *range++ = hit.range;
+    *segment++ = hit.segment;
+  }
+  return py::make_tuple(ranges, segments);
+}
+
+py::tuple meetBeams(const Scene& scene, const Array& poses, const Array& bearings) {
+  const std::vector<Pose2D> origins = originsOf(poses, bearings);
+  const auto n = static_cast<std::size_t>(bearings.size());
+  std::vector<Hit> hits(n);
+  {
+    const py::gil_scoped_release release;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Pose2D& pose = origins[origins.size() == 1 ? 0 : i];
+      hits[i] = scene.cast(pose.x, pose.y, pose.theta + bearings.data()[i],
+                           std::numeric_limits<double>::infinity());
+    }
+  }
+  return tupleOf(hits);
 }
 
 py::tuple castFan(const Scene& scene, const std::array<double, 3>& origin, double first, double increment,
@@ -58,15 +91,7 @@ py::tuple castFan(const Scene& scene, const std::array<double, 3>& origin, doubl
     const py::gil_scoped_release release;
     scene.castFan({origin[0], origin[1], origin[2]}, first, increment, samples, max_range, hits.data());
   }
-  Array ranges(static_cast<py::ssize_t>(samples));
-  py::array_t<std::int64_t> segments(static_cast<py::ssize_t>(samples));
-  double* range = ranges.mutable_data();
-  std::int64_t* segment = segments.mutable_data();
-  for (const Hit& hit : hits) {
-    *range++ = hit.range;
-    *segment++ = hit.segment;
-  }
-  return py::make_tuple(ranges, segments);
+  return tupleOf(hits);
 }
 
 }  // namespace
@@ -80,6 +105,8 @@ void bindRaycast(py::module_& m) {
            "Ranges (n,) [m] of beams that leave poses (n, 3), or one pose (3,), at bearings (n,) [rad]; +inf "
            "beyond\n"
            "max_range [m]. Poses are of the laser, in the map frame.")
+      .def("meet", &meetBeams, py::arg("poses"), py::arg("bearings"),
+           "Ranges (n,) [m] as of cast, at any distance, and the segments (n,) that are met; -1: nothing.")
       .def("cast_fan", &castFan, py::arg("origin"), py::arg("first"), py::arg("increment"),
            py::arg("samples"), py::arg("max_range"),
            "Ranges (samples,) [m] and indices (samples,) of the segments met; +inf and -1: nothing within "

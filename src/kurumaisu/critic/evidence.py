@@ -9,11 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
+from kurumaisu._core import Whitener
 from kurumaisu.critic import replay, solve
 from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalogue, roughened, settings_of, showing
 from kurumaisu.critic.comb import Comb, Walked
 from kurumaisu.critic.drive import Drive
-from kurumaisu.critic.noise import Noise, whitened
+from kurumaisu.critic.noise import Noise, whitener
 from kurumaisu.critic.prior import Z_USUAL, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -65,20 +66,27 @@ class Problem:
         noise: Noise,
         terms: tuple[Term, ...] | None = None,
         ids: frozenset[str] | None = None,
+        known: replay.Increments | None = None,
     ) -> None:
-        """Take terms: those that such drives can show, where somebody has found them out; ids: effects that may act."""
+        """Take terms: those that such drives can show, where somebody has found them out; ids: effects that may act.
+
+        known: of the same model.
+        """
         self.drives = drives
         self.model = model
         self.noise = noise
         self._terms = terms
         self.ids = ids
+        self._known = known or replay.Increments(model)
+        self._whiteners: dict[int, tuple[Drive, Whitener]] = {}
         self._walked: Walked = {}
 
     def changed(
         self, *, drives: Sequence[Drive] | None = None, model: Model | None = None, noise: Noise | None = None
     ) -> Problem:
         """Return the problem, with the same terms, of other drives, another model or another noise."""
-        other = Problem(drives or self.drives, model or self.model, noise or self.noise, self.terms, self.ids)
+        known = None if model is not None else self._known
+        other = Problem(drives or self.drives, model or self.model, noise or self.noise, self.terms, self.ids, known)
         if drives is None:
             other._walked = self._walked
         return other
@@ -103,7 +111,7 @@ class Problem:
 
     def simulated(self, drive: Drive, settings: Sequence[EffectSetting]) -> FloatArray:
         """Return the simulated body increments of a drive, (m, 3)."""
-        return replay.increments(drive, self.model, settings)
+        return self._known.of(drive, settings)
 
     def simulated_columns(self, drive: Drive, fit: Fit) -> FloatArray:
         """Return the derivative of the simulated increments by every term at a fit, per step, (3 m, k)."""
@@ -130,9 +138,15 @@ class Problem:
             simulated = self.simulated(drive, here)
             rows = [(drive.measured - simulated).ravel()]
             rows += [(self.simulated(drive, settings) - simulated).ravel() / share for settings, share in moves]
-            parts.append(whitened(drive, np.column_stack(rows), self.noise)[0])
+            parts.append(self.whitened(drive, np.column_stack(rows)))
         both = np.concatenate(parts)
         return both[:, 0], both[:, 1:]
+
+    def whitened(self, drive: Drive, columns: FloatArray) -> FloatArray:
+        """Return columns (3 m, k) of one of the drives, whitened."""
+        if id(drive) not in self._whiteners:
+            self._whiteners[id(drive)] = drive, whitener(drive, self.noise)
+        return self._whiteners[id(drive)][1].whiten(columns)
 
     def fit(self, ids: Iterable[str], start: Mapping[Key, float]) -> Fit:
         """Return the nonlinear fit of a set of effects with all their parameters; start: a first guess by term."""
@@ -271,7 +285,7 @@ class Problem:
 
     def _whitened(self, drive: Drive, settings: tuple[EffectSetting, ...]) -> FloatArray:
         residual = drive.measured - self.simulated(drive, settings)
-        return whitened(drive, residual.reshape(-1, 1), self.noise)[0][:, 0]
+        return self.whitened(drive, residual.reshape(-1, 1))[:, 0]
 
 
 def covariance(gram: FloatArray) -> FloatArray:

@@ -12,12 +12,13 @@ from kurumaisu import effects
 from kurumaisu.critic.gain import log_density_gain, rmse_gain
 from kurumaisu.critic.laser.shots import Shots, missing
 from kurumaisu.critic.predict_motion import Forecast
-from kurumaisu.critic.predict_scan import Expected, Joint, ScanModel, expected, scattered
-from kurumaisu.critic.predict_track import Places, chosen, joined, rows_of
+from kurumaisu.critic.predict_rows import Expectations
+from kurumaisu.critic.predict_scan import Expected, Joint, ScanModel, scattered
+from kurumaisu.critic.predict_track import Places, chosen, joined
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.verdict import ChannelGain
 from kurumaisu.params import EffectSetting, Model
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 CHANNEL = "range"
 _SCANS = 60  # of test runs
@@ -31,10 +32,11 @@ Settings = tuple[EffectSetting, ...]
 
 @dataclass(frozen=True)
 class Split:
-    """Scans to fit and scans to judge by; apart: those to judge by were not among those that found what extends."""
+    """Scans to fit and scans to judge by, as rows of those known; apart: the latter did not find what extends."""
 
-    train: Shots
-    test: Shots
+    known: Expectations
+    train: IntArray
+    test: IntArray
     apart: bool
 
 
@@ -48,7 +50,7 @@ def measure(recording: Recording, model: Model, forecast: Forecast | None, setti
     sums: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     squares: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     for split in _splits(recording, model, forecast):
-        refitted = settings if split.apart else refit(split.train, settings)
+        refitted = settings if split.apart else _refit(split.known, split.train, settings)
         sides = [_side(split, some, recording.truth) for some in ((), refitted)]
         use = sides[0].counts & sides[1].counts
         for i, side in enumerate(sides):
@@ -78,9 +80,10 @@ class _Side:
 
 
 def _side(split: Split, settings: Settings, truth: tuple[float, float] | None) -> _Side:
-    trained = scattered(expected(split.train, settings), split.train.measured, settings, truth)
-    what = expected(split.test, settings)
-    error = split.test.measured - what.mean
+    measured = split.known.shots.measured
+    trained = scattered(split.known.rows(settings, split.train), measured[split.train], settings, truth)
+    what = split.known.rows(settings, split.test)
+    error = measured[split.test] - what.mean
     with np.errstate(invalid="ignore"):
         counts = what.place & (np.abs(error / trained.of(what)[1]) < _OUTLIER)
     return _Side(trained, what, error, counts)
@@ -93,44 +96,61 @@ def _splits(recording: Recording, model: Model, forecast: Forecast | None) -> It
     picked = [(run, *chosen(run, _SCANS)) for run in tests]
     held = [places.of(run, stamps, measured) for run, stamps, measured in picked if len(stamps)]
     if held:
-        yield Split(joined(parts), joined(held), apart=True)
+        sizes = len(joined(parts).stamps), len(joined(held).stamps)
+        rows = np.arange(sum(sizes))
+        yield Split(Expectations(joined([*parts, *held])), rows[: sizes[0]], rows[sizes[0] :], apart=True)
         return
+    known = Expectations(joined(parts))
+    rows = np.arange(len(known.shots.stamps))
     if len(parts) == 1:
-        parts = _cut(parts[0], _PARTS)
-    for i, part in enumerate(parts):
-        rest = [other for j, other in enumerate(parts) if j != i]
-        if rest:
-            yield Split(joined(rest), part, apart=False)
+        cuts = [part for part in np.array_split(rows, _PARTS) if len(part)]
+    else:
+        cuts = np.split(rows, np.cumsum([len(part.stamps) for part in parts[:-1]]))
+    for test in cuts:
+        if len(test) < len(rows):
+            yield Split(known, np.setdiff1d(rows, test), test, apart=False)
 
 
 def refit(shots: Shots, settings: Settings) -> Settings:
     """Return settings whose parameters are those that explain some shots best, near those given."""
-    base = expected(shots, settings)
-    error = shots.measured - base.mean
-    sd = scattered(base, shots.measured, settings, None).of(base)[1]
-    use = base.place & (np.abs(np.nan_to_num(error / sd, nan=np.inf)) < _OUTLIER)
-    keys, columns, sizes = [], [], []
+    return _refit(Expectations(shots), np.arange(len(shots.stamps)), settings)
+
+
+def _refit(known: Expectations, rows: IntArray, settings: Settings) -> Settings:
+    """Return the same for some of the scans."""
+    base, measured = known.rows(settings, rows), known.shots.measured[rows]
+    changes = []
     for setting in settings:
         for p in effects.by_id(setting.id).parameters:
             size = abs(setting.parameters[p.name] - p.null)
             if size == 0 or p.lower == p.upper:
                 continue
             moved = _with(settings, {(setting.id, p.name): _inside(p, setting.parameters[p.name] + _STEP * size)})
-            change = (expected(shots, moved).mean - base.mean)[use] / sd[use]
-            if np.isfinite(change).all() and np.any(change):
-                keys.append((setting.id, p.name))
-                columns.append(change / _STEP)
-                sizes.append(size)
+            change = known.rows(moved, rows).mean - base.mean
+            if np.any(change[base.place]):
+                changes.append(((setting.id, p.name), size, change))
+    if not changes:
+        return settings
+    error = measured - base.mean
+    sd = scattered(base, measured, settings, None).of(base)[1]
+    use = base.place & (np.abs(np.nan_to_num(error / sd, nan=np.inf)) < _OUTLIER)
+    keys, columns, sizes = [], [], []
+    for key, size, change in changes:
+        column = change[use] / sd[use]
+        if np.isfinite(column).all() and np.any(column):
+            keys.append(key)
+            columns.append(column / _STEP)
+            sizes.append(size)
     if not keys:
         return settings
     j = np.column_stack(columns)
     shares = np.linalg.solve(j.T @ j + np.eye(len(keys)) / _VAGUE**2, j.T @ (error / sd)[use])
-    known = {(setting.id, name): value for setting in settings for name, value in setting.parameters.items()}
+    at = {(setting.id, name): value for setting in settings for name, value in setting.parameters.items()}
     bounds = {(s.id, p.name): p for s in settings for p in effects.by_id(s.id).parameters}
     return _with(
         settings,
         {
-            key: _inside(bounds[key], known[key] + share * size)
+            key: _inside(bounds[key], at[key] + share * size)
             for key, share, size in zip(keys, shares.tolist(), sizes, strict=True)
         },
     )
@@ -145,7 +165,3 @@ def _with(settings: Settings, values: dict[tuple[str, str], float]) -> Settings:
         EffectSetting(s.id, {name: values.get((s.id, name), value) for name, value in s.parameters.items()})
         for s in settings
     )
-
-
-def _cut(shots: Shots, parts: int) -> list[Shots]:
-    return [rows_of(shots, rows) for rows in np.array_split(np.arange(len(shots.stamps)), parts) if len(rows)]

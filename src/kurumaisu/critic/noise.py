@@ -14,7 +14,7 @@ from scipy.linalg import qr
 from scipy.optimize import minimize
 from scipy.special import expit
 
-from kurumaisu._core import whiten
+from kurumaisu._core import Whitener
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.prior import occam
 from kurumaisu.types import FloatArray
@@ -55,12 +55,11 @@ _WORTH = 4.0  # [nat] from which a second colour is believed: it has four parame
 _SAME = 0.03  # share of a column beyond those before it that makes it one of its own
 
 
-def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
-    """Return L^-1 X for columns X (3 m, k), L L' their covariance, and its log determinant in parts (m, 3)."""
-    return whiten(
+def whitener(drive: Drive, noise: Noise) -> Whitener:
+    """Return what whitens any columns of a drive as whitened does."""
+    return Whitener(
         drive.poses,
         drive.times,
-        columns,
         drive.activity * (1 + noise.growth * drive.pace),
         position_sd=noise.position_sd,
         heading_sd=noise.heading_sd,
@@ -70,6 +69,12 @@ def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArra
         ],
         process_tau=[noise.tau, noise.slow_tau],
     )
+
+
+def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
+    """Return L^-1 X for columns X (3 m, k), L L' their covariance, and its log determinant in parts (m, 3)."""
+    made = whitener(drive, noise)
+    return made.whiten(columns), made.log_determinants
 
 
 @dataclass(frozen=True)
@@ -167,9 +172,9 @@ class Scatter:
         """Return minus the restricted log likelihood, up to a constant."""
         log_determinant, gram = 0.0, np.zeros(2 * self._stacked[0].shape[1:])
         for drive, columns in zip(self._drives, self._stacked, strict=True):
-            white, parts = whitened(drive, columns, noise)
-            log_determinant += float(parts.sum())
-            gram += white.T @ white
+            made = whitener(drive, noise)
+            log_determinant += float(made.log_determinants.sum())
+            gram += made.gram(columns)
         square, b, inner = gram[0, 0], gram[1:, 0], gram[1:, 1:] + 1e-6 * np.eye(len(gram) - 1)
         rest = square - b @ np.linalg.solve(inner, b)
         return 0.5 * float(log_determinant + rest + np.linalg.slogdet(inner)[1])

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from kurumaisu import effects
-from kurumaisu.critic.laser.shots import Shots, look, predict, thin
+from kurumaisu.critic.laser.shots import Look, Shots, look, predict, thin
 from kurumaisu.critic.laser.trust import trusted_place
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray
@@ -63,14 +63,26 @@ class ScanModel:
 def expected(shots: Shots, settings: Settings) -> Expected:
     """Return what shots are to read with these effects, and what makes them scatter."""
     settings = undrawn(shots, settings)
+    return seen_from(shots, settings, looks(shots, settings))
+
+
+def looks(shots: Shots, settings: Settings) -> list[Look]:
+    """Return what the beams meet, and what they would from poses that are moved back and forth, along each axis."""
     seen = look(shots, settings, 0)
+    moves = [sign * size * np.eye(3)[i] for i, size in enumerate(_MOVE) for sign in (-1.0, 1.0)]
+    return [seen, *(look(shots, settings, 0, shift=move, like=seen) for move in moves)]
+
+
+def seen_from(shots: Shots, settings: Settings, around: Sequence[Look]) -> Expected:
+    """Return what expected does; settings: without what is drawn; around: of looks with the same settings."""
+    seen = around[0]
     mean = predict(shots, settings, seen, 0)
     mean = np.where((mean <= shots.laser.range_max) & (mean >= shots.laser.range_min), mean, np.nan)
     own = np.square(predict(shots, settings, seen, 0, noise=1.0) - mean)
     moved = np.zeros((3, *mean.shape))
     shared = np.ones((*mean.shape, 4))
     for i, size in enumerate(_MOVE):
-        sides = [look(shots, settings, 0, shift=sign * size * np.eye(3)[i], like=seen) for sign in (-1.0, 1.0)]
+        sides = around[1 + 2 * i : 3 + 2 * i]
         # Where a moved beam meets nothing, the move says nothing.
         low, high = (np.nan_to_num((predict(shots, settings, side, 0) - mean) / size) for side in sides)
         moved[i] = 0.5 * (low**2 + high**2)  # at an edge one side jumps

@@ -48,6 +48,11 @@ class Places:
             run=np.arange(len(stamps)) if len(tracks) > 1 else np.zeros(len(stamps), dtype=int),
             measured=np.full(shape, np.nan) if measured is None else measured,
             shift=np.zeros((*shape, 3)),
+            known={
+                name: np.interp(stamps, run.covariates[name].t, run.covariates[name].values[:, 0])
+                for name in self._base.known
+                if name in run.covariates
+            },
         )
 
     def trained(self) -> list[Shots]:
@@ -102,13 +107,23 @@ def joined(parts: Sequence[Shots]) -> Shots:
         run=np.concatenate([part.run + offset for part, offset in zip(parts, offsets, strict=True)]),
         measured=np.concatenate([part.measured for part in parts]),
         shift=np.concatenate([part.shift for part in parts]),
+        known={
+            name: np.concatenate([part.known[name] for part in parts])
+            for name in parts[0].known
+            if all(name in part.known for part in parts)
+        },
     )
 
 
 def rows_of(shots: Shots, rows: IntArray) -> Shots:
     """Return some of the scans."""
     return replace(
-        shots, stamps=shots.stamps[rows], run=shots.run[rows], measured=shots.measured[rows], shift=shots.shift[rows]
+        shots,
+        stamps=shots.stamps[rows],
+        run=shots.run[rows],
+        measured=shots.measured[rows],
+        shift=shots.shift[rows],
+        known={name: values[rows] for name, values in shots.known.items()},
     )
 
 

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import OrderedDict
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -14,6 +15,8 @@ from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.sim import plant
 from kurumaisu.types import FloatArray
+
+_ROOM = 2**26  # bytes of increments that are kept
 
 
 def extend(model: Model, settings: Sequence[EffectSetting]) -> Model:
@@ -54,6 +57,30 @@ def increments(drive: Drive, model: Model, settings: Sequence[EffectSetting]) ->
     """Return the simulated body increments between the reference's times, (m, 3)."""
     at = seen(drive, model, settings)
     return geometry.between(at[:-1], at[1:])
+
+
+class Increments:
+    """Simulated body increments of drives by one model: a search asks for many of them again and again."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._known: OrderedDict[Hashable, tuple[Drive, FloatArray]] = OrderedDict()
+        self._room = _ROOM
+
+    def of(self, drive: Drive, settings: Sequence[EffectSetting]) -> FloatArray:
+        """Return the increments with these effects, (m, 3), not to be written to."""
+        whole = ((each.id, tuple(sorted(each.parameters.items()))) for each in completed(self._model, settings))
+        key = (id(drive), *whole)
+        if key in self._known:
+            self._known.move_to_end(key)
+            return self._known[key][1]
+        found = increments(drive, self._model, settings)
+        found.flags.writeable = False
+        self._known[key] = drive, found
+        self._room -= found.nbytes
+        while self._room < 0:
+            self._room += self._known.popitem(last=False)[1][1].nbytes
+        return found
 
 
 def seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:

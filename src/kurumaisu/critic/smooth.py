@@ -18,7 +18,6 @@ from kurumaisu import effects
 from kurumaisu.critic import replay
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
-from kurumaisu.critic.noise import whitened
 from kurumaisu.critic.prior import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.critic.smooth_basis import Basis, bases
 from kurumaisu.critic.smooth_columns import Sensitivity
@@ -87,7 +86,7 @@ def columns(problem: Problem, settings: Sequence[EffectSetting], curves: Sequenc
     parts = []
     for drive in problem.drives:
         own = raw_columns(drive, problem.model, settings, curves)
-        parts.append(whitened(drive, own, problem.noise)[0])
+        parts.append(problem.whitened(drive, own))
     return np.concatenate(parts)
 
 
@@ -101,12 +100,18 @@ def raw_columns(drive: Drive, model: Model, settings: Sequence[EffectSetting], c
 
 def beside(problem: Problem, fit: Fit, of: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the residual at a fit and columns `of`, both without what the fit's own parameters could take up."""
+    y, own = taken_up(problem, fit)
+    return y, of - own @ (own.T @ of)
+
+
+def taken_up(problem: Problem, fit: Fit) -> tuple[FloatArray, FloatArray]:
+    """Return the residual at a fit without what its own parameters could take up, and an orthonormal basis of that."""
     y, slopes = problem.linearised(fit.terms, fit.values, fit.terms)
     if not slopes.shape[1]:
-        return y, of
+        return y, slopes
     left, sizes, _ = np.linalg.svd(slopes, full_matrices=False)
     own = left[:, sizes > 1e-6 * max(sizes[0], 1e-12)]
-    return y - own @ (own.T @ y), of - own @ (own.T @ of)
+    return y - own @ (own.T @ y), own
 
 
 def belief(gram: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> Belief:

@@ -13,7 +13,7 @@ from kurumaisu.critic.catalogue import Candidate
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.prior import log_prior
-from kurumaisu.critic.smooth import Belief, Curve, Design, belief, beside
+from kurumaisu.critic.smooth import Belief, Curve, Design, belief, taken_up
 from kurumaisu.types import FloatArray
 
 BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
@@ -83,16 +83,19 @@ def _tried(bare: Sequence[tuple[Fit, float]], also: frozenset[Candidate]) -> lis
 
 def _rivals(problem: Problem, design: Design, fits: Sequence[tuple[Fit, float]]) -> Iterator[Rival]:
     share = float(np.log(_ODDS / max(len(design.curves), 1)))
+    grams = [_gram(design.columns[:, curve.columns]) for curve in design.curves]
     for fit, worth in fits:
-        y, columns = beside(problem, fit, design.columns)
-        for curve, gram, b in _parts(design, y, columns):
-            found = belief(gram, b, curve.basis.priors)
+        y, own = taken_up(problem, fit)
+        # Of columns without what the fit can take up: normal equations, of which only a little changes with the fit.
+        products = np.column_stack([own, y]).T @ design.columns
+        cross, b = products[:-1], products[-1]
+        for curve, gram in zip(design.curves, grams, strict=True):
+            part = cross[:, curve.columns]
+            found = belief(gram - part.T @ part, b[curve.columns], curve.basis.priors)
             # All curves of a kind that the data chose from share what one has.
             chosen = replace(found, nats=found.nats - float(np.log(curve.basis.ways)))
             yield Rival(fit, curve, chosen, worth + chosen.nats + share)
 
 
-def _parts(design: Design, y: FloatArray, columns: FloatArray) -> Iterator[tuple[Curve, FloatArray, FloatArray]]:
-    for curve in design.curves:
-        own = columns[:, curve.columns]
-        yield curve, own.T @ own, own.T @ y
+def _gram(columns: FloatArray) -> FloatArray:
+    return np.asarray(columns.T @ columns)

@@ -60,39 +60,38 @@ def without_beams(
     total = np.zeros((common, common))
     inner[shared:, shared:] = cross.inner
     outer[shared:] = cross.common
+    taken: list[tuple[FloatArray, FloatArray]] = []
     for k, gram in enumerate(grams):
-        rest, beside, taken = _without_own(gram, cross.own[k], size)
-        lead = gram.shared
+        own, lead = gram.own, gram.shared
         index = [k, *(scans + 3 * layout.stand[k] + i for i in range(lead - 1))]
-        inner[np.ix_(index, index)] += rest[:lead, :lead]
-        inner[shared:, index] += beside[:, :lead]
-        outer[index] += rest[:lead, lead:]
-        total += rest[lead:, lead:]
-        if taken is not None:
-            part, columns = taken
-            inner[shared:, shared:] -= part.T @ part
-            outer[shared:] -= part.T @ columns[:, lead:]
+        rest, beside = gram.matrix[own : own + lead, own:], cross.own[k][:, own:]
+        if own:
+            part, columns = _of_own(gram, cross.own[k], size)
+            rest, beside = rest - columns[:, :lead].T @ columns, beside - part.T @ columns[:, :lead]
+            taken.append((part, columns[:, lead:]))
+        inner[np.ix_(index, index)] += rest[:, :lead]
+        inner[shared:, index] += beside
+        outer[index] += rest[:, lead:]
+        total += gram.matrix[own + lead :, own + lead :]
+    if taken:  # all at once: one product of large matrices instead of many of small ones
+        parts, columns = (np.concatenate(each) for each in zip(*taken, strict=True))
+        inner[shared:, shared:] -= parts.T @ parts
+        outer[shared:] -= parts.T @ columns
+        total -= columns.T @ columns
     inner[:shared, shared:] = inner[shared:, :shared].T
     inner[:shared, :shared] += precision(layout, noise, np.tile(size**-2, stands))[0]
     inner[range(shared, len(inner)), range(shared, len(inner))] += max(beam_sd, _FLOOR) ** -2
     return np.asarray(total - outer.T @ cho_solve(cho_factor(inner), outer))
 
 
-def _without_own(
-    gram: Gram, cross: FloatArray, size: FloatArray
-) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray] | None]:
-    """Return the rest of a gram, and of the beams' products with it, when errors of its own poses are integrated out.
+def _of_own(gram: Gram, cross: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what goes when errors of a scan's own poses are integrated out, as roots.
 
-    The third is what that takes from the beams: roots (own, b) and (own, m).
+    (own, b) of the beams' offsets and (own, m) of the other columns.
     """
     own = gram.own
-    if own == 0:
-        return gram.matrix, cross, None
     scale = np.tile(size, own // 3)
     inner = gram.matrix[:own, :own] * np.outer(scale, scale) + np.eye(own)
     lower = np.linalg.cholesky(inner)
     columns = solve_triangular(lower, gram.matrix[:own, own:] * scale[:, np.newaxis], lower=True)
-    beams = solve_triangular(lower, (cross[:, :own] * scale).T, lower=True)
-    rest = gram.matrix[own:, own:] - columns.T @ columns
-    lead = gram.shared
-    return rest, cross[:, own:] - beams.T @ columns[:, :lead], (beams, columns)
+    return solve_triangular(lower, (cross[:, :own] * scale).T, lower=True), columns

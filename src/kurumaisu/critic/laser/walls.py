@@ -33,19 +33,18 @@ def walls_at(world: World, height: float) -> Walls:
 
 
 class Rays:
-    """Casts rays against walls; builds a scene per reflectance, of which there are few."""
+    """Casts rays against walls."""
 
     def __init__(self, walls: Walls) -> None:
-        self._returns = np.unique(walls.returns)
-        self._scenes = [Scene(walls.segments[walls.returns == value]) for value in self._returns]
+        order = np.argsort(walls.returns, kind="stable")  # where walls coincide, the first one counts: the darkest
+        self._scene = Scene(walls.segments[order])
+        self._returns = np.append(walls.returns[order], 1.0)  # the last: of nothing
 
     def ranges(self, poses: FloatArray, bearings: FloatArray) -> FloatArray:
         """Return ranges (n,) [m] of beams from poses (n, 3) along bearings (n,) [rad]; +inf: nothing there."""
-        return np.asarray(np.min([scene.cast(poses, bearings, np.inf) for scene in self._scenes], axis=0))
+        return self._scene.cast(poses, bearings, np.inf)
 
     def cast(self, poses: FloatArray, bearings: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ranges as above, and the reflectance (n,) of what is met; 1 where that is nothing."""
-        each = np.array([scene.cast(poses, bearings, np.inf) for scene in self._scenes])
-        nearest = each.argmin(axis=0)
-        ranges = each[nearest, np.arange(len(nearest))]
-        return ranges, np.where(np.isfinite(ranges), self._returns[nearest], 1.0)
+        ranges, met = self._scene.meet(poses, bearings)
+        return ranges, self._returns[met]
