@@ -93,7 +93,7 @@ class Comb:
     def _one_way(
         self, term: Term, fixed: Sequence[Term], sign: float, room: float
     ) -> Iterator[tuple[float, FloatArray]]:
-        size, growth = abs(term.step) * term.parameter.scale / 2, _GROWTH[1]
+        size, growth = abs(term.step) * term.parameter.scale / 3, _GROWTH[1]
         before: FloatArray | None = None
         for _ in range(_SIZES):
             if size > room:
