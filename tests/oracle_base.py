@@ -71,11 +71,20 @@ def _each(rule):
     return all_steps
 
 
+def wheels_off(curvature, half, v, w):
+    """Each wheel's speed times its own radius: the right one larger, the left one smaller."""
+    if half == 0:
+        return v, 0.0, w + curvature * v
+    right, left = (v + side * w * half for side in (1, -1))
+    right, left = right * (1 + curvature * half), left * (1 - curvature * half)
+    return (right + left) / 2, 0.0, (right - left) / (2 * half)
+
+
 for _name, _rule in {
     "base.gain_v": lambda p, v, w: (v + p["gain"] * v, 0.0, w),
     "base.gain_w": lambda p, v, w: (v, 0.0, w + p["gain"] * w),
     "base.left_right_gain": lambda p, v, w: (v, 0.0, w + p["asymmetry"] * abs(w)),
-    "base.veer": lambda p, v, w: (v, 0.0, w + p["curvature"] * v),
+    "base.veer": lambda p, v, w: wheels_off(p["curvature"], p["apart"] / 2, v, w),
     "base.reverse_gain": lambda p, v, w: (v * (1 + p["gain"]) if v < 0 else v, 0.0, w),
     "base.curvature_v": lambda p, v, w: (0.0 if p["curvature"] * abs(v) > 1 else v - p["curvature"] * v * abs(v), 0, w),
     "base.curvature_w": lambda p, v, w: (v, 0, 0.0 if p["curvature"] * abs(w) > 1 else w - p["curvature"] * w * abs(w)),
@@ -242,7 +251,7 @@ def caster_reversal(p, drive):
                 kicked_to, since = last_side, 0.0
             last_way = way
         travelled = abs(v) * drive.dt
-        kick = p["kick"] * math.exp(-(since + travelled / 2) / p["length"]) if v != 0 else 0.0
+        kick = p["kick"] * math.exp(-(since + travelled / 2) / p["length"]) if abs(v) > 1e-3 else 0.0
         out.append(w + kicked_to * kick)
         since += travelled
         if w != 0:
@@ -256,19 +265,35 @@ def dac_zero_f(p, v_f, v_s, _signs):
 
 
 @_volts("base.dac_zero_s")
-def dac_zero_s(p, v_f, v_s, _signs):
-    return v_f, [v + p["offset"] for v in v_s]
+def dac_zero_s(p, v_f, v_s, signs):
+    """With rests, whoever is told to turn to one side by volts that stand for the other does not turn."""
+
+    def shifted(v, sign):
+        v += p["offset"]
+        if p["rests"] < 0.5 or (not sign > 0 and not sign < 0):
+            return v
+        side = _LAWS["steering"]["positive" if sign > 0 else "negative"]
+        return 0.0 if (v - side["intercept"]) / side["slope"] * sign < 0 else v
+
+    return v_f, [shifted(v, sign) for v, sign in zip(v_s, signs, strict=True)]
 
 
 @_volts("base.dac_quantisation")
-def dac_quantisation(p, v_f, v_s, _signs):
-    """The nearest of two neighbouring steps."""
+def dac_quantisation(p, v_f, v_s, signs):
+    """Climb from level to level, half a step below 0 on, while the next one is not farther than what is asked for."""
 
-    def nearest(v):
-        below = math.floor(v / p["step"]) * p["step"]
-        return below if v - below < p["step"] / 2 else below + p["step"]
+    def reached(size):
+        level = (p["phase"] - 3) * p["step"]
+        while level + p["step"] / 2 <= size:
+            level += p["step"]
+        return max(level - p["cut"] * p["step"] / 2, 0.0)
 
-    return ([nearest(v) for v in volts] if p["step"] > 0 else volts for volts in (v_f, v_s))
+    if p["step"] == 0:
+        return v_f, v_s
+    v_f, v_s = ([math.copysign(reached(abs(v)), v) if v else 0.0 for v in volts] for volts in (v_f, v_s))
+    if p["rests"] < 0.5:  # a turn is never just 0 V
+        v_s = [1e-12 if v == 0 and sign in (-1, 1) else v for v, sign in zip(v_s, signs, strict=True)]
+    return v_f, v_s
 
 
 @_volts("base.steering_law")

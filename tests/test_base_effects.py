@@ -182,10 +182,46 @@ def test_dac_zero_and_steps():
     it = effects.Volts(np.array([0.1, 0.0]), np.array([-0.1234, 0.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]))
     zero = effects.by_id("base.dac_zero_f")({"offset": 0.02}, CONTEXT).apply(it)
     np.testing.assert_allclose([*zero.v_f, *zero.v_s], [0.12, 0.02, -0.1234, 0.0])
-    zero = effects.by_id("base.dac_zero_s")({"offset": 0.02}, CONTEXT).apply(it)
+    zero = effects.by_id("base.dac_zero_s")({"offset": 0.02, "rests": 0.0}, CONTEXT).apply(it)
     np.testing.assert_allclose([*zero.v_f, *zero.v_s], [0.1, 0.0, -0.1034, 0.02])
-    steps = effects.by_id("base.dac_quantisation")({"step": 0.005}, CONTEXT).apply(it)
-    np.testing.assert_allclose([*steps.v_f, *steps.v_s], [0.1, 0.0, -0.125, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("form", "expected"),
+    [((0.0, 0.0), [0.1, 0.0, -0.125, 0.0]), ((0.5, 0.0), [0.1025, 0.0, -0.1225, 0.0]),
+     ((0.5, 1.0), [0.1, 0.0, -0.12, 0.0])],
+)  # fmt: skip
+def test_steps_are_rounded_or_have_no_zero_or_cut(form, expected):
+    it = effects.Volts(np.array([0.101, 0.0]), np.array([-0.1234, 0.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]))
+    values = {"step": 0.005, "phase": form[0], "cut": form[1], "rests": 0.0}
+    steps = effects.by_id("base.dac_quantisation")(values, CONTEXT).apply(it)
+    np.testing.assert_allclose([*steps.v_f, *steps.v_s], expected)
+
+
+@pytest.mark.parametrize(("rests", "rate"), [(0.0, -0.169476 / 0.469278), (1.0, 0.0)])
+def test_a_turn_of_no_volts_goes_on_or_rests(rests, rate):
+    effect = EffectSetting("base.dac_quantisation", {"step": 0.01, "phase": 0.0, "cut": 0.0, "rests": rests})
+    plant = Plant(replace(MODEL, effects=(effect,)), DT, np.random.default_rng(0))
+    w = plant.from_rates(np.zeros(2), np.array([-0.36, 0.0])).w
+    np.testing.assert_allclose(w, [rate, 0.0], atol=1e-9)
+
+
+def test_a_voltage_beyond_its_branch_is_the_other_side_or_rest():
+    """A left turn of 0.05 rad/s is 0.0792 V; 0.05 V more is a right turn by equation (2)."""
+    law = CONTEXT.steering
+    it = effects.Volts(np.zeros(2), law.volts(np.array([0.05, 0.2])), np.zeros(2), np.ones(2))
+    jumps, rests = (
+        effects.by_id("base.dac_zero_s")({"offset": 0.05, "rests": rests}, CONTEXT).apply(it) for rests in (0.0, 1.0)
+    )
+    np.testing.assert_allclose(jumps.v_s, it.v_s + 0.05)
+    np.testing.assert_allclose(rests.v_s, [0.0, it.v_s[1] + 0.05])
+
+
+def test_casters_do_not_turn_a_chair_that_creeps_to_its_rest():
+    v = np.concatenate([np.full(10, 0.5), np.full(10, -0.5), -0.5e-3 * 0.5 ** np.arange(10)])
+    out = apply("base.caster_reversal", {"kick": 0.1, "length": 0.25}, v, np.where(v > 0, 0.2, 0.0)).w
+    assert out[10:20].all()
+    assert not out[20:].any()
 
 
 def test_a_shifted_zero_reaches_the_rates_by_the_voltage_law():

@@ -26,7 +26,9 @@ def criticise(data):
 @pytest.mark.parametrize("effect", hidden_effect.EFFECTS)
 def test_a_hidden_effect_is_named_and_measured(effect):
     size = 0.3 * hidden_effect.draw_size(effect, np.random.default_rng(7))
-    verdict = criticise(recording(effect, size, 70, 40.0)).verdict
+    # Wheels that differ and a leak of V_f into V_s look alike, but for the volts of the threshold.
+    seconds = 60.0 if effect == "base.veer" else 40.0
+    verdict = criticise(recording(effect, size, 70, seconds)).verdict
     assert verdict.verdict == "named"
     assert [cause.id for cause in verdict.causes] == [effect]
     (estimate,) = verdict.causes[0].parameters.values()

@@ -34,7 +34,7 @@ def build(folder: Path, text: str, *entries: RobotEffects, **options: Any) -> Si
 
 def test_a_veering_robot_turns_and_its_odometry_does_not_know(tmp_path: Path) -> None:
     text = robot('name "one" localization "odom" odom_error [0 0 0 0]')
-    sim = build(tmp_path, text, on("one", base__veer={"curvature": 0.5}))
+    sim = build(tmp_path, text, on("one", base__veer={"curvature": 0.5, "apart": 0.0}))
     last = drive(sim, (0.6, 0, 0.1), 40)[-1]
     np.testing.assert_allclose(last.poses[0, :2], euler(np.zeros(3), np.array([0.6, 0, 0.4]), 0.1, 40), atol=1e-9)
     np.testing.assert_allclose(last.odometry[0, :2], euler(np.zeros(3), np.array([0.6, 0, 0.1]), 0.1, 40, True))
@@ -275,9 +275,14 @@ def test_bad_entries_are_named(entry: dict[str, Any], message: str) -> None:
 
 def test_robots_that_are_not_there_are_named(tmp_path: Path) -> None:
     with pytest.raises(Error, match="effects: robot: the world has no position of this name: nobody"):
-        build(tmp_path, CROWD, on("nobody", base__veer={"curvature": 0.1}))
+        build(tmp_path, CROWD, on("nobody", base__veer={"curvature": 0.1, "apart": 0.0}))
     with pytest.raises(Error, match=r"effects: 'base\.veer' is given twice"):
-        build(tmp_path, CROWD, on("*", base__veer={"curvature": 0.1}), on("r1", base__veer={"curvature": 0.1}))
+        build(
+            tmp_path,
+            CROWD,
+            on("*", base__veer={"curvature": 0.1, "apart": 0.0}),
+            on("r1", base__veer={"curvature": 0.1, "apart": 0.0}),
+        )
 
 
 def test_the_shipped_options_have_no_effects() -> None:

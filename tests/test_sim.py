@@ -72,7 +72,7 @@ def test_free_motion_is_the_arc_of_equation_3(
 
 def test_effects_of_the_model_and_of_a_file_act(model: Model, dynamics: Dynamics, tmp_path: Path) -> None:
     path = tmp_path / "effects.yaml"
-    path.write_text("effects: [{id: base.veer, parameters: {curvature: 0.1}}]")
+    path.write_text("effects: [{id: base.veer, parameters: {curvature: 0.1, apart: 0.0}}]")
     slow = replace(model, effects=(EffectSetting("base.gain_v", {"gain": -0.5}),))
     simulator = ChairSimulator(with_effects(slow, path), free(tmp_path), dynamics)
     simulator.reset(1)
@@ -83,10 +83,10 @@ def test_effects_of_the_model_and_of_a_file_act(model: Model, dynamics: Dynamics
 
 def test_bad_effects_are_refused(model: Model, dynamics: Dynamics, tmp_path: Path) -> None:
     path = tmp_path / "effects.yaml"
-    path.write_text("effects: [{id: base.veer, parameters: {curvature: x}}]")
+    path.write_text("effects: [{id: base.veer, parameters: {curvature: x, apart: 0.0}}]")
     with pytest.raises(Error, match=r"effects\.yaml: effects\[0\]\.parameters\.curvature: must be a number"):
         with_effects(model, path)
-    path.write_text("effects: [{id: base.veer, parameters: {curvature: 0.1}, extra: 1}]")
+    path.write_text("effects: [{id: base.veer, parameters: {curvature: 0.1, apart: 0.0}, extra: 1}]")
     with pytest.raises(Error, match=r"effects\[0\]\.extra: is not a known key"):
         with_effects(model, path)
     unknown = replace(model, effects=(EffectSetting("base.nonsense", {}),))

@@ -70,6 +70,7 @@ def test_covariates_are_what_they_are_called():
     np.testing.assert_allclose(values("since_command"), DT * np.array([0.5, 1.5, 0.5, 0.5, 0.5, 0.5]))
     np.testing.assert_allclose(values("since_reversal"), [np.inf, np.inf, 0.004, 0.012, 0.016, 0.016])
     np.testing.assert_allclose(values("heading"), 1 + DT * np.array([0, 0, 0, 0.25, 0.75, 1.0]))
+    np.testing.assert_allclose(values("distance"), DT * np.array([0.1, 0.3, 0.6, 1.0, 1.2, 1.2]))
     np.testing.assert_allclose(values("wheel_left", 0.6), v - 0.3 * w)
     np.testing.assert_allclose(values("x", x=np.full(6, 7.0)), 7.0)
     np.testing.assert_allclose(values("y")[:2], DT * 0.2 * np.sin(1) * np.array([0.5, 1.5]))

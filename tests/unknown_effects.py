@@ -24,7 +24,7 @@ TRACK = MODEL.chassis.track
 
 @dataclass
 class State:
-    """Of the robot now: rates asked for, pose, time, age of the command, way since reversing, a temperature."""
+    """Of the robot now: rates asked for, pose, time, age of the command, way since reversing, in all, a temperature."""
 
     v: float = 0.0
     w: float = 0.0
@@ -34,6 +34,7 @@ class State:
     time: float = 0.0
     age: float = 0.0
     way: float = 1e9
+    gone: float = 0.0
     warmth: float = 20.0
 
 
@@ -57,6 +58,7 @@ def bump(x: float) -> float:
 KINDS = {
     "corrugated floor": Kind(0, "heading", lambda s, a, b: math.sin(3 * s.heading + 6 * a)),
     "side wind": Kind(1, "heading", lambda s, a, b: math.sin(s.heading + 6 * a)),
+    "oval wheel": Kind(0, "distance", lambda s, a, b: math.sin(2 * math.pi * s.gone / (0.7 + 0.6 * a))),
     "carpet edge": Kind(2, "x", lambda s, a, b: math.tanh((s.x - 2 * a + 1) / 0.4)),
     "gully": Kind(2, "y", lambda s, a, b: bump((s.y - 2 * a + 1) / (0.4 + 0.4 * b))),
     "overshoot": Kind(0, "since_command", lambda s, a, b: math.exp(-s.age / (0.3 + 0.5 * a))),
@@ -153,6 +155,7 @@ def drive(commands, extra, channel, gain_w, noise, rng) -> Run:
         s.y += STEP * (rates[0] * sin + rates[1] * cos)
         s.heading += STEP * rates[2]
         s.way += STEP * abs(rates[0])
+        s.gone += STEP * abs(rates[0])
     table = np.array(poses)
     table[:, 1:] += errors[: len(table)]
     return Run(

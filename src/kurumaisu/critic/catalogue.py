@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -20,6 +20,7 @@ _TYPICAL = 8.0  # whitened norm of the step by which a parameter is judged
 _NEAR = 0.4  # of the log of the norm
 _TRIALS = 12
 _FARTHEST = 2.0**7  # scales
+_USUAL = 0.7  # that an effect which has several forms acts in the usual one, before the data
 _STRAIGHT = 0.9  # correlation of the changes by a step and by two from which a derivative says what a parameter does
 
 
@@ -52,11 +53,15 @@ class Term:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One way in which an effect may act: terms that are fitted, or fixed ones. ways: how many the effect has."""
+    """One way in which an effect may act: terms that are fitted, or fixed ones.
+
+    ways: one over the probability that it acts in this way, before the data; usual: it is no unusual form.
+    """
 
     id: str
     terms: tuple[Term, ...]
-    ways: int
+    ways: float
+    usual: bool = True
 
     @property
     def fixed(self) -> bool:
@@ -80,6 +85,7 @@ def catalogue(model: Model, ids: frozenset[str] | None = None) -> tuple[Term, ..
         for effect in effects.BASE
         if not effect.random and not effect.choices and (ids is None or effect.id in ids)
         for parameter in effect.parameters
+        if effect.id in own or all(parameter.name not in form for form in effect.forms)
     )
 
 
@@ -179,18 +185,35 @@ def candidates(terms: Sequence[Term], model: Model, ids: frozenset[str] | None =
             continue
         sizes = range(1, len(amplitudes) + 1) if effect.separable else [len(amplitudes)]
         subsets = [subset for size in sizes for subset in combinations(amplitudes, size)]
-        found += [Candidate(effect.id, (*subset, *shapes), len(subsets)) for subset in subsets]
+        forms = () if effect.id in own else effect.forms
+        for terms_of, ways, usual in _forms(effect, forms):
+            # Volts go through thresholds: what an unusual form makes of large sizes, nobody has looked at.
+            simple = usual or not issubclass(effect, effects.VoltageEffect)
+            ways_of = [subset if simple else tuple(replace(term, rough=True) for term in subset) for subset in subsets]
+            found += [
+                Candidate(effect.id, (*own_terms, *shapes, *terms_of), ways * len(subsets), usual)
+                for own_terms in ways_of
+            ]
     return tuple(found)
+
+
+def _forms(
+    effect: type[effects.BaseEffect], forms: Sequence[Mapping[str, float]]
+) -> Iterator[tuple[tuple[Term, ...], float, bool]]:
+    """Yield the fixed terms of each form, one over its probability, and whether it is the usual one."""
+    if not forms:
+        yield (), 1.0, True
+    for i, form in enumerate(forms):
+        fixed = tuple(_fixed(effect.id, parameter, form) for parameter in effect.parameters if parameter.name in form)
+        yield fixed, (len(forms) - 1) / (1 - _USUAL) if i else 1 / _USUAL, i == 0
 
 
 def _choices(effect: type[effects.BaseEffect]) -> Iterator[Candidate]:
     for choice in effect.choices:
-        terms = (
-            Term(
-                effect.id,
-                replace(parameter, lower=choice[parameter.name], upper=choice[parameter.name]),
-                parameter.null,
-            )
-            for parameter in effect.parameters
-        )
-        yield Candidate(effect.id, tuple(terms), len(effect.choices))
+        terms = tuple(_fixed(effect.id, parameter, choice) for parameter in effect.parameters)
+        yield Candidate(effect.id, terms, len(effect.choices))
+
+
+def _fixed(name: str, parameter: Parameter, values: Mapping[str, float]) -> Term:
+    value = values[parameter.name]
+    return Term(name, replace(parameter, lower=value, upper=value), parameter.null)

@@ -9,12 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic import gain, naming, noise, predict_doubt, smooth_fit, smooth_judge
+from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.prior import odds
 from kurumaisu.critic.smooth_fit import Extension
 from kurumaisu.types import FloatArray
 
+# Sizes of a cause, as shares of the one fitted, whose marks together stand for those of its other forms.
+_FORMS = (0.25, 0.5, 1.5, 2.0, 3.0)
 Progress = Callable[[str], None]
 Truth = tuple[float, float] | None
 
@@ -69,6 +72,11 @@ def _judged(
     left = scatter(first, found.best, truth, project=True, beside=beside)
     final = left.estimate(first.noise)
     growth = left.growth(final, odds(len(found.p)))
+    if growth.p > 1 / 2 and found.best.ids and beside is None:
+        # What a cause of another form leaves behind is no noise, and grows with the rates, too.
+        strict = scatter(first, found.best, truth, project=True, forms=True)
+        final = strict.estimate(final.noise)
+        growth = strict.growth(final, odds(len(found.p)))
     problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
     again = naming.search(problem, progress, found.best)
     beyond = smooth_judge.judge(problem, again, progress)
@@ -76,9 +84,18 @@ def _judged(
 
 
 def scatter(
-    problem: Problem, fit: Fit, truth: Truth, *, project: bool, beside: Extension | None = None
+    problem: Problem,
+    fit: Fit,
+    truth: Truth,
+    *,
+    project: bool,
+    beside: Extension | None = None,
+    forms: bool = False,
 ) -> noise.Scatter:
-    """Return what is left about a fit, or an extension, with all that may act projected out or nothing."""
+    """Return what is left about a fit, or an extension, with all that may act projected out or nothing.
+
+    forms: with what the causes of the fit would do in other forms projected out, too.
+    """
     settings = fit.settings if beside is None else beside.settings
     residuals = [drive.measured - problem.simulated(drive, settings) for drive in problem.drives]
 
@@ -86,8 +103,25 @@ def scatter(
         if not project or not problem.terms:
             return np.empty((rows, 0))
         if beside is None:
-            return problem.simulated_columns(drive, fit)
+            own = problem.simulated_columns(drive, fit)
+            return np.column_stack([own, _other_forms(problem, drive, fit)]) if forms else own
         return smooth_fit.simulated_columns(problem, drive, beside)
 
     projected = [columns(drive, left.size) for drive, left in zip(problem.drives, residuals, strict=True)]
     return noise.Scatter(problem.drives, residuals, projected, truth)
+
+
+def _other_forms(problem: Problem, drive: Drive, fit: Fit) -> FloatArray:
+    """Return what the increments of a drive would be more if each cause were of other sizes, (3 m, k).
+
+    A mark that is no multiple of the fitted one's is that of another form: a rounder corner, a longer tail.
+    """
+    here = problem.simulated(drive, fit.settings)
+    columns = [np.empty((here.size, 0))]
+    for i, term in enumerate(fit.terms):
+        for share in () if term.fixed or term.shape else _FORMS:
+            value = term.null + share * (fit.values[i] - term.null)
+            value = float(np.clip(value, term.parameter.lower, term.parameter.upper))
+            moved = settings_of(fit.terms, np.where(np.arange(len(fit.values)) == i, value, fit.values))
+            columns.append((problem.simulated(drive, moved) - here).reshape(-1, 1))
+    return np.column_stack(columns)

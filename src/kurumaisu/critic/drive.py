@@ -13,6 +13,7 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu._core import AxisInverse
 from kurumaisu.critic.recording import Run, Series
+from kurumaisu.effects import LATE
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray, IntArray
@@ -25,6 +26,7 @@ LONGEST = 100_000.0  # [s] a day: what is longer has its times in another unit, 
 # variables), while over long ones it averages out.
 _ROLLS = 0.2  # [s] for which a chair may move on after it was asked to rest
 _STILL = 0.1  # share of the noise of a moving chair that one at rest may have
+_ROUNDING = 1e-9  # [m/s], [rad/s]
 _USUAL_V, _USUAL_W = 0.8, 0.8  # [m/s], [rad/s]
 POSE_INTERVAL = {"voltage": 0.1, "command": 0.1, "odom": 2.0}
 
@@ -106,6 +108,7 @@ def prepare(run: Run, model: Model, interval: float | None = None) -> Drive:
         w=_mean_rates(times, w, edges),
         times=pose_times,
         poses=poses,
+        known=_late(source, times, (v, w), edges),
     )
 
 
@@ -122,8 +125,9 @@ def prepare_all(run: Run, model: Model, until: float) -> Drive:
         raise Error(f"{run.name}: lasts {last - first:.6g} s: are its times in seconds?")
     # A reference whose clock is off sees the path at other times.
     edges = np.arange(first, last + 2 * GRID + _CLOCK * (last - first), GRID)
+    known = _late(source, times, (v, w), edges)
     v, w = _mean_rates(times, v, edges), _mean_rates(times, w, edges)
-    return Drive(run.name, source, float(edges[0]), v, w, pose.t[use], pose.values[use, :3])
+    return Drive(run.name, source, float(edges[0]), v, w, pose.t[use], pose.values[use, :3], known=known)
 
 
 def split(drive: Drive, parts: int) -> list[Drive]:
@@ -206,8 +210,27 @@ def _thin(pose: Series, since: float, interval: float) -> tuple[FloatArray, Floa
     return pose.t[keep], pose.values[keep, :3]
 
 
+def _late(
+    source: str, times: FloatArray, rates: tuple[FloatArray, FloatArray], edges: FloatArray
+) -> dict[str, FloatArray]:
+    """Return, by its name, the share of each cell of the grid that passed before the last change in it, 0: none.
+
+    Odometry is no command, and what it says did not change at its stamps.
+    """
+    if source == "odom":
+        return {}
+    changes = times[np.any(np.diff(np.stack(rates), axis=1, prepend=0.0) != 0, axis=0)]
+    cell = np.floor((changes - edges[0]) / GRID).astype(int)
+    inside = (cell >= 0) & (cell < len(edges) - 1)
+    late = np.zeros(len(edges) - 1)
+    late[cell[inside]] = ((changes - edges[0]) / GRID - cell)[inside]
+    return {LATE: late}
+
+
 def _mean_rates(times: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
     """Return the mean over each cell of the grid of samples held until the next; 0 before the first."""
     knots = np.append(times, max(edges[-1], times[-1]) + GRID)
     integral = np.concatenate([[0.0], np.cumsum(values * np.diff(knots))])
-    return np.asarray(np.diff(np.interp(edges, knots, integral)) / GRID)
+    means = np.diff(np.interp(edges, knots, integral)) / GRID
+    # Differences of sums leave rests that are not quite 0: by the law, turns that stand for the volts of a threshold.
+    return np.asarray(np.where(np.abs(means) < _ROUNDING, 0.0, means))

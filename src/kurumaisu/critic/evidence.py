@@ -12,6 +12,7 @@ import numpy as np
 from kurumaisu._core import Whitener
 from kurumaisu.critic import replay, solve
 from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalogue, roughened, settings_of, showing
+from kurumaisu.critic.comb import Comb, Walked
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.noise import Noise, whitener
 from kurumaisu.critic.prior import Z_USUAL, occam, occam_plane
@@ -21,7 +22,10 @@ from kurumaisu.types import FloatArray
 _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
 _STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a refit may start
 _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
-_ROUGH_STARTS = tuple(float(n) for n in np.geomspace(0.25, 64, 25))  # of a parameter whose derivative says little
+_ROUGH_DERIVATIVE = 1e-4  # the same of what has a comb of likely values: right between its teeth
+_PLACES = 17  # that are tried on a tooth of a comb
+_HOPE = 4.0  # [nat] less is not worth a closer look: a tooth costs more
+_ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
 
 
 @dataclass(frozen=True)
@@ -75,13 +79,17 @@ class Problem:
         self.ids = ids
         self._known = known or replay.Increments(model)
         self._whiteners: dict[int, tuple[Drive, Whitener]] = {}
+        self._walked: Walked = {}
 
     def changed(
         self, *, drives: Sequence[Drive] | None = None, model: Model | None = None, noise: Noise | None = None
     ) -> Problem:
         """Return the problem, with the same terms, of other drives, another model or another noise."""
         known = None if model is not None else self._known
-        return Problem(drives or self.drives, model or self.model, noise or self.noise, self.terms, self.ids, known)
+        other = Problem(drives or self.drives, model or self.model, noise or self.noise, self.terms, self.ids, known)
+        if drives is None:
+            other._walked = self._walked
+        return other
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
@@ -178,23 +186,47 @@ class Problem:
         for i, term in enumerate(terms):
             if term.key in start or term.shape or term.fixed:
                 continue
-            sizes = _ROUGH_STARTS if term.rough else _STARTS
-            guesses = [term.null + sign * n * term.step * term.parameter.scale for n in sizes for sign in (1, -1)]
-            tried = [np.where(np.arange(len(values)) == i, guess, values) for guess in guesses]
-            inside = [guess for guess in tried if lower[i] <= guess[i] <= upper[i]] or [values]
-            values = min(inside, key=lambda guess: float(np.sum(self.residual(terms, guess) ** 2)))
+            steps = [sign * n * term.step * term.parameter.scale for n in _STARTS for sign in (1, -1)]
+            values = self._rough_start(terms, values, i) if term.rough else values
+            values = self._nearest(terms, values, i, [term.null + step for step in steps])
         return values
+
+    def _nearest(self, terms: Sequence[Term], values: FloatArray, i: int, guesses: Iterable[float]) -> FloatArray:
+        """Return values with the best of some guesses of one of them, or of itself where it is not null."""
+        p, own = terms[i].parameter, values[i]
+        inside = [guess for guess in guesses if p.lower <= guess <= p.upper]
+        inside += [own] if own != terms[i].null or not inside else []
+        tried = [np.where(np.arange(len(values)) == i, guess, values) for guess in inside]
+        return min(tried, key=lambda guess: float(np.sum(self.residual(terms, guess) ** 2)))
+
+    def _rough_start(self, terms: Sequence[Term], values: FloatArray, i: int) -> FloatArray:
+        """Return values with the best tooth of a comb of likely ones, and the best place on it."""
+        settings = settings_of(terms, values)
+        residual = [self._whitened(drive, settings) for drive in self.drives]
+        form = [other for other in terms if other.id == terms[i].id and other.fixed]
+        starts = self._comb.starts(terms[i], form, residual)
+        if not starts or starts[0].nats < _HOPE:
+            return np.where(np.arange(len(values)) == i, starts[0].value if starts else values[i], values)
+        apart = {start.value: start.apart for start in starts}
+        found = self._nearest(terms, values, i, apart)
+        places = np.linspace(-1.0, 1.0, _PLACES) * apart.get(float(found[i]), 0.0)
+        return self._nearest(terms, found, i, found[i] + places[places != 0])
+
+    @cached_property
+    def _comb(self) -> Comb:
+        return Comb(self.drives, self.model, self.noise, self._walked)
 
     def _occam(self, chosen: Sequence[Candidate], terms: Sequence[Term], solution: solve.Solution) -> float:
         """Return what the set costs, in nats: Laplace's approximation about the fit, with the prior of each signal."""
         cost, free = 0.0, []
         for candidate in chosen:
-            cost += float(np.log(candidate.ways)) + (_ROUGH_WAYS if candidate.rough else 0.0)
+            cost += float(np.log(candidate.ways))
             own = [i for i, term in enumerate(terms) if term.id == candidate.id and not term.fixed]
             loud = [i for i in own if not terms[i].shape]
             free += loud
             cost += sum(_shape_cost(terms[i], solution, i) for i in own if terms[i].shape)
-            cost += self._amplitudes(terms, solution, loud)
+            size = self._amplitudes(terms, solution, loud)
+            cost += max(_ROUGH_WAYS + size, _teeth(terms, solution, loud)) if candidate.rough else size
         if len(free) > 1:
             unit = solution.slopes[:, free] / np.maximum(np.linalg.norm(solution.slopes[:, free], axis=0), 1e-9)
             cost += 0.5 * float(np.linalg.slogdet(unit.T @ unit + np.eye(len(free)) / Z_USUAL**2)[1])
@@ -236,7 +268,7 @@ class Problem:
             i = known.get(term.key)
             p = term.parameter
             at = term.null if i is None else float(values[i])
-            share = 1.0 if i is None else _DERIVATIVE
+            share = 1.0 if i is None else _ROUGH_DERIVATIVE if term.rough else _DERIVATIVE
             if term.fixed:
                 yield settings_of(terms, values), share
                 continue
@@ -262,6 +294,14 @@ def covariance(gram: FloatArray) -> FloatArray:
     A weak prior of 1000 steps keeps it finite where the data do not determine a parameter at all.
     """
     return np.asarray(np.linalg.inv(gram + 1e-6 * np.eye(len(gram))))
+
+
+def _teeth(terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> float:
+    """Return the cost of sizes that the data know so closely: by chance, one out of many would fit as well."""
+    sizes = [abs(solution.values[i] - terms[i].null) for i in loud if terms[i].rough]
+    sds = [solution.sds[i] for i in loud if terms[i].rough]
+    width = np.sqrt(2 * np.pi) * np.array(sds) / np.maximum(sizes, 1e-12)
+    return float(np.sum(_ROUGH_RANGE - np.log(np.clip(width, 1e-6, 1.0))))
 
 
 def _shape_cost(term: Term, solution: solve.Solution, i: int) -> float:

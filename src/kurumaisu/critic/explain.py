@@ -30,8 +30,7 @@ from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-# Growth of the noise that counts beside other causes: less is left by causes of a slightly other form, too.
-_GROWTH_BESIDE = 1.0
+_GROWTH_BESIDE = 1.0  # at usual rates, from which growing noise is named beside a curve
 _PICTURE = 0.1  # [s] between the poses drawn
 # [s] after which a simulated path begins again at the measured pose: the random wander of the heading adds up, and
 # after a minute hides what the model does.
@@ -96,8 +95,8 @@ def criticism(
     causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
     # Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
     asked = problem.ids is None or process_noise(problem).id in problem.ids
-    beside = bool(causes or found.confounded) or made.beyond.extension is not None
-    sure = growth.p >= naming.NAMED and growth.noise.growth >= (_GROWTH_BESIDE if beside else 0.0)
+    # What a curve leaves behind may grow with the rates, too; only what doubles the noise is no such thing.
+    sure = growth.p >= naming.NAMED and (made.beyond.extension is None or growth.noise.growth >= _GROWTH_BESIDE)
     if asked and sure and all(drive.source != "odom" for drive in drives):
         kind, causes = "named", (*causes, Cause(process_noise(problem).id, growth.p, {}, growth.gain_nats))
     settings = best.settings if kind in ("named", "confounded") else ()

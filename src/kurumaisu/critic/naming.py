@@ -115,7 +115,9 @@ def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Ch
         for other in problem.candidates:
             new = other.id not in fit.ids - {one.id} and other not in fit.candidates
             if new and (screen.mends(other, one) if other.fixed else screen.related(one, other)):
-                yield fit.candidates - {one} | {other}, kept
+                # What fits one form of a comb is nowhere near what fits another.
+                begin = {key: value for key, value in kept.items() if not other.rough or key[0] != other.id}
+                yield fit.candidates - {one} | {other}, begin
     for other in screen.fixed:
         if other.id not in fit.ids and screen.mends(other):
             yield fit.candidates | {other}, kept

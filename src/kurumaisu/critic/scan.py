@@ -48,9 +48,10 @@ class Screen:
 
     def alike(self, one: Candidate, other: Candidate) -> bool:
         """Tell whether two effects of one parameter have the same column."""
-        if len(one.terms) != 1 or len(other.terms) != 1 or one.fixed or other.fixed:
+        mine, others = ([term for term in c.terms if not term.fixed] for c in (one, other))
+        if len(mine) != 1 or len(others) != 1:
             return False
-        i, j = self._index[one.terms[0].key], self._index[other.terms[0].key]
+        i, j = self._index[mine[0].key], self._index[others[0].key]
         return bool(abs(self.correlation[i, j]) > ALIKE)
 
     def related(self, one: Candidate, other: Candidate) -> bool:
@@ -73,7 +74,7 @@ class Screen:
     def _sets(self) -> Iterator[frozenset[Candidate]]:
         """Yield the fit's set with effects added and taken out; three changes only where some of them may cancel."""
         own = sorted(self.centre.candidates, key=_name)
-        others = [c for c in self.problem.candidates if not c.fixed and c not in self.centre.candidates]
+        others = [c for c in self.problem.candidates if c.usual and not c.fixed and c not in self.centre.candidates]
         pool = [*own, *others]
         for size in range(_SWAPS + 1):
             for changes in combinations(pool, size):
@@ -120,7 +121,8 @@ class Screen:
             value = term.null + float(x) * term.step * term.parameter.scale
             if not term.parameter.lower <= value <= term.parameter.upper:
                 return None
-            start[term.key] = value
+            if not term.rough or term.key in self.centre.start:  # else it is searched for
+                start[term.key] = value
         step = -known
         step[use] += offsets
         gained = float(self.b @ step) - 0.5 * float(step @ gram @ step)

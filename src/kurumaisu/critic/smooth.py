@@ -21,6 +21,7 @@ from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.prior import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.critic.smooth_basis import Basis, bases
 from kurumaisu.critic.smooth_columns import Sensitivity
+from kurumaisu.critic.smooth_waves import girth
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
@@ -29,8 +30,8 @@ _SIZES = np.concatenate([np.geomspace(Z_LOW, Z_USUAL, 8), np.geomspace(Z_USUAL, 
 _LOG_WEIGHTS = np.log(np.concatenate([np.full(8, 0.9 / 8), np.full(4, 0.1 / 4)]))
 # What a rate's factor may follow: over the rate itself it would be the sum of a rate and a curve again.
 _BRAKES = {
-    "v_gain": ("w", "abs_w", "v_times_w", "time", "since_command", "since_reversal", "heading", "x", "y"),
-    "w_gain": ("v", "abs_v", "v_times_w", "time", "since_command", "since_reversal", "heading", "x", "y"),
+    "v_gain": ("w", "abs_w", "v_times_w", "time", "since_command", "since_reversal", "heading", "distance", "x", "y"),
+    "w_gain": ("v", "abs_v", "v_times_w", "time", "since_command", "since_reversal", "heading", "distance", "x", "y"),
 }
 
 
@@ -63,7 +64,7 @@ class Design:
         taken = {setting.id for setting in problem.model.effects}
         self.curves: list[Curve] = []
         at = 0
-        for basis in bases(problem.drives, problem.model, settings):
+        for basis in bases(problem.drives, problem.model, settings, girth(problem, settings)):
             for channel in _channels(basis.covariate):
                 if effects.smooth_id(channel, basis.covariate) not in taken:
                     self.curves.append(Curve(channel, basis, slice(at, at + basis.size)))

@@ -29,7 +29,8 @@ class Basis:
 
     knots: of the hats, empty where periodic; constants: the parameter that the covariate needs to be computed, if any;
     priors: covariances of the coefficients, (k, k) each, of a curve whose mean square over the drives is 1;
-    low, high: the covariate lies between them in 95 % of the time that the chair moves.
+    low, high: the covariate lies between them in 95 % of the time that the chair moves. ways: out of how many like it
+    this one was chosen by the data.
     """
 
     covariate: str
@@ -38,6 +39,7 @@ class Basis:
     priors: tuple[FloatArray, ...]
     low: float
     high: float
+    ways: int = 1
 
     @property
     def size(self) -> int:
@@ -63,16 +65,24 @@ class Basis:
         return {**self.constants, "level": numbers[0], **cosines, **sines}
 
 
-def bases(drives: Sequence[Drive], model: Model, settings: Sequence[EffectSetting]) -> Iterator[Basis]:
-    """Yield the curves over every covariate that varies in these drives, as simulated with some effects."""
+def bases(
+    drives: Sequence[Drive], model: Model, settings: Sequence[EffectSetting], girth: tuple[float, int] | None
+) -> Iterator[Basis]:
+    """Yield the curves over every covariate that varies in these drives, as simulated with some effects.
+
+    girth: period of the distance travelled [m], and out of how many it was chosen; None where the way is too short.
+    """
     motions = [replay.motion(drive, model, settings) for drive in drives]
-    extras = set.intersection(*(set(drive.known) for drive in drives)) - {"x", "y", "heading", "v_f", "v_s"}
+    usual = {"x", "y", "heading", "v_f", "v_s", effects.LATE}
+    extras = set.intersection(*(set(drive.known) for drive in drives)) - usual
     # Rows of odometry are no commands: the time since the last one says how the rows are spaced, and nothing else.
     measured = any(drive.source == "odom" for drive in drives)
     for name in (*effects.COVARIATES, *sorted(extras)):
         if measured and name == "since_command":
             continue
-        constants = _constants(name, drives, model)
+        if name == "distance" and girth is None:
+            continue
+        constants = {"period": girth[0]} if name == "distance" and girth else _constants(name, drives, model)
         samples = [_samples(name, constants, motion) for motion in motions]
         moving = [(motion.v != 0) | (motion.w != 0) for motion in motions]
         pooled = np.concatenate([values[moved] for values, moved in zip(samples, moving, strict=True)])
@@ -85,7 +95,8 @@ def bases(drives: Sequence[Drive], model: Model, settings: Sequence[EffectSettin
             continue
         matrix = _matrix(knots, period, pooled)
         low, high = np.quantile(known, [0.025, 0.975])
-        yield Basis(name, knots, constants, tuple(priors_of(knots, matrix)), float(low), float(high))
+        ways = girth[1] if name == "distance" and girth else 1
+        yield Basis(name, knots, constants, tuple(priors_of(knots, matrix)), float(low), float(high), ways)
 
 
 def _samples(name: str, constants: dict[str, float], motion: effects.Motion) -> FloatArray:

@@ -29,7 +29,7 @@ def beside(drive: Drive, run: Run) -> Drive:
     known = {name: np.interp(middle, series.t, series.values[:, 0]) for name, series in run.covariates.items()}
     if run.voltage is not None:
         known |= {name: _held(run.voltage, name, middle) for name in ("v_f", "v_s")}
-    return replace(drive, known=known)
+    return replace(drive, known={**drive.known, **known})
 
 
 def _middle(drive: Drive) -> FloatArray:

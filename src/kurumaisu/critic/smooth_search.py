@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -92,7 +92,9 @@ def _rivals(problem: Problem, design: Design, fits: Sequence[tuple[Fit, float]])
         for curve, gram in zip(design.curves, grams, strict=True):
             part = cross[:, curve.columns]
             found = belief(gram - part.T @ part, b[curve.columns], curve.basis.priors)
-            yield Rival(fit, curve, found, worth + found.nats + share)
+            # All curves of a kind that the data chose from share what one has.
+            chosen = replace(found, nats=found.nats - float(np.log(curve.basis.ways)))
+            yield Rival(fit, curve, chosen, worth + chosen.nats + share)
 
 
 def _gram(columns: FloatArray) -> FloatArray:

@@ -31,6 +31,7 @@ COVARIATES = {
     "since_command": ("time_since_command", "time since the command changed", "s"),
     "since_reversal": ("distance_since_reversal", "distance since the last reversal", "m"),
     "heading": ("heading", "heading", "rad"),
+    "distance": ("distance", "distance travelled", "m"),
     "x": ("x", "x in the map", "m"),
     "y": ("y", "y in the map", "m"),
     "v_f": ("v_f mod step", "translation voltage within a step of the converter", "V"),

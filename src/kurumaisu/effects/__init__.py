@@ -14,6 +14,7 @@ import numpy as np
 from kurumaisu.effects.accel_limit import AccelLimit
 from kurumaisu.effects.backlash import Backlash
 from kurumaisu.effects.base import (
+    LATE,
     BaseEffect,
     Context,
     Effect,
@@ -217,6 +218,7 @@ __all__ = [
     "CONSTANTS",
     "COVARIATES",
     "LASER",
+    "LATE",
     "MEANINGS",
     "PERIODIC",
     "RANGE_COVARIATES",

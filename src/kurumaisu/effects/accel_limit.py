@@ -4,8 +4,13 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from kurumaisu import _core
-from kurumaisu.effects.base import Context, Effect, Follows, Motion, Parameter, Rate, Stage
+from kurumaisu.effects.base import LATE, Context, Effect, Follows, Motion, Parameter, Rate, Stage
+from kurumaisu.types import FloatArray
+
+_LATEST = 0.98  # of a step: what is left then tells little of the new target
 
 
 class AccelLimit(Effect):
@@ -30,10 +35,26 @@ class AccelLimit(Effect):
 
     def apply(self, motion: Motion) -> Motion:
         """Ramp v and w; a sample is the step's mean rate."""
-        v, self._v = _core.ramp(motion.v, self.values["slowness_v"], motion.dt, self._v)
-        w, self._w = _core.ramp(motion.w, self.values["slowness_w"], motion.dt, self._w)
+        slow_v, slow_w = self.values["slowness_v"], self.values["slowness_w"]
+        v, self._v = _core.ramp(_begun(motion, motion.v, slow_v, self._v), slow_v, motion.dt, self._v)
+        w, self._w = _core.ramp(_begun(motion, motion.w, slow_w, self._w), slow_w, motion.dt, self._w)
         return replace(motion, v=v, w=w)
 
     def settle(self, motion: Motion) -> None:
         """Have reached v and w."""
         self._v, self._w = float(motion.v[-1]), float(motion.w[-1])
+
+
+def _begun(motion: Motion, target: FloatArray, slowness: float, level: float) -> FloatArray:
+    """Return targets (n,) with, where one changed within a step, how far a ramp can come in what is left of it.
+
+    The mean of the step would have it begin with the step, which is half a step too early on average.
+    """
+    late = motion.known.get(LATE)
+    if late is None or slowness == 0:
+        return target
+    before = np.concatenate([[level], target[:-1]])
+    left = 1 - np.minimum(late, _LATEST)
+    change = (target - before) / left
+    reach = left * motion.dt / slowness
+    return np.asarray(np.where(late > 0, before + np.clip(change, -reach, reach), target))

@@ -19,6 +19,8 @@ from kurumaisu._core import AxisLaw
 from kurumaisu.effects.mechanism import Mechanism, Parameter
 from kurumaisu.types import FloatArray
 
+LATE = "share of the step before the change"  # no name that a recording could have
+
 
 class Stage(IntEnum):
     """Where in the drive chain an effect acts; effects apply in this order, those of a stage in the catalogue's."""
@@ -66,7 +68,8 @@ class Motion:
     u: None where the chair does not slip, which is 0 throughout. heading [rad] in the map at the first sample; None
     where nobody knows it: an effect that needs it then goes on from where its own sum of the turns has come.
     known: what else somebody knows of each step, (n,) each: v_asked, w_asked before all effects, x, y [m], heading
-    [rad], v_f, v_s [V], and quantities of a recording by their names.
+    [rad], v_f, v_s [V], quantities of a recording by their names; LATE: the share of the step that had passed when
+    what was asked for changed, 0 where it did not.
     """
 
     dt: float
@@ -137,6 +140,7 @@ class ReferenceEffect(BaseEffect, ABC):
 
 
 __all__ = [
+    "LATE",
     "BaseEffect",
     "Context",
     "Effect",

@@ -8,6 +8,8 @@ import numpy as np
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 from kurumaisu.types import BoolArray, FloatArray
 
+_DRIVING = 1.0e-3  # [m/s] from which a chair drives: a lag never quite comes to rest
+
 
 class CasterReversal(Effect):
     """After each change of the driving direction an additional yaw rate, which dies away with the distance.
@@ -46,7 +48,7 @@ class CasterReversal(Effect):
         kick = self.values["kick"] * np.exp(-(since + way / 2) / self.values["length"])
         self._direction, self._turn, self._side = float(direction[-1]), float(turn[-1]), float(side[-1])
         self._travel = float(since[-1] + way[-1])
-        return replace(motion, w=motion.w + side * kick * (motion.v != 0))
+        return replace(motion, w=motion.w + side * kick * (np.abs(motion.v) > _DRIVING))
 
     def settle(self, motion: Motion) -> None:
         """Have the casters trail."""

@@ -3,6 +3,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from kurumaisu.effects.base import Follows, Parameter, Rate, Stage, VoltageEffect, Volts
 
 _OFFSET = (Parameter("offset", "V", null=0.0, scale=0.01, lower=-0.5, upper=0.5),)
@@ -26,17 +28,29 @@ class DacZeroF(VoltageEffect):
 
 
 class DacZeroS(VoltageEffect):
-    """V_s plus a constant."""
+    """V_s plus a constant.
+
+    By equation (2) as printed, a voltage beyond the branch that was meant lies on the other one: the chair turns to
+    the wrong side, and fast. rests: 1 where it does not turn at all then.
+    """
 
     id = "base.dac_zero_s"
     stage = Stage.CONVERTER
-    parameters = _OFFSET
+    parameters = (*_OFFSET, Parameter("rests", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0))
+    forms = ({"rests": 0.0}, {"rests": 1.0})
     sentence = "the steering voltage is off by a constant"
-    formula = "V_s + offset"
+    formula = "V_s + offset; with rests = 1, 0 where that is beyond the branch meant"
     source = "offset error of any D/A converter; 2-20 mV"
     shows_in = Rate.W
     follows = Follows.W
 
     def apply(self, volts: Volts) -> Volts:
         """Shift V_s."""
-        return replace(volts, v_s=volts.v_s + self.values["offset"])
+        v_s = volts.v_s + self.values["offset"]
+        if self.values["rests"] < 0.5:
+            return replace(volts, v_s=v_s)
+        law = self.context.steering
+        slope = np.where(volts.sign_w < 0, law.negative.slope, law.positive.slope)
+        intercept = np.where(volts.sign_w < 0, law.negative.intercept, law.positive.intercept)
+        beyond = volts.sign_w * (v_s - intercept) / slope < 0  # False where the sign is unknown
+        return replace(volts, v_s=np.where(beyond, 0.0, v_s))

@@ -10,13 +10,15 @@ import numpy as np
 from kurumaisu.effects.base import Motion
 from kurumaisu.types import BoolArray, FloatArray
 
-# Followed by sines and cosines, with a period that the model file states: a turn, or a step of the D/A converter.
-PERIODIC = ("heading", "v_f", "v_s")
+# Followed by sines and cosines, with a period that the model file states: a turn, the girth of a wheel, or a step of
+# the D/A converter.
+PERIODIC = ("heading", "distance", "v_f", "v_s")
+_PERIODS = {"heading": "rad", "distance": "m"}
 # A parameter that a covariate needs besides its curve, by its name, with its unit.
 CONSTANTS: Mapping[str, tuple[str, str]] = {
     "wheel_left": ("track", "m"),
     "wheel_right": ("track", "m"),
-    **{name: ("period", "rad" if name == "heading" else "V") for name in PERIODIC},
+    **{name: ("period", _PERIODS.get(name, "V")) for name in PERIODIC},
 }
 MEANINGS: Mapping[str, str] = {
     "v": "forward speed that the effects before have left [m/s]",
@@ -30,6 +32,7 @@ MEANINGS: Mapping[str, str] = {
     "since_command": "time since the rates asked for changed [s]",
     "since_reversal": "distance since the driving direction changed [m]",
     "heading": "heading in the map [rad]; periodic",
+    "distance": "distance travelled since the start, back or forth [m]; periodic, for wheels out of round",
     "x": "place in the map [m]",
     "y": "place in the map [m]",
     "v_f": "translation voltage [V]; periodic, for steps of the D/A converter",
@@ -54,6 +57,7 @@ class Follower:
         self._since = np.inf  # [s] since the last change of the command
         self._direction = 0.0  # last direction driven, 0: none yet
         self._travel = np.inf  # [m] since the last reversal
+        self._way = 0.0  # [m] since the start
 
     def values(self, motion: Motion) -> FloatArray:
         """Return the covariate in each step, (n,); inf where there was no command or no reversal yet."""
@@ -80,6 +84,13 @@ class Follower:
         after = before + np.cumsum(motion.w) * motion.dt
         self._heading = float(after[-1])
         return np.asarray(after - motion.w * motion.dt / 2)
+
+    def distance(self, motion: Motion) -> FloatArray:
+        """Return the distance travelled since the start, in the middle of each step [m]."""
+        way = np.abs(motion.v) * motion.dt
+        after = self._way + np.cumsum(way)
+        self._way = float(after[-1])
+        return np.asarray(after - way / 2)
 
     def place(self, motion: Motion, axis: int) -> FloatArray:
         """Return x (axis 0) or y (axis 1) from the start on, in the middle of each step [m]."""
@@ -133,6 +144,7 @@ COVARIATES: Mapping[str, Callable[[Follower, Motion], FloatArray]] = {
     "since_command": Follower.since_command,
     "since_reversal": Follower.since_reversal,
     "heading": Follower.heading,
+    "distance": Follower.distance,
     "x": lambda self, motion: self.place(motion, 0),
     "y": lambda self, motion: self.place(motion, 1),
 }

@@ -7,17 +7,25 @@ from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Sta
 
 
 class Veer(Effect):
-    """Yaw rate plus curvature times forward speed: unequal wheels (UMBmark type B)."""
+    """Yaw rate plus curvature times forward speed: unequal wheels (UMBmark type B).
+
+    apart: of the wheels, where it is they that differ; then a turn drives the chair, too. 0: nothing but a turn.
+    """
 
     id = "base.veer"
     stage = Stage.GAIN
-    parameters = (Parameter("curvature", "rad/m", null=0.0, scale=0.03, lower=-2.0, upper=2.0),)
+    parameters = (
+        Parameter("curvature", "rad/m", null=0.0, scale=0.03, lower=-2.0, upper=2.0),
+        Parameter("apart", "m", null=0.0, scale=0.55, lower=0.0, upper=2.0),
+    )
+    forms = ({"apart": 0.0}, {"apart": 0.55})  # [m] wheels of a wheelchair
     sentence = "the chair veers to one side in proportion to the distance driven (unequal wheels)"
-    formula = "w + curvature · v"
+    formula = "w + curvature · v, v + curvature · (apart / 2)² · w"
     source = "UMBmark 1996, E_d: unequal wheels; 0.02-0.1 rad/m"
     shows_in = Rate.W
     follows = Follows.V
 
     def apply(self, motion: Motion) -> Motion:
-        """Add a turn in proportion to v."""
-        return replace(motion, w=motion.w + self.values["curvature"] * motion.v)
+        """Add a turn in proportion to v, and what each wheel's error makes of a turn."""
+        curvature, half = self.values["curvature"], self.values["apart"] / 2
+        return replace(motion, v=motion.v + curvature * half**2 * motion.w, w=motion.w + curvature * motion.v)

@@ -65,10 +65,10 @@ BASE: dict[str, Hidden] = {
     "base.veer": Hidden(*_of("events", ev.veer, ev.unequal_wheels), 0.03, True, 0.6, _as("curvature")),
     "base.dead_zone_v": Hidden(*_of("events", ev.dead_zone_v, ev.soft_zone_v), 0.03, False, 0.4, _as("width")),
     "base.dead_zone_w": Hidden(*_of("events", ev.dead_zone_w, ev.soft_zone_w), 0.03, False, 0.3, _as("width")),
-    "base.dac_zero_f": Hidden(*_of("events", ev.dac_zero_f), 0.02, True, 0.3, _as("offset")),
-    "base.dac_zero_s": Hidden(*_of("events", ev.dac_zero_s), 0.02, True, 0.3, _as("offset")),
+    "base.dac_zero_f": Hidden(*_of("volts", ev.dac_zero_f), 0.02, True, 0.3, _as("offset")),
+    "base.dac_zero_s": Hidden(*_of("volts", ev.dac_zero_s), 0.02, True, 0.3, _as("offset")),
     "base.dac_quantisation": Hidden(
-        *_of("events", ev.dac_quantisation, ev.dac_truncation), 0.02, False, 0.06, _as("step")
+        *_of("volts", ev.dac_quantisation, ev.dac_truncation), 0.02, False, 0.06, _as("step")
     ),
     "base.reverse_gain": Hidden(*_of("events", ev.reverse_gain), 0.08, True, 0.6, _as("gain")),
     "base.curvature_v": Hidden(*_of("events", ev.curvature_v, ev.expo_v), 0.1, True, 0.8, _as("curvature")),
@@ -129,7 +129,5 @@ BASE: dict[str, Hidden] = {
     "base.sign": Hidden(
         *_of("events", ev.sign), 1.0, False, 1.0, lambda _: {}, lambda rng: {"kind": float(rng.integers(4))}, False
     ),
-    "base.steering_law": Hidden(
-        *_of("events", ev.steering_law), 1.0, False, 1.0, lambda _: {"flip": 1.0}, scaled=False
-    ),
+    "base.steering_law": Hidden(*_of("volts", ev.steering_law), 1.0, False, 1.0, lambda _: {"flip": 1.0}, scaled=False),
 }

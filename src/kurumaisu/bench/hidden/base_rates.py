@@ -48,20 +48,35 @@ def lag2_w(r: Rates, s: Sizes) -> Rates:
     return replace(r, w=_cascade(r.w, s["size"]))
 
 
+def _goals(rate: FloatArray) -> tuple[list[float], list[float]]:
+    """Return, per cell, the rate asked for at its end, and the share of the cell for which that is asked for.
+
+    A cell whose mean lies between those of its neighbours, which are held, is one in which the command changes.
+    """
+    before, after = np.roll(rate, 1), np.roll(rate, -1)
+    steady = np.isclose(before, np.roll(rate, 2), atol=1e-9) & np.isclose(after, np.roll(rate, -2), atol=1e-9)
+    held = steady & ((rate - before) * (after - rate) > 1e-12)
+    held[:2] = held[-2:] = False
+    goal = np.where(held, after, rate)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(held, (rate - before) / (after - before), 1.0)
+    return goal.tolist(), share.tolist()
+
+
 def _ramp(rate: FloatArray, slowness: float) -> FloatArray:
     """Return the cells' means of a rate whose slope is limited to 1 / slowness."""
     if slowness <= 0:
         return rate
     at, out = 0.0, []
-    for goal in rate.tolist():
-        needed = abs(goal - at) * slowness
-        if needed <= STEP:
-            out.append(goal - (goal - at) * needed / (2 * STEP))
-            at = goal
+    for goal, share in zip(*_goals(rate), strict=True):
+        needed, given = abs(goal - at) * slowness, STEP * share
+        if needed <= given:
+            mean, end = goal - (goal - at) * needed / (2 * given), goal
         else:
-            way = math.copysign(STEP / slowness, goal - at)
-            out.append(at + way / 2)
-            at += way
+            way = math.copysign(given / slowness, goal - at)
+            mean, end = at + way / 2, at + way
+        out.append((1 - share) * at + share * mean)
+        at = end
     return np.array(out)
 
 
@@ -70,13 +85,14 @@ def _soft_ramp(rate: FloatArray, slowness: float) -> FloatArray:
     if slowness <= 0:
         return rate
     blend = 0.05  # [m/s], [rad/s]
-    fade = math.exp(-STEP / 2 / (blend * slowness))
     missing, before, out = 0.0, 0.0, []
-    for goal in rate.tolist():
+    for goal, share in zip(*_goals(rate), strict=True):
+        fade = math.exp(-share * STEP / 2 / (blend * slowness))
+        at = before - missing
         missing += goal - before
         middle = blend * math.asinh(math.sinh(missing / blend) * fade)
         after = blend * math.asinh(math.sinh(middle / blend) * fade)
-        out.append(goal - (missing + 4 * middle + after) / 6)
+        out.append((1 - share) * at + share * (goal - (missing + 4 * middle + after) / 6))
         missing, before = after, goal
     return np.array(out)
 
@@ -158,7 +174,8 @@ def _kicks(r: Rates, s: Sizes, shape: Callable[[FloatArray], FloatArray]) -> Flo
         if last >= 0:
             middle = (way[start:end] + way[start + 1 : end + 1]) / 2 - way[start]
             out[start:end] = s["size"] * np.sign(r.asked_w[turning[last]]) * shape(middle)
-    return np.asarray(np.where(r.v != 0, out, 0.0))
+    # A chair that lags never quite comes to rest; its casters do not go on turning it there.
+    return np.asarray(np.where(np.abs(r.v) > 1e-3, out, 0.0))
 
 
 def rate_noise(r: Rates, s: Sizes) -> Rates:

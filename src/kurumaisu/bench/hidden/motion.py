@@ -64,7 +64,8 @@ class Measured:
 class Form:
     """One way of being wrong: a function of what it acts on and of its sizes.
 
-    stage: 'events', 'rates', 'floor', 'spread' (the noise's amplitude) or 'reference'.
+    stage: 'volts' and then 'events', which act on the same, 'rates', 'floor', 'spread' (the noise's amplitude) or
+    'reference'.
     """
 
     stage: str
@@ -96,7 +97,7 @@ def drive(setting: Setting, faults: Sequence[Fault]) -> tuple[FloatArray, Rates]
     """Return true poses of the marker at the reference's stamps (m, 3), headings unwrapped, and the final rates."""
     command = setting.command
     events = Events(command[:, 0], command[:, 1], command[:, 2])
-    for fault in _of(faults, "events"):
+    for fault in (*_of(faults, "volts"), *_of(faults, "events")):
         events = fault.form.act(events, fault.sizes)
     rates = _sampled(events, setting)
     for stage in ("rates", "floor", "spread"):
@@ -146,4 +147,5 @@ def _sampled(events: Events, setting: Setting) -> Rates:
 def _means(t: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
     knots = np.append(t, max(edges[-1], t[-1]) + 1.0)
     sums = np.concatenate([[0.0], np.cumsum(values * np.diff(knots))])
-    return np.asarray(np.diff(np.interp(edges, knots, sums)) / np.diff(edges))
+    means = np.diff(np.interp(edges, knots, sums)) / np.diff(edges)
+    return np.asarray(np.where(np.abs(means) < 1e-9, 0.0, means))  # rounding is neither driving nor turning

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""First values of parameters whose derivative says little: what every size does to the rates, weighed at once.
+
+The steps of a converter fit the voltages of a drive at one size and miss them at the next, so the likelihood of the
+size is a comb. What a change of the rates does to the reference is linear, though: worked out once for short times,
+it tells what any change would explain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kurumaisu.critic import replay
+from kurumaisu.critic.catalogue import Term, settings_of
+from kurumaisu.critic.drive import GRID, Drive
+from kurumaisu.critic.noise import Noise, whitened
+from kurumaisu.critic.smooth_columns import Sensitivity
+from kurumaisu.params import Model
+from kurumaisu.types import FloatArray
+
+_CELLS = 20  # of the grid for which a change of the rates is held
+_TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a first value needs no more
+_ALIKE = (0.4, 0.8)  # correlation of neighbouring sizes: below, there is one between them; above, they may be farther
+_GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
+_SIZES = 500  # at most
+_BEST = 6  # that are tried
+
+
+Way = tuple[object, ...]  # an effect's parameter, with the form in which it acts
+Walked = dict[Way, tuple[FloatArray, FloatArray]]  # sizes (k,), and what each changes, (k, bins)
+
+
+@dataclass(frozen=True)
+class Start:
+    """A value; how far the next one that was weighed is from it; what it explains, in nats, as far as lines go."""
+
+    value: float
+    apart: float
+    nats: float
+
+
+class Comb:
+    """What changes of the rates explain in some drives, about the model without effects."""
+
+    def __init__(self, drives: Sequence[Drive], model: Model, noise: Noise, walked: Walked) -> None:
+        """Take the beginnings of the drives; walked: what sizes have been found to do, whatever the noise."""
+        self._model, self._walked = model, walked
+        share = max(_TOTAL / len(drives), _LEAST)
+        self._drives = [_begin(drive, share) for drive in drives[: int(_TOTAL / share)]]
+        self._plain = [replay.motion(drive, model, ()) for drive in self._drives]
+        self._columns: list[FloatArray] = []
+        for drive, plain in zip(self._drives, self._plain, strict=True):
+            held = np.repeat(np.eye(-(-len(drive.v) // _CELLS)), _CELLS, axis=0)[: len(drive.v)]
+            sensitivity = Sensitivity(drive, plain)
+            both = np.column_stack([sensitivity.increments(channel, held) for channel in ("v", "w")])
+            self._columns.append(whitened(drive, both, noise)[0])
+        self._grams = [columns.T @ columns for columns in self._columns]
+        self._squares: dict[Way, FloatArray] = {}
+
+    def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[Start]:
+        """Return the most promising values of a term beside fixed ones; residual: of each drive, whitened."""
+        key = (term.key, *((other.key, other.parameter.lower) for other in fixed))
+        if key not in self._walked:
+            found = list(self._walk(term, fixed))
+            self._walked[key] = np.array([value for value, _ in found]), np.array([change for _, change in found])
+        values, changes = self._walked[key]
+        if not len(values):
+            return []
+        if key not in self._squares:
+            parts = zip(self._grams, self._parts(changes), strict=True)
+            self._squares[key] = np.sum([np.sum((own @ gram) * own, axis=1) for gram, own in parts], axis=0)
+        pull = np.concatenate([c.T @ r[: len(c)] for c, r in zip(self._columns, residual, strict=False)])
+        gained = changes @ pull - 0.5 * self._squares[key]
+        peaks = np.flatnonzero((gained >= np.append(gained[1:], -np.inf)) & (gained >= np.append(-np.inf, gained[:-1])))
+        best = peaks[np.argsort(-gained[peaks])][:_BEST]
+        apart = np.abs(np.diff(values, append=1.1 * values[-1]))
+        return [Start(float(values[k]), float(apart[k]), float(gained[k])) for k in best]
+
+    def _parts(self, changes: FloatArray) -> list[FloatArray]:
+        """Return what belongs to each drive of changes (k, bins)."""
+        return np.split(changes, np.cumsum([len(gram) for gram in self._grams])[:-1], axis=1)
+
+    def _walk(self, term: Term, fixed: Sequence[Term]) -> Iterator[tuple[float, FloatArray]]:
+        """Yield sizes with what they change, as far apart as that differs; either way where there are two."""
+        p = term.parameter
+        for sign, room in ((-1.0, term.null - p.lower), (1.0, p.upper - term.null)):
+            if room > 0:
+                yield from self._one_way(term, fixed, sign, room)
+
+    def _one_way(
+        self, term: Term, fixed: Sequence[Term], sign: float, room: float
+    ) -> Iterator[tuple[float, FloatArray]]:
+        size, growth = abs(term.step) * term.parameter.scale / 3, _GROWTH[1]
+        before: FloatArray | None = None
+        for _ in range(_SIZES):
+            if size > room:
+                return
+            value = term.null + sign * size
+            here = self._change(term, fixed, value)
+            alike = 1.0 if before is None else _alike(before, here)
+            if alike < _ALIKE[0] and growth > _GROWTH[0]:
+                size, growth = size / (1 + growth) * (1 + growth / 2), growth / 2
+                continue
+            yield value, here
+            before = here
+            growth = min(1.5 * growth, _GROWTH[1]) if alike > _ALIKE[1] else growth
+            size *= 1 + growth
+
+    def _change(self, term: Term, fixed: Sequence[Term], value: float) -> FloatArray:
+        """Return what a value adds to v and w in the bins of all drives, (bins,)."""
+        terms = (term, *fixed)
+        settings = settings_of(terms, np.array([value, *(other.parameter.lower for other in fixed)]))
+        moved = [replay.motion(drive, self._model, settings) for drive in self._drives]
+        pairs = zip(moved, self._plain, strict=True)
+        return np.concatenate([_means(rate) for a, b in pairs for rate in (a.v - b.v, a.w - b.w)])
+
+
+def _begin(drive: Drive, seconds: float) -> Drive:
+    """Return so much of a drive from its start on."""
+    count = max(int(np.searchsorted(drive.times, drive.times[0] + seconds, side="right")), 3)
+    cells = min(int((drive.times[:count][-1] - drive.start) / GRID) + 2, len(drive.v))
+    known = {name: values[:cells] for name, values in drive.known.items()}
+    short = replace(drive, v=drive.v[:cells], w=drive.w[:cells], known=known)
+    return short.seen_at(drive.times[:count], drive.poses[:count])
+
+
+def _means(values: FloatArray) -> FloatArray:
+    """Return the means over bins; the last one may be short."""
+    starts = np.arange(0, len(values), _CELLS)
+    return np.asarray(np.add.reduceat(values, starts) / np.diff(np.append(starts, len(values))))
+
+
+def _alike(one: FloatArray, other: FloatArray) -> float:
+    norms = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(one @ other) / norms if norms else 1.0

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Parameters with a comb of likely values, and inputs that change between two points of the replay's grid."""
+
+import numpy as np
+import pytest
+
+from kurumaisu.bench.hidden import base_case
+from kurumaisu.bench.hidden.base_catalogue import BASE
+from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.critic import replay
+from kurumaisu.critic.drive import prepare
+from kurumaisu.critic.evidence import Problem
+from kurumaisu.critic.noise import Noise
+from kurumaisu.critic.recording import Run, Series
+from kurumaisu.effects import LATE
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+NOISE = Noise(position_sd=0.005, heading_sd=0.005, sd_v=0.01, sd_lateral=0.003, sd_w=0.02, tau=0.3)
+STEP = "base.dac_quantisation"
+
+
+def problem_with(form, step, seed):
+    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(seed), seconds=40.0, rate=10.0)
+    faults = [BASE[STEP].fault({"size": step}, form)] if step else []
+    data = base_case.recording("steps", drives, faults)
+    return Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset({STEP}))
+
+
+@pytest.mark.parametrize(("form", "phase"), [("plain", 0.0), ("other", 0.5)])
+def test_a_converters_step_is_found_among_all_its_teeth(form, phase):
+    problem = problem_with(form, 0.0367, 1)
+    best = max((problem.fit_candidates([c], {}) for c in problem.candidates), key=lambda fit: fit.score)
+    assert best.start[STEP, "step"] == pytest.approx(0.0367, rel=3e-3)
+    assert best.start[STEP, "phase"] == phase
+    assert best.start[STEP, "cut"] == 0.0
+    assert best.score > problem.fit_candidates((), {}).score + 10
+
+
+def test_without_steps_no_tooth_is_worth_its_cost():
+    problem = problem_with("plain", 0.0, 2)
+    nothing = problem.fit_candidates((), {}).score
+    fits = [problem.fit_candidates([candidate], {}) for candidate in problem.candidates]
+    assert len(fits) == 4  # rounded, without a 0, cut, and resting at 0 V
+    assert all(fit.score < nothing for fit in fits)
+
+
+def replayed(start, settings):
+    """The way driven after a command of 0.6 m/s at a time within a step of the grid, of a chair without noise."""
+    command = Series(np.array([0.0, start]), np.array([[0.0, 0.0], [0.6, 0.0]]), ("v", "w"))
+    pose = Series(np.array([0.0, 1.0, 2.0, 3.0]), np.zeros((4, 3)), ("x", "y", "theta"))
+    drive = prepare(Run("run", command=command, pose=pose), MODEL)
+    return replay.path(drive, MODEL, settings)[-1, 0]
+
+
+@pytest.mark.parametrize("start", [0.5, 0.5031, 0.5062, 0.5099])
+def test_a_ramp_begins_when_its_command_does(start):
+    """0.6 m/s at 1 m/s^2 is reached 0.6 s late, on a parabola: 0.18 m less; nothing of it hangs on the grid."""
+    ramp = (EffectSetting("base.accel_limit", {"slowness_v": 1.0, "slowness_w": 0.0}),)
+    assert replayed(start, ()) == pytest.approx(0.6 * (3.0 - start), abs=1e-9)
+    assert replayed(start, ramp) == pytest.approx(0.6 * (3.0 - start) - 0.18, abs=1e-4)
+
+
+def test_what_changes_within_a_step_is_known_and_rests_are_rests():
+    t = np.round(np.arange(200) * 0.0333, 6)
+    rates = np.column_stack([0.3 * (np.arange(200) % 3 == 0), 0.2 * (np.arange(200) % 4 == 0)])
+    command = Series(t, rates, ("v", "w"))
+    pose = Series(np.arange(0.0, 6.0, 0.1), np.zeros((60, 3)), ("x", "y", "theta"))
+    drive = prepare(Run("run", command=command, pose=pose), MODEL)
+    edges = drive.start + 0.01 * np.arange(len(drive.v) + 1)
+    for low, high, share, v, w in zip(edges[:-1], edges[1:], drive.known[LATE], drive.v, drive.w, strict=True):
+        before = np.searchsorted(t, low + 1e-9, side="right") - 1
+        inside = (t > low + 1e-9) & (t < high - 1e-9)
+        if not inside.any():
+            assert share == pytest.approx(0.0, abs=1e-6)
+            assert (v, w) == tuple(pytest.approx(rate, abs=1e-12) for rate in rates[before])
+            assert (v == 0) == (rates[before, 0] == 0)
+            assert (w == 0) == (rates[before, 1] == 0)
+        elif (rates[np.flatnonzero(inside)[0]] != rates[before]).any():
+            assert share == pytest.approx((t[inside][0] - low) / 0.01, abs=1e-6)
