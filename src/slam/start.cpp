@@ -33,7 +33,8 @@ ReadingSettings readings(const MapperSettings& s) {
 
 std::vector<double> ticks(double deviation, double step) {
   std::vector<double> out{0};
-  for (double off = step; off <= kWidth * deviation; off += step) out.insert(out.end(), {off, -off});
+  const int count = static_cast<int>(kWidth * deviation / step);
+  for (int i = 1; i <= count; ++i) out.insert(out.end(), {i * step, -i * step});
   return out;
 }
 
