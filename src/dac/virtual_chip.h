@@ -14,8 +14,8 @@
 
 namespace kurumaisu::dac {
 
-/// Runs from its construction to its end, in a thread of its own. It puts out what the attributes _raw say as soon as it
-/// sees them: what is overwritten before does not show. Its range goes from 0 V to 5 V. Powering up and down means nothing.
+/// Runs from its construction to its end, in a thread of its own. It puts out what the attributes _raw say as soon as
+/// it sees them: what is overwritten before does not show. Its range is 0 V to 5 V. Powering up and down means nothing.
 class VirtualChip {
  public:
   /// root: a folder that is made for it, where the device's file says that devices are. log: as of VirtualBoard.

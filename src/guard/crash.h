@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A crash that the guard hears of at once. The kernel closes a socket only when the process' memory has been written to a
-// core file and given back.
+// A crash that the guard hears of at once. The kernel closes a socket only when the process' memory has been written to
+// a core file and given back.
 #pragma once
 
 namespace kurumaisu::guard {
