@@ -16,8 +16,8 @@ from kurumaisu.critic.recording import Run, Series
 from kurumaisu.msg import Voltages
 from kurumaisu.paper import advice
 from kurumaisu.paper.options import Options
-from kurumaisu.ros.experiment_drive import pose_of
 from kurumaisu.ros.recorder import Recorder
+from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.types import FloatArray
 
 _TOPICS = ("voltages", "ground_truth", "odom", "scan", "cmd_vel_out", "tf_static")
@@ -60,7 +60,8 @@ class Heard:
         self._add("voltages", (m.header.stamp.to_sec(), m.translation, m.steering, m.v, m.w))
 
     def _pose(self, name: str, m: Odometry) -> None:
-        self._add(name, (m.header.stamp.to_sec(), *pose_of(m).tolist()))
+        place = m.pose.pose.position
+        self._add(name, (m.header.stamp.to_sec(), place.x, place.y, yaw_of(m.pose.pose.orientation)))
 
     def _add(self, name: str, row: tuple[float, ...]) -> None:
         with self._lock:
