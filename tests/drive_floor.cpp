@@ -22,8 +22,8 @@ class Floor {
       : voltages_(nh.advertise<kurumaisu::Voltages>("voltages", 10)),
         odom_(nh.advertise<nav_msgs::Odometry>("odom", 10)),
         survived_(nh.advertise<geometry_msgs::TwistStamped>("cmd_vel_out", 10)),
-        commands_(nh.subscribe("experiment_vel", 1, &Floor::onCommand, this,
-                               ros::TransportHints().tcpNoDelay())) {}
+        commands_(
+            nh.subscribe("experiment_vel", 1, &Floor::onCommand, this, ros::TransportHints().tcpNoDelay())) {}
 
   void run(double rate) {
     for (ros::SteadyTime due = ros::SteadyTime::now(); ros::ok();) {

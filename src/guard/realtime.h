@@ -13,9 +13,9 @@ void makeRealtime(int priority);
 /// its socket, and so its voltages, meanwhile.
 struct Favour {
   int priority;  ///< of SCHED_FIFO, below the guard's; 0: none
-  double
-      longest_run;  ///< [s] of processor time at it without a wait: who takes more loses it, but not his nice value.
-  ///< An endless loop would keep the kernel's own threads from their work, the tty's among them
+  /// [s] of processor time at it without a wait: who takes more loses it, but not his nice value. An endless loop would
+  /// keep the kernel's own threads from their work, the tty's among them.
+  double longest_run;
   int nice;  ///< also where the priority is refused; 0: as it is. It counts among one session's processes only,
              ///< where the kernel groups them (sched_autogroup_enabled), or systemd does
 };
