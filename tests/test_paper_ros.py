@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The paper's experiments through the chair's own programs, at small size: docs/paper.md has them in full."""
 
-import contextlib
 import os
 import signal
-import subprocess
 import time
 from pathlib import Path
 
@@ -12,7 +10,7 @@ import numpy as np
 import pytest
 import rosbag
 
-from kurumaisu.bench.processes import master, program
+from kurumaisu.bench.processes import master, program, running
 from kurumaisu.errors import Error
 from kurumaisu.paper import drive
 from kurumaisu.params import shipped
@@ -60,26 +58,14 @@ def test_a_launch_that_fails_shows_the_end_of_its_log(tmp_path):
         )
 
 
-@contextlib.contextmanager
-def running(*command, environment, output=subprocess.DEVNULL):
-    process = subprocess.Popen(command, env=environment, stdout=output, stderr=subprocess.STDOUT)
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-        process.wait(PATIENCE)
-
-
 def test_a_drive_is_watched_while_it_is_recorded(tmp_path):
     """Half a drive: what it lacks is said, and when it is interrupted the bag is whole."""
     said, bag = tmp_path / "said", tmp_path / "drive.bag"
     arguments = [f"file:={shipped(drive.HELD_OUT)}", f"bag:={tmp_path / 'other.bag'}", "speed:=4"]
     with (
         master() as ros,
-        running("roslaunch", "kurumaisu", "identification.launch", *arguments, environment=ros),
-        said.open("wb") as stream,
-        running(program("calibrate"), "record", str(bag), "--every", "1", environment=ros, output=stream) as watcher,
+        running(["roslaunch", "kurumaisu", "identification.launch", *arguments], environment=ros),
+        running([program("calibrate"), "record", str(bag), "--every", "1"], said, ros) as watcher,
     ):
         deadline = time.monotonic() + PATIENCE
         while "turning left:" not in said.read_text() and time.monotonic() < deadline:

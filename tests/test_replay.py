@@ -3,7 +3,6 @@
 
 import contextlib
 import math
-import signal
 import subprocess
 import time
 from collections.abc import Iterator, Sequence
@@ -12,22 +11,11 @@ from pathlib import Path
 import numpy as np
 import rosbag
 
-from kurumaisu.bench.processes import master
+from kurumaisu.bench.processes import master, running
 
 PATIENCE = 60.0  # [s] of wall time for a process to end
 TICK = 0.02  # [s] of base_node
 DRIVES = (("0.5", "0.4"), ("-0.2", "0.5"))  # v [m/s], w [rad/s]
-
-
-@contextlib.contextmanager
-def running(*command: str, environment: dict[str, str]) -> Iterator[subprocess.Popen[bytes]]:
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-        process.wait(PATIENCE)
 
 
 def wait_for_file(path: Path) -> None:
@@ -46,7 +34,7 @@ def wait_for_message(topic: str, environment: dict[str, str], count: int = 1) ->
 @contextlib.contextmanager
 def recording(bag: Path, *topics: str, environment: dict[str, str]) -> Iterator[None]:
     """Record topics beside what record.launch records."""
-    with running("rosbag", "record", "-O", str(bag), *topics, environment=environment):
+    with running(["rosbag", "record", "-O", str(bag), *topics], environment=environment):
         wait_for_file(Path(f"{bag}.active"))
         yield
     wait_for_file(bag)
@@ -60,7 +48,7 @@ def mapping(bag: Path | None, environment: dict[str, str]) -> Iterator[None]:
         return
     with (
         recording(bag, "/map", environment=environment),
-        running("roslaunch", "kurumaisu", "slam.launch", environment=environment),
+        running(["roslaunch", "kurumaisu", "slam.launch"], environment=environment),
     ):
         wait_for_message("/map_metadata", environment)  # of the first scan
         yield
@@ -69,10 +57,10 @@ def mapping(bag: Path | None, environment: dict[str, str]) -> Iterator[None]:
 def record(bag: Path, *arguments: str, maps: Path | None = None) -> None:
     """Record the simulator driven this way and that; arguments: of record.launch."""
     names = [bag] if not arguments else [bag.with_name(f"{bag.stem}_0.bag")]
-    with master() as environment, running("roslaunch", "kurumaisu", "sim.launch", environment=environment):
+    with master() as environment, running(["roslaunch", "kurumaisu", "sim.launch"], environment=environment):
         wait_for_message("/odom", environment)
         command = ["roslaunch", "kurumaisu", "record.launch", f"bag:={bag}", *arguments]
-        with mapping(maps, environment), running(*command, environment=environment):
+        with mapping(maps, environment), running(command, environment=environment):
             wait_for_file(Path(f"{names[0]}.active"))
             wait_for_message("/scan", environment)
             for v, w in DRIVES:

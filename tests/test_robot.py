@@ -1,40 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """robot.launch against a virtual laser and a virtual D/A board at pseudo-terminals, with nothing else changed."""
 
-import contextlib
-import signal
 import subprocess
 import sys
-import time
 
 import pytest
 import yaml
 
 from kurumaisu.bench.guard_rig import Rig
-from kurumaisu.bench.processes import master, program
+from kurumaisu.bench.processes import master, program, running
+from kurumaisu.ros.testing import wait_for
 
 PATIENCE = 60.0  # [s] of wall time for anything to come about
-
-
-def wait_for(condition, what):
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        if result := condition():
-            return result
-        time.sleep(0.02)
-    raise AssertionError(f"not within {PATIENCE} s: {what}")
-
-
-@contextlib.contextmanager
-def running(command, log, environment=None):
-    with log.open("w") as file:
-        process = subprocess.Popen(command, stdout=file, stderr=file, env=environment)
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-        process.wait(PATIENCE)
 
 
 def heard(topic, environment, *options):
@@ -77,16 +54,19 @@ def twist(v, w):
 
 def test_a_command_becomes_volts_at_the_board(chair, tmp_path):
     rig, environment = chair
-    wait_for(lambda: volts(rig) is not None, "the board is spoken to")
+    wait_for(lambda: volts(rig) is not None, "the board is spoken to", PATIENCE)
     assert heard("/scan", environment, "--noarr")["header"]["frame_id"] == "laser"
     publish = ["rostopic", "pub", "-r", "20", "/cmd_vel", "geometry_msgs/Twist"]
     with running([*publish, twist(0.0, 0.0)], tmp_path / "zero.log", environment):
         wait_for(
-            lambda: "armed" in statuses(environment).get("/chair/guard/base_node: guard", ""), "the guard is armed"
+            lambda: "armed" in statuses(environment).get("/chair/guard/base_node: guard", ""),
+            "the guard is armed",
+            PATIENCE,
         )
         assert volts(rig) == pytest.approx((0.0, 0.0), abs=0.002)
     with running([*publish, twist(0.5, 0.3)], tmp_path / "drive.log", environment):
-        wait_for(lambda: volts(rig) == pytest.approx((0.789916, -0.045582), abs=0.002), "(1) and (2) at the board")
+        asked = pytest.approx((0.789916, -0.045582), abs=0.002)
+        wait_for(lambda: volts(rig) == asked, "(1) and (2) at the board", PATIENCE)
         odom = heard("/odom", environment)
         assert odom["twist"]["twist"]["linear"]["x"] == pytest.approx(0.5, abs=0.01)
         said = statuses(environment)

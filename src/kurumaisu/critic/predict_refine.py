@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.laser.shots import Shots, Track
+from kurumaisu.critic.laser.shots import Shots, Track, rows_of
 from kurumaisu.critic.predict_scan import ScanModel, expected, fit_scatter
-from kurumaisu.critic.predict_track import Places, joined, rows_of
+from kurumaisu.critic.predict_track import Places, joined
 from kurumaisu.critic.recording import Run
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray, IntArray

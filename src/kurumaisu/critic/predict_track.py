@@ -16,7 +16,7 @@ from kurumaisu.critic.predict_path import Paths
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.smooth_known import beside
 from kurumaisu.params import Model
-from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.types import FloatArray
 
 _AROUND = np.array([-0.5, -0.3, -0.2, -0.1, 0.0, 0.05, 0.1, 0.2, 0.3])  # [s] about a stamp: late clocks, slow sweeps
 _AFTER = 1e-3  # [s] so much later a pose is asked for, where the last row is of the very stamp
@@ -112,18 +112,6 @@ def joined(parts: Sequence[Shots]) -> Shots:
             for name in parts[0].known
             if all(name in part.known for part in parts)
         },
-    )
-
-
-def rows_of(shots: Shots, rows: IntArray) -> Shots:
-    """Return some of the scans."""
-    return replace(
-        shots,
-        stamps=shots.stamps[rows],
-        run=shots.run[rows],
-        measured=shots.measured[rows],
-        shift=shots.shift[rows],
-        known={name: values[rows] for name, values in shots.known.items()},
     )
 
 

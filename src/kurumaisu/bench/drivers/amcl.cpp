@@ -167,12 +167,4 @@ void run(int count, char** words) {
 
 }  // namespace
 
-int main(int count, char** words) {
-  try {
-    run(count, words);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
-  return 0;
-}
+int main(int count, char** words) { return exitStatus(run, count, words); }

@@ -93,6 +93,18 @@ struct Cells {
   std::vector<double> values;
 };
 
+/// Runs a program; prints what it throws. Returns its exit status.
+template <typename Run>
+int exitStatus(Run&& run, int count, char** words) {
+  try {
+    run(count, words);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
+
 inline double processorTime() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);

@@ -234,7 +234,11 @@ def predict(shots: Shots, settings: Sequence[EffectSetting], seen: Look, seed: i
 
 def thin(shots: Shots, most: int) -> Shots:
     """Return at most so many of the scans, evenly taken."""
-    rows = np.unique(np.linspace(0, len(shots.stamps) - 1, most).astype(int))
+    return rows_of(shots, np.unique(np.linspace(0, len(shots.stamps) - 1, most).astype(int)))
+
+
+def rows_of(shots: Shots, rows: IntArray) -> Shots:
+    """Return some of the scans."""
     return replace(
         shots,
         stamps=shots.stamps[rows],
