@@ -168,9 +168,11 @@ def test_it_publishes_the_script_at_a_steady_rate_then_zero_then_nothing(run):
     assert len(run.go(CARE.rest_time - 0.05)) == 0
     said = run.go(6.0)
     assert np.diff(said[:, 0]) == pytest.approx(1 / CARE.rate)
-    assert len(said) == round((run.script.seconds + CARE.stop_time) * CARE.rate)
+    assert len(said) == round((CARE.lead_time + run.script.seconds + CARE.stop_time) * CARE.rate)
     expected = samples(run.script.phases, 1 / CARE.rate)
-    assert said[: len(expected), 1:] == pytest.approx(expected[:, 1:])
+    lead = round(CARE.lead_time * CARE.rate)
+    assert not said[:lead, 1:].any()  # who has not let go is not obeyed
+    assert said[lead : lead + len(expected), 1:] == pytest.approx(expected[:, 1:])
     assert run.supervisor.stage is Stage.ENDED
     assert run.supervisor.outcome == ""
 

@@ -29,6 +29,7 @@ class Care:
     patience: float
     pose_timeout: float
     clock_jump: float
+    lead_time: float
     stop_time: float
     place_distance: float
     place_angle: float
@@ -155,7 +156,7 @@ class Supervisor:
             if why:
                 self.stop(why)
                 return
-            self._origin, self._begin, self._due, self.stage = origin, now, now, Stage.RUNNING
+            self._origin, self._begin, self._due, self.stage = origin, now + self._care.lead_time, now, Stage.RUNNING
         elif self._first is not None and now - self._first > self._care.patience:
             lost = absent or self._lost(now)
             self.stop(f"no poses on {', '.join(lost)}" if lost else "the chair does not stand")
@@ -171,6 +172,8 @@ class Supervisor:
 
     def _row(self, now: float) -> tuple[float, ...] | None:
         elapsed = now - self._begin
+        if elapsed < -_SAME:
+            return self.rest
         if elapsed >= self._rows[-1, 0] - _SAME:
             self.stop("")
             return self._stopping(now)
