@@ -62,7 +62,7 @@ Method mrpt(sim::Sensor& /*sensor*/) {
   };
   auto start = std::make_shared<Start>();
   return [start](std::uint32_t ms, double first_byte) {
-    if (start->scans == 10) return start->host + 1e-3 * static_cast<std::uint32_t>(ms - start->clock);
+    if (start->scans == 10) return start->host + 1e-3 * (ms - start->clock);
     *start = {start->scans + 1, ms, first_byte - sim::kLeastDelay};
     return start->host;
   };

@@ -60,7 +60,7 @@ Wiring anyWiring(std::mt19937& random) {
       wiring.channels[signal] = {{low, is_reference ? low + between(random, 0.01, 1) : between(random, 0, 2)},
                                  !is_reference && random() % 2 == 0};
       const double per_volt = std::exp(between(random, 2, 9)) * (random() % 2 == 0 ? 1 : -1);
-      const int min = static_cast<int>(random() % 3 == 0 ? -40000 : 0);
+      const int min = random() % 3 == 0 ? -40000 : 0;
       wiring.codings[signal] = {per_volt, between(random, 0, 4000), min, 65535};
     }
     if (d::misfit(wiring.channels, wiring.codings).empty()) return wiring;

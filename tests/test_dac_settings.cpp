@@ -98,7 +98,7 @@ TEST(Yaml, MessagesNameFileLineKeyAndValue) {
 }
 
 TEST(Yaml, ScalarsAreWhatYamlTakesThemFor) {
-  using Kind = k::Kind;
+  using k::Kind;
   for (const auto& [text, kind] : std::vector<std::pair<std::string, Kind>>{
            {"0", Kind::kInteger},        {"-12", Kind::kInteger},  {"+7", Kind::kInteger},
            {"007", Kind::kText},         {"0x1F", Kind::kText},    {"1_000", Kind::kText},

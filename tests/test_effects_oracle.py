@@ -46,7 +46,7 @@ def wave(x):
 def watched(v, w, u, heading):
     """Each covariate in each step, by somebody who watches the drive."""
     rows, x, y, t = [], 0.0, 0.0, 0.0
-    since_command, since_reversal, way, asked = math.inf, math.inf, 0, (0.0, 0.0)
+    since_command, since_reversal, way, asked, distance = math.inf, math.inf, 0, (0.0, 0.0), 0.0
     for speed, turn, aside in zip(v, w, u, strict=True):
         if (speed, turn) != asked:
             asked, since_command = (speed, turn), 0.0
@@ -69,6 +69,7 @@ def watched(v, w, u, heading):
                 "since_command": since_command + DT / 2,
                 "since_reversal": since_reversal + abs(speed) * DT / 2,
                 "heading": middle,
+                "distance": distance + abs(speed) * DT / 2,
                 "x": x + east * DT / 2,
                 "y": y + north * DT / 2,
                 "rust": 0.5,
@@ -77,6 +78,7 @@ def watched(v, w, u, heading):
         x, y, t, heading = x + east * DT, y + north * DT, t + DT, heading + turn * DT
         since_command += DT
         since_reversal += abs(speed) * DT
+        distance += abs(speed) * DT
     return rows
 
 

@@ -95,6 +95,7 @@ class Sensor {
  public:
   explicit Sensor(const Case& what) {
     std::vector<v::Fault> faults;
+    faults.reserve(what.faults.size());
     for (const std::string& text : what.faults) faults.push_back(v::fault(text));
     std::unique_ptr<v::Endpoint> endpoint;
     if (what.serial) {
@@ -394,7 +395,7 @@ TEST(Driver, TellsWhySensorsRefuse) {
     l::State state;
     std::string told;
   };
-  using State = l::State;
+  using l::State;
   const std::map<std::string, Refusal> refusals{
       {"bm01", {State::kRefused, "LASER_NO_LIGHT: BM is answered by status 01"}},
       {"md0e", {State::kRefused, "LASER_REFUSED: MD0044072501000 is answered by status 0E"}},

@@ -146,8 +146,8 @@ TEST(LaserSettings, ContradictionsStopTheStart) {
 
 // dynamic_reconfigure cuts what it is asked for to the limits of msg/Laser.cfg before the node sees it.
 TEST(LaserSettings, LimitsAreThoseOfReconfigure) {
-  const auto low = kurumaisu::LaserConfig::__getMin__();
-  const auto high = kurumaisu::LaserConfig::__getMax__();
+  const auto& low = kurumaisu::LaserConfig::__getMin__();
+  const auto& high = kurumaisu::LaserConfig::__getMax__();
   Value given;
   given["angle_min"] = low.angle_min;
   given["angle_max"] = high.angle_max;

@@ -157,7 +157,7 @@ void filterLane(const Whitener::Step<kSize>& step, const double* in, Eigen::Inde
                 Eigen::Index out_stride, double* mean) {
   using Lane = Eigen::Array<double, 1, kColumns>;
   std::array<Lane, kSize> state;
-  for (int i = 0; i < kSize; ++i) state[i] = Eigen::Map<const Lane>(mean + i * kColumns);
+  for (int i = 0; i < kSize; ++i) state[i] = Eigen::Map<const Lane>(mean + std::ptrdiff_t{i} * kColumns);
   std::array<Lane, 3> innovation;
   for (int r = 0; r < 3; ++r) {
     innovation[r] = Eigen::Map<const Lane>(in + r * in_stride);
@@ -166,10 +166,11 @@ void filterLane(const Whitener::Step<kSize>& step, const double* in, Eigen::Inde
   const auto& [l00, l10, l11, l20, l21, l22] = step.lower;
   Eigen::Map<Lane>{out} = l00 * innovation[0];
   Eigen::Map<Lane>{out + out_stride} = l10 * innovation[0] + l11 * innovation[1];
-  Eigen::Map<Lane>{out + 2 * out_stride} = l20 * innovation[0] + l21 * innovation[1] + l22 * innovation[2];
+  Eigen::Map<Lane>{out + std::ptrdiff_t{2}* out_stride} =
+      l20 * innovation[0] + l21 * innovation[1] + l22 * innovation[2];
   for (int i = 0; i < kSize; ++i) {
     const auto& gain = step.gain[i];
-    Eigen::Map<Lane>{mean + i* kColumns} =
+    Eigen::Map<Lane>{mean + std::ptrdiff_t{i}* kColumns} =
         step.keep[i] * state[i] + gain[0] * innovation[0] + gain[1] * innovation[1] + gain[2] * innovation[2];
   }
 }

@@ -2,6 +2,7 @@
 // getID: the serial number of the sensor on a port. Without ROS, MRPT and libraries of this package, so that udev can
 // run it.
 #include <algorithm>
+#include <charconv>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "laser/handshake.h"
@@ -82,7 +84,10 @@ std::unique_ptr<k::Port> open(const std::string& name, const k::Link::Interrupte
   if (name[0] == '/') return std::make_unique<k::Tty>(name, kBaud);
   const std::size_t colon = name.find(':');
   if (colon == std::string::npos) throw std::invalid_argument("neither a tty's full path nor ADDRESS:PORT");
-  const int port = std::atoi(name.c_str() + colon + 1);
+  int port = 0;
+  const char* const end = name.data() + name.size();
+  const auto [stop, error] = std::from_chars(name.data() + colon + 1, end, port);
+  if (error != std::errc() || stop != end) throw std::invalid_argument("its port is no number");
   return std::make_unique<k::Tcp>(name.substr(0, colon), port, kPatience, interrupted);
 }
 
@@ -102,7 +107,7 @@ std::string serialNumber(const std::string& name) {
 bool report(const std::string& port, bool quiet) {
   try {
     const std::string serial = serialNumber(port);
-    std::cout << (quiet ? serial : "Device at " + port + " has ID " + serial) << std::endl;
+    std::cout << (quiet ? serial : "Device at " + port + " has ID " + serial) << '\n';
     return true;
   } catch (const std::exception& problem) {
     std::cerr << "getID: " << port << ": " << problem.what() << "\n";

@@ -25,7 +25,7 @@ namespace {
 namespace k = kurumaisu::laser;
 using diagnostic_msgs::DiagnosticStatus;
 using kurumaisu::LaserConfig;
-using Trigger = std_srvs::Trigger;
+using std_srvs::Trigger;
 
 constexpr double kLongestWait = 0.02;   // [s] for a callback, so that a stop is soon noticed
 constexpr double kWarningPeriod = 1.0;  // [s] between two equal warnings

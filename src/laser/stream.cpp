@@ -103,7 +103,7 @@ void ScipStream::put(const std::string& command, const std::string& status,
                      const std::vector<std::string>& lines) {
   ready_ = command + "\n" + status + scip::sum(status) + "\n";
   for (const std::string& line : lines) ready_ += line + scip::sum(line) + "\n";
-  ready_ += "\n";
+  ready_ += '\n';
   read_ = 0;
 }
 

@@ -69,6 +69,7 @@ py::tuple render(Camera& camera, const Panels& panels, const Array& poses, const
   requireFinite(eye, "eye");
   if (n < panels.bodies) throw std::invalid_argument("poses has fewer rows than there are bodies");
   std::vector<Pose> stands;
+  stands.reserve(static_cast<std::size_t>(n));
   for (py::ssize_t i = 0; i < n; ++i) {
     stands.push_back({poses.at(i, 0), poses.at(i, 1), poses.at(i, 2), poses.at(i, 3)});
   }

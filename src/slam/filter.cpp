@@ -188,6 +188,7 @@ std::array<double, 9> Filter::covarianceAt(std::size_t node) const {
 
 std::vector<std::array<double, 9>> Filter::pathCovariances() const {
   std::vector<std::array<double, 9>> out;
+  out.reserve(nodes());
   for (std::size_t node = 0; node < nodes(); ++node) out.push_back(covarianceAt(node));
   return out;
 }

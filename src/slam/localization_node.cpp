@@ -115,7 +115,7 @@ LocalizationNode::LocalizationNode(ros::NodeHandle& nh, k::LocalizationNodeSetti
 }
 
 void LocalizationNode::advertise(ros::NodeHandle& nh) {
-  using Empty = std_srvs::Empty;
+  using std_srvs::Empty;
   services_.push_back(nh.advertiseService<Empty::Request, Empty::Response>(
       "global_localization", [this](Empty::Request&, Empty::Response&) {
         if (localizer_) localizer_->forget();

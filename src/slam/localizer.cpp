@@ -281,7 +281,7 @@ class Localizer::Impl {
         Gaussian wide = estimate.map_from_base;
         wide.covariance.diagonal() += Eigen::Vector3d(0.01, 0.01, 0.0025);  // 0.1 m, 3 degrees
         setPose(wide);
-        estimate.map_from_base = wide;
+        estimate.map_from_base = std::move(wide);
       }
     }
   }

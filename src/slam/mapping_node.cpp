@@ -112,13 +112,13 @@ MappingNode::MappingNode(ros::NodeHandle& nh, k::MappingNodeSettings settings,
 }
 
 void MappingNode::advertise(ros::NodeHandle& nh) {
-  using GetMap = nav_msgs::GetMap;
+  using nav_msgs::GetMap;
   services_.push_back(nh.advertiseService<GetMap::Request, GetMap::Response>(
       "dynamic_map", [this](GetMap::Request&, GetMap::Response& response) {
         if (mapper_) response.map = output_.mapOf(*mapper_, last_scan_);
         return response.map.info.width > 0;
       }));
-  using StateFile = kurumaisu::StateFile;
+  using kurumaisu::StateFile;
   services_.push_back(private_.advertiseService<StateFile::Request, StateFile::Response>(
       "save_map", [this](StateFile::Request& request, StateFile::Response& response) {
         try {

@@ -15,12 +15,14 @@ std::string deviation(const MappingState& state) {
 
 /// What went wrong since the last time, if the map grows all the same.
 MappingVerdict passing(const MappingState& state) {
-  if (state.jumps > 0)
+  if (state.jumps > 0) {
     return {1, "MAPPING_ODOMETRY_JUMP: jumps not believed: " + std::to_string(state.jumps)};
+  }
   if (state.skipped > 0) return {1, "MAPPING_TOO_SLOW: scans skipped: " + std::to_string(state.skipped)};
-  if (state.dropped > 0)
+  if (state.dropped > 0) {
     return {1, "MAPPING_DROPPED: scans dropped: " + std::to_string(state.dropped) +
                    ", the last: " + state.reason};
+  }
   return {0, "mapping; " + deviation(state)};
 }
 

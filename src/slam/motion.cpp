@@ -29,7 +29,7 @@ std::optional<Eigen::Matrix3d> growth(const Odometry& first, const Odometry& sec
   if (!first.covariance || !second.covariance) return std::nullopt;
   const Eigen::Matrix3d carried = lever(first.pose, second.pose);
   const Eigen::Matrix3d turn = turning(-first.pose.theta);
-  const Eigen::Matrix3d grown =
+  Eigen::Matrix3d grown =
       turn * (*second.covariance - carried * *first.covariance * carried.transpose()) * turn.transpose();
   const bool sound =
       grown.allFinite() && grown(0, 0) > 0 && grown(2, 2) > 0 &&

@@ -39,6 +39,7 @@ std::vector<int> distancesOf(const Measurement& measurement, const Codes& codes,
   }
   requireSize("ranges", measurement.ranges.size(), count);
   std::vector<int> distances;
+  distances.reserve(measurement.ranges.size());
   for (const double range : measurement.ranges) distances.push_back(distanceOf(range, codes, parameters));
   return distances;
 }
@@ -47,8 +48,10 @@ std::vector<int> intensitiesOf(const Measurement& measurement, std::size_t count
   if (measurement.intensities.empty()) return std::vector<int>(count, 0);
   requireSize("intensities", measurement.intensities.size(), count);
   std::vector<int> intensities;
-  for (const double value : measurement.intensities)
+  intensities.reserve(measurement.intensities.size());
+  for (const double value : measurement.intensities) {
     intensities.push_back(std::isnan(value) ? 0 : static_cast<int>(std::clamp(value, 0.0, double{kMost})));
+  }
   return intensities;
 }
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import os
 import sys
 import time
 
@@ -48,5 +48,7 @@ def _follow(terminal: Terminal, hand: Hand, key_settings: KeySettings, period: f
 
 
 def _show(text: str) -> None:
-    with contextlib.suppress(OSError):  # the terminal is gone: rest is published all the same
+    try:
         print(text, end="", flush=True)
+    except OSError:  # the terminal is gone: rest is published all the same, and Python's last flush must not fail
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
