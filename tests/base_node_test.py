@@ -249,6 +249,7 @@ class BaseNode(unittest.TestCase):
         assert max(-np.diff(v)) < 0.5 * 0.1
         assert client.update_configuration({"v_jerk": math.nan})["v_jerk"] == shipped["v_jerk"]
         assert client.update_configuration({"v_jerk": -1.0})["v_jerk"] > 0
+        assert client.update_configuration({"v_deceleration": 0.0})["v_deceleration"] == 0.2  # it must brake
         client.update_configuration(shipped)
         self.voltages.wait(lambda m: m.v == 0.6, "the old limit")
         client.close()
