@@ -30,7 +30,9 @@ from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-_GROWTH_BESIDE = 1.0  # at usual rates, from which growing noise is named beside a curve
+# At usual rates, from which growing noise is named: alone, where less is no matter, and beside something else, which in
+# another form than ours leaves residuals that grow with the rates, too.
+_GROWTH_ALONE, _GROWTH_BESIDE = 0.5, 1.0
 _PICTURE = 0.1  # [s] between the poses drawn
 # [s] after which a simulated path begins again at the measured pose: the random wander of the heading adds up, and
 # after a minute hides what the model does.
@@ -95,8 +97,8 @@ def criticism(
     causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
     # Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
     asked = problem.ids is None or process_noise(problem).id in problem.ids
-    # What a curve leaves behind may grow with the rates, too; only what doubles the noise is no such thing.
-    sure = growth.p >= naming.NAMED and (made.beyond.extension is None or growth.noise.growth >= _GROWTH_BESIDE)
+    least = _GROWTH_BESIDE if made.something else _GROWTH_ALONE
+    sure = growth.p >= naming.NAMED and growth.noise.growth >= least
     if asked and sure and all(drive.source != "odom" for drive in drives):
         kind, causes = "named", (*causes, Cause(process_noise(problem).id, growth.p, {}, growth.gain_nats))
     settings = best.settings if kind in ("named", "confounded") else ()
