@@ -427,7 +427,7 @@ class OneRobot(Case):
         wait_for(lambda: self.ask("step", Trigger) and truth.messages, "the second robot")
         assert place(truth.last) == (-1, -2, 0)
         self.step()
-        assert ("/robot_1/odom", "/robot_1/base_footprint") in self.transforms()
+        wait_for(lambda: ("/robot_1/odom", "/robot_1/base_footprint") in self.transforms(), "the second robot's tf")
         with tempfile.TemporaryDirectory() as folder:
             assert self.ask("save", StateFile, f"{folder}/state").success
             assert self.ask("delete", Delete, "second").success
@@ -436,7 +436,7 @@ class OneRobot(Case):
             loaded = self.ask("load", StateFile, f"{folder}/state")
             assert loaded.success, loaded.message
         self.step()
-        assert ("/robot_1/odom", "/robot_1/base_footprint") in self.transforms()
+        wait_for(lambda: ("/robot_1/odom", "/robot_1/base_footprint") in self.transforms(), "the second robot's tf")
         assert place(self.truth.last) == (1, 0.5, 0)
         assert self.ask("delete", Delete, "target").success
         self.step()
