@@ -32,8 +32,8 @@ struct ArbiterSettings {
   std::vector<InputSettings> inputs;
   std::vector<LockSettings> locks;
   Rates absurd;  ///< commands beyond these magnitudes are mistakes, not wishes [m/s, rad/s]
-  bool
-      first_word_is_rest{};  ///< silence does not release an input that was never heard: its commander may hang
+  /// Silence does not release an input that was never heard: its commander may hang.
+  bool first_word_is_rest{};
 };
 
 /// Events since the start.

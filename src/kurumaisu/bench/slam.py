@@ -15,24 +15,21 @@ import numpy as np
 from kurumaisu import slam, slam_score
 from kurumaisu._core import LaserError
 from kurumaisu.bench import slam_office
+from kurumaisu.bench.slam_drive import SimulatedDrive
 from kurumaisu.bench.slam_fresh import drives, fresh
 from kurumaisu.bench.slam_localise_office import office_logs
 from kurumaisu.bench.slam_models import models
 from kurumaisu.bench.slam_peers import Peer
 from kurumaisu.bench.slam_real import real
-from kurumaisu.bench.slam_roam import log_of
 from kurumaisu.bench.table import Table
 from kurumaisu.driving import Driver, load_route
 from kurumaisu.localization import load_localizer_settings
 from kurumaisu.map_file import read_map
 from kurumaisu.params import load_model, shipped
-from kurumaisu.sim.chair import ChairSimulator, Command
-from kurumaisu.sim.scanner import Scan
-from kurumaisu.sim.settings import load_dynamics, with_effects
+from kurumaisu.sim.settings import with_effects
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World, load_world
 
-_COMMAND_EVERY = 10  # simulator steps
 _DRIVES, _LONG = 3, 300.0  # fresh drives and their time [s]
 
 
@@ -123,22 +120,14 @@ def _building(seeds: int, seconds: float) -> None:
 
 def drive(world: World, seed: int, seconds: float) -> tuple[slam.ScanLog, FloatArray]:
     """Return the scans and odometry of the scripted round (or its first seconds), and the true poses (n, 3)."""
-    model = with_effects(load_model(shipped("launch/md100.yaml")), shipped("launch/uneven_floor.yaml"))
-    simulator = ChairSimulator(model, world, load_dynamics(shipped("launch/physical.yaml")))
+    simulated = SimulatedDrive(world, seed)
     driver = Driver(load_route(shipped("launch/round.yaml")))
-    observation = simulator.reset(seed)
-    commands: list[tuple[float, float]] = []
-    scans: list[Scan] = []
-    while observation.time < seconds and not driver.done:
-        if len(commands) % _COMMAND_EVERY == 0:
-            v, w = driver.command(observation.pose)
-        commands.append((v, w))
-        volts = float(model.translation.volts(v)), float(model.steering.volts(w))
-        observation = simulator.step(Command(*volts, float(np.sign(v)), float(np.sign(w))))
-        if observation.scan is not None:
-            scans.append(observation.scan)
-    log = log_of(model.laser, np.array(commands), simulator.step_time, scans)
-    return log, np.array([scan.pose for scan in scans])
+    v = w = 0.0
+    while simulated.observation.time < seconds and not driver.done:
+        if simulated.due:
+            v, w = driver.command(simulated.observation.pose)
+        simulated.step(v, w)
+    return simulated.log()
 
 
 def _mapped(

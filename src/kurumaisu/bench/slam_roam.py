@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,18 +12,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from kurumaisu import slam
-from kurumaisu._core import integrate
+from kurumaisu.bench.slam_drive import SimulatedDrive
 from kurumaisu.driving import Driver, Route
 from kurumaisu.errors import Error
 from kurumaisu.map_file import MapFile
-from kurumaisu.params import Laser, Model, load_model, shipped
-from kurumaisu.sim.chair import ChairSimulator, Command
-from kurumaisu.sim.scanner import Scan
-from kurumaisu.sim.settings import load_dynamics, with_effects
+from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world import World, load_world
 
-_COMMAND_EVERY = 10  # simulator steps
 _STEP = 0.2  # [m] of the planner's grid
 _CLEAR = 0.55  # [m] from a way to the nearest wall
 _NEAR = 1.2  # [m] from walls nearer than this a way keeps away
@@ -112,9 +107,7 @@ def roam(grid: MapFile, folder: Path, seed: int, seconds: float) -> tuple[slam.S
     ways, rng = Ways(grid), np.random.default_rng(seed)
     start = ways.place(rng)
     world = world_of(grid, start, _first_heading(ways.way(start, np.random.default_rng(seed)), start), folder)
-    model = with_effects(load_model(shipped("launch/md100.yaml")), shipped("launch/uneven_floor.yaml"))
-    simulator = ChairSimulator(model, world, load_dynamics(shipped("launch/physical.yaml")))
-    return _drive(simulator, model, ways, rng, seconds, seed)
+    return _drive(SimulatedDrive(world, seed), ways, rng, seconds)
 
 
 def _first_heading(way: FloatArray, start: FloatArray) -> float:
@@ -123,44 +116,22 @@ def _first_heading(way: FloatArray, start: FloatArray) -> float:
 
 
 def _drive(
-    simulator: ChairSimulator, model: Model, ways: Ways, rng: np.random.Generator, seconds: float, seed: int
+    drive: SimulatedDrive, ways: Ways, rng: np.random.Generator, seconds: float
 ) -> tuple[slam.ScanLog, FloatArray]:
-    observation = simulator.reset(seed)
-    commands: list[tuple[float, float]] = []
-    scans: list[Scan] = []
-    driver, there, since = Driver(_route(np.zeros((0, 2)))), observation.pose, 0.0
+    driver, there, since = Driver(_route(np.zeros((0, 2)))), drive.observation.pose, 0.0
     v = w = 0.0
-    while observation.time < seconds:
-        stuck = observation.time - since
-        if np.hypot(*(observation.pose - there)[:2]) > 0.3:
-            there, since = observation.pose, observation.time
+    while drive.observation.time < seconds:
+        now, pose = drive.observation.time, drive.observation.pose
+        stuck = now - since
+        if np.hypot(*(pose - there)[:2]) > 0.3:
+            there, since = pose, now
         if driver.done or stuck > _STUCK + _BACK:
-            driver, since = Driver(_route(ways.way(observation.pose[:2], rng))), observation.time
-        if len(commands) % _COMMAND_EVERY == 0:
-            v, w = driver.command(observation.pose) if stuck < _STUCK else (-0.3, 0.0)
-        commands.append((v, w))
-        volts = float(model.translation.volts(v)), float(model.steering.volts(w))
-        observation = simulator.step(Command(*volts, float(np.sign(v)), float(np.sign(w))))
-        if observation.scan is not None:
-            scans.append(observation.scan)
-    log = log_of(model.laser, np.array(commands), simulator.step_time, scans)
-    return log, np.array([scan.pose for scan in scans])[: len(log.times)]
+            driver, since = Driver(_route(ways.way(pose[:2], rng))), now
+        if drive.due:
+            v, w = driver.command(pose) if stuck < _STUCK else (-0.3, 0.0)
+        drive.step(v, w)
+    return drive.log()
 
 
 def _route(way: FloatArray) -> Route:
     return Route(way, speed=0.6, turn=0.7, gain=1.5, reach=0.3, pause=1.0, deadline=1e9)
-
-
-def log_of(laser: Laser, commands: FloatArray, step: float, scans: Sequence[Scan]) -> slam.ScanLog:
-    """Return scans with the odometry that integrates the commands (n, 2), each held for a step [s]."""
-    odom = integrate(commands[:, 0], commands[:, 1], np.full(len(commands), step))
-    fan = slam.Fan(
-        angle_min=laser.angle_min,
-        angle_increment=laser.angle_increment,
-        time_increment=laser.time_increment,
-        range_max=laser.range_max,
-        base_from_laser=(laser.mount.x, laser.mount.y, laser.mount.yaw),
-    )
-    times = np.array([scan.time for scan in scans])
-    ranges = np.array([scan.ranges for scan in scans], dtype=np.float32)
-    return slam.scan_log("drive", times, ranges, fan, step * np.arange(len(odom)), odom)
