@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
@@ -22,21 +23,26 @@ ROOT = sources.ROOT
 BUILD = ROOT / ".ws/build"
 XUNIT = BUILD / "test_results/kurumaisu"
 LOGS = ROOT / ".ws/log"
-TARGET = "_run_tests_kurumaisu_"
+CTEST = "_ctest_kurumaisu_"
 TAIL = 60  # lines of a failed check's output that are shown
 
 
 @dataclass(frozen=True)
 class Check:
-    """A command that succeeds or fails; with tests, its results count instead of its exit status."""
+    """A command that succeeds or fails; with results, what they say counts, too."""
 
     name: str
     command: list[str]
     timeout: float = 600.0  # [s]
     slow: bool = False  # left out by --fast
-    tests: bool = False
+    results: str = ""  # pattern of its result files
     beside: bool = False  # needs no answer soon: runs beside the others, on what they leave of the cores
+    crowd: bool = False  # may run beside its like
     reads: list[Path] = field(default_factory=list)  # if given: not run again until one of these changes
+
+    def written(self) -> list[Path]:
+        """Return the result files that are there."""
+        return sorted(XUNIT.glob(self.results)) if self.results else []
 
 
 def main() -> int:
@@ -50,25 +56,33 @@ def main() -> int:
     total = Counts(skipped=sum(c.slow for c in chosen) if arguments.fast else 0)
     for check in chosen:
         if check.slow and arguments.fast:
-            _line("skip", check.name, "--fast", 0.0)
-    chosen = [c for c in chosen if not (c.slow and arguments.fast)]
-    stop = Event()
-    with ThreadPoolExecutor(1) as pool:
-        try:
-            beside = []
-            for check in chosen:
-                if check.beside:
-                    beside.append(pool.submit(_run, check, arguments.k, stop))
-                else:
-                    total += _run(check, arguments.k, stop)
-            total = sum((future.result() for future in beside), total)
-        finally:
-            stop.set()
+            _line("skip", check.name, 0.0, "--fast")
+    total += _run_all([c for c in chosen if not (c.slow and arguments.fast)], arguments.k)
     if total == Counts():
         print(f"no check and no test file has {arguments.k!r} in its name")
         total = Counts(failed=1)
     print(total)
     return 1 if total.failed else 0
+
+
+def _run_all(checks: list[Check], word: str) -> Counts:
+    """Run the checks one after the other, but for those that run beside others."""
+    total, beside, stop = Counts(), list[Future[Counts]](), Event()
+    with ThreadPoolExecutor(1) as idle, ThreadPoolExecutor(os.cpu_count()) as several:
+        crowd = list[Future[Counts]]()
+        try:
+            for check in checks:
+                if check.beside:
+                    beside.append(idle.submit(_run, check, word, stop))
+                elif check.crowd:
+                    crowd.append(several.submit(_run, check, word, stop))
+                else:
+                    total = sum((future.result() for future in crowd), total)
+                    crowd.clear()
+                    total += _run(check, word, stop)
+            return sum((future.result() for future in [*crowd, *beside]), total)
+        finally:
+            stop.set()
 
 
 def _checks() -> list[Check]:
@@ -98,21 +112,23 @@ def _checks() -> list[Check]:
 
 
 def _tests(word: str) -> list[Check]:
-    """Return a check for each test program; one that fails where CMake does not know the file."""
-    listing = subprocess.run(["make", "-C", str(BUILD), "help"], check=True, capture_output=True, text=True).stdout
-    targets = [line.split()[1] for line in listing.splitlines() if f" {TARGET}" in line]
+    """Return a check for each test program, run as ctest would; one that fails where CMake does not know the file."""
+    listing = subprocess.run(
+        ["ctest", "--show-only=json-v1"], cwd=BUILD, check=True, capture_output=True, text=True
+    ).stdout
+    commands = {test["name"]: test["command"] for test in json.loads(listing)["tests"]}
     checks = []
-    for path in [*(ROOT / "tests").glob("test_*.cpp"), *(ROOT / "tests").glob("*.test")]:
-        ending = f"rostest_tests_{path.name}" if path.suffix == ".test" else f"gtest_{path.stem}"
-        command = ["cmake", "--build", str(BUILD), "--target", TARGET + ending]
-        if TARGET + ending not in targets:
-            command = ["bash", "-c", f"echo tests/CMakeLists.txt does not run {path.name}; false"]
-        checks.append(Check(path.name, command, slow=path.suffix == ".test", tests=True))
-    pytest = ["cmake", "--build", str(BUILD), "--target", f"{TARGET}pytest_unit"]
+    for path in [*sorted((ROOT / "tests").glob("test_*.cpp")), *sorted((ROOT / "tests").glob("*.test"))]:
+        nodes = path.suffix == ".test"
+        unknown = ["bash", "-c", f"echo tests/CMakeLists.txt does not run {path.name}; false"]
+        command = commands.get(CTEST + (f"rostest_tests_{path.name}" if nodes else f"gtest_{path.stem}"), unknown)
+        pattern = "ros*.xml" if nodes else f"gtest-{path.stem}.xml"
+        checks.append(Check(path.name, command, slow=nodes, results=pattern, crowd=not nodes))
+    pytest = commands[f"{CTEST}pytest_unit"]
     if word and word not in "pytest":
         pytest = ["env", f"PYTEST_ADDOPTS=-k {word}", *pytest]
     # nodes wait more than they compute, which leaves the cores to what runs beside them: so pytest comes last
-    return [*checks, Check("pytest", pytest, timeout=1200, tests=True)]
+    return [*checks, Check("pytest", pytest, timeout=1200, results="pytest-unit.xml")]
 
 
 def _pytest_files() -> set[str]:
@@ -128,26 +144,35 @@ def _run(check: Check, word: str, stop: Event) -> Counts:
     stamp = LOGS / f"{check.name}.clean"
     state = sources.content_hash(check.reads)
     if check.reads and stamp.exists() and stamp.read_text() == state:
-        _line("ok", check.name, "nothing changed since it passed", 0.0)
+        _line("ok", check.name, 0.0, "nothing changed since it passed")
         return Counts(passed=1)
     start = time.monotonic()
     log = LOGS / f"{check.name}.log"
+    for path in check.written():
+        path.unlink()
     problem = _execute(check, log, stop)
-    counts = Counts(failed=1) if problem else Counts(passed=1)
-    if check.tests and not problem:
-        counts = results.read(sorted(XUNIT.glob("*.xml")))
-        silent = _silent(check, word)
-        if silent:
-            problem = f"no test ran in: {', '.join(silent)}"
-            counts += Counts(failed=len(silent))
-    note = problem or (str(counts) if check.tests else "")
-    _line("FAILED" if counts.failed else "ok", check.name, note, time.monotonic() - start)
+    counts, note = _judge(check, word, problem)
+    _line("FAILED" if counts.failed else "ok", check.name, time.monotonic() - start, note)
     if counts.failed:
-        lines = log.read_text(errors="replace").splitlines()
-        print("\n".join(f"    {line}" for line in lines[-TAIL:]), f"\n    (whole output: {log})", flush=True)
+        lines = [f"    {line}" for line in log.read_text(errors="replace").splitlines()[-TAIL:]]
+        lines += [f"    {line}" for line in results.failures(check.written())]
+        print("\n".join(lines), f"\n    (whole output: {log})", flush=True)
     elif check.reads:
         stamp.write_text(state)
     return counts
+
+
+def _judge(check: Check, word: str, problem: str) -> tuple[Counts, str]:
+    """Return the counts of a check that has ended, and a note on them."""
+    if not check.results:
+        return (Counts(failed=1) if problem else Counts(passed=1)), problem
+    counts = results.read(check.written())
+    if problem and not counts.failed:  # it passed all, and died after that
+        return counts + Counts(failed=1), problem
+    silent = _silent(check, word)
+    if silent:
+        return counts + Counts(failed=len(silent)), f"no test ran in: {', '.join(silent)}"
+    return counts, str(counts)
 
 
 def _silent(check: Check, word: str) -> list[str]:
@@ -194,7 +219,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-def _line(verdict: str, name: str, note: str, seconds: float) -> None:
+def _line(verdict: str, name: str, seconds: float, note: str) -> None:
     print(f"{verdict:<7} {name:<24} {seconds:6.1f} s  {note}".rstrip(), flush=True)
 
 

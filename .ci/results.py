@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
+LINES = 25  # of a failure's text that are shown
+
 
 @dataclass(frozen=True)
 class Counts:
@@ -34,6 +36,22 @@ def read(paths: list[Path]) -> Counts:
         return Counts(failed=1)
     total = sum((_verdict(case) for case in cases), Counts())
     return total if total != Counts() else Counts(failed=1)
+
+
+def failures(paths: list[Path]) -> list[str]:
+    """Return the lines that say what failed, readable files only."""
+    lines = []
+    for path in paths:
+        try:
+            cases = list(ElementTree.parse(path).iter("testcase"))
+        except (ElementTree.ParseError, OSError):
+            lines.append(f"{path}: unreadable")
+            continue
+        for case in cases:
+            for element in [*case.findall("failure"), *case.findall("error")]:
+                text = (element.text or element.get("message") or "").strip().splitlines()
+                lines += [f"{case.get('classname')}.{case.get('name')}:", *(f"  {line}" for line in text[-LINES:])]
+    return lines
 
 
 def classes(path: Path) -> set[str]:

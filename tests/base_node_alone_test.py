@@ -21,6 +21,7 @@ from nav_msgs.msg import Odometry
 from kurumaisu.ros.testing import PATIENCE, Commander, SimulatedClock, Topic, wait_for
 
 PERIOD = 0.02  # [s] of base_node.yaml
+FACTOR = 5.0  # simulated seconds per second
 
 
 def is_neutral(message: Voltages) -> bool:
@@ -81,7 +82,8 @@ class Alone(unittest.TestCase):
     def end_while_driving(self, name: str, end: Callable[[subprocess.Popen[str]], Any]) -> None:
         voltages = Topic(f"/{name}/voltages", Voltages)
         commander = Commander(f"/{name}/cmd_vel")
-        process = start(name, {"odometry/publish_tf": False})
+        # A commander that connects late, or gets no turn for so long, would count as one that has let go.
+        process = start(name, {"odometry/publish_tf": False, "inputs/navigation/timeout": PATIENCE})
         try:
             commander.say(0.5, 0.3)
             wait_for(lambda: len(voltages.messages) > 50, "voltages")
@@ -114,10 +116,10 @@ class Alone(unittest.TestCase):
 
     def test_simulated_time(self) -> None:
         rospy.set_param("/use_sim_time", True)  # this test's own clock was chosen at its start
-        clock = SimulatedClock(start=50.0, factor=5.0)
+        clock = SimulatedClock(start=50.0, factor=FACTOR)
         voltages, odom = Topic("/simulated/voltages", Voltages), Topic("/simulated/odom", Odometry)
         commander = Commander("/simulated/cmd_vel")
-        process = start("simulated", {"inputs/navigation/timeout": 5.0, "odometry/publish_tf": False})
+        process = start("simulated", {"inputs/navigation/timeout": FACTOR * PATIENCE, "odometry/publish_tf": False})
         try:
             commander.say(0.0, 0.0)
             voltages.wait(is_neutral, "the node")
@@ -140,7 +142,7 @@ class Alone(unittest.TestCase):
             clock.close()
 
     def check_pace(self, odom: Topic, clock: SimulatedClock) -> None:
-        """The node is not behind the clock, though it runs fivefold."""
+        """The node is not behind the clock, though it runs fast."""
         target = clock.now + 1.0
         odom.wait(lambda m: m.header.stamp.to_sec() >= target, "the node keeps up")
         stamps = np.array([m.header.stamp.to_sec() for m in odom.messages])

@@ -43,6 +43,19 @@ def test_a_missing_file_is_a_failure(tmp_path):
     assert results.read([tmp_path / "none.xml"]) == Counts(failed=1)
 
 
+def test_says_what_failed(tmp_path):
+    path = tmp_path / "law.xml"
+    path.write_text(GTEST)
+    assert results.failures([path]) == ["Law.bad:", "  1 != 2"]
+    path.write_text(ROSTEST_DIED.replace("no results", "\n".join(f"line {i}" for i in range(100))))
+    assert results.failures([path]) == [
+        "rostest.runner.RosTest.testbase:",
+        *(f"  line {i}" for i in range(100 - results.LINES, 100)),
+    ]
+    path.write_text("<testsuite>")
+    assert results.failures([path]) == [f"{path}: unreadable"]
+
+
 def test_names_the_modules_that_ran(tmp_path):
     (tmp_path / "pytest.xml").write_text(PYTEST)
     assert {"test_one", "test_two"} <= results.classes(tmp_path / "pytest.xml")
