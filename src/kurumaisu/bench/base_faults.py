@@ -13,6 +13,7 @@ from pathlib import Path
 
 from kurumaisu.bench import (
     base_faults_board,
+    base_faults_chip,
     base_faults_clock,
     base_faults_commands,
     base_faults_ends,
@@ -29,6 +30,7 @@ _MODULES = (
     base_faults_commands,
     base_faults_ends,
     base_faults_board,
+    base_faults_chip,
     base_faults_owners,
     base_faults_clock,
     base_faults_stops,

@@ -11,7 +11,7 @@ from kurumaisu.bench.base_faults_seen import Case, Seen, trips
 from kurumaisu.bench.base_faults_stage import BrokenCalls, Setup, Stage, V, W
 
 _SLACK = 0.03  # [s] of two writes and the scheduler, beyond what the board's and the guard's settings allow
-_AWAY = 0.4  # [s] that something is unplugged, or stuck
+AWAY = 0.4  # [s] that something is unplugged, or stuck
 _BACK = 0.2  # [s] to open a board again, and to write neutral
 _MANY = 16  # commands that meet a fault: it lasts for some attempts to recover
 
@@ -57,7 +57,7 @@ def _once(fault: str) -> Callable[[Stage, Seen], None]:
         before = trips(stage)
         stage.mark()
         stage.inject(fault)
-        time.sleep(_AWAY)
+        time.sleep(AWAY)
         seen.undisturbed(stage)
         seen.check(trips(stage) == before, "the guard tripped")
         seen.note("voltages as before, no trip")
@@ -65,9 +65,10 @@ def _once(fault: str) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def _unplugged(stage: Stage, seen: Seen) -> None:
+def unplugged(stage: Stage, seen: Seen) -> None:
+    """Take the device away for a while."""
     stage.drive()
-    begin = stage.inject(f"unplug={_AWAY}")
+    begin = stage.inject(f"unplug={AWAY}")
     stage.status("guard", "the D/A converter is lost")
     plugged = until(lambda: [c.time for c in stage.changes(begin) if c.volts is None], "the board is back")[0]
     since = stage.neutral()
@@ -96,7 +97,7 @@ def _write_fails(how: int, code: str) -> Callable[[Stage, Seen], None]:
         stage.drive()
         stage.calls.break_writes(how)
         stage.wait_said("GUARD_TRIPPED")
-        time.sleep(_AWAY)
+        time.sleep(AWAY)
         begin = time.monotonic()
         stage.calls.break_writes(BrokenCalls.WHOLE)
         since = stage.neutral()
@@ -111,7 +112,7 @@ def _reference_lost(stage: Stage, seen: Seen) -> None:
     """Whatever is left of the joystick's plug: V_f and V_s go to where the reference was."""
     stage.drive()
     begin = stage.inject(f"lost/referencex{_MANY}")
-    code = 1.5 / float(stage.device_values["channels"]["translation"]["code"]["per_volt"])
+    code = 1.5 * stage.rig.step
 
     def stopped() -> list[float]:
         found = [c for c in stage.changes(begin) if c.volts]
@@ -142,9 +143,9 @@ def _other_reference(stage: Stage, seen: Seen) -> None:
     seen.note("never armed; diagnostics: the D/A converter is lost")
 
 
-_LATCHED = "the guard trips and stays neutral until the stick is let go"
-_OBEYS = f"neutral within a period and all retries + 30 ms; {_LATCHED}"
-_RETURN = f"neutral is the first thing that it gets; {_LATCHED}"
+LATCHED = "the guard trips and stays neutral until the stick is let go"
+_OBEYS = f"neutral within a period and all retries + 30 ms; {LATCHED}"
+RETURN = f"neutral is the first thing that it gets; {LATCHED}"
 _BROKEN = Setup(broken=True)
 
 CASES = (
@@ -186,23 +187,23 @@ CASES = (
         "5",
         "board: deaf",
         f"to {_MANY} commands",
-        f"held; when it hears again, {_RETURN}",
+        f"held; when it hears again, {RETURN}",
         _hears_nothing(f"deafx{_MANY}", "DAC_NO_REPLY"),
     ),
     Case(
         "5",
         "board: stalled",
-        f"reads nothing for {_AWAY:g} s",
-        f"held; when it reads again, {_RETURN}",
-        _hears_nothing(f"stall={_AWAY}", "DAC_NO_REPLY"),
+        f"reads nothing for {AWAY:g} s",
+        f"held; when it reads again, {RETURN}",
+        _hears_nothing(f"stall={AWAY}", "DAC_NO_REPLY"),
     ),
-    Case("5", "board: unplugged", f"for {_AWAY:g} s", f"held; back, {_RETURN}", _unplugged, repeated=True),
+    Case("5", "board: unplugged", f"for {AWAY:g} s", f"held; back, {RETURN}", unplugged, repeated=True),
     Case("5", "wire: short writes", "half of every write()", "the rest is sent, too: drives on", _writes_half, _BROKEN),
     Case(
         "5",
         "wire: blocked",
         "write() takes half, then EAGAIN",
-        f"held; back, {_RETURN}",
+        f"held; back, {RETURN}",
         _write_fails(BrokenCalls.STUCK, "DAC_BLOCKED"),
         _BROKEN,
     ),
@@ -210,7 +211,7 @@ CASES = (
         "5",
         "wire: EIO",
         "of every write()",
-        f"held; back, {_RETURN}",
+        f"held; back, {RETURN}",
         _write_fails(BrokenCalls.ERROR, "DAC_CLOSED"),
         _BROKEN,
     ),
@@ -218,7 +219,7 @@ CASES = (
         "17",
         "reference: lost",
         f"its output at 0 V for {_MANY} commands, the reply says so",
-        f"V_f and V_s neutral at the pin; {_LATCHED}",
+        f"V_f and V_s neutral at the pin; {LATCHED}",
         _reference_lost,
         clamped=False,
     ),

@@ -20,7 +20,9 @@ _STOPPED = 0.5  # [s]
 _LOADED = 3.0  # [s] of driving on busy cores
 
 
-def _dies(number: signal.Signals, bound: float = _DEATH) -> Callable[[Stage, Seen], None]:
+def dies(number: signal.Signals, bound: float = _DEATH) -> Callable[[Stage, Seen], None]:
+    """Return how base_node dies of a signal; neutral within the bound [s]."""
+
     def play(stage: Stage, seen: Seen) -> None:
         stage.drive()
         since = seen.neutral(stage, stage.strike(number), bound)
@@ -38,7 +40,8 @@ def _node_again(stage: Stage, seen: Seen, since: float) -> None:
     seen.latched(stage, since)
 
 
-def _stops(stage: Stage, seen: Seen) -> None:
+def stops(stage: Stage, seen: Seen) -> None:
+    """Stop base_node for a while."""
     stage.drive()
     begin = stage.strike(signal.SIGSTOP)
     since = seen.neutral(stage, begin, stage.guard_values["limits"]["silence"] + _HANG)
@@ -62,7 +65,8 @@ def _ends(number: signal.Signals) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def _guard_dies(stage: Stage, seen: Seen) -> None:
+def guard_dies(stage: Stage, seen: Seen) -> None:
+    """Kill the guard."""
     stage.drive()
     since = seen.neutral(stage, stage.strike(signal.SIGKILL, stage.rig.guard()), _GUARD)
     seen.said(stage, "GUARD_DEAD: killed: Killed")
@@ -136,15 +140,15 @@ _SOON = "neutral within 10 ms; started anew with the stick held: neutral until i
 _LOOPS = "2 busy loops for each core"
 
 CASES = (
-    Case("3", "base_node dies", "SIGKILL", _SOON, _dies(signal.SIGKILL), repeated=True),
-    Case("3", "base_node dies", "SIGSEGV", _SOON, _dies(signal.SIGSEGV), repeated=True),
-    Case("3", "base_node dies", "SIGABRT", _SOON, _dies(signal.SIGABRT), repeated=True),
+    Case("3", "base_node dies", "SIGKILL", _SOON, dies(signal.SIGKILL), repeated=True),
+    Case("3", "base_node dies", "SIGSEGV", _SOON, dies(signal.SIGSEGV), repeated=True),
+    Case("3", "base_node dies", "SIGABRT", _SOON, dies(signal.SIGABRT), repeated=True),
     Case(
         "3",
         "base_node hangs",
         f"SIGSTOP, SIGCONT after {_STOPPED:g} s",
         "neutral within the guard's silence + 20 ms; then neutral until the stick is let go",
-        _stops,
+        stops,
         repeated=True,
     ),
     Case("3", "base_node is ended", "SIGTERM", "neutral within a tick + 10 ms", _ends(signal.SIGTERM), repeated=True),
@@ -153,7 +157,7 @@ CASES = (
         "guard dies",
         "SIGKILL",
         "neutral within 20 ms, by the sentinel; then neutral until the stick is let go",
-        _guard_dies,
+        guard_dies,
         repeated=True,
     ),
     Case(
@@ -179,13 +183,13 @@ CASES = (
         _both_die,
     ),
     Case("15", "busy cores", _LOOPS, "drives on within its limits, or is neutral", _loaded),
-    Case("15", "busy cores", f"{_LOOPS}, SIGSTOP of base_node", "as without load", _loaded_with(_stops), repeated=True),
+    Case("15", "busy cores", f"{_LOOPS}, SIGSTOP of base_node", "as without load", _loaded_with(stops), repeated=True),
     Case(
         "15",
         "busy cores",
         f"{_LOOPS}, SIGKILL of base_node",
         "as without load",
-        _loaded_with(_dies(signal.SIGKILL)),
+        _loaded_with(dies(signal.SIGKILL)),
         repeated=True,
     ),
 )

@@ -20,7 +20,8 @@ _SHORT = 0.5  # [V] a device's clamp that is narrower than the model's band
 _WATCH = 0.4  # [s]
 
 
-def _second_guard(stage: Stage, seen: Seen) -> None:
+def second_guard(stage: Stage, seen: Seen) -> None:
+    """Start a second guard on the same device."""
     stage.drive()
     stage.mark()
     code, said = _guard(stage, {"socket": str(stage.rig.folder / "another.sock")}, {})
@@ -98,7 +99,7 @@ def _narrow_device(stage: Stage, seen: Seen) -> None:
 _ALONE = "refused; the first owner is not disturbed"
 
 CASES = (
-    Case("6", "two owners of the port", "a second guard", _ALONE, _second_guard),
+    Case("6", "two owners of the port", "a second guard", _ALONE, second_guard),
     Case("6", "two owners of the port", "set_voltages", _ALONE, _second_program),
     Case("6", "two clients of the guard", "a second base_node", _ALONE, _second_client),
     Case(

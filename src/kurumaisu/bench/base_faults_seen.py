@@ -117,7 +117,7 @@ def _span(values: Sequence[float]) -> str:
 def bands(stage: Stage) -> list[tuple[str, float, float]]:
     """Return the names and limits [V] of what the board may put out, a code's rounding included."""
     model, device = stage.law.voltages, stage.device_values["channels"]
-    code = 1 / float(device["translation"]["code"]["per_volt"])
+    code = stage.rig.step
     found = []
     for name, band in (("translation", model.translation), ("steering", model.steering)):
         volt = device[name]["volt"]

@@ -19,7 +19,7 @@ from typing import Any
 import yaml
 
 from kurumaisu.bench.base_faults_peer import Event, Graph, Peer, end, until
-from kurumaisu.bench.guard_rig import Change, Rig, changed
+from kurumaisu.bench.guard_rig import Change, ChipRig, Rig, changed
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.params import load_model, shipped
 
@@ -39,6 +39,7 @@ class Setup:
     node: Mapping[str, Any] = field(default_factory=dict)  # parameters of base_node; model/... and guard/... too
     device: Mapping[str, Any] = field(default_factory=dict)
     guard: Mapping[str, Any] = field(default_factory=dict)
+    chip: bool = False  # a chip in a tree of files in place of the board
     broken: bool = False
     simulated: bool = False  # time
 
@@ -79,7 +80,8 @@ class Stage:
         self.peer = Peer(self.graph, folder / "peer.log")
         self.calls = BrokenCalls(folder / "calls") if setup.broken else None
         self.environment = self.calls.environment if self.calls else {}
-        self.rig = Rig(folder, arming=None, device=setup.device, guard=setup.guard, environment=self.environment)
+        rig = ChipRig if setup.chip else Rig
+        self.rig = rig(folder, arming=None, device=setup.device, guard=setup.guard, environment=self.environment)
         self.guard_values = yaml.safe_load(self.rig.settings.read_text())
         self.device_values = yaml.safe_load(self.rig.device.read_text())
         model = shipped("launch/md100.yaml")

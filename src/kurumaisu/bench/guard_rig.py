@@ -61,6 +61,8 @@ def changed(tree: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 class Rig:
     """Board, sentinel and guard, in a folder of their own."""
 
+    _DEVICE, _PLACE = "serial_ascii", "port"  # file of launch/dac, and its key that says where the device is
+
     def __init__(
         self,
         folder: Path,
@@ -82,10 +84,12 @@ class Rig:
         self.messages = folder / "guard.log"
         self._changes: list[Change] = []
         self._read = 0  # [bytes] of the log
-        tree = yaml.safe_load(shipped("launch/dac/serial_ascii.yaml").read_text())
-        device = changed(tree, device or {})
-        self._code = 1 / min(device["channels"][name]["code"]["per_volt"] for name in ("translation", "steering"))
-        self.device = self._write("device.yaml", device | {"port": str(folder / "dac")})
+        tree = yaml.safe_load(shipped(f"launch/dac/{self._DEVICE}.yaml").read_text()) | {
+            self._PLACE: str(folder / "dac")
+        }
+        tree = changed(tree, device or {})
+        self.step = self._step(tree)
+        self.device = self._write("device.yaml", tree)
         settings = yaml.safe_load(shipped("launch/guard.yaml").read_text())
         if arming is not None:
             settings["limits"]["arming"] = arming
@@ -97,6 +101,10 @@ class Rig:
         self.settings = self._write("guard.yaml", settings | {"model": model, "socket": str(self.socket)})
         self._sentinel: subprocess.Popen[bytes] | None = None
         self._board: subprocess.Popen[str] | None = None
+
+    def _step(self, device: Mapping[str, Any]) -> float:
+        """Return the device's step [V]."""
+        return 1 / min(float(device["channels"][name]["code"]["per_volt"]) for name in ("translation", "steering"))
 
     def _write(self, name: str, tree: dict[str, object]) -> Path:
         path = self.folder / name
@@ -182,7 +190,7 @@ class Rig:
         if words[0] is None:
             return Change(time_s, None)
         f, s, reference = (float(word) for word in words if word)
-        return Change(time_s, max(abs(f), abs(s)) < self._code / 2, (f, s, reference))
+        return Change(time_s, max(abs(f), abs(s)) < self.step / 2, (f, s, reference))
 
     def reaction(self, since: float) -> float | None:
         """Return when [s, monotonic] guard or sentinel noticed what happened, by their log; None if none says so."""
@@ -213,12 +221,10 @@ class Rig:
 class ChipRig(Rig):
     """The same with a virtual chip, in a tree of files like those of Linux's IIO."""
 
-    def __init__(self, folder: Path) -> None:
-        """Write the files that they read. Start with board()."""
-        super().__init__(folder)
-        device = yaml.safe_load(shipped("launch/dac/mcp4728.yaml").read_text())
-        self.device = self._write("device.yaml", device | {"root": str(folder / "dac")})
-        self._code = _SUPPLY / 2 ** device["bits"]
+    _DEVICE, _PLACE = "mcp4728", "root"
+
+    def _step(self, device: Mapping[str, Any]) -> float:
+        return float(_SUPPLY / 2 ** device["bits"])
 
 
 def in_memory() -> Path | None:
