@@ -96,10 +96,11 @@ def test_of_repetitions_the_worst_counts():
 )
 def test_a_voltage_outside_the_clamp_is_seen(volts, good):
     band = {"translation": (-1.8, 2.2), "steering": (-1.0, 1.0), "reference": (2.4, 2.6)}
-    channels = {name: {"volt": {"min": a, "max": b}, "code": {"per_volt": 819.0}} for name, (a, b) in band.items()}
+    channels = {name: {"volt": {"min": a, "max": b}} for name, (a, b) in band.items()}
     stage = SimpleNamespace(
         law=load_model(shipped("launch/md100.yaml")),
         device_values={"channels": channels},
+        rig=SimpleNamespace(step=1 / 819.0),
         changes=lambda: [Change(0.0, None), Change(1.0, False, volts)],
     )
     seen = Seen()
