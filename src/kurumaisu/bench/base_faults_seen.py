@@ -66,8 +66,8 @@ class Seen:
 
     def again(self, stage: Stage) -> None:
         """See that the chair drives once the stick was let go."""
-        stage.drive()
-        self.note("let go: drives again")
+        trips = stage.drive()
+        self.note("let go: drives again" + (f", tripped {trips} times more" if trips else ""))
 
     def said(self, stage: Stage, *words: str) -> None:
         """See that base_node or guard says so, soon."""

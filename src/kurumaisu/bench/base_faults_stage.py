@@ -21,11 +21,13 @@ import yaml
 from kurumaisu.bench.base_faults_peer import Event, Graph, Peer, end, until
 from kurumaisu.bench.guard_rig import Change, ChipRig, Rig, changed
 from kurumaisu.bench.processes import PATIENCE, program
+from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 
 V, W = 0.5, 0.3  # [m/s, rad/s] at which the chair drives when something breaks
 NODE = "/base_node"
 _HELD = 0.4  # [s] for which a stick that is still held must move nothing
+_TRIPS = 2  # of the guard on the way to a speed, until it is an error
 _HALF = 0.0007  # [V] more than half a code of the board
 _DIAGNOSTICS = 0.2  # [s] their period here, in place of what ships, to save time
 _BEGIN = 100.0  # [s] of simulated time
@@ -167,20 +169,27 @@ class Stage:
         """Return the board's changes since the mark, and since then [s, monotonic]."""
         return [change for change in self.rig.changes()[self._first :] if change.time >= since]
 
-    def drive(self, v: float = V, w: float = W) -> None:
-        """Start what does not run, let go, and drive until the board has the voltages. Raise Error if it never has."""
+    def drive(self, v: float = V, w: float = W) -> int:
+        """Start what does not run, let go, and drive until the board has the voltages. Raise Error if it never has.
+
+        Return how often the guard tripped before: a kernel that is late with the terminal's bytes is a lost reply.
+        """
         self.rig.start()
         runs = self.node and self.node.poll() is None
         if runs and self.peer.said.get("cmd_vel") == [v, w] and self.is_armed() and self.has(v, w):
-            return
+            return 0
         if not runs:
             self.start_node()
         if self.simulated and math.isinf(self._ticks[1]):
             self.tick(_BEGIN)
-        self.peer.say(0.0, 0.0)
-        until(lambda: self.is_armed() and self._obeys(), "the guard is armed, and base_node obeys")
-        self.peer.say(v, w)
-        until(lambda: self.has(v, w), f"the board has the voltages of {v} m/s, {w} rad/s")
+        for trips in range(_TRIPS + 1):
+            self.peer.say(0.0, 0.0)
+            until(lambda: self.is_armed() and self._obeys(), "the guard is armed, and base_node obeys")
+            self.peer.say(v, w)
+            until(lambda: self.has(v, w) or not self.is_armed(), f"the board has the voltages of {v} m/s, {w} rad/s")
+            if self.is_armed():
+                return trips
+        raise Error(f"the guard tripped {_TRIPS + 1} times on the way to {v} m/s, {w} rad/s")
 
     def rest(self) -> None:
         """Let go, and wait for neutral; what comes counts from now on."""
