@@ -29,7 +29,9 @@ _NULLS = 50  # simulations of the model as it is, for the covariance of the stat
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
 _SIZES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # in units of a parameter's scale, tried first
 _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
-_LEFT = 1e-3  # share of an effect's evidence that its own form may leave to others
+_LEFT = 1e-3  # share of an effect's evidence that its own form may leave to any other one
+_LEFT_LIKE = 0.02  # and to one that changes the same numbers
+_WEAK = 0.05  # share of the strongest effect's evidence, from which another one is beyond doubt
 _LARGEST = 6  # effects in a set
 _TRIES = 12  # simulations of a refit per parameter
 _REFITS = 4  # effects that are refitted
@@ -98,6 +100,10 @@ class Simulator:
         """Return which of the statistics are roots of counts."""
         return self._statistics.counts()
 
+    def null(self, effect: type[Mechanism]) -> dict[str, float]:
+        """Return an effect's parameters in the model as it is."""
+        return self._assembly.marks.null(effect)
+
     def __call__(self, settings: Sequence[EffectSetting], seed: int) -> FloatArray:
         """Return the statistics of a simulation."""
         shots, seen, base = self._assembly.shots, self._assembly.marks.seen, self._assembly.marks.base
@@ -134,9 +140,10 @@ class ScatterSearch:
         gone: set[type[Mechanism]] = set()
         while len(chosen) < _LARGEST:
             new = self._step(pushes, chosen, gone)
-            if new is None or new.nats < max([_ENOUGH, *(_LEFT * piece.nats for piece in chosen)]):
+            if new is None or new.nats < self._least(chosen, new):
                 break
             chosen = self._settled(chosen, new, gone)
+        chosen = self._polished(chosen)
         settings = [piece.setting for piece in chosen]
         return [Scatter(piece.setting, piece.p, piece.nats, self._errors(piece, settings)) for piece in chosen]
 
@@ -171,6 +178,11 @@ class ScatterSearch:
         p = float(np.exp(best.nats - logsumexp([0.0, *(piece.nats for piece in tried)])))
         return None if p < 0.5 else replace(best, p=p)
 
+    def _least(self, chosen: Sequence[_Piece], new: _Piece) -> float:
+        """Return the evidence from which an effect is taken beside others [nat]: they may act in another form."""
+        like = [piece.nats for piece in chosen if self._overlap(piece, new) > _OVERLAP]
+        return max([_ENOUGH, *(_LEFT * piece.nats for piece in chosen), *(_LEFT_LIKE * nats for nats in like)])
+
     def _settled(self, chosen: Sequence[_Piece], new: _Piece, gone: set[type[Mechanism]]) -> list[_Piece]:
         """Return the pieces with a new one, fitted together with those like it; what it makes superfluous is gone."""
         like = [piece for piece in chosen if self._overlap(piece, new) > _OVERLAP]
@@ -190,6 +202,22 @@ class ScatterSearch:
                 group = [replace(piece, nats=nats) if piece.effect is old.effect else piece for piece in group]
         return [*rest, *group]
 
+    def _polished(self, chosen: Sequence[_Piece]) -> list[_Piece]:
+        """Return all pieces fitted together, without weak ones that stood for what others had been fitted to wrongly."""
+        if len(chosen) < 2:
+            return list(chosen)
+        group, cost = self._together(chosen, ())
+        strong = max(piece.nats for piece in group)
+        for old in sorted(group, key=lambda piece: piece.nats):
+            others = [piece for piece in group if piece.effect is not old.effect]
+            if old.nats > _WEAK * strong or not others:
+                continue
+            fewer, more = self._together(others, ())
+            z = np.sqrt(max(2 * (more - cost), 0.0))
+            if more - cost - float(occam(np.array(z))) - old.price < self._least(others, old):
+                group, cost = fewer, more
+        return group
+
     def _overlap(self, one: _Piece, other: _Piece) -> float:
         """Return the cosine of what two effects do to the statistics, whatever its sign."""
         plain = self._statistics((), (1, 2))
@@ -202,7 +230,7 @@ class ScatterSearch:
         """Yield what each parameter alone does to the statistics, at some values."""
         plain = self._simulate((), 1)
         for effect in self._candidates(set()):
-            null = {p.name: p.null for p in effect.parameters}
+            null = self._simulate.null(effect)
             for p in self._parameters(effect):
                 for value in _sizes(p):
                     moved = self._simulate((EffectSetting(effect.id, {**null, p.name: value}),), 1)
@@ -236,7 +264,7 @@ class ScatterSearch:
 
     def _alone(self, start: _Rough, beside: Sequence[EffectSetting]) -> tuple[_Piece, float]:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
-        null = {p.name: p.null for p in start.effect.parameters}
+        null = self._simulate.null(start.effect)
         setting = EffectSetting(start.effect.id, {**null, **start.values})
         (piece,), low = self._together([_Piece(start.effect, setting, tuple(start.values), 0.0, 0.0)], beside)
         for p in self._parameters(start.effect) if low > _POOR else ():
