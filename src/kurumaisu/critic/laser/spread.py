@@ -7,11 +7,10 @@ the same numbers are then fitted together, and what is no longer needed goes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 from scipy.special import logsumexp
 
 from kurumaisu import effects
@@ -33,7 +32,12 @@ _LEFT = 1e-3  # share of an effect's evidence that its own form may leave to any
 _LEFT_LIKE = 0.02  # and to one that changes the same numbers
 _WEAK = 0.05  # share of the strongest effect's evidence, from which another one is beyond doubt
 _LARGEST = 6  # effects in a set
-_TRIES = 12  # simulations of a refit per parameter
+_ROUNDS = 4  # Gauss-Newton steps of a refit
+_SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
+_FARTHEST = 3.0  # such a step, in units of the first difference
+_FINER = 0.5  # of one step's difference is the next one's
+_DAMPED = 0.02  # share by which the curvature is raised: other draws make the slopes uncertain
+_SETTLED = 0.3  # nats that another step must bring
 _REFITS = 4  # effects that are refitted
 _CLOSE = 0.5  # share of what the best of them gains that another one must gain, to be refitted
 _COMPARED = 10  # simulations with the effects, for the report
@@ -203,7 +207,7 @@ class ScatterSearch:
         return [*rest, *group]
 
     def _polished(self, chosen: Sequence[_Piece]) -> list[_Piece]:
-        """Return all pieces fitted together, without weak ones that stood for what others had been fitted to wrongly."""
+        """Return all pieces fitted together, without weak ones that stood in for wrong sizes of others."""
         if len(chosen) < 2:
             return list(chosen)
         group, cost = self._together(chosen, ())
@@ -291,11 +295,27 @@ class ScatterSearch:
             made = zip(pieces, values, strict=True)
             return [replace(piece, setting=EffectSetting(piece.setting.id, each)) for piece, each in made]
 
-        cost: Callable[[FloatArray], float] = lambda x: self._misfit((*beside, *(p.setting for p in at(x))))  # noqa: E731
-        simplex = np.vstack([np.zeros(len(places)), np.eye(len(places))])
-        options = {"maxfev": _TRIES * len(places), "xatol": 0.02, "fatol": 0.1, "initial_simplex": simplex}
-        result = minimize(cost, np.zeros(len(places)), method="Nelder-Mead", options=options)
-        return at(result.x), float(result.fun)
+        def numbers(x: FloatArray) -> FloatArray:
+            return self._statistics((*beside, *(piece.setting for piece in at(x))), (1, 2))
+
+        x, reach = np.zeros(len(places)), 1.0
+        here = numbers(x)
+        low = self._likeness.cost(here)
+        for _ in range(_ROUNDS):
+            moved = [numbers(x + reach * one) - here for one in np.eye(len(x))]
+            slopes = np.array([self._likeness.whitened(change, here) / reach for change in moved])
+            left = self._likeness.whitened(here - self._likeness.measured, here)
+            inner = slopes @ slopes.T
+            move = -np.linalg.solve(inner + _DAMPED * np.diag(np.diag(inner)) + 1e-6 * np.eye(len(x)), slopes @ left)
+            before, move, reach = low, np.clip(move, -_FARTHEST, _FARTHEST), _FINER * reach
+            for share in _SHARES:
+                tried = numbers(x + share * move)
+                if self._likeness.cost(tried) < low:
+                    x, here, low = x + share * move, tried, self._likeness.cost(tried)
+                    break
+            if before - low < _SETTLED:
+                break
+        return at(x), low
 
     def _errors(self, piece: _Piece, every: Sequence[EffectSetting]) -> dict[str, float]:
         """Return sds of the parameters that were fitted, from how the statistics follow each."""

@@ -65,9 +65,8 @@ class Statistics:
 
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
         """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
-        left, coefficients = self._leftover(error)
-        common = coefficients[:, 0] / self._common_sd
-        moved = (self._moves @ coefficients[:, :, np.newaxis])[:, :, 0]
+        left, common = self._leftover(error)
+        common = common / self._common_sd
         inside = self._trust & np.isfinite(left)
         z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
         out = [_log(float(np.mean(z[group & inside] ** 2))) for group in self._groups.masks if (group & inside).any()]
@@ -83,7 +82,7 @@ class Statistics:
         out += [_between(z, inside, np.broadcast_to(np.arange(z.shape[1]), z.shape)), _between(z, inside, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
-        out.append(self._mixed(readings - moved))
+        out.append(self._mixed(readings))
         return np.array([*out, *_values(readings[self._trust])])
 
     def names(self) -> list[str]:
@@ -117,7 +116,7 @@ class Statistics:
         ]
 
     def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return what poses and common mode leave of the errors (k, b), in deviations, and their coefficients (k, q).
+        """Return what poses and common mode leave of the errors (k, b), in deviations, and the common modes (k,) [m].
 
         Missing readings and outliers take the value that the others give them.
         """
@@ -132,10 +131,10 @@ class Statistics:
             fitted = (self._basis @ coefficients[:, :, np.newaxis])[:, :, 0] / self._sd
             width = 1.4826 * float(np.median(np.abs((z - fitted)[inside])))
             inside = known & (np.abs(np.nan_to_num(z - fitted)) < 4.5 * max(width, 0.1))
-        return np.where(known, z - fitted, np.nan), coefficients
+        return np.where(known, z - fitted, np.nan), coefficients[:, 0]
 
     def _mixed(self, readings: FloatArray) -> float:
-        """Return how many readings (k, b), errors of the poses taken out, lie well between the sides of a jump."""
+        """Return how many readings beside a jump lie well between its sides."""
         near, far, at = self._sides
         if not at.any():
             return 0.0
