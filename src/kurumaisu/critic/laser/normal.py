@@ -15,7 +15,7 @@ from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, refined
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, thin
-from kurumaisu.critic.laser.standing import kinks, smoothed
+from kurumaisu.critic.laser.sought import moved, stands
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
 from kurumaisu.geometry import compose
 from kurumaisu.params import EffectSetting
@@ -24,7 +24,6 @@ from kurumaisu.types import FloatArray, IntArray
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
 _SURE = 0.3  # share of the scans that must lie on a smooth path, or else none is preferred
 _ROUNDS = 3
-_UNSEEN = 0.2  # weight of a pose that no scan has moved, among others
 _SHIFTS = 2  # times that poses are sought by the scans
 _LEAST = 1e-4  # [m] deviation of a reading
 _BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau=1.0)  # before any is known
@@ -46,14 +45,15 @@ class Assembly:
     def __init__(self, shots: Shots, ids: frozenset[str] | None = None) -> None:
         """Take the shots, and the effects to look for; None for all."""
         self.hats = [hats(shots, row) for row in range(len(shots.stamps))]
-        self.layout = Layout(shots.stamps, shots.run, _stands(shots))
+        self.layout = Layout(shots.stamps, shots.run, stands(shots))
         self.tracks = shots.tracks
         self.kinked = [np.zeros(len(track.times), dtype=bool) for track in shots.tracks]
         self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
         self._linearise(shots, roughly=True)
         self.first = self._trust()
         for i in range(_SHIFTS):
-            self._linearise(self._moved(), roughly=i < _SHIFTS - 1)
+            found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._errors())
+            self._linearise(found, roughly=i < _SHIFTS - 1)
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base)
         self.forms, fixed = self.marks.forms(ids)
@@ -80,36 +80,6 @@ class Assembly:
         if sure.mean() < _SURE:
             sure[:] = True
         return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & sure[:, np.newaxis])
-
-    def _moved(self) -> Shots:
-        """Return the shots on tracks that are moved to where the scans put them, each scan alone."""
-        tracks = [replace(track, poses=track.poses.copy()) for track in self.shots.tracks]
-        sums = [np.zeros((*track.poses.shape[:1], 4)) for track in tracks]
-        for k, errors in enumerate(self._errors()):
-            rows = self._alike_rows(k)
-            sums[self.shots.run[k]][rows, :3] += errors
-            sums[self.shots.run[k]][rows, 3] += 1
-        mean, sought = [], []
-        # Errors are as of the first tracks, which `shift` has moved already.
-        for track, first, some in zip(tracks, self.tracks, sums, strict=True):
-            moved = first.poses + some[:, :3] / np.maximum(some[:, 3:], 1)
-            sought.append(moved)
-            track.poses[:] = smoothed(track.times, moved, np.where(some[:, 3] > 0, 1.0, _UNSEEN))
-            mean.append(track.poses - first.poses)
-        self.kinked = [
-            kinks(moved_to, track.poses, some[:, 3] > 0)
-            for moved_to, track, some in zip(sought, tracks, sums, strict=True)
-        ]
-        shift = [hat.weights @ mean[self.shots.run[k]][hat.rows] for k, hat in enumerate(self.hats)]
-        return replace(self.shots, tracks=tuple(tracks), shift=np.array(shift))
-
-    def _alike_rows(self, k: int) -> IntArray:
-        """Return the rows of the track that share the errors of a scan: its own, or all of its stand."""
-        rows = np.arange(len(self.shots.tracks[self.shots.run[k]].times))[self.hats[k].rows]
-        if self.layout.stand[k] < 0:
-            return rows
-        poses = self.tracks[self.shots.run[k]].poses
-        return np.flatnonzero((poses == poses[rows[0]]).all(axis=1))
 
     def _errors(self) -> list[FloatArray]:
         """Return the errors of the poses (q, 3) under each scan, by that scan alone, within what is plausible."""
@@ -281,21 +251,6 @@ class Assembly:
                 moved.append(predict(self.shots, (), seen, 0))
             out.append((moved[1] - moved[0]) / (len(signs) * _MOVE[axis]))
         return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
-
-
-def _stands(shots: Shots) -> IntArray:
-    """Return which scans were taken from one and the same row of reference poses, numbered, else -1."""
-    out = np.full(len(shots.stamps), -1)
-    known: dict[tuple[int, bytes], int] = {}
-    for k in range(len(out)):
-        track = shots.tracks[shots.run[k]]
-        times = shots.stamps[k] + shots.said[[0, -1]]
-        low = max(int(np.searchsorted(track.times, times[0], side="right")) - 1, 0)
-        high = min(int(np.searchsorted(track.times, times[1])), len(track.times) - 1)
-        rows = track.poses[low : high + 1]
-        if (rows == rows[0]).all():
-            out[k] = known.setdefault((int(shots.run[k]), rows[0].tobytes()), len(known))
-    return out
 
 
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:

@@ -64,6 +64,8 @@ def pinned(
 
     winner: a block that acts beside them, whose coefficients are integrated out; truth: known sd of the reference.
     """
+    if not forms and winner is None:
+        return Pinned((), assembly, assembly.residual)
     at = [dict(setting.parameters) for setting in settings]
     block = _block(assembly, winner)
     moving = any(not issubclass(effects.by_id(form.id), effects.ReadingEffect) for form in forms)

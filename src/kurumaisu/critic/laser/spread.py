@@ -15,14 +15,12 @@ from scipy.special import logsumexp
 
 from kurumaisu import effects
 from kurumaisu.critic.laser.likeness import Likeness
-from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.shots import own_with, read
-from kurumaisu.critic.laser.statistics import Statistics
+from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.prior import log_prior, occam
 from kurumaisu.critic.story import Comparison
 from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import FloatArray
 
 _NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
@@ -91,33 +89,6 @@ class _Piece:
 
 def _low(rough: _Rough) -> float:
     return rough.low
-
-
-class Simulator:
-    """Statistics of the shots with effects on how readings scatter."""
-
-    def __init__(self, assembly: Assembly, statistics: Statistics) -> None:
-        self._assembly = assembly
-        self._statistics = statistics
-
-    def counts(self) -> BoolArray:
-        """Return which of the statistics are roots of counts."""
-        return self._statistics.counts()
-
-    def null(self, effect: type[Mechanism]) -> dict[str, float]:
-        """Return an effect's parameters in the model as it is."""
-        return self._assembly.marks.null(effect)
-
-    def __call__(self, settings: Sequence[EffectSetting], seed: int) -> FloatArray:
-        """Return the statistics of a simulation."""
-        shots, seen, base = self._assembly.shots, self._assembly.marks.seen, self._assembly.marks.base
-        rng = np.random.default_rng([seed, 7])
-        chain = effects.build_laser(own_with(shots, settings), np.random.default_rng(seed))
-        error = shots.laser.error
-        raw = read(shots, seen, chain, rng.standard_normal(base.shape), self._statistics.pose_errors(rng))
-        readings = error.reading(error.range(raw), np.zeros_like(raw))
-        with np.errstate(invalid="ignore"):
-            return self._statistics.of(readings, np.where(np.isfinite(readings), readings - base, np.nan))
 
 
 class ScatterSearch:

@@ -17,7 +17,8 @@ from kurumaisu.critic.laser.pinned import Pinned, pinned
 from kurumaisu.critic.laser.rivals import Rival, Weighed
 from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
-from kurumaisu.critic.laser.spread import Scatter, ScatterSearch, Simulator
+from kurumaisu.critic.laser.simulated import Simulator
+from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
 from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.supply import every_id, supplier
 from kurumaisu.critic.laser.twins import Groups, joined, twins
