@@ -183,3 +183,9 @@ def test_damaged_tables_are_not_what_they_were(damage, tmp_path):
     write_case(tmp_path / "case", case.recording, damage=damage)
     t = np.loadtxt(tmp_path / "case/run_1/pose.csv", delimiter=",", skiprows=1)[:, 0]
     assert np.any(np.diff(t) <= 0)
+
+
+def test_an_offset_is_no_twin_of_a_temperature_that_has_the_offset_in_it(tmp_path):
+    case = make(Ask("single", ("laser.offset",), 30.0, regime="clean", design="room", family="laser"), 5, tmp_path)
+    assert case.truth.z_rival > 0.1
+    assert ("laser.temperature",) not in case.truth.accepted

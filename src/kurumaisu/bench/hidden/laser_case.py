@@ -151,7 +151,8 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
         return replace(truth, z=float(np.linalg.norm(list(odd.values()))), z_alone=odd)
     own = [scale.signal(LASER[name].fault(sizes[name], ask.form)) for name in means]
     plain = [scale.signal(LASER[name].fault(sizes[name], "plain")) for name in means]
-    rivals = scale.rivals([name for name in MEANS if name not in ids and (scale.tour.moving or not LASER[name].moving)])
+    others = [name for name in MEANS if name not in ids and (scale.tour.moving or not LASER[name].moving)]
+    rivals = scale.rivals(others, ids)
     gram = scale.gram(np.concatenate([np.stack([*own, *plain], axis=-1), *rivals.values()], axis=-1))
     at, rest = 2 * len(means), dict[str, float]()
     for name, columns in rivals.items():

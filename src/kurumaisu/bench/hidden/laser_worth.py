@@ -134,15 +134,18 @@ class LaserScale:
             rigid = (hats[:, :, None] * rigid[:, :, None, :]).reshape(*ux.shape, 9)
         return np.concatenate([rigid, np.ones_like(ux)[..., None]], axis=-1)
 
-    def rivals(self, names: Sequence[str]) -> dict[str, FloatArray]:
-        """Return the signals (s, b, k) of rivals at typical sizes, those with a free shape in several."""
+    def rivals(self, names: Sequence[str], hidden: Sequence[str] = ()) -> dict[str, FloatArray]:
+        """Return the signals (s, b, k) of rivals at typical sizes, those with a free shape in several.
+
+        hidden: what they are rivals of, which no rival may have in it.
+        """
         out = {}
         for name in names:
             if name == "world.map_error":
                 out[name] = self._walls()
             else:
                 faults = [LASER[name].fault(shape, "plain") for shape in _shapes(name)]
-                if name in _BESIDE:
+                if name in _BESIDE and _BESIDE[name] not in hidden:
                     faults.append(LASER[_BESIDE[name]].fault({"size": 1e-3}, "plain"))
                 out[name] = np.stack([self.signal(fault) for fault in faults], axis=-1)
         return out

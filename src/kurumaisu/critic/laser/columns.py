@@ -44,13 +44,15 @@ class Column:
 class Form:
     """An effect with its shape settled: at: values of the parameters that only shape it; columns: of the others.
 
-    start: index of the first column in the whole matrix.
+    start: index of the first column in the whole matrix. between: two columns at the bounds of a parameter which they
+    follow in a straight line: of shares of both, those of one sign are within its bounds.
     """
 
     id: str
     at: Mapping[str, float]
     columns: tuple[Column, ...]
     start: int
+    between: bool = False
 
     @property
     def span(self) -> slice:
@@ -118,7 +120,11 @@ class Marks:
             if issubclass(effect, effects.LaserEffect) and not shapes(effect.id):
                 continue
             for at, marks, values in self._of(effect):
-                forms.append(Form(effect.id, at, tuple(marks), len(columns)))
+                ends = {p.name: {p.lower, p.upper} for p in effect.parameters if p.lower > 0}
+                between = len(marks) == 2 and any(
+                    {mark.beside.get(name) for mark in marks} == both for name, both in ends.items()
+                )
+                forms.append(Form(effect.id, at, tuple(marks), len(columns), between))
                 columns += [value.astype(np.float32) for value in values]
         nothing = np.empty((*self.base.shape, 0), dtype=np.float32)
         return forms, np.stack(columns, axis=-1) if columns else nothing
@@ -254,12 +260,20 @@ class Marks:
             units = np.array([_unit(self._slope(effect, acting[0], {parameter.name: value})) for value in grid])
             sizes = np.linalg.svd(units, compute_uv=False)
             rank = int(np.sum(sizes > _RANK * sizes[0]))
-            if rank > 2 or (rank == 2 and _geometric(parameter)):  # within bounds, which a sum of two would ignore
+            if rank == 2 and _geometric(parameter) and self._straight(effect, acting[0], parameter):
+                pairs = [{**pair, parameter.name: end} for pair in pairs for end in (parameter.lower, parameter.upper)]
+            elif rank > 2 or (rank == 2 and _geometric(parameter)):  # within bounds, which a sum of two would ignore
                 grids[parameter.name] = grid
             elif rank == 2:
                 other = int(np.argmin(np.abs(units @ units[0])))
                 pairs = [{**pair, parameter.name: grid[i]} for pair in pairs for i in (0, other)]
         return pairs, grids
+
+    def _straight(self, effect: type[Mechanism], acting: Parameter, shaping: Parameter) -> bool:
+        """Return whether a column follows a parameter that shapes it in a straight line from bound to bound."""
+        values = (shaping.lower, 0.5 * (shaping.lower + shaping.upper), shaping.upper)
+        low, middle, high = (np.nan_to_num(self._slope(effect, acting, {shaping.name: value})) for value in values)
+        return _rms(middle - 0.5 * (low + high)) < _RANK * _rms(high - low)
 
 
 def _directions(count: int) -> list[tuple[float, ...]]:

@@ -11,38 +11,22 @@ import numpy as np
 
 from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.columns import Form, Marks
+from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, refined
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, thin
-from kurumaisu.critic.laser.standing import kinks, smoothed
+from kurumaisu.critic.laser.sought import moved, stands
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
 from kurumaisu.geometry import compose
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import BoolArray, FloatArray, IntArray
+from kurumaisu.types import FloatArray, IntArray
 
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
-_OUTLIER = 4.5  # deviations from which a reading does not count
-_BINS = 6  # of the range, and of the incidence, in which the deviation is estimated
 _SURE = 0.3  # share of the scans that must lie on a smooth path, or else none is preferred
-_JOLT = 4.0  # sds among scans from which one of them does not count
-_TOLERATED = 0.1  # share by which a scan may always be noisier than the middle one
 _ROUNDS = 3
-_UNSEEN = 0.2  # weight of a pose that no scan has moved, among others
 _SHIFTS = 2  # times that poses are sought by the scans
-_MANY = 10  # readings of a beam, and beams, from which their offsets are estimated
 _LEAST = 1e-4  # [m] deviation of a reading
 _BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau=1.0)  # before any is known
-_MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
-
-
-@dataclass(frozen=True)
-class BeamNoise:
-    """Deviations (k, b) [m] of readings, how neighbours correlate, which readings count, and beams' own offsets [m]."""
-
-    sd: FloatArray
-    rho: float
-    valid: BoolArray
-    own_sd: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -61,14 +45,15 @@ class Assembly:
     def __init__(self, shots: Shots, ids: frozenset[str] | None = None) -> None:
         """Take the shots, and the effects to look for; None for all."""
         self.hats = [hats(shots, row) for row in range(len(shots.stamps))]
-        self.layout = Layout(shots.stamps, shots.run, _stands(shots))
+        self.layout = Layout(shots.stamps, shots.run, stands(shots))
         self.tracks = shots.tracks
         self.kinked = [np.zeros(len(track.times), dtype=bool) for track in shots.tracks]
         self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
         self._linearise(shots, roughly=True)
         self.first = self._trust()
         for i in range(_SHIFTS):
-            self._linearise(self._moved(), roughly=i < _SHIFTS - 1)
+            found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._errors())
+            self._linearise(found, roughly=i < _SHIFTS - 1)
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base)
         self.forms, fixed = self.marks.forms(ids)
@@ -96,36 +81,6 @@ class Assembly:
             sure[:] = True
         return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & sure[:, np.newaxis])
 
-    def _moved(self) -> Shots:
-        """Return the shots on tracks that are moved to where the scans put them, each scan alone."""
-        tracks = [replace(track, poses=track.poses.copy()) for track in self.shots.tracks]
-        sums = [np.zeros((*track.poses.shape[:1], 4)) for track in tracks]
-        for k, errors in enumerate(self._errors()):
-            rows = self._alike_rows(k)
-            sums[self.shots.run[k]][rows, :3] += errors
-            sums[self.shots.run[k]][rows, 3] += 1
-        mean, sought = [], []
-        # Errors are as of the first tracks, which `shift` has moved already.
-        for track, first, some in zip(tracks, self.tracks, sums, strict=True):
-            moved = first.poses + some[:, :3] / np.maximum(some[:, 3:], 1)
-            sought.append(moved)
-            track.poses[:] = smoothed(track.times, moved, np.where(some[:, 3] > 0, 1.0, _UNSEEN))
-            mean.append(track.poses - first.poses)
-        self.kinked = [
-            kinks(moved_to, track.poses, some[:, 3] > 0)
-            for moved_to, track, some in zip(sought, tracks, sums, strict=True)
-        ]
-        shift = [hat.weights @ mean[self.shots.run[k]][hat.rows] for k, hat in enumerate(self.hats)]
-        return replace(self.shots, tracks=tuple(tracks), shift=np.array(shift))
-
-    def _alike_rows(self, k: int) -> IntArray:
-        """Return the rows of the track that share the errors of a scan: its own, or all of its stand."""
-        rows = np.arange(len(self.shots.tracks[self.shots.run[k]].times))[self.hats[k].rows]
-        if self.layout.stand[k] < 0:
-            return rows
-        poses = self.tracks[self.shots.run[k]].poses
-        return np.flatnonzero((poses == poses[rows[0]]).all(axis=1))
-
     def _errors(self) -> list[FloatArray]:
         """Return the errors of the poses (q, 3) under each scan, by that scan alone, within what is plausible."""
         size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
@@ -143,7 +98,7 @@ class Assembly:
                 left[k] = self.residual[k] - np.hstack([own, shared]) @ errors
                 out.append(errors[: gram.own].reshape(-1, 3) if gram.own else errors[np.newaxis, 1:4])
             z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
-            beam = replace(self.first, valid=self.first.valid & (z < _OUTLIER * _MAD * np.nanmedian(z)))
+            beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * MAD * np.nanmedian(z)))
         return out
 
     def refine(self, fitted: Sequence[Form], beam: BeamNoise, scan: ScanNoise) -> None:
@@ -185,7 +140,7 @@ class Assembly:
         project = np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
         beam = self.first
         for _ in range(_ROUNDS):
-            beam = self._refined(beam, project)
+            beam = refined(self.first, beam, lambda last: self.leftover(last, project), self.marks.seen, self.layout)
         narrow = max((span.stop for span in whole), default=self._fixed)
         grams, cross = self._crossed(beam, narrow)
         scan = estimate(grams, self.layout, truth, project)
@@ -264,35 +219,6 @@ class Assembly:
             by_id.setdefault(form.id, []).append(form)
         return [chosen.get(name, forms[len(forms) // 2]) for name, forms in by_id.items()]
 
-    def _refined(self, beam: BeamNoise, project: IntArray) -> BeamNoise:
-        left = np.where(beam.valid, self.leftover(beam, project), np.nan)
-        sd = self.first.sd.copy()
-        for covariate in (self.marks.seen.ranges, self.marks.seen.incidence):  # oblique walls may be read more noisily
-            sd *= _factors(left, sd, np.where(beam.valid, covariate, np.nan), covariate)
-        z = left / sd
-        every = self.leftover_all(left, beam, project) / sd
-        valid = self.first.valid & (np.abs(np.nan_to_num(every)) < _OUTLIER) & ~self._jolted(every)[:, np.newaxis]
-        both = beam.valid[:, 1:] & beam.valid[:, :-1] & (np.abs(z[:, 1:]) < _OUTLIER) & (np.abs(z[:, :-1]) < _OUTLIER)
-        a, b = z[:, 1:][both], z[:, :-1][both]
-        rho = float(np.clip(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9), 0.0, 0.95))
-        kept = np.where(beam.valid & (np.abs(z) < _OUTLIER), left, np.nan)
-        return replace(beam, sd=sd, rho=rho, valid=valid, own_sd=_own_sd(kept, sd))
-
-    def _jolted(self, z: FloatArray) -> BoolArray:
-        """Return (k,) which scans nothing fits as well as the others: the speed jumped between two poses."""
-        with np.errstate(invalid="ignore"):
-            seen = np.where(self.first.valid, np.minimum(np.abs(z), _OUTLIER), np.nan)
-        some = self.first.valid.any(axis=1)
-        size = np.ones(len(z))
-        size[some] = np.sqrt(np.nanmean(seen[some] ** 2, axis=1))
-        middle = float(np.median(size[some]))
-        width = _MAD * float(np.median(np.abs(size[some] - middle)))
-        return np.asarray((size > middle + max(_JOLT * width, _TOLERATED * middle)) & (self.layout.stand < 0))
-
-    def leftover_all(self, left: FloatArray, beam: BeamNoise, project: IntArray) -> FloatArray:
-        """Return the leftover of every reading that may ever count, outliers of the last round too."""
-        return self.leftover(beam, project) if not np.array_equal(beam.valid, self.first.valid) else left
-
     def _rows(self, k: int, columns: IntArray | None) -> tuple[FloatArray, FloatArray, FloatArray]:
         poses = self.poses[k]
         one = np.ones((poses.shape[0], 1))
@@ -325,45 +251,6 @@ class Assembly:
                 moved.append(predict(self.shots, (), seen, 0))
             out.append((moved[1] - moved[0]) / (len(signs) * _MOVE[axis]))
         return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
-
-
-def _stands(shots: Shots) -> IntArray:
-    """Return which scans were taken from one and the same row of reference poses, numbered, else -1."""
-    out = np.full(len(shots.stamps), -1)
-    known: dict[tuple[int, bytes], int] = {}
-    for k in range(len(out)):
-        track = shots.tracks[shots.run[k]]
-        times = shots.stamps[k] + shots.said[[0, -1]]
-        low = max(int(np.searchsorted(track.times, times[0], side="right")) - 1, 0)
-        high = min(int(np.searchsorted(track.times, times[1])), len(track.times) - 1)
-        rows = track.poses[low : high + 1]
-        if (rows == rows[0]).all():
-            out[k] = known.setdefault((int(shots.run[k]), rows[0].tobytes()), len(known))
-    return out
-
-
-def _factors(left: FloatArray, sd: FloatArray, known: FloatArray, covariate: FloatArray) -> FloatArray:
-    """Return by how much the deviations (k, b) of what is left differ from sd, in bins of a covariate."""
-    bins = np.digitize(covariate, np.nanquantile(known, np.linspace(0, 1, _BINS + 1)[1:-1]))
-    out = np.ones_like(sd)
-    for i in range(_BINS):
-        inside = (bins == i) & np.isfinite(known)
-        if inside.any():
-            out[bins == i] = max(_MAD * float(np.median(np.abs(left[inside] / sd[inside]))), 0.05)
-    return out
-
-
-def _own_sd(left: FloatArray, sd: FloatArray) -> float:
-    """Return the sd [m] of what beams keep over all scans, beyond what chance leaves of so many readings."""
-    seen = np.isfinite(left)
-    count = seen.sum(axis=0)
-    many = count >= _MANY
-    if many.sum() < _MANY:
-        return 0.0
-    middle = np.nanmean(left[:, many], axis=0)
-    chance = np.nansum(np.where(seen, sd, 0.0)[:, many] ** 2, axis=0) / count[many] ** 2
-    spread = (_MAD * float(np.median(np.abs(middle - np.median(middle))))) ** 2
-    return float(np.sqrt(max(spread - float(np.median(chance)), 0.0)))
 
 
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:

@@ -22,6 +22,8 @@ from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 _STEPS = 2
+_ROUNDS = 4  # times that the scans are seen anew with what moves their beams
+_SETTLED = 0.5  # sds by which a parameter may still move between two of them
 _STEP = 0.05  # of a finite difference, in units of the larger of a parameter and its scale
 _SHAPE = 1.0  # prior sd of what only shapes an effect, in the same units
 _SIZE = 100.0  # and of its size
@@ -37,35 +39,80 @@ class _Free:
     step: float
 
 
-def pinned(
-    assembly: Assembly, normal: Normal, forms: Sequence[Form], settings: Sequence[EffectSetting], winner: Rival | None
-) -> list[tuple[EffectSetting, dict[str, float]]]:
-    """Return the settings of forms, refitted together, and the sds of the parameters that act or shape, by name.
+@dataclass(frozen=True)
+class Pinned:
+    """Settings of what acts on the mean, with the sds of what was fitted; where that was, and what it leaves.
 
-    winner: a block that acts beside them, whose coefficients are integrated out.
+    assembly: the scans as they are seen with these effects, where any of them moves beams; left (k, b) [m]: of the
+    residual there.
     """
+
+    settings: tuple[tuple[EffectSetting, dict[str, float]], ...]
+    assembly: Assembly
+    left: FloatArray
+
+
+def pinned(
+    assembly: Assembly,
+    normal: Normal,
+    forms: Sequence[Form],
+    settings: Sequence[EffectSetting],
+    winner: Rival | None,
+    truth: tuple[float, float] | None,
+) -> Pinned:
+    """Return the forms, refitted together.
+
+    winner: a block that acts beside them, whose coefficients are integrated out; truth: known sd of the reference.
+    """
+    if not forms and winner is None:
+        return Pinned((), assembly, assembly.residual)
     at = [dict(setting.parameters) for setting in settings]
-    if not forms:
-        return []
     block = _block(assembly, winner)
-    if any(not issubclass(effects.by_id(form.id), effects.ReadingEffect) for form in forms):
-        assembly = assembly.again(settings)
+    moving = any(not issubclass(effects.by_id(form.id), effects.ReadingEffect) for form in forms)
     free = [each for i, form in enumerate(forms) for each in _free(i, form, at[i])]
-    sds = np.empty(0)
-    for _ in range(_STEPS):
-        columns = np.stack([_slope(assembly, forms, at, each) for each in free], axis=-1)
-        left = assembly.residual - assembly.marks.together(_settings(forms, at))
-        gram = assembly.products(normal, np.concatenate([columns, block], axis=2), left)
-        prior = np.r_[np.array([each.prior for each in free]), np.ones(block.shape[2])]
-        inverse = np.linalg.inv(gram[:-1, :-1] * np.outer(prior, prior) + np.eye(len(prior)))
-        step, sds = prior * (inverse @ (prior * gram[:-1, -1])), prior * np.sqrt(np.diag(inverse))
-        for each, by in zip(free, step.tolist(), strict=False):
-            p = each.parameter
-            at[each.index][p.name] = float(np.clip(at[each.index][p.name] + by, p.lower, p.upper))
+    sds, left = np.zeros(len(free)), assembly.residual
+    for _ in range(_ROUNDS if moving else 1):
+        if moving:
+            # Where the chair was, which scans count and how they scatter: all of that was found without the effect.
+            assembly = assembly.again(_settings(forms, at))
+            normal = normal if winner is not None else assembly.settle(truth)
+        before = _values(free, at)
+        for _ in range(_STEPS):
+            columns = [_slope(assembly, forms, at, each) for each in free]
+            left = assembly.residual - assembly.marks.together(_settings(forms, at))
+            step, sds, blocked = _step(assembly, normal, free, (columns, block), left)
+            left = left - block @ blocked
+            for each, by in zip(free, step.tolist(), strict=True):
+                p = each.parameter
+                at[each.index][p.name] = float(np.clip(at[each.index][p.name] + by, p.lower, p.upper))
+        if np.all(np.abs(_values(free, at) - before) < _SETTLED * sds):
+            break
     out: list[dict[str, float]] = [{} for _ in forms]
-    for each, sd in zip(free, sds.tolist(), strict=False):
+    for each, sd in zip(free, sds.tolist(), strict=True):
         out[each.index][each.parameter.name] = sd
-    return list(zip(_settings(forms, at), out, strict=True))
+    return Pinned(tuple(zip(_settings(forms, at), out, strict=True)), assembly, left)
+
+
+def _values(free: Sequence[_Free], at: Sequence[dict[str, float]]) -> FloatArray:
+    return np.array([at[each.index][each.parameter.name] for each in free])
+
+
+def _step(
+    assembly: Assembly,
+    normal: Normal,
+    free: Sequence[_Free],
+    parts: tuple[Sequence[FloatArray], FloatArray],
+    left: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the step of each free parameter, its sd, and the coefficients of the block; parts: columns of both."""
+    columns, block = parts
+    every = np.concatenate([*(column[:, :, np.newaxis] for column in columns), block], axis=2)
+    gram = assembly.products(normal, every, left)
+    prior = np.r_[np.array([each.prior for each in free]), np.ones(block.shape[2])]
+    inverse = np.linalg.inv(gram[:-1, :-1] * np.outer(prior, prior) + np.eye(len(prior)))
+    step, sds = prior * (inverse @ (prior * gram[:-1, -1])), prior * np.sqrt(np.diag(inverse))
+    count = len(free)
+    return step[:count], sds[:count], step[count:]
 
 
 def _settings(forms: Sequence[Form], at: Sequence[dict[str, float]]) -> list[EffectSetting]:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu.critic.laser.free import Free
-from kurumaisu.critic.laser.search import Fitted, Found, confusion
+from kurumaisu.critic.laser.search import FORM, Fitted, Found, confusion
 from kurumaisu.critic.prior import odds
 from kurumaisu.critic.smooth import Belief, belief
 from kurumaisu.types import FloatArray, IntArray
@@ -112,7 +112,8 @@ def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:
 
 def _beside(fit: Fitted, free: Free, gram: FloatArray, share: float) -> Rival:
     seen = belief(*beside(fit, free, gram), free.priors)
-    return Rival(fit, free, seen, fit.score + seen.nats + share)
+    left = FORM * (fit.log_likelihood + seen.nats) if fit.forms else 0.0
+    return Rival(fit, free, seen, fit.score + seen.nats + share - left)
 
 
 def _pruned(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects, geometry
-from kurumaisu.critic.laser.standing import steadied
+from kurumaisu.critic.laser.standing import held, steadied
 from kurumaisu.critic.laser.walls import Rays, Walls, walls_at
 from kurumaisu.critic.recording import LaserMount, Recording, Run
 from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
@@ -98,7 +98,7 @@ def gather(recording: Recording, model: Model) -> Shots:
     for i, run in enumerate(runs):
         assert run.scan is not None
         assert run.pose is not None
-        tracks.append(Track(run.pose.t - zero, steadied(run.pose.t, run.pose.values[:, :3])))
+        tracks.append(Track(*held(run.pose.t - zero, steadied(run.pose.t, run.pose.values[:, :3]))))
         rows = [index for j, index in chosen if j == i]
         stamps.append(run.scan.t[rows] - zero)
         measured.append(run.scan.values[rows])

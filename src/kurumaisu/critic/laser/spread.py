@@ -7,31 +7,35 @@ the same numbers are then fitted together, and what is no longer needed goes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 from scipy.special import logsumexp
 
 from kurumaisu import effects
 from kurumaisu.critic.laser.likeness import Likeness
-from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.shots import own_with, read
-from kurumaisu.critic.laser.statistics import Statistics
+from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.prior import log_prior, occam
 from kurumaisu.critic.story import Comparison
 from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import FloatArray
 
 _NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
 _SIZES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # in units of a parameter's scale, tried first
 _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
-_LEFT = 1e-3  # share of an effect's evidence that its own form may leave to others
+_LEFT = 1e-3  # share of an effect's evidence that its own form may leave to any other one
+_LEFT_LIKE = 0.02  # and to one that changes the same numbers
+_WEAK = 0.05  # share of the strongest effect's evidence, from which another one is beyond doubt
 _LARGEST = 6  # effects in a set
-_TRIES = 12  # simulations of a refit per parameter
+_ROUNDS = 4  # Gauss-Newton steps of a refit
+_SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
+_FARTHEST = 3.0  # such a step, in units of the first difference
+_FINER = 0.5  # of one step's difference is the next one's
+_DAMPED = 0.02  # share by which the curvature is raised: other draws make the slopes uncertain
+_SETTLED = 0.3  # nats that another step must bring
 _REFITS = 4  # effects that are refitted
 _CLOSE = 0.5  # share of what the best of them gains that another one must gain, to be refitted
 _COMPARED = 10  # simulations with the effects, for the report
@@ -87,29 +91,6 @@ def _low(rough: _Rough) -> float:
     return rough.low
 
 
-class Simulator:
-    """Statistics of the shots with effects on how readings scatter."""
-
-    def __init__(self, assembly: Assembly, statistics: Statistics) -> None:
-        self._assembly = assembly
-        self._statistics = statistics
-
-    def counts(self) -> BoolArray:
-        """Return which of the statistics are roots of counts."""
-        return self._statistics.counts()
-
-    def __call__(self, settings: Sequence[EffectSetting], seed: int) -> FloatArray:
-        """Return the statistics of a simulation."""
-        shots, seen, base = self._assembly.shots, self._assembly.marks.seen, self._assembly.marks.base
-        rng = np.random.default_rng([seed, 7])
-        chain = effects.build_laser(own_with(shots, settings), np.random.default_rng(seed))
-        error = shots.laser.error
-        raw = read(shots, seen, chain, rng.standard_normal(base.shape), self._statistics.pose_errors(rng))
-        readings = error.reading(error.range(raw), np.zeros_like(raw))
-        with np.errstate(invalid="ignore"):
-            return self._statistics.of(readings, np.where(np.isfinite(readings), readings - base, np.nan))
-
-
 class ScatterSearch:
     """Finds the effects that the statistics call for."""
 
@@ -134,9 +115,10 @@ class ScatterSearch:
         gone: set[type[Mechanism]] = set()
         while len(chosen) < _LARGEST:
             new = self._step(pushes, chosen, gone)
-            if new is None or new.nats < max([_ENOUGH, *(_LEFT * piece.nats for piece in chosen)]):
+            if new is None or new.nats < self._least(chosen, new):
                 break
             chosen = self._settled(chosen, new, gone)
+        chosen = self._polished(chosen)
         settings = [piece.setting for piece in chosen]
         return [Scatter(piece.setting, piece.p, piece.nats, self._errors(piece, settings)) for piece in chosen]
 
@@ -171,6 +153,11 @@ class ScatterSearch:
         p = float(np.exp(best.nats - logsumexp([0.0, *(piece.nats for piece in tried)])))
         return None if p < 0.5 else replace(best, p=p)
 
+    def _least(self, chosen: Sequence[_Piece], new: _Piece) -> float:
+        """Return the evidence from which an effect is taken beside others [nat]: they may act in another form."""
+        like = [piece.nats for piece in chosen if self._overlap(piece, new) > _OVERLAP]
+        return max([_ENOUGH, *(_LEFT * piece.nats for piece in chosen), *(_LEFT_LIKE * nats for nats in like)])
+
     def _settled(self, chosen: Sequence[_Piece], new: _Piece, gone: set[type[Mechanism]]) -> list[_Piece]:
         """Return the pieces with a new one, fitted together with those like it; what it makes superfluous is gone."""
         like = [piece for piece in chosen if self._overlap(piece, new) > _OVERLAP]
@@ -190,6 +177,22 @@ class ScatterSearch:
                 group = [replace(piece, nats=nats) if piece.effect is old.effect else piece for piece in group]
         return [*rest, *group]
 
+    def _polished(self, chosen: Sequence[_Piece]) -> list[_Piece]:
+        """Return all pieces fitted together, without weak ones that stood in for wrong sizes of others."""
+        if len(chosen) < 2:
+            return list(chosen)
+        group, cost = self._together(chosen, ())
+        strong = max(piece.nats for piece in group)
+        for old in sorted(group, key=lambda piece: piece.nats):
+            others = [piece for piece in group if piece.effect is not old.effect]
+            if old.nats > _WEAK * strong or not others:
+                continue
+            fewer, more = self._together(others, ())
+            z = np.sqrt(max(2 * (more - cost), 0.0))
+            if more - cost - float(occam(np.array(z))) - old.price < self._least(others, old):
+                group, cost = fewer, more
+        return group
+
     def _overlap(self, one: _Piece, other: _Piece) -> float:
         """Return the cosine of what two effects do to the statistics, whatever its sign."""
         plain = self._statistics((), (1, 2))
@@ -202,7 +205,7 @@ class ScatterSearch:
         """Yield what each parameter alone does to the statistics, at some values."""
         plain = self._simulate((), 1)
         for effect in self._candidates(set()):
-            null = {p.name: p.null for p in effect.parameters}
+            null = self._simulate.null(effect)
             for p in self._parameters(effect):
                 for value in _sizes(p):
                     moved = self._simulate((EffectSetting(effect.id, {**null, p.name: value}),), 1)
@@ -236,7 +239,7 @@ class ScatterSearch:
 
     def _alone(self, start: _Rough, beside: Sequence[EffectSetting]) -> tuple[_Piece, float]:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
-        null = {p.name: p.null for p in start.effect.parameters}
+        null = self._simulate.null(start.effect)
         setting = EffectSetting(start.effect.id, {**null, **start.values})
         (piece,), low = self._together([_Piece(start.effect, setting, tuple(start.values), 0.0, 0.0)], beside)
         for p in self._parameters(start.effect) if low > _POOR else ():
@@ -263,11 +266,27 @@ class ScatterSearch:
             made = zip(pieces, values, strict=True)
             return [replace(piece, setting=EffectSetting(piece.setting.id, each)) for piece, each in made]
 
-        cost: Callable[[FloatArray], float] = lambda x: self._misfit((*beside, *(p.setting for p in at(x))))  # noqa: E731
-        simplex = np.vstack([np.zeros(len(places)), np.eye(len(places))])
-        options = {"maxfev": _TRIES * len(places), "xatol": 0.02, "fatol": 0.1, "initial_simplex": simplex}
-        result = minimize(cost, np.zeros(len(places)), method="Nelder-Mead", options=options)
-        return at(result.x), float(result.fun)
+        def numbers(x: FloatArray) -> FloatArray:
+            return self._statistics((*beside, *(piece.setting for piece in at(x))), (1, 2))
+
+        x, reach = np.zeros(len(places)), 1.0
+        here = numbers(x)
+        low = self._likeness.cost(here)
+        for _ in range(_ROUNDS):
+            moved = [numbers(x + reach * one) - here for one in np.eye(len(x))]
+            slopes = np.array([self._likeness.whitened(change, here) / reach for change in moved])
+            left = self._likeness.whitened(here - self._likeness.measured, here)
+            inner = slopes @ slopes.T
+            move = -np.linalg.solve(inner + _DAMPED * np.diag(np.diag(inner)) + 1e-6 * np.eye(len(x)), slopes @ left)
+            before, move, reach = low, np.clip(move, -_FARTHEST, _FARTHEST), _FINER * reach
+            for share in _SHARES:
+                tried = numbers(x + share * move)
+                if self._likeness.cost(tried) < low:
+                    x, here, low = x + share * move, tried, self._likeness.cost(tried)
+                    break
+            if before - low < _SETTLED:
+                break
+        return at(x), low
 
     def _errors(self, piece: _Piece, every: Sequence[EffectSetting]) -> dict[str, float]:
         """Return sds of the parameters that were fitted, from how the statistics follow each."""

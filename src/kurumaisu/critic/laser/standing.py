@@ -8,8 +8,9 @@ import numpy as np
 from kurumaisu.types import BoolArray, FloatArray
 
 _PAUSE = 5.0  # [s] without a pose, after which the chair may stand elsewhere
-_STEP = 6.0  # sds of the poses' jitter that lie between two of them where the chair stands
-_SPREAD = 1.5  # sds of the jitter that poses of one place scatter by
+_APART = 1e-3  # [s] from the middle of a pause, at which the stand before ends and the next one begins
+_STEP = 8.0  # sds of the poses' jitter that lie between two of them where the chair stands
+_SPREAD = 2.2  # sds of the jitter, itself known to a third from few poses, that poses of one place scatter by
 _FEWEST = 5  # poses of a stand
 _WINDOW = 0.25  # [s] on each side, over which a chair's path is smooth
 _LEAST = 2.01  # poses on each side, however seldom they are taken
@@ -33,6 +34,22 @@ def steadied(times: FloatArray, poses: FloatArray) -> FloatArray:
         if len(rows) >= _FEWEST and _stands(poses[rows], jitter):
             out[rows] = poses[rows].mean(axis=0)
     return out
+
+
+def held(times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return times (m,) [s] and poses (m, 3) with rows in the middle of pauses: until or from there a stand lasts.
+
+    Between two stands the chair was carried, nobody knows when. A straight way from one to the other would have it
+    creep at the first and the last scans of both, and a late stamp or a long sweep would seem to show.
+    """
+    same = np.r_[False, (poses[1:] == poses[:-1]).all(axis=1), False]
+    row = np.arange(len(times) - 1)
+    gap = (np.diff(times) > _PAUSE) & ~same[1:-1]
+    late, early = row[gap & same[row]], row[gap & same[row + 2]]
+    middle = 0.5 * (times[1:] + times[:-1])
+    order = np.argsort(np.r_[np.arange(len(times)), late + 0.25, early + 0.75], kind="stable")
+    every = np.r_[times, middle[late] - _APART, middle[early] + _APART]
+    return every[order], np.concatenate([poses, poses[late], poses[early + 1]])[order]
 
 
 def kinks(sought: FloatArray, smooth: FloatArray, seen: BoolArray) -> BoolArray:

@@ -13,11 +13,12 @@ from kurumaisu.critic.laser import pictures, rivals, still
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.pictures import NO_PICTURES, Part, Pictures, misfits, noise_rows
-from kurumaisu.critic.laser.pinned import pinned
+from kurumaisu.critic.laser.pinned import Pinned, pinned
 from kurumaisu.critic.laser.rivals import Rival, Weighed
 from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
-from kurumaisu.critic.laser.spread import Scatter, ScatterSearch, Simulator
+from kurumaisu.critic.laser.simulated import Simulator
+from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
 from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.supply import every_id, supplier
 from kurumaisu.critic.laser.twins import Groups, joined, twins
@@ -28,7 +29,7 @@ from kurumaisu.critic.story import Comparison
 from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, NextExperiment, Unknown
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting, Model
-from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.types import FloatArray
 
 MATERIAL = 3e-4  # [m] rms change of the readings below which an effect of the laser does not matter
 _SCATTERED = 45  # scans whose scatter is looked at: each simulation of them takes a hundredth of a second
@@ -79,9 +80,11 @@ def criticise(
         found = Search(assembly.forms, normal.gram).run()
     normal = assembly.full(normal)
     made = _made(assembly, normal, found)
+    progress("laser: fitting what acts")
+    fit = pinned(assembly, normal, made.fit.forms, _settings(assembly, made.fit), made.winner, recording.truth)
     progress("laser: weighing effects on the scatter")
-    scatter, comparison = _scatter(assembly, normal, made, ids)
-    finding = _finding(assembly, normal, made, scatter)
+    scatter, comparison = _scatter(assembly, normal, fit, ids)
+    finding = _finding(assembly, normal, made, fit, scatter)
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
     return replace(finding, pictures=Pictures(shown, pictures.rivals(made.found), noise_rows(normal), comparison))
@@ -120,12 +123,6 @@ class _Made:
             start = stop
         return [*out, Part(self.winner.free.id, self.winner.free.span, self.coefficients)] if self.winner else out
 
-    def columns(self) -> tuple[IntArray, FloatArray]:
-        """Return which columns of the whole matrix act, and by how much."""
-        spans = [form.span for form in self.fit.forms] + ([self.winner.free.span] if self.winner else [])
-        use = np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
-        return use, np.concatenate([self.fit.coefficients, self.coefficients])
-
 
 def _made(assembly: Assembly, normal: Normal, found: Found) -> _Made:
     weighed = rivals.weigh(found, assembly.free, normal.gram)
@@ -141,29 +138,26 @@ def _with(winner: Rival, normal: Normal) -> tuple[Fitted, Rival, FloatArray, Flo
 
 
 def _scatter(
-    assembly: Assembly, normal: Normal, made: _Made, ids: frozenset[str] | None
+    assembly: Assembly, normal: Normal, fit: Pinned, ids: frozenset[str] | None
 ) -> tuple[list[Scatter], tuple[Comparison, ...]]:
     """Return the effects on how readings scatter about the best fit of their mean, and what they mend."""
-    use, at = made.columns()
-    error = assembly.residual - assembly.columns[:, :, use.astype(int)] @ at
-    few = assembly.thinned(_SCATTERED)
-    rows = np.unique(np.linspace(0, len(error) - 1, _SCATTERED).astype(int))
+    few = fit.assembly.thinned(_SCATTERED)
+    rows = np.unique(np.linspace(0, len(fit.left) - 1, _SCATTERED).astype(int))
     statistics = Statistics(few, normal.scan_noise)
     means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
     measured = few.shots.measured
-    seen = statistics.of(measured, np.where(np.isfinite(measured), error[rows], np.nan))
+    seen = statistics.of(measured, np.where(np.isfinite(measured), fit.left[rows], np.nan))
     search = ScatterSearch(Simulator(few, statistics), seen, sorted(means), ids)
     found = search.run()
     return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
 
-def _finding(assembly: Assembly, normal: Normal, made: _Made, scatter: list[Scatter]) -> LaserFinding:
+def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatter: list[Scatter]) -> LaserFinding:
     found = made.found
     sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
-    refitted = pinned(assembly, normal, made.fit.forms, _settings(assembly, made.fit), made.winner)
-    settings = {setting.id: setting for setting, _ in refitted}
-    estimates = {setting.id: _estimates(setting, sds) for setting, sds in refitted}
+    settings = {setting.id: setting for setting, _ in fit.settings}
+    estimates = {setting.id: _estimates(setting, sds) for setting, sds in fit.settings}
     if made.winner is not None:
         free = made.winner.free
         valid = normal.beam_noise.valid

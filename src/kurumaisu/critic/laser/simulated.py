@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The numbers that scans would have with effects on their scatter, by the very effects that the simulator runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic.laser.normal import Assembly
+from kurumaisu.critic.laser.shots import own_with, read
+from kurumaisu.critic.laser.statistics import Statistics
+from kurumaisu.effects import Mechanism
+from kurumaisu.params import EffectSetting
+from kurumaisu.types import BoolArray, FloatArray
+
+
+class Simulator:
+    """Statistics of the shots with effects on how readings scatter."""
+
+    def __init__(self, assembly: Assembly, statistics: Statistics) -> None:
+        self._assembly = assembly
+        self._statistics = statistics
+
+    def counts(self) -> BoolArray:
+        """Return which of the statistics are roots of counts."""
+        return self._statistics.counts()
+
+    def null(self, effect: type[Mechanism]) -> dict[str, float]:
+        """Return an effect's parameters in the model as it is."""
+        return self._assembly.marks.null(effect)
+
+    def __call__(self, settings: Sequence[EffectSetting], seed: int) -> FloatArray:
+        """Return the statistics of a simulation."""
+        shots, seen, base = self._assembly.shots, self._assembly.marks.seen, self._assembly.marks.base
+        rng = np.random.default_rng([seed, 7])
+        chain = effects.build_laser(own_with(shots, settings), np.random.default_rng(seed))
+        error = shots.laser.error
+        raw = read(shots, seen, chain, rng.standard_normal(base.shape), self._statistics.pose_errors(rng))
+        readings = error.reading(error.range(raw), np.zeros_like(raw))
+        with np.errstate(invalid="ignore"):
+            return self._statistics.of(readings, np.where(np.isfinite(readings), readings - base, np.nan))

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Stands and pauses, effects beside effects of another form, and sizes refitted where the effect acts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from laser_scene import recording
+
+from kurumaisu import effects
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.critic.laser.columns import Column, Form, Marks
+from kurumaisu.critic.laser.search import Search
+from kurumaisu.critic.laser.shots import gather
+from kurumaisu.critic.laser.spread import ScatterSearch
+from kurumaisu.critic.laser.standing import held, steadied
+from kurumaisu.critic.laser.verdicts import criticise
+from kurumaisu.critic.recording import Series
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+
+
+def say(_):
+    """Progress that nobody reads."""
+
+
+def test_a_carried_chair_stands_until_it_is_carried():
+    times = np.array([0.0, 0.1, 0.2, 60.0, 60.1, 60.2])
+    places = np.repeat([[0.0, 0.0, 0.0], [3.0, 2.0, 1.0]], 3, axis=0)
+    t, poses = held(times, places)
+    for when, x in ((0.2, 0.0), (1.2, 0.0), (29.0, 0.0), (31.0, 3.0), (59.5, 3.0), (60.2, 3.0)):
+        assert np.interp(when, t, poses[:, 0]) == x
+    driven = places + np.arange(6)[:, np.newaxis]
+    np.testing.assert_array_equal(held(times, driven)[0], times)
+
+
+def test_stands_are_found_whatever_their_jitter_happens_to_be():
+    times = np.concatenate([100 * i + 0.1 * np.arange(20) for i in range(4)])
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        places = np.repeat(rng.uniform(-1, 1, (4, 3)), 20, axis=0)
+        still = steadied(times, places + 3e-4 * rng.standard_normal(places.shape))
+        assert len(np.unique(still, axis=0)) == 4, seed
+
+
+@pytest.mark.parametrize(
+    ("coefficient", "offset", "named"), [(4e-4, 0.0, "laser.temperature"), (0, 1e-3, "laser.offset")]
+)
+def test_the_temperature_at_which_a_laser_reads_right_is_free_within_bounds(tmp_path, coefficient, offset, named):
+    data = recording(tmp_path, None, 0.0, 1, scans=20)
+    run = data.runs[0]
+    warmth = 21.5 + 4 * np.sin(run.scan.t)[:, np.newaxis]
+    known = {"temperature": Series(run.scan.t, warmth, ("temperature",))}
+    shots = gather(replace(data, runs=(replace(run, covariates=known),)), MODEL)
+    forms, columns = Marks(shots).forms(frozenset({"laser.temperature", "laser.offset"}))
+    error = coefficient * (warmth - 22.3) + offset + np.zeros_like(shots.measured)
+    flat = np.concatenate([columns, error[:, :, np.newaxis]], axis=2)[np.isfinite(columns).all(axis=2)] / 0.01
+    assert Search(forms, flat.T.astype(float) @ flat).run().best.ids == {named}
+
+
+def _two(z, other):
+    """The search among two effects that have nothing in common, of so many deviations each."""
+    forms = [
+        Form(name, {}, (Column(effects.by_id(name).parameters[0], squared=False, beside={}),), i)
+        for i, name in enumerate(("laser.offset", "laser.scale"))
+    ]
+    gram = np.diag([1e4, 1e4, 0.0])
+    gram[:2, 2] = gram[2, :2] = 100 * np.array([z, other])
+    return Search(forms, gram).run()
+
+
+def test_what_a_form_leaves_is_not_one_more_effect():
+    assert set(_two(20.0, 7.0).named) == {"laser.offset", "laser.scale"}
+    assert _two(80.0, 7.0).named == ("laser.offset",)
+
+
+def test_a_delay_is_measured_where_it_acts(tmp_path, monkeypatch):
+    monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 120)
+    case = make(Ask("single", ("laser.latency",), None, family="laser"), 121, tmp_path)
+    finding = criticise(case.recording, MODEL, say)
+    assert [cause.id for cause in finding.causes] == ["laser.latency"]
+    truth = case.truth.parameters["laser.latency"]["delay"]
+    assert finding.causes[0].parameters["delay"].estimate == pytest.approx(truth, rel=0.12)
+
+
+class _Three:
+    """Numbers that follow two effects: a spread that both raise, and one number each."""
+
+    def counts(self):
+        return np.zeros(3, dtype=bool)
+
+    def null(self, effect):
+        return {p.name: p.null for p in effect.parameters}
+
+    def __call__(self, settings, seed):
+        at = {f"{setting.id}.{name}": value for setting in settings for name, value in setting.parameters.items()}
+        step, own = at.get("laser.quantisation.step", 0.001), at.get("laser.beam_bias.sd", 0.0)
+        numbers = [np.log(4e-6 + step**2 / 12 + own**2), 0.3 * np.log(step / 0.001), np.log(1e-7 + own**2)]
+        return np.array(numbers) + 0.02 * np.random.default_rng(seed).standard_normal(3)
+
+
+def test_effects_on_the_same_numbers_are_fitted_together():
+    simulate = _Three()
+    truth = [
+        effects_at("laser.quantisation", step=0.006),
+        effects_at("laser.beam_bias", sd=0.0015),
+    ]
+    ids = frozenset({"laser.quantisation", "laser.beam_bias", "laser.range_noise"})
+    found = ScatterSearch(simulate, simulate(truth, 5), (), ids).run()
+    sizes = {each.setting.id: each.setting.parameters for each in found}
+    assert set(sizes) == {"laser.quantisation", "laser.beam_bias"}
+    assert sizes["laser.quantisation"]["step"] == pytest.approx(0.006, rel=0.1)
+    assert sizes["laser.beam_bias"]["sd"] == pytest.approx(0.0015, rel=0.1)
+
+
+def effects_at(name, **values):
+    """A setting of an effect with these values, the others as of none."""
+    return EffectSetting(name, {**{p.name: p.null for p in effects.by_id(name).parameters}, **values})
