@@ -10,6 +10,7 @@ import numpy as np
 from kurumaisu.critic import (
     sanity_input,
     sanity_jumps,
+    sanity_law,
     sanity_map,
     sanity_pose,
     sanity_rates,
@@ -74,7 +75,10 @@ def _of_run(run: Run, model: Model) -> list[str]:
     known = []
     for name, _, rates in inputs:
         asked = rates[0] if name != "voltage" else _from_volts(run, rates[1], model)
-        known.append((name, sanity_input.compare(asked, rates[1], name), _number(*rates)))
+        match = sanity_input.compare(asked, rates[1], name)
+        if name != "odometry":
+            match = sanity_law.match(run, name, match, rates[1], model)
+        known.append((name, match, _number(*rates)))
     words = _one(sanity_pose.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
     words += [*sanity_jumps.words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
     words += [*_one(sanity_pose.folded(run.pose)), *_one(sanity_stamps.words(run.pose))]
