@@ -67,13 +67,16 @@ class Drive:
     def pace(self) -> FloatArray:
         """Rates asked for while the chair moves during each increment, in units of what is usual, (m,).
 
-        A chair that rolls on keeps its pace: else noise that ends with the command would pass for noise that grows.
+        A chair that rolls on keeps its pace, and one at rest has the mean one: else noise that rests with the chair
+        would pass for noise that grows.
         """
         rates = np.abs(self.v) / _USUAL_V + np.abs(self.w) / _USUAL_W
         own, rolling = (
             self._means(rates, before) / np.maximum(self._means(self._moving, before), 1e-9) for before in (0.0, _ROLLS)
         )
-        return np.asarray(np.where(own > 0, own, rolling))
+        moved = np.where(own > 0, own, rolling)
+        usual = float(moved[moved > 0].mean()) if (moved > 0).any() else 0.0
+        return np.asarray(np.where(moved > 0, moved, usual))
 
     @property
     def _moving(self) -> FloatArray:

@@ -23,10 +23,12 @@ class Likeness:
     def drawn(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
         """Return what this curve draws of the best fit's effects, beside another fit that lacks them.
 
-        By effect: evidence [nat] by which the curve may be better for nothing but the form of the equation.
+        By effect, of which there is one at most: evidence [nat] by which the curve may be better for nothing but the
+        form of the equation.
         """
         missing = self._best.ids - fit.ids
-        if not missing:
+        # Of several, one may hide what another does: then a small whole has large parts.
+        if len(missing) != 1 or fit.ids - self._best.ids:
             return {}
         y, own = taken_up(self._problem, fit)
         columns = self._design.columns[:, curve.columns]

@@ -39,18 +39,24 @@ class Rivalry:
 
     rivals: best first, but for those that draw an effect of the catalogue in another form, and so speak for that;
     lead: of the best one over the best set without a curve [nat]; p: posterior of each curve by the id of its effect;
-    p_effects: of each effect of the catalogue, with curves in the running.
+    p_effects: of each effect of the catalogue, with curves in the running; p_nothing: that there is neither.
     """
 
     rivals: tuple[Rival, ...]
     lead: float
     p: dict[str, float]
     p_effects: dict[str, float]
+    p_nothing: float
 
     @property
     def winner(self) -> Rival | None:
         """Return the best set with a curve, if it beats the catalogue."""
         return self.rivals[0] if self.rivals and self.lead > BEYOND else None
+
+
+def no_rivals(found: Naming) -> Rivalry:
+    """Return the result where no curve can act: the catalogue's own."""
+    return Rivalry((), -np.inf, {}, dict(found.p), 1.0 - max(found.p.values(), default=0.0))
 
 
 def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozenset()) -> Rivalry:
@@ -60,7 +66,7 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
     bare = [(fit, fit.score + log_prior(len(fit.candidates), count)) for fit in found.fits]
     rivals = sorted(_rivals(problem, design, _tried(bare, also)), key=lambda rival: -rival.worth)
     if not rivals:
-        return Rivalry((), -np.inf, {}, dict(found.p))
+        return no_rivals(found)
     plain = np.array([worth + np.log1p(-_ODDS) for _, worth in bare])
     total = logsumexp(np.concatenate([plain, [rival.worth for rival in rivals]]))
     p = {
@@ -80,7 +86,8 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
     for rival in beyond:
         curves[rival.curve.id] = curves.get(rival.curve.id, 0.0) + float(np.exp(rival.worth - total))
     lead = beyond[0].worth - ceiling if beyond else -np.inf
-    return Rivalry(tuple(beyond), lead, curves, p)
+    nothing = float(sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if not fit.ids))
+    return Rivalry(tuple(beyond), lead, curves, p, nothing)
 
 
 def _tried(bare: Sequence[tuple[Fit, float]], also: frozenset[Candidate]) -> list[tuple[Fit, float]]:
