@@ -7,16 +7,27 @@ import numpy as np
 import pytest
 
 from kurumaisu.bench import hidden_effect
-from kurumaisu.critic import replay
+from kurumaisu.bench.critic import recording_of
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.critic import naming, replay, sanity
+from kurumaisu.critic.catalogue import Candidate, Term
+from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import GRID, Drive, prepare
-from kurumaisu.critic.evidence import Fit, Problem
-from kurumaisu.critic.noise import Noise
+from kurumaisu.critic.evidence import Problem
+from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.noise import Growth, Noise
+from kurumaisu.critic.pruned import pruned
 from kurumaisu.critic.smooth import Belief, Design
 from kurumaisu.critic.smooth_alike import Likeness
+from kurumaisu.critic.smooth_judge import Beyond, undecided
+from kurumaisu.critic.smooth_search import Rivalry
 from kurumaisu.critic.stand_ins import Posterior, confounded
+from kurumaisu.critic.verdict import Gain, LogDensityGain
+from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
+OFFSET = Parameter("offset", "V", null=0.0, scale=0.01, lower=-0.5, upper=0.5)
 NOISE = Noise(position_sd=0.005, heading_sd=0.005, sd_v=0.01, sd_lateral=0.003, sd_w=0.02, tau=0.3)
 
 
@@ -68,16 +79,10 @@ def understeering():
     drives = []
     for seed in range(2):
         run = hidden_effect.make_run(None, 0.0, seed, 40.0, hidden_effect.USUAL)
-        made = prepare(recorded(run), MODEL)
+        made = prepare(recording_of("made", [run]).runs[0], MODEL)
         drives.append(made.seen_at(made.times, replay.path(made, MODEL, [effect])))
     problem = Problem(drives, MODEL, NOISE, ids=frozenset({"base.understeer"}))
     return problem, problem.fit(["base.understeer"], {}), problem.fit([], {})
-
-
-def recorded(tables):
-    from kurumaisu.bench.critic import recording_of
-
-    return recording_of("made", [tables]).runs[0]
 
 
 @pytest.mark.parametrize(("channel", "covariate", "drawn"), [("w_gain", "abs_v", True), ("v_gain", "time", False)])
@@ -88,7 +93,65 @@ def test_a_curve_speaks_for_the_effect_that_it_draws(understeering, channel, cov
     belief = Belief(0.0, 0.04 * np.eye(curve.basis.size))
     found = Likeness(problem, best, design).drawn(nothing, curve, belief)
     assert set(found) == ({"base.understeer"} if drawn else set())
-    assert isinstance(best, Fit)
     if drawn:  # the larger the effect, the more its equation may be off
         assert 3.0 < found["base.understeer"] < 0.05 * best.log_likelihood - 0.05 * nothing.log_likelihood
         assert Likeness(problem, best, design).drawn(best, curve, belief) == {}
+
+
+def fit_of(names, score):
+    return SimpleNamespace(ids=frozenset(names.split()), candidates=frozenset(names.split()), score=score)
+
+
+def found_of(p, *fits):
+    return Naming((*fits, fit_of("", 0.0)), p, (), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("p_effect", "p_curve", "p_nothing", "said"),
+    [(0.55, 0.44, 0.01, True), (0.95, 0.04, 0.01, False), (0.5, 0.2, 0.3, False), (0.55, 0.1, 0.0, False)],
+)
+def test_an_effect_or_a_curve_for_sure_is_not_nothing(p_effect, p_curve, p_nothing, said):
+    found = found_of({"a": p_effect}, fit_of("a", 40.0))
+    rivalry = Rivalry((SimpleNamespace(),), 0.0, {"smooth.w.v": p_curve}, {"a": p_effect}, p_nothing)
+    assert undecided(found, rivalry) is said
+
+
+def gain(value):
+    density = LogDensityGain(1.0, 1.0 + value, value, value - 0.05, value + 0.05)
+    return Gain(density)
+
+
+def decision(p, *fits):
+    nothing = Beyond(Rivalry((), -np.inf, {}, p, 0.0), None, 1.0)
+    return Decision(SimpleNamespace(), found_of(p, *fits), Growth(0.0, 0.0, NOISE), nothing)
+
+
+def test_an_uncertain_effect_that_held_out_data_refuse_is_left_out():
+    made = decision({"a": 1.0, "b": 0.7}, fit_of("a b", 50.0), fit_of("a c", 49.5), fit_of("a", 49.0))
+    other, worth = pruned(made, gain(-0.1), lambda one: gain(0.2 if one.found.best.ids == {"a"} else -0.1))
+    assert other.found.best.ids == {"a"}
+    assert worth == gain(0.2)
+
+
+def test_what_is_certain_or_confirmed_is_kept():
+    certain = decision({"a": 1.0, "b": 0.95}, fit_of("a b", 50.0), fit_of("a", 45.0))
+    assert pruned(certain, gain(-0.1), lambda _: gain(0.2)) == (certain, gain(-0.1))
+    confirmed = decision({"a": 1.0, "b": 0.7}, fit_of("a b", 50.0), fit_of("a", 49.0))
+    assert pruned(confirmed, gain(0.2), lambda _: gain(0.3)) == (confirmed, gain(0.2))
+
+
+@pytest.mark.parametrize("seed", [2, 17])
+def test_another_steering_law_is_neither_a_unit_nor_a_sign(seed):
+    """By the other law of V_s the chair hardly turns, and more like the volts' steps than like the rates asked for."""
+    case = make(Ask("single", ("base.steering_law",), form="other", family="base"), seed)
+    assert sanity.examine(case.recording, MODEL).invalid == []
+
+
+def test_another_form_is_tried_without_what_stood_in_for_it():
+    """From a wrong form beside a needless effect to the right form alone: neither step alone is better."""
+    zero, other = (Candidate("zero", (Term("zero", OFFSET, 0.0, rough=rough),), 2.0) for rough in (False, True))
+    needless = Candidate("needless", (Term("needless", OFFSET, 0.0),), 1.0)
+    problem = SimpleNamespace(candidates=(zero, other, needless))
+    screen = SimpleNamespace(fixed=(), related=lambda *_: True, mends=lambda *_: True)
+    fit = SimpleNamespace(candidates=frozenset({zero, needless}), ids=frozenset({"zero", "needless"}), start={})
+    assert frozenset({other}) in {chosen for chosen, _ in naming._neighbours(problem, screen, fit)}
