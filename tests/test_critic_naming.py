@@ -15,7 +15,7 @@ from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import GRID, Drive, prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
-from kurumaisu.critic.noise import Growth, Noise
+from kurumaisu.critic.noise import Growth, Noise, Scatter, whitener
 from kurumaisu.critic.pruned import pruned
 from kurumaisu.critic.smooth import Belief, Design
 from kurumaisu.critic.smooth_alike import Likeness
@@ -70,6 +70,25 @@ def test_rest_tells_nothing_about_noise_that_grows_with_the_rates():
     assert pace[10] == pytest.approx(pace[pace != pace[10]].mean(), rel=0.05)
     one_speed = drive([0.4, 0.0, 0.4, 0.0], np.zeros(4)).pace
     np.testing.assert_allclose(one_speed, 0.5)
+
+
+def noise_of_a_drive(growth, seed):
+    """Return how likely growth is in 40 s of a drive whose whitened increments are drawn under noise that grows."""
+    made = drive([0.2, 0.0, 0.7, 0.4, -0.3, 0.0, 0.1, 0.6] * 10, [0.3, 0.0, -0.5, 0.0, 0.4, 0.7, 0.0, -0.2] * 10)
+    made = made.seen_at(made.times, replay.path(made, MODEL, ()))
+    truth = Noise(**{**vars(NOISE), "growth": growth})
+    size = 3 * (len(made.times) - 1)
+    inverse = whitener(made, truth).whiten(np.eye(size))
+    left = np.linalg.solve(inverse, np.random.default_rng(seed).standard_normal(size)).reshape(-1, 3)
+    scatter = Scatter([made], [left], [np.empty((size, 0))], (NOISE.position_sd, NOISE.heading_sd))
+    return scatter.growth(scatter.estimate(NOISE), 0.02)
+
+
+def test_how_much_noise_grows_is_found_from_noise_that_does_not():
+    found = noise_of_a_drive(3.0, 1)
+    assert found.p > 0.99
+    assert 1.5 < found.noise.growth < 6.0
+    assert noise_of_a_drive(0.0, 1).p < 0.1
 
 
 @pytest.fixture(scope="module")
