@@ -60,7 +60,7 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
     hint = smooth_judge.hinted(first, found)
     if hint is not None:
         made = _judged(first, found, hint, truth, progress)
-        if made.beyond.extension is not None:
+        if made.beyond.extension is not None and made.beyond.rivalry.winner is not None:
             return made
     return _judged(first, found, None, truth, progress)
 

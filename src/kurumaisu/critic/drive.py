@@ -61,13 +61,26 @@ class Drive:
 
         A chair asked to rest may roll on for a while, and is never quite still.
         """
-        moving = self._means(((self.v != 0) | (self.w != 0)).astype(float), _ROLLS)
-        return np.asarray(np.maximum(np.sqrt(moving), _STILL))
+        return np.asarray(np.maximum(np.sqrt(self._means(self._moving, _ROLLS)), _STILL))
 
     @cached_property
     def pace(self) -> FloatArray:
-        """Rates asked for during each increment, in units of what is usual, (m,)."""
-        return self._means(np.abs(self.v) / _USUAL_V + np.abs(self.w) / _USUAL_W, 0.0)
+        """Rates asked for while the chair moves during each increment, in units of what is usual, (m,).
+
+        A chair that rolls on keeps its pace, and one at rest has the mean one: else noise that rests with the chair
+        would pass for noise that grows.
+        """
+        rates = np.abs(self.v) / _USUAL_V + np.abs(self.w) / _USUAL_W
+        own, rolling = (
+            self._means(rates, before) / np.maximum(self._means(self._moving, before), 1e-9) for before in (0.0, _ROLLS)
+        )
+        moved = np.where(own > 0, own, rolling)
+        usual = float(moved[moved > 0].mean()) if (moved > 0).any() else 0.0
+        return np.asarray(np.where(moved > 0, moved, usual))
+
+    @property
+    def _moving(self) -> FloatArray:
+        return np.asarray((self.v != 0) | (self.w != 0), dtype=np.float64)
 
     def seen_at(self, times: FloatArray, poses: FloatArray) -> Drive:
         """Return the drive with other poses (m + 1, 3) at other times (m + 1,)."""

@@ -32,7 +32,7 @@ from kurumaisu.types import FloatArray
 
 # At usual rates, from which growing noise is named: alone, where less is no matter, and beside something else, which in
 # another form than ours leaves residuals that grow with the rates, too.
-_GROWTH_ALONE, _GROWTH_BESIDE = 0.5, 1.0
+_GROWTH_ALONE, _GROWTH_BESIDE = 0.2, 0.4
 _PICTURE = 0.1  # [s] between the poses drawn
 # [s] after which a simulated path begins again at the measured pose: the random wander of the heading adds up, and
 # after a minute hides what the model does.

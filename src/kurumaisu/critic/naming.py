@@ -3,20 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
 
+from kurumaisu.critic import stand_ins
 from kurumaisu.critic.catalogue import Candidate, Key
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.scan import Screen
-from kurumaisu.types import FloatArray
+from kurumaisu.critic.stand_ins import Posterior, confounded
 
-NAMED = 0.9  # posterior from which a cause is named
-RIVAL = 0.05  # posterior from which an effect counts as a rival of another
+NAMED, RIVAL = stand_ins.NAMED, stand_ins.RIVAL
 _REFITS = 10  # sets refitted after each scan
 _CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
 _ROUNDS = 8  # scans at most
@@ -99,12 +99,9 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
     weights = np.array([worth(fit) for fit in ranked])
     weights = np.exp(weights - logsumexp(weights))
 
-    def p_any(names: Iterable[str]) -> float:
-        wanted = set(names)
-        return float(sum(w for w, fit in zip(weights, ranked, strict=True) if fit.ids & wanted))
-
-    p = {name: p_any([name]) for name in sorted({candidate.id for candidate in problem.candidates})}
-    return Naming(tuple(ranked), p, _confounded(ranked, weights, p, p_any), _false_alarm(nothing), nothing.enough)
+    posterior = Posterior(ranked, weights)
+    p = {name: posterior.p.get(name, 0.0) for name in sorted({candidate.id for candidate in problem.candidates})}
+    return Naming(tuple(ranked), p, confounded(posterior), _false_alarm(nothing), nothing.enough)
 
 
 def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
@@ -118,6 +115,8 @@ def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Ch
                 # What fits one form of a comb is nowhere near what fits another.
                 begin = {key: value for key, value in kept.items() if not other.rough or key[0] != other.id}
                 yield fit.candidates - {one} | {other}, begin
+                if other.rough and other.id == one.id:  # what stood in for the right form may go with the wrong one
+                    yield from ((fit.candidates - {one, more} | {other}, begin) for more in fit.candidates - {one})
     for other in screen.fixed:
         if other.id not in fit.ids and screen.mends(other):
             yield fit.candidates | {other}, kept
@@ -125,30 +124,6 @@ def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Ch
         if other.rough and other.id not in fit.ids:
             yield frozenset({other}), {}
             yield fit.candidates | {other}, kept
-
-
-def _confounded(
-    ranked: Sequence[Fit], weights: FloatArray, p: dict[str, float], p_any: Callable[[Iterable[str]], float]
-) -> tuple[tuple[str, ...], ...]:
-    """Return, for each uncertain effect of the best set, the set with those that could stand in, if one must act."""
-    best = ranked[0]
-    groups: list[set[str]] = []
-    for name in sorted(best.ids):
-        if p[name] >= NAMED:
-            continue
-        without = best.ids - {name}
-        group = {name}
-        for fit, weight in zip(ranked, weights, strict=True):
-            stands_in = name not in fit.ids and len(fit.ids & without) >= len(without) - 1
-            # Alone, as `name` does: what needs others beside it is another story.
-            if stands_in and len(fit.ids) <= len(best.ids) and weight > RIVAL / 5:
-                group |= {other for other in fit.ids - best.ids if p[other] >= RIVAL}
-        groups.append(group)
-    merged: list[set[str]] = []
-    for group in groups:
-        meeting = [other for other in merged if other & group]
-        merged = [other for other in merged if not other & group] + [group.union(*meeting)]
-    return tuple(tuple(sorted(group)) for group in merged if len(group) > 1 and p_any(group) >= NAMED)
 
 
 def _false_alarm(screen: Screen) -> float:

@@ -50,6 +50,8 @@ _FLOOR = dict.fromkeys(vars(START), 1e-5) | {"tau": 0.02, "slow_tau": 0.5, "grow
 _CEILING = dict.fromkeys(vars(START), 3.0) | {"sd_w": 10.0, "tau": 20.0, "slow_tau": 20.0, "growth": 30.0}
 ONE_COLOUR = ("position_sd", "heading_sd", "sd_v", "sd_lateral", "sd_w", "tau")
 _SECOND = ("slow_v", "slow_lateral", "slow_w", "slow_tau")
+_GROWN = (0.3, 1.0, 3.0)  # from which growth is searched for: from a single one the search sticks half way
+_GROWING = ("sd_v", "sd_lateral", "sd_w", "slow_v", "slow_lateral", "slow_w")
 _HINTS = (0.1, 0.5, 1.0, 3.0)  # of a second colour's usual size
 _WORTH = 4.0  # [nat] from which a second colour is believed: it has four parameters
 _SAME = 0.03  # share of a column beyond those before it that makes it one of its own
@@ -142,7 +144,7 @@ class Scatter:
     def growth(self, about: Estimate, prior_odds: float) -> Growth:
         """Return how likely it is that the noise grows with the rates, about the estimate of noise that does not."""
         names = (*ONE_COLOUR, *(_SECOND if about.noise.slow_v else ()))
-        growing = self._best(replace(about.noise, growth=_SLOW.growth), (*names, "growth"))
+        growing = min((self._best(_grown(about.noise, size), (*names, "growth")) for size in _GROWN), key=_cost_of)
         better = max(about.cost - growing.cost, 0.0)
         nats = better - float(occam(np.sqrt(2 * better), sides=1))
         return Growth(float(expit(nats + np.log(prior_odds))), nats, growing.noise)
@@ -178,6 +180,15 @@ class Scatter:
         square, b, inner = gram[0, 0], gram[1:, 0], gram[1:, 1:] + 1e-6 * np.eye(len(gram) - 1)
         rest = square - b @ np.linalg.solve(inner, b)
         return 0.5 * float(log_determinant + rest + np.linalg.slogdet(inner)[1])
+
+
+def _grown(noise: Noise, growth: float) -> Noise:
+    """Return noise that grows, and is about as large as before at usual rates."""
+    return replace(noise, growth=growth, **{name: getattr(noise, name) / (1 + growth) for name in _GROWING})
+
+
+def _cost_of(estimate: Estimate) -> float:
+    return estimate.cost
 
 
 def _independent(columns: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from kurumaisu.critic import excitation, explain, gain, next_experiment, noise, predict, sanity, smooth_explain, worth
-from kurumaisu.critic.decide import Progress, decide, scatter
+from kurumaisu.critic.decide import Decision, Progress, decide, scatter
 from kurumaisu.critic.drive import Drive, driven, prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
@@ -17,10 +17,11 @@ from kurumaisu.critic.laser.merge import with_laser
 from kurumaisu.critic.portion import bounded
 from kurumaisu.critic.predict_extended import forecast_of
 from kurumaisu.critic.predict_motion import Settings
+from kurumaisu.critic.pruned import pruned
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.smooth_known import informed
-from kurumaisu.critic.verdict import write_verdict
+from kurumaisu.critic.verdict import Gain, write_verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, follow_commands, load_model
 
@@ -112,7 +113,11 @@ def _criticise_base(
     names = {drive.name for drive in withheld}
     whole = [drive for drive in test if drive.name not in names]
     splits = gain.with_withheld(gain.folds(train, whole), train, withheld)
-    held = gain.measure(model, splits, made.refit, baseline, made.problem.noise) if splits and made.something else None
+
+    def worth_of(one: Decision) -> Gain:
+        return gain.measure(model, splits, one.refit, baseline, one.problem.noise)
+
+    made, held = pruned(made, worth_of(made) if splits and made.something else None, worth_of)
     progress("planning the next drive")
     scripts = next_experiment.drives()
     proposal = next_experiment.propose(made.problem, made.found, scripts)

@@ -10,6 +10,7 @@ import numpy as np
 from kurumaisu.critic import (
     sanity_input,
     sanity_jumps,
+    sanity_law,
     sanity_map,
     sanity_pose,
     sanity_rates,
@@ -71,19 +72,22 @@ def _of_run(run: Run, model: Model) -> list[str]:
     found = sanity_pose.course(run.pose)
     pose = _mended(run.pose, found)
     inputs = [(name, part, rates) for name, part in _inputs(run) if (rates := _rates(part, pose)) is not None]
-    known = []
+    known, lawful = [], True
     for name, _, rates in inputs:
         asked = rates[0] if name != "voltage" else _from_volts(run, rates[1], model)
-        known.append((name, sanity_input.compare(asked, rates[1], name), _number(*rates)))
+        plain = sanity_input.compare(asked, rates[1], name)
+        match = sanity_law.match(run, name, plain, rates[1], model) if name != "odometry" else plain
+        known.append((name, match, _number(*rates)))
+        lawful &= match is plain
     words = _one(sanity_pose.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
     words += [*sanity_jumps.words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
     words += [*_one(sanity_pose.folded(run.pose)), *_one(sanity_stamps.words(run.pose))]
     told = [line for name, part, rates in inputs for line in _against(name, part, pose, rates, model)]
     for name, match, number in known:
         told += [*match.words, *sanity_input.sign_and_unit(match, number, name)]
-    # Of poses that are mirrored every input seems to have the wrong sign.
+    # Of poses that are mirrored every input seems to have the wrong sign; by another law some voltages have.
     reflected = found is not None and found.factor < 0
-    words += [line for line in told if not (reflected and "wrong sign" in line)]
+    words += [line for line in told if not ((reflected or not lawful) and "wrong sign" in line)]
     return list(dict.fromkeys(words))
 
 

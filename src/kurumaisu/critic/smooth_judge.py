@@ -14,7 +14,7 @@ from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.smooth import Design, beside, null_evidence
 from kurumaisu.critic.smooth_fit import Extension, extend
-from kurumaisu.critic.smooth_search import Rivalry, compare
+from kurumaisu.critic.smooth_search import Rivalry, compare, no_rivals
 
 _ALARM = 0.01  # share of null draws with as much evidence above which a curve is not believed
 _HOPELESS = 100.0  # [nat] behind the catalogue, when simulated, that no other effects beside a curve make good
@@ -47,14 +47,14 @@ def hinted(problem: Problem, found: Naming) -> Extension | None:
 def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> Beyond:
     """Return whether a curve beats the catalogue, and the best one with the effects that act beside it."""
     if not _asked(problem) or not found.enough:
-        return Beyond(Rivalry((), -np.inf, {}, dict(found.p)), None, 1.0)
+        return Beyond(no_rivals(found), None, 1.0)
     progress("trying what is not in the catalogue")
     rivalry = compare(problem, found)
-    if rivalry.winner is None:
+    if rivalry.winner is None and not undecided(found, rivalry):
         return Beyond(rivalry, None, 1.0)
     first = _extension(problem, rivalry)
     if not _holds(problem, found, first, _HOPELESS):
-        return Beyond(Rivalry((), -np.inf, {}, dict(found.p)), None, 1.0)
+        return Beyond(no_rivals(found), None, 1.0)
     curved = replay.extend(problem.model, [first.unknown])
     # With the curve in, sets may be best that nobody would have tried without it.
     other = naming.search(problem.changed(model=curved), progress).best
@@ -62,13 +62,21 @@ def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> B
         more = problem.fit_candidates(other.candidates, other.start)
         found = replace(found, fits=(*found.fits, more))
     rivalry = compare(problem, found, also=other.candidates)
-    if rivalry.winner is None:
+    if rivalry.winner is None and not undecided(found, rivalry):
         return Beyond(rivalry, None, 1.0)
     extension = _extension(problem, rivalry)
     if not _holds(problem, found, extension, 0.0):
-        return Beyond(Rivalry((), -np.inf, {}, dict(found.p)), None, 1.0)
+        return Beyond(no_rivals(found), None, 1.0)
     alarm = false_alarm(problem, rivalry)
     return Beyond(rivalry, extension if alarm <= _ALARM else None, alarm)
+
+
+def undecided(found: Naming, rivalry: Rivalry) -> bool:
+    """Tell whether something acts for sure, but it may as well be a curve as any effect of the best set."""
+    if not found.best.ids or found.confounded or not rivalry.rivals or rivalry.p_nothing > 1 - naming.NAMED:
+        return False
+    surest = max(rivalry.p_effects[name] for name in found.best.ids)
+    return surest < naming.NAMED <= surest + sum(rivalry.p.values())
 
 
 def _holds(problem: Problem, found: Naming, extension: Extension, behind: float) -> bool:

@@ -14,10 +14,12 @@ from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.smooth import Belief, Curve, Design, belief, taken_up
+from kurumaisu.critic.smooth_alike import Likeness
 from kurumaisu.types import FloatArray
 
 BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
 _ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
+_SHARE = 0.002  # posterior from which it is asked which effect a curve draws
 _FITS = 10  # sets of the catalogue beside which curves are tried
 
 
@@ -35,19 +37,26 @@ class Rival:
 class Rivalry:
     """Result of the comparison.
 
-    rivals: best first; lead: of the best one over the best set without a curve [nat]; p: posterior of each curve by
-    the id of its effect; p_effects: of each effect of the catalogue, with curves in the running.
+    rivals: best first, but for those that draw an effect of the catalogue in another form, and so speak for that;
+    lead: of the best one over the best set without a curve [nat]; p: posterior of each curve by the id of its effect;
+    p_effects: of each effect of the catalogue, with curves in the running; p_nothing: that there is neither.
     """
 
     rivals: tuple[Rival, ...]
     lead: float
     p: dict[str, float]
     p_effects: dict[str, float]
+    p_nothing: float
 
     @property
     def winner(self) -> Rival | None:
         """Return the best set with a curve, if it beats the catalogue."""
         return self.rivals[0] if self.rivals and self.lead > BEYOND else None
+
+
+def no_rivals(found: Naming) -> Rivalry:
+    """Return the result where no curve can act: the catalogue's own."""
+    return Rivalry((), -np.inf, {}, dict(found.p), 1.0 - max(found.p.values(), default=0.0))
 
 
 def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozenset()) -> Rivalry:
@@ -57,21 +66,28 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
     bare = [(fit, fit.score + log_prior(len(fit.candidates), count)) for fit in found.fits]
     rivals = sorted(_rivals(problem, design, _tried(bare, also)), key=lambda rival: -rival.worth)
     if not rivals:
-        return Rivalry((), -np.inf, {}, dict(found.p))
+        return no_rivals(found)
     plain = np.array([worth + np.log1p(-_ODDS) for _, worth in bare])
-    curved = np.array([rival.worth for rival in rivals])
-    total = logsumexp(np.concatenate([plain, curved]))
-    p: dict[str, float] = {}
-    for rival in rivals:
-        p[rival.curve.id] = p.get(rival.curve.id, 0.0) + float(np.exp(rival.worth - total))
-    p_effects = {
-        name: float(
-            sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if name in fit.ids)
-            + sum(np.exp(rival.worth - total) for rival in rivals if name in rival.fit.ids)
-        )
+    total = logsumexp(np.concatenate([plain, [rival.worth for rival in rivals]]))
+    p = {
+        name: float(sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if name in fit.ids))
         for name in found.p
     }
-    return Rivalry(tuple(rivals), float(curved[0] - plain.max()), p, p_effects)
+    likeness, ceiling = Likeness(problem, found.best, design), float(plain.max())
+    beyond: list[Rival] = []
+    for rival in rivals:
+        share = float(np.exp(rival.worth - total))
+        draws = likeness.drawn(rival.fit, rival.curve, rival.belief) if share > _SHARE else {}
+        drawn = {name for name, nats in draws.items() if rival.worth - ceiling < BEYOND + nats}
+        for name in rival.fit.ids | drawn:
+            p[name] += share
+        beyond += [] if drawn else [rival]
+    curves: dict[str, float] = {}
+    for rival in beyond:
+        curves[rival.curve.id] = curves.get(rival.curve.id, 0.0) + float(np.exp(rival.worth - total))
+    lead = beyond[0].worth - ceiling if beyond else -np.inf
+    nothing = float(sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if not fit.ids))
+    return Rivalry(tuple(beyond), lead, curves, p, nothing)
 
 
 def _tried(bare: Sequence[tuple[Fit, float]], also: frozenset[Candidate]) -> list[tuple[Fit, float]]:

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects that nobody is sure of are left out where data held out refuse them, so that they spoil no certain one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from kurumaisu.critic.decide import Decision
+from kurumaisu.critic.evidence import Fit
+from kurumaisu.critic.material import confirmed
+from kurumaisu.critic.verdict import Gain
+
+_TRIED = 2  # smaller sets, the likeliest first: each is fitted to all folds
+
+
+def pruned(made: Decision, worth: Gain | None, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain | None]:
+    """Return a decision with what it is worth, or that of a smaller set which keeps what is named and is confirmed."""
+    found = made.found
+    if worth is None or made.beyond.extension is not None:
+        return made, worth
+    if confirmed(worth, found.best.score - found.empty.score):
+        return made, worth
+    smaller = [fit for fit in found.fits if fit.ids and set(found.named) <= fit.ids < found.best.ids]
+    for fit in smaller[:_TRIED]:
+        other = _with(made, fit)
+        gained = measure(other)
+        if confirmed(gained, fit.score - found.empty.score):
+            return other, gained
+    return made, worth
+
+
+def _with(made: Decision, fit: Fit) -> Decision:
+    """Return the decision with another set as the best, and the sets of rivals that its effects are in."""
+    found = made.found
+    fits = (fit, *(other for other in found.fits if other is not fit))
+    groups = tuple(group for group in found.confounded if fit.ids & set(group))
+    return replace(made, found=replace(found, fits=fits, confounded=groups))

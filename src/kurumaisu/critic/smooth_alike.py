@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which effect of the catalogue a curve draws: another form of a known cause is no cause outside the catalogue."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kurumaisu.critic.evidence import Fit, Problem
+from kurumaisu.critic.smooth import Belief, Curve, Design, taken_up
+from kurumaisu.types import FloatArray
+
+_ALIKE = 0.9  # correlation of signals from which a curve draws an effect; noise alone bends a curve by as much
+_FORM = 0.15  # share of its signal by which a chair's fault may differ from the catalogue's equation for it
+
+
+class Likeness:
+    """How alike curves are to the effects of a fit, as both explain the drives."""
+
+    def __init__(self, problem: Problem, best: Fit, design: Design) -> None:
+        self._problem, self._best, self._design = problem, best, design
+        self._signals = {name: _signal(problem, best, name) for name in sorted(best.ids)}
+
+    def drawn(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
+        """Return what this curve draws of the best fit's effects, beside another fit that lacks them.
+
+        By effect, of which there is one at most: evidence [nat] by which the curve may be better for nothing but the
+        form of the equation.
+        """
+        missing = self._best.ids - fit.ids
+        # Of several, one may hide what another does: then a small whole has large parts.
+        if len(missing) != 1 or fit.ids - self._best.ids:
+            return {}
+        y, own = taken_up(self._problem, fit)
+        columns = self._design.columns[:, curve.columns]
+        columns = columns - own @ (own.T @ columns)
+        spread = np.eye(columns.shape[1]) + belief.prior @ (columns.T @ columns)
+        drawn = columns @ np.linalg.solve(spread, belief.prior @ (columns.T @ y))
+        signals = {name: self._signals[name] - own @ (own.T @ self._signals[name]) for name in sorted(missing)}
+        return {
+            name: 0.5 * float(_FORM**2 * signal @ signal)
+            for name, signal in signals.items()
+            if _correlation(drawn, signal) > _ALIKE
+        }
+
+
+def _signal(problem: Problem, fit: Fit, name: str) -> FloatArray:
+    """Return what an effect of a fit does, whitened."""
+    null = np.array(
+        [
+            term.null if term.id == name and not term.shape else value
+            for term, value in zip(fit.terms, fit.values, strict=True)
+        ]
+    )
+    return problem.residual(fit.terms, null) - problem.residual(fit.terms, fit.values)
+
+
+def _correlation(one: FloatArray, other: FloatArray) -> float:
+    norms = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(one @ other) / norms if norms else 0.0

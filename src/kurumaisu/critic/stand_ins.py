@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What could act in the place of an effect that is not certain: sets of effects of which one acts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from kurumaisu.critic.evidence import Fit
+from kurumaisu.types import FloatArray
+
+NAMED = 0.9  # posterior from which a cause is named
+RIVAL = 0.05  # posterior from which an effect counts as a rival of another
+
+
+class Posterior:
+    """Sets of effects, best first, and how likely each is; p: of each effect."""
+
+    def __init__(self, ranked: Sequence[Fit], weights: FloatArray) -> None:
+        self.ranked = ranked
+        self.weights = weights
+        self.p = {name: self.any_of([name]) for name in frozenset().union(*(fit.ids for fit in ranked))}
+
+    def any_of(self, names: Iterable[str]) -> float:
+        """Return how likely it is that one of some effects acts."""
+        wanted = set(names)
+        return float(sum(w for w, fit in zip(self.weights, self.ranked, strict=True) if fit.ids & wanted))
+
+
+def confounded(posterior: Posterior) -> tuple[tuple[str, ...], ...]:
+    """Return, for each uncertain effect of the best set, the set with those that could stand in, if one must act."""
+    best = posterior.ranked[0]
+    merged: list[set[str]] = []
+    for name in sorted(best.ids):
+        if posterior.p[name] >= NAMED:
+            continue
+        group = _alone(posterior, name)
+        if posterior.any_of(group) < NAMED:
+            group = _with_others(posterior, name, group)
+        meeting = [other for other in merged if other & group]
+        merged = [other for other in merged if not other & group] + [group.union(*meeting)]
+    return tuple(tuple(sorted(group)) for group in merged if len(group) > 1 and posterior.any_of(group) >= NAMED)
+
+
+def _alone(posterior: Posterior, name: str) -> set[str]:
+    """Return an effect with those that do alone what it does: what needs others beside it is another story."""
+    best = posterior.ranked[0]
+    without = best.ids - {name}
+    group = {name}
+    for fit, weight in zip(posterior.ranked, posterior.weights, strict=True):
+        stands_in = name not in fit.ids and len(fit.ids & without) >= len(without) - 1
+        if stands_in and len(fit.ids) <= len(best.ids) and weight > RIVAL / 5:
+            group |= {other for other in fit.ids - best.ids if posterior.p[other] >= RIVAL}
+    return group
+
+
+def _with_others(posterior: Posterior, name: str, group: set[str]) -> set[str]:
+    """Return the set with effects that do together what it does, the likeliest sets first, until one must act."""
+    certain = {other for other, p in posterior.p.items() if p >= NAMED}
+    for fit in posterior.ranked:
+        if posterior.any_of(group) >= NAMED:
+            break
+        if name not in fit.ids:
+            group = group | (fit.ids - certain)
+    return group

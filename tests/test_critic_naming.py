@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is said of an effect that is found but not certain: sets, curves that draw it, other forms of it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kurumaisu.bench import hidden_effect
+from kurumaisu.bench.critic import recording_of
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.critic import naming, replay, sanity
+from kurumaisu.critic.catalogue import Candidate, Term
+from kurumaisu.critic.decide import Decision
+from kurumaisu.critic.drive import GRID, Drive, prepare
+from kurumaisu.critic.evidence import Problem
+from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.noise import Growth, Noise, Scatter, whitener
+from kurumaisu.critic.pruned import pruned
+from kurumaisu.critic.smooth import Belief, Design
+from kurumaisu.critic.smooth_alike import Likeness
+from kurumaisu.critic.smooth_judge import Beyond, undecided
+from kurumaisu.critic.smooth_search import Rivalry
+from kurumaisu.critic.stand_ins import Posterior, confounded
+from kurumaisu.critic.verdict import Gain, LogDensityGain
+from kurumaisu.effects import Parameter
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+OFFSET = Parameter("offset", "V", null=0.0, scale=0.01, lower=-0.5, upper=0.5)
+NOISE = Noise(position_sd=0.005, heading_sd=0.005, sd_v=0.01, sd_lateral=0.003, sd_w=0.02, tau=0.3)
+
+
+def posterior(*sets):
+    """Return the posterior of sets given as (weight, names)."""
+    ranked = [SimpleNamespace(ids=frozenset(names.split())) for _, names in sets]
+    return Posterior(ranked, np.array([weight for weight, _ in sets]))
+
+
+def test_one_for_one_stand_ins_make_a_set():
+    assert confounded(posterior((0.5, "a b"), (0.3, "a c"), (0.2, "a d"))) == (("b", "c", "d"),)
+
+
+def test_what_needs_others_beside_it_is_in_no_set_where_others_do():
+    assert confounded(posterior((0.55, "b"), (0.4, "c"), (0.05, "d e"))) == (("b", "c"),)
+
+
+def test_two_that_stand_in_for_three_are_a_set_rather_than_nothing():
+    """Something acts beside a, for sure: b and c and d, or e and f with neither of them."""
+    assert confounded(posterior((0.5, "a b c d"), (0.5, "a e f"))) == (("b", "c", "d", "e", "f"),)
+
+
+def test_what_may_not_act_at_all_is_in_no_set():
+    assert confounded(posterior((0.6, "b"), (0.4, ""))) == ()
+
+
+def drive(v, w):
+    """Return a drive with rates (n,) held for 0.5 s each and poses at 10 Hz."""
+    rates = [np.repeat(np.asarray(rate, dtype=float), 50) for rate in (v, w)]
+    times = np.arange(0.0, len(rates[0]) * GRID, 0.1)
+    return Drive("made", "command", 0.0, *rates, times, np.zeros((len(times), 3)))
+
+
+def test_rest_tells_nothing_about_noise_that_grows_with_the_rates():
+    """A chair that rolls on has the pace it had; one that rests the mean one: no other noise by any growth."""
+    pace = drive([0.8, 0.0, 0.0, 0.4, 0.4, 0.0], np.zeros(6)).pace
+    np.testing.assert_allclose(pace[:4], 1.0)
+    np.testing.assert_allclose(pace[5], 1.0)  # 0.1 s after the command ended
+    np.testing.assert_allclose(pace[16:24], 0.5)
+    assert pace[10] == pytest.approx(pace[pace != pace[10]].mean(), rel=0.05)
+    one_speed = drive([0.4, 0.0, 0.4, 0.0], np.zeros(4)).pace
+    np.testing.assert_allclose(one_speed, 0.5)
+
+
+def noise_of_a_drive(growth, seed):
+    """Return how likely growth is in 40 s of a drive whose whitened increments are drawn under noise that grows."""
+    made = drive([0.2, 0.0, 0.7, 0.4, -0.3, 0.0, 0.1, 0.6] * 10, [0.3, 0.0, -0.5, 0.0, 0.4, 0.7, 0.0, -0.2] * 10)
+    made = made.seen_at(made.times, replay.path(made, MODEL, ()))
+    truth = Noise(**{**vars(NOISE), "growth": growth})
+    size = 3 * (len(made.times) - 1)
+    inverse = whitener(made, truth).whiten(np.eye(size))
+    left = np.linalg.solve(inverse, np.random.default_rng(seed).standard_normal(size)).reshape(-1, 3)
+    scatter = Scatter([made], [left], [np.empty((size, 0))], (NOISE.position_sd, NOISE.heading_sd))
+    return scatter.growth(scatter.estimate(NOISE), 0.02)
+
+
+def test_how_much_noise_grows_is_found_from_noise_that_does_not():
+    found = noise_of_a_drive(3.0, 1)
+    assert found.p > 0.99
+    assert 1.5 < found.noise.growth < 6.0
+    assert noise_of_a_drive(0.0, 1).p < 0.1
+
+
+@pytest.fixture(scope="module")
+def understeering():
+    """Return a problem of chairs that understeer, without noise, the fit of that, and of nothing."""
+    effect = EffectSetting("base.understeer", {"k": 0.5})
+    drives = []
+    for seed in range(2):
+        run = hidden_effect.make_run(None, 0.0, seed, 40.0, hidden_effect.USUAL)
+        made = prepare(recording_of("made", [run]).runs[0], MODEL)
+        drives.append(made.seen_at(made.times, replay.path(made, MODEL, [effect])))
+    problem = Problem(drives, MODEL, NOISE, ids=frozenset({"base.understeer"}))
+    return problem, problem.fit(["base.understeer"], {}), problem.fit([], {})
+
+
+@pytest.mark.parametrize(("channel", "covariate", "drawn"), [("w_gain", "abs_v", True), ("v_gain", "time", False)])
+def test_a_curve_speaks_for_the_effect_that_it_draws(understeering, channel, covariate, drawn):
+    problem, best, nothing = understeering
+    design = Design(problem, ())
+    (curve,) = (c for c in design.curves if (c.channel, c.basis.covariate) == (channel, covariate))
+    belief = Belief(0.0, 0.04 * np.eye(curve.basis.size))
+    found = Likeness(problem, best, design).drawn(nothing, curve, belief)
+    assert set(found) == ({"base.understeer"} if drawn else set())
+    if drawn:  # the larger the effect, the more its equation may be off
+        assert 3.0 < found["base.understeer"] < 0.05 * best.log_likelihood - 0.05 * nothing.log_likelihood
+        assert Likeness(problem, best, design).drawn(best, curve, belief) == {}
+
+
+def fit_of(names, score):
+    return SimpleNamespace(ids=frozenset(names.split()), candidates=frozenset(names.split()), score=score)
+
+
+def found_of(p, *fits):
+    return Naming((*fits, fit_of("", 0.0)), p, (), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("p_effect", "p_curve", "p_nothing", "said"),
+    [(0.55, 0.44, 0.01, True), (0.95, 0.04, 0.01, False), (0.5, 0.2, 0.3, False), (0.55, 0.1, 0.0, False)],
+)
+def test_an_effect_or_a_curve_for_sure_is_not_nothing(p_effect, p_curve, p_nothing, said):
+    found = found_of({"a": p_effect}, fit_of("a", 40.0))
+    rivalry = Rivalry((SimpleNamespace(),), 0.0, {"smooth.w.v": p_curve}, {"a": p_effect}, p_nothing)
+    assert undecided(found, rivalry) is said
+
+
+def gain(value):
+    density = LogDensityGain(1.0, 1.0 + value, value, value - 0.05, value + 0.05)
+    return Gain(density)
+
+
+def decision(p, *fits):
+    nothing = Beyond(Rivalry((), -np.inf, {}, p, 0.0), None, 1.0)
+    return Decision(SimpleNamespace(), found_of(p, *fits), Growth(0.0, 0.0, NOISE), nothing)
+
+
+def test_an_uncertain_effect_that_held_out_data_refuse_is_left_out():
+    made = decision({"a": 1.0, "b": 0.7}, fit_of("a b", 50.0), fit_of("a c", 49.5), fit_of("a", 49.0))
+    other, worth = pruned(made, gain(-0.1), lambda one: gain(0.2 if one.found.best.ids == {"a"} else -0.1))
+    assert other.found.best.ids == {"a"}
+    assert worth == gain(0.2)
+
+
+def test_what_is_certain_or_confirmed_is_kept():
+    certain = decision({"a": 1.0, "b": 0.95}, fit_of("a b", 50.0), fit_of("a", 45.0))
+    assert pruned(certain, gain(-0.1), lambda _: gain(0.2)) == (certain, gain(-0.1))
+    confirmed = decision({"a": 1.0, "b": 0.7}, fit_of("a b", 50.0), fit_of("a", 49.0))
+    assert pruned(confirmed, gain(0.2), lambda _: gain(0.3)) == (confirmed, gain(0.2))
+
+
+@pytest.mark.parametrize("seed", [2, 17])
+def test_another_steering_law_is_neither_a_unit_nor_a_sign(seed):
+    """By the other law of V_s the chair hardly turns, and more like the volts' steps than like the rates asked for."""
+    case = make(Ask("single", ("base.steering_law",), form="other", family="base"), seed)
+    assert sanity.examine(case.recording, MODEL).invalid == []
+
+
+def test_another_form_is_tried_without_what_stood_in_for_it():
+    """From a wrong form beside a needless effect to the right form alone: neither step alone is better."""
+    zero, other = (Candidate("zero", (Term("zero", OFFSET, 0.0, rough=rough),), 2.0) for rough in (False, True))
+    needless = Candidate("needless", (Term("needless", OFFSET, 0.0),), 1.0)
+    problem = SimpleNamespace(candidates=(zero, other, needless))
+    screen = SimpleNamespace(fixed=(), related=lambda *_: True, mends=lambda *_: True)
+    fit = SimpleNamespace(candidates=frozenset({zero, needless}), ids=frozenset({"zero", "needless"}), start={})
+    assert frozenset({other}) in {chosen for chosen, _ in naming._neighbours(problem, screen, fit)}
