@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""MRPT's own programs on our files: rbpf-slam, pf-localization on our rawlog and simplemap, rosbag2rawlog on our bag."""
+"""MRPT's own programs: rbpf-slam and pf-localization on our rawlog and simplemap, rosbag2rawlog on our bag."""
 
 import re
 import shutil
