@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The localiser in a room whose scans are computed here, and everything that may go wrong around it.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <ctime>
 #include <functional>
 #include <map>
 #include <stdexcept>
@@ -333,7 +335,15 @@ TEST(LocalizerFaults, AMapOf10000By10000Cells) {
                 grid.cells.begin() + static_cast<long>(y + 6000) * kEdge + 4000);
   }
   const k::Pose2D map_from_grid{room::kMapFromGrid.x - 200, room::kMapFromGrid.y - 300, 0};
+  const std::clock_t begun = std::clock();
   k::Localizer subject(settings(), kChair, 1, grid, map_from_grid);
+  const double seconds = static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC;
+  RecordProperty("seconds", std::to_string(seconds));
+  EXPECT_LT(seconds, 15);  // of processor time, until it may begin
+  rusage used{};
+  ASSERT_EQ(getrusage(RUSAGE_SELF, &used), 0);
+  RecordProperty("megabytes", std::to_string(used.ru_maxrss / 1024));
+  EXPECT_LT(used.ru_maxrss / 1024, 800);  // the map itself among them, 100 MB
   subject.forget();
   const auto moments = drive(subject, 0, 20);
   EXPECT_TRUE(sure(moments.back()));

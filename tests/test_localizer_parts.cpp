@@ -7,6 +7,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "slam/doubt.h"
 #include "slam/field.h"
 #include "slam/motion.h"
 #include "slam/pose.h"
@@ -145,6 +146,105 @@ TEST(Sensor, TellsHitsFromThingsInTheWayAndFromWallsThatWereCrossed) {
   EXPECT_GT(sensor.weigh(oneBeam(1.025F), pose), sensor.weigh(oneBeam(1.1F), pose));
   EXPECT_GT(sensor.weigh(oneBeam(1.1F), pose), sensor.weigh(oneBeam(0.5F), pose));
   EXPECT_EQ(sensor.weigh(oneBeam(0.5F), pose), 0);
+}
+
+TEST(Sensor, WhatHidesAWallCountsHalfAgainstTheFitAndWhatCrossesItDouble) {
+  k::Fit fit;
+  EXPECT_EQ(fit.share(), 0);
+  fit.hits = 6;
+  EXPECT_EQ(fit.share(), 1);
+  fit.shorts = 4;
+  EXPECT_DOUBLE_EQ(fit.share(), 6.0 / 8);
+  fit.through = 2;
+  EXPECT_DOUBLE_EQ(fit.share(), 6.0 / 12);
+}
+
+/// Only what doubt depends on.
+const k::RecoverySettings kRecovery = [] {
+  k::RecoverySettings settings{};
+  settings.alpha_slow = 0.002;
+  settings.alpha_fast = 0.15;
+  settings.lost_fit = 0.5;
+  settings.lost_drop = 0.88;
+  settings.found_fit = 0.93;
+  settings.found_way = 1.5;
+  return settings;
+}();
+
+/// Scans of one fit after minutes of another, until it is doubted; a hundred if never.
+int scansUntilDoubt(double usual, double now) {
+  k::Health health;
+  k::Doubt doubt(kRecovery);
+  for (int i = 0; i < 2000; ++i) {
+    health.take(usual, kRecovery);
+    if (doubt.judge(health, 0) != k::Doubt::Step::kNone) return 0;
+  }
+  for (int i = 1; i < 100; ++i) {
+    health.take(now, kRecovery);
+    if (doubt.judge(health, 0) == k::Doubt::Step::kWiden) return i;
+  }
+  return 100;
+}
+
+TEST(Doubt, BeginsWhenTheFitFallsBelowItsShareOfTheUsual) {
+  EXPECT_EQ(scansUntilDoubt(1, 0.89), 100);
+  EXPECT_EQ(scansUntilDoubt(0.8, 0.72), 100);  // of the usual, not of 1
+  EXPECT_LE(scansUntilDoubt(1, 0.80), 10);     // a second
+  EXPECT_LE(scansUntilDoubt(0.8, 0.6), 10);
+  EXPECT_LE(scansUntilDoubt(1, 0.2), 2);      // plainly elsewhere
+  EXPECT_EQ(scansUntilDoubt(0.45, 0.45), 0);  // bad as ever is bad, too
+}
+
+TEST(Doubt, ANewPoseHasAFewScansToSettle) {
+  k::Health health;
+  k::Doubt doubt(kRecovery);
+  for (int i = 0; i < 8; ++i) {
+    health.take(0.1, kRecovery);
+    EXPECT_EQ(doubt.judge(health, 0), k::Doubt::Step::kNone) << i;
+  }
+  health.take(0.1, kRecovery);
+  EXPECT_EQ(doubt.judge(health, 0), k::Doubt::Step::kWiden);
+  EXPECT_TRUE(doubt.standing());
+}
+
+/// A pose that fitted perfectly and is doubted now.
+struct Doubted {
+  Doubted() {
+    for (int i = 0; i < 2000; ++i) health.take(1, kRecovery);
+    while (doubt.judge(health, 0) != k::Doubt::Step::kWiden) health.take(0.7, kRecovery);
+  }
+  k::Doubt::Step after(double fit, double travelled, int scans) {
+    k::Doubt::Step step{};
+    for (int i = 0; i < scans && step != k::Doubt::Step::kSearch; ++i) {
+      health.take(fit, kRecovery);
+      step = doubt.judge(health, travelled);
+    }
+    return step;
+  }
+  k::Health health;
+  k::Doubt doubt{kRecovery};
+};
+
+TEST(Doubt, EndsWhenTheFitIsAsUsualAgainAndHasHeldForAWay) {
+  Doubted at_rest;
+  EXPECT_EQ(at_rest.after(1, 0, 100), k::Doubt::Step::kNone);
+  EXPECT_TRUE(at_rest.doubt.standing());  // at rest it proves nothing
+  Doubted driven;
+  EXPECT_EQ(driven.after(1, 1.6, 40), k::Doubt::Step::kNone);
+  EXPECT_FALSE(driven.doubt.standing());
+}
+
+TEST(Doubt, NineOfTenReadingsAreNotEnough) {
+  Doubted nearly;  // as from a wrong corridor
+  EXPECT_EQ(nearly.after(0.92, 1.6, 40), k::Doubt::Step::kNone);
+  EXPECT_TRUE(nearly.doubt.standing());
+  EXPECT_EQ(nearly.after(0.92, 4.6, 1), k::Doubt::Step::kSearch);
+}
+
+TEST(Doubt, LeadsToASearchWhenTheNeighbourhoodDoesNotFitEither) {
+  Doubted elsewhere;
+  EXPECT_EQ(elsewhere.after(0.7, 0, 7), k::Doubt::Step::kNone);
+  EXPECT_EQ(elsewhere.after(0.7, 0, 1), k::Doubt::Step::kSearch);
 }
 
 TEST(Sensor, AlignsToAWallAcrossIt) {

@@ -145,6 +145,51 @@ TEST(Faults, MostScansMayBeMissing) {
   EXPECT_LT(errorAt(last, at), 0.1);
 }
 
+TEST(Faults, MostReadingsMayBeMissing) {
+  k::Mapper mapper(room::settings(), 1);
+  std::mt19937 dice(5);
+  const auto out = drive(mapper, 0, 20, [&](Moment& moment) {
+    for (float& range : moment.scan.ranges) range = dice() % 5 == 0 ? range : std::nanf("");
+  });
+  EXPECT_LT(errorAt(out.back().map_from_base, 19.9), 0.25);
+}
+
+TEST(Faults, OdometryThatStandsStillIsMadeUpForByTheScans) {
+  k::Mapper mapper(room::settings(), 1);
+  const k::Pose2D rest = room::Wheels().at(0);
+  const auto out = drive(mapper, 0, 20, [&](Moment& moment) { moment.start = moment.end = rest; });
+  EXPECT_LT(errorAt(out.back().map_from_base, 19.9), 0.15);
+}
+
+/// Range [m] at which a ray meets somebody of 0.2 m radius, or infinity.
+double meets(const k::Pose2D& ray, double x, double y) {
+  const k::Pose2D seen = k::between(ray, {x, y, 0});
+  const double inside = 0.2 * 0.2 - seen.y * seen.y;
+  return seen.x > 0 && inside > 0 ? seen.x - std::sqrt(inside) : std::numeric_limits<double>::infinity();
+}
+
+TEST(Faults, PeopleAroundTheChairDoNotMoveIt) {
+  k::Mapper mapper(room::settings(), 1);
+  int hidden = 0;
+  const auto out = drive(mapper, 0, 20, [&](Moment& moment) {
+    const k::Pose2D laser = k::compose(room::truth(moment.t), room::kUrg.base_from_laser);
+    for (int i = 0; i < room::kBeams; ++i) {
+      const k::Pose2D ray{laser.x, laser.y,
+                          laser.theta + room::kUrg.angle_min + room::kUrg.angle_increment * i};
+      for (int person = 0; person < 5; ++person) {  // to and fro through the room, at a metre a second
+        const double along = 3.5 * std::sin(moment.t / 3.5 + person);
+        const double across = -3.0 + 1.1 * person;
+        const auto range = static_cast<float>(meets(ray, along, across));
+        if (!(range > 0.1F && range < moment.scan.ranges[i])) continue;
+        moment.scan.ranges[i] = range;
+        ++hidden;
+      }
+    }
+  });
+  EXPECT_GT(hidden, 0.1 * 200 * room::kBeams);
+  EXPECT_LT(errorAt(out.back().map_from_base, 19.9), 0.15);
+}
+
 TEST(Faults, WithoutReadingsThePoseGetsUncertainAndIsFoundAgain) {
   k::Mapper mapper(room::settings(), 1);
   const auto out = drive(mapper, 0, 12, [](Moment& moment) {

@@ -79,7 +79,8 @@ def record(bag: Path, *arguments: str, maps: Path | None = None) -> None:
 
 def replay(bags: Sequence[Path], out: Path, *arguments: str) -> None:
     """Replay them and record what the re-run base says beside what was recorded; arguments: of replay.launch."""
-    topics = ["/odom", "/recorded/odom", "/voltages", "/recorded/voltages", "/scan", "/tf", "/recorded/tf", "/map"]
+    again = ["/odom", "/voltages", "/tf", "/map", "/trajectory", "/particlecloud"]
+    topics = [*again, *(f"/recorded{topic}" for topic in again), "/scan"]
     with master() as environment, recording(out, *topics, environment=environment):
         command = ["roslaunch", "kurumaisu", "replay.launch", f"bag:={' '.join(map(str, bags))}", *arguments]
         subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
@@ -150,7 +151,7 @@ def alike(one: Path, other: Path) -> tuple[float, float]:
 def test_odometry_again_is_the_same_to_the_last_bit_and_so_is_nearly_the_map(tmp_path):
     """Through live topics and a recorded clock, from a bag that was split."""
     live, out = tmp_path / "live.bag", tmp_path / "again.bag"
-    record(tmp_path / "drive.bag", "split:=4", maps=live)
+    record(tmp_path / "drive.bag", "split:=4", "others:=map trajectory particlecloud", maps=live)
     parts = sorted(tmp_path.glob("drive_*.bag"))
     assert len(parts) > 1
     with rosbag.Bag(parts[0]) as first:
@@ -161,6 +162,9 @@ def test_odometry_again_is_the_same_to_the_last_bit_and_so_is_nearly_the_map(tmp
     replay(parts, out, "base:=reckoned", "slam:=true")
     with rosbag.Bag(out) as both:
         then, now = bits(both, "/recorded/odom"), bits(both, "/odom")
+        for topic in ("/map", "/trajectory", "/particlecloud"):  # what mapped then is out of the way of what maps now
+            assert both.get_message_count(f"/recorded{topic}") > 0, topic
+            assert both.get_message_count(topic) > 0, topic
     assert len(now) > 200
     assert {stamp: pose for stamp, pose in then.items() if stamp in now} == now
     assert max(abs(pose[0]) for pose in now.values()) > 0.5  # it has driven

@@ -118,6 +118,15 @@ TEST(Deskew, WithoutMotionKeepsEveryReading) {
   EXPECT_EQ(got.ranges[4], kInf);  // beyond range_max
 }
 
+TEST(Deskew, WithoutMotionNoFanLosesARay) {
+  for (int trial = 0; trial < 200; ++trial) {
+    const double increment = 0.006 + 1.7e-6 * trial;
+    k::Scan scan{
+        0, {-340 * increment, increment, 0, 5.6, {0.3, 0.05, 0.1 * trial}}, std::vector<float>(682, 2.0F)};
+    for (const float range : k::deskew(scan, {0, 0, 0}).ranges) ASSERT_NEAR(range, 2.0, 1e-5) << trial;
+  }
+}
+
 TEST(Mapper, FollowsTheChairThroughBadOdometry) {
   const Drive out = drive(1, 40);
   double worst = 0;

@@ -49,6 +49,14 @@ class Mapper:
         self, path: str, settings: Mapping[str, float], pose: Sequence[float], deviations: Sequence[float]
     ) -> None: ...
 
+def write_rawlog(
+    path: str,
+    times: FloatArray,
+    odom: FloatArray,
+    odom_end: FloatArray,
+    ranges: NDArray[np.float32],
+    fan: Fan,
+) -> None: ...
 def read_rawlog(path: str) -> tuple[FloatArray, FloatArray, NDArray[np.float32], Fan]: ...
 
 class Estimate(TypedDict):

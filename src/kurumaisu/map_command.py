@@ -41,12 +41,17 @@ def main(arguments: list[str] | None = None) -> int:
         metavar=("DISTANCE", "ANGLE"),
         help="how well that is known: deviations, 1 m and 0.5 rad at most (0.3 0.2)",
     )
+    parser.add_argument(
+        "--rawlog", type=Path, metavar="FILE", help="write the scans and odometry as MRPT's rawlog, too"
+    )
     options = parser.parse_args(arguments)
     try:
         if not 0 <= options.seed < 2**32:
             raise Error(f"--seed: must be 0 to 4294967295: {options.seed}")
         settings = slam.load_mapping_settings(options.settings or shipped("launch/mapping_node.yaml"))
         log, truth = read_log(options.log)
+        if options.rawlog is not None:
+            slam.write_rawlog(log, options.rawlog)
         distance, angle = options.within
         start = None
         if options.start is not None:

@@ -117,6 +117,17 @@ def read_rawlog(path: Path) -> ScanLog:
     return ScanLog(path.name, times, ranges, odom, odom, fan)
 
 
+def write_rawlog(log: ScanLog, path: Path) -> None:
+    """Write a log for MRPT's own programs. Raise Error naming the file.
+
+    Rawlogs cannot say when a beam was taken, so each scan is moved to where it would have been taken at once.
+    """
+    try:
+        _slam.write_rawlog(str(path), log.times, log.odom, log.odom_end, log.ranges, log.fan)
+    except RuntimeError as error:
+        raise Error(str(error)) from error
+
+
 def map_scans(
     mapper_settings: MapperSettings,
     log: ScanLog,

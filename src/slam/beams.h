@@ -2,6 +2,7 @@
 // The readings of a scan that a localiser weighs.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct Beams {
   std::size_t asked = 0;    ///< beams looked at, with those that met nothing
   double independence = 1;  ///< share of them that count as independent of their neighbours
 };
+
+constexpr std::size_t kLeastReadings = 8;  ///< fewer say nothing of how well they fit
 
 constexpr int kGrades = 8;
 

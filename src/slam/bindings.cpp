@@ -10,6 +10,7 @@
 
 #include "slam/localizer_bindings.h"
 #include "slam/mapper.h"
+#include "slam/pose.h"
 #include "slam/rawlog.h"
 
 namespace py = pybind11;
@@ -105,6 +106,23 @@ py::tuple readRawlog(const std::string& path) {
   return py::make_tuple(py::array_t<double>(n, log.times.data()), odom, ranges, log.fan);
 }
 
+void writeRawlog(const std::string& path, const std::vector<double>& times, const py::array_t<double>& odom,
+                 const py::array_t<double>& ends, const py::array_t<float, py::array::c_style>& ranges,
+                 const k::Fan& fan) {
+  k::LaserLog log{fan, static_cast<std::size_t>(ranges.shape(1)), times, {}, {}};
+  log.fan.time_increment = 0;
+  const auto at = odom.unchecked<2>();
+  const auto end = ends.unchecked<2>();
+  for (py::ssize_t i = 0; i < at.shape(0); ++i) {
+    const k::Pose2D start{at(i, 0), at(i, 1), at(i, 2)};
+    const k::Scan scan{
+        times[static_cast<std::size_t>(i)], fan, {ranges.data(i, 0), ranges.data(i, 0) + log.beams}};
+    log.odom.push_back(start);
+    log.ranges.push_back(k::deskew(scan, k::between(start, {end(i, 0), end(i, 1), end(i, 2)})).ranges);
+  }
+  k::writeRawlog(path, log);
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_slam, m) {
@@ -165,6 +183,12 @@ PYBIND11_MODULE(_slam, m) {
         "Times (n,) [s], odom_from_base (n, 3) at the scans, ranges (n, beams) [m], the fan. Raise "
         "RuntimeError "
         "naming the file and what is wrong.");
+
+  m.def("write_rawlog", &writeRawlog, py::arg("path"), py::arg("times"), py::arg("odom"), py::arg("odom_end"),
+        py::arg("ranges"), py::arg("fan"),
+        "Write what read_rawlog() reads, each scan as if taken at its first beam. odom, odom_end: "
+        "odom_from_base (n, 3) "
+        "at the first and at the last beam. Raise RuntimeError naming the file.");
 
   k::bindLocalizer(m);
 }

@@ -7,24 +7,20 @@
 #include <stdexcept>
 #include <string>
 
+#include "slam/doubt.h"
+#include "slam/finder.h"
 #include "slam/places.h"
 #include "slam/pose.h"
-#include "slam/search.h"
+#include "slam/vague.h"
 
 namespace kurumaisu {
 namespace {
 
-constexpr int kLeastReadings = 8;     // fewer say nothing of how well they fit
 constexpr int kRounds = 4;            // of the last alignment
-constexpr int kPatience = 8;          // scans before a new pose is doubted
 constexpr double kNearby = 0.3;       // [m] around a doubted pose is searched first
 constexpr double kNearbyTurn = 0.15;  // [rad]
 constexpr double kSearchAgain = 3;    // times found_way after which a search that led to nothing is repeated
-constexpr double kHeadStart = 5;  // log-odds of the place where the chair was believed to be, when doubted
-// A doubted pose is believed again when its fit is as usual but for this: from the wrong corridor nine of ten
-// readings are explained too. Else a search decides.
-constexpr double kLessThanUsual = 0.03;
-constexpr double kTurnPerWay = 0.5;  // [m/rad] a turn shows as much as so much way
+constexpr double kTurnPerWay = 0.5;   // [m/rad] a turn shows as much as so much way
 
 void check(const Scan& scan, const Odometry& start, const Pose2D& end, const std::optional<Odometry>& last) {
   validate(scan);
@@ -38,21 +34,6 @@ void check(const Scan& scan, const Odometry& start, const Pose2D& end, const std
   }
 }
 
-/// How well the map fits, lately and usually.
-struct Health {
-  double fast = 0, slow = 0;
-  int scans = 0;
-
-  void take(double fit, const RecoverySettings& settings) {
-    ++scans;
-    fast += std::fmax(settings.alpha_fast, 1.0 / scans) * (fit - fast);
-    slow += std::fmax(settings.alpha_slow, 1.0 / scans) * (fit - slow);
-  }
-  bool doubtful(const RecoverySettings& settings) const {
-    return scans > kPatience && (fast < settings.lost_fit || fast < settings.lost_drop * slow);
-  }
-};
-
 }  // namespace
 
 class Localizer::Impl {
@@ -61,14 +42,16 @@ class Localizer::Impl {
        const Pose2D& map_from_grid)
       : settings_(settings),
         process_(chair.process),
+        doubt_(settings_.recovery),
         field_(grid, map_from_grid, settings.reading.max_distance),
         sensor_(field_, settings_.reading, chair.laser),
         particles_(settings_, seed),
-        places_(sensor_, settings_.recovery) {}
+        places_(sensor_, settings_.recovery),
+        finder_(sensor_, settings_, process_) {}
 
   void setPose(const Gaussian& map_from_base) {
     settle(map_from_base);
-    doubted_for_ = 0;
+    doubt_.clear();
     health_ = {};
   }
 
@@ -103,8 +86,10 @@ class Localizer::Impl {
     }
     if (update) once_ = false;
     estimate.knowledge = told(estimate.map_from_base);
-    estimate.map_from_base.covariance.topLeftCorner<2, 2>() += ofMap() * Eigen::Matrix2d::Identity();
-    if (estimate.knowledge == Knowledge::kAmbiguous) blur(estimate.map_from_base.covariance);
+    estimate.map_from_base.covariance.topLeftCorner<2, 2>() += ofMap(field_) * Eigen::Matrix2d::Identity();
+    if (estimate.knowledge == Knowledge::kAmbiguous) {
+      blur(estimate.map_from_base.covariance, settings_.ambiguous_spread);
+    }
     estimate.fit = health_.fast;
     estimate.fit_usual = health_.slow;
     return estimate;
@@ -122,7 +107,7 @@ class Localizer::Impl {
   void start(Knowledge knowledge) {
     knowledge_ = knowledge;
     places_ = Places(sensor_, settings_.recovery);
-    search_.reset();
+    finder_.reset();
     travelled_ = 0;
     verified_ = false;
   }
@@ -140,7 +125,7 @@ class Localizer::Impl {
   Knowledge told(const Gaussian& pose) const {
     const double largest = std::sqrt(std::fmax(pose.covariance(0, 0), pose.covariance(1, 1)));
     const bool doubtful =
-        largest > settings_.ambiguous_spread || doubted_for_ > 0 || blind_ > settings_.recovery.found_way;
+        largest > settings_.ambiguous_spread || doubt_.standing() || blind_ > settings_.recovery.found_way;
     return doubtful && knowledge_ == Knowledge::kTracking ? Knowledge::kAmbiguous : knowledge_;
   }
 
@@ -162,23 +147,21 @@ class Localizer::Impl {
       setBase(estimate.map_from_base);
     }
     look(beams, estimate);
-    if (doubted_for_ > 0) ++doubted_for_;
-    const double way = doubted_for_ > 0 ? travelled_ / settings_.recovery.found_way : 0;
-    if (way >= 1 && health_.fast >= restored_) doubted_for_ = 0;
-    const bool unsettled = doubted_for_ > 0 && way >= kSearchAgain;
-    const bool doubtful = health_.doubtful(settings_.recovery);
-    if (unsettled || (doubtful && doubted_for_ > kPatience)) {
-      known_ = true;
-      start(Knowledge::kLost);
-      lose(beams, estimate);
-    } else if (doubtful && doubted_for_ == 0) {
-      widen(estimate.map_from_base);
+    switch (doubt_.judge(health_, travelled_)) {
+      case Doubt::Step::kNone:
+        return;
+      case Doubt::Step::kWiden:
+        return widen(estimate.map_from_base);
+      case Doubt::Step::kSearch:
+        known_ = true;
+        start(Knowledge::kLost);
+        return lose(beams, estimate);
     }
   }
 
   void look(const Beams& beams, const Estimate& estimate) {
     const Fit fit = sensor_.look(beams, estimate.map_from_base.mean);
-    if (fit.readings() >= kLeastReadings) health_.take(fit.share(), settings_.recovery);
+    if (fit.readings() >= static_cast<int>(kLeastReadings)) health_.take(fit.share(), settings_.recovery);
   }
 
   /// A doubted pose may be a little off only: that is tried first.
@@ -186,55 +169,37 @@ class Localizer::Impl {
     pose.covariance.diagonal() +=
         Eigen::Vector3d(kNearby * kNearby, kNearby * kNearby, kNearbyTurn * kNearbyTurn);
     settle(pose);
-    doubted_for_ = 1;
-    restored_ = std::fmax(settings_.recovery.found_fit, health_.slow - kLessThanUsual);
-  }
-
-  /// Goes on with the search for the places of one scan; when done, they are moved to where they would be by now.
-  std::optional<Places> search(const Beams& beams, const Pose2D* doubted) {
-    if (!search_) {
-      if (beams.beams.size() < kLeastReadings) return std::nullopt;
-      search_.emplace(sensor_, settings_.recovery, beams);
-      searched_ = beams;
-      searched_from_ = *last_;
-      if (doubted != nullptr) doubted_ = *doubted;
-    }
-    if (!search_->step()) return std::nullopt;
-    Places found(sensor_, settings_.recovery);
-    found.add(search_->poses(), searched_, 0);
-    if (doubted != nullptr) found.add({doubted_}, searched_, kHeadStart);
-    search_.reset();
-    found.update(motionBetween(searched_from_, *last_, settings_.motion, process_), beams);
-    return found;
   }
 
   void lose(const Beams& beams, Estimate& estimate) {
-    const Pose2D doubted = estimate.map_from_base.mean;
-    estimate.map_from_base.covariance = anywhere();
-    const auto found = search(beams, known_ ? &doubted : nullptr);
-    estimate.searched = search_ ? search_->progress() : 1;
+    estimate.map_from_base.covariance = anywhere(field_);
+    const auto doubted = known_ ? std::optional<Pose2D>(estimate.map_from_base.mean) : std::nullopt;
+    const auto found = finder_.step(beams, *last_, doubted);
+    estimate.searched = finder_.progress();
     if (!found || found->empty()) return;
     places_ = *found;
     knowledge_ = Knowledge::kAmbiguous;
     health_ = {};
     estimate.updated = true;
     show(estimate);
-    mix(estimate);
+    estimate.map_from_base.covariance += around(pose_.mean, places_.all());
   }
 
   void follow(const Beams& beams, const Gaussian& motion, bool update, Estimate& estimate) {
-    if (update || search_) {
+    if (update || finder_.busy()) {
       places_.update(motion, beams);
       show(estimate);
     }
-    if (search_ || travelled_ >= kSearchAgain * settings_.recovery.found_way) searchAgain(beams);
+    if (finder_.busy() || travelled_ >= kSearchAgain * settings_.recovery.found_way) searchAgain(beams);
     look(beams, estimate);
     decide(estimate);
-    if (knowledge_ == Knowledge::kAmbiguous) mix(estimate);
+    if (knowledge_ == Knowledge::kAmbiguous) {
+      estimate.map_from_base.covariance += around(pose_.mean, places_.all());
+    }
   }
 
   void searchAgain(const Beams& beams) {
-    const auto found = search(beams, nullptr);
+    const auto found = finder_.step(beams, *last_, std::nullopt);
     if (!found) return;
     places_.merge(*found);
     verified_ = true;
@@ -247,33 +212,14 @@ class Localizer::Impl {
     estimate.particles = static_cast<int>(places_.size());
   }
 
-  /// Variance of a wall's place in its cell [m^2]. All readings of a wall share it, now and later, so that no
-  /// filter averages it out.
-  double ofMap() const { return field_.resolution() * field_.resolution() / 12; }
-
-  /// Never so narrow that it looks certain.
-  void blur(Eigen::Matrix3d& covariance) const {
-    const double least = settings_.ambiguous_spread * settings_.ambiguous_spread;
-    for (int i = 0; i < 2; ++i) covariance(i, i) = std::fmax(covariance(i, i), least);
-  }
-
-  /// Around the likeliest, as wide as the others are away from it.
-  void mix(Estimate& estimate) const {
-    for (const auto& [pose, weight] : places_.all()) {
-      const Eigen::Vector3d off(pose.x - pose_.mean.x, pose.y - pose_.mean.y,
-                                wrapAngle(pose.theta - pose_.mean.theta));
-      estimate.map_from_base.covariance += weight * off * off.transpose();
-    }
-  }
-
   /// One place is taken when it has held against all others over some way, those of a second search among them.
   void decide(Estimate& estimate) {
     const auto& s = settings_.recovery;
-    if (search_ || travelled_ < s.found_way) return;
+    if (finder_.busy() || travelled_ < s.found_way) return;
     if (health_.doubtful(s)) {
       known_ = false;
       start(Knowledge::kLost);
-      estimate.map_from_base.covariance = anywhere();
+      estimate.map_from_base.covariance = anywhere(field_);
     } else if (places_.odds() >= s.found_odds && places_.bestFit() >= s.found_fit) {
       if (!verified_) {
         travelled_ = kSearchAgain * s.found_way;  // now
@@ -286,36 +232,24 @@ class Localizer::Impl {
     }
   }
 
-  /// The whole map, any heading.
-  Eigen::Matrix3d anywhere() const {
-    Eigen::Matrix3d out = Eigen::Matrix3d::Zero();
-    const double edge = field_.resolution() * std::hypot(field_.width(), field_.height());
-    out.diagonal() << edge * edge / 12, edge * edge / 12, M_PI * M_PI / 3;
-    return out;
-  }
-
   LocalizerSettings settings_;
   RateNoise process_;
+  Health health_;
+  Doubt doubt_;
   Field field_;
   Sensor sensor_;
   Particles particles_;
   Places places_;
+  Finder finder_;
   Knowledge knowledge_ = Knowledge::kLost;
   Gaussian pose_{{0, 0, 0}, Eigen::Matrix3d::Zero()};  ///< at at_
   std::optional<Odometry> at_;                         ///< of the last update
   std::optional<Odometry> last_;                       ///< of the last scan
-  std::optional<Search> search_;
-  Beams searched_{};
-  Odometry searched_from_{};
-  Pose2D doubted_{0, 0, 0};
-  bool known_ = false;     ///< there was a pose before the search
+  bool known_ = false;                                 ///< there was a pose before the search
   bool verified_ = false;  ///< the places have held against those of a second search
-  double restored_ = 1;    ///< fit from which a doubted pose is believed again
-  int doubted_for_ = 0;    ///< scans since the pose was first doubted; 0 = it is not
   bool once_ = false;
   double blind_ = 0;      ///< driven since a scan had readings [m]
   double travelled_ = 0;  ///< since all places were in question [m]
-  Health health_;
 };
 
 Localizer::Localizer(const LocalizerSettings& settings, const Chair& chair, std::uint32_t seed,

@@ -23,4 +23,8 @@ struct LaserLog {
 /// Throws std::runtime_error that names the file and what is wrong with it.
 LaserLog readRawlog(const std::string& path);
 
+/// Writes pairs of actions and sensory frames, as MRPT's own programs read them. What beams moved during a scan should
+/// have been taken out before: rawlogs cannot say it. Throws std::runtime_error naming the file.
+void writeRawlog(const std::string& path, const LaserLog& log);
+
 }  // namespace kurumaisu

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "slam/scan.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -16,6 +17,7 @@ constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 // Neighbouring readings this close to each other [share of the range] lie on one surface and may be
 // interpolated. A wall seen at 80 degrees from its normal changes by 3.5 % from beam to beam of 0.35 degrees.
 constexpr double kSameSurface = 0.05;
+constexpr double kRounding = 1e-6;  // [beams] a reading so near to a ray is on it
 
 /// A reading moved to the time of beam 0: bearing in beams from beam 0, range [m].
 struct Moved {
@@ -45,9 +47,11 @@ void setNearest(std::vector<float>& ranges, const Moved& reading) {
 void setBetween(std::vector<float>& ranges, const Moved& a, const Moved& b) {
   const Moved& first = a.beam < b.beam ? a : b;
   const Moved& last = a.beam < b.beam ? b : a;
-  const int end = static_cast<int>(std::fmin(std::floor(last.beam), static_cast<double>(ranges.size()) - 1));
-  for (int ray = static_cast<int>(std::fmax(0.0, std::ceil(first.beam))); ray <= end; ++ray) {
-    const double part = last.beam > first.beam ? (ray - first.beam) / (last.beam - first.beam) : 0.0;
+  const int end =
+      static_cast<int>(std::fmin(std::floor(last.beam + kRounding), static_cast<double>(ranges.size()) - 1));
+  for (int ray = static_cast<int>(std::fmax(0.0, std::ceil(first.beam - kRounding))); ray <= end; ++ray) {
+    const double part =
+        last.beam > first.beam ? std::clamp((ray - first.beam) / (last.beam - first.beam), 0.0, 1.0) : 0.0;
     const double range = 1.0 / ((1 - part) / first.range + part / last.range);
     if (!(ranges[ray] <= range)) ranges[ray] = static_cast<float>(range);
   }

@@ -10,8 +10,11 @@
 namespace kurumaisu {
 namespace {
 
-constexpr double kHit = 3;         // deviations up to which a reading belongs to a wall
-constexpr float kInTheWay = 0.5F;  // share that a reading before a wall counts against the fit
+constexpr double kHit = 3;  // deviations up to which a reading belongs to a wall
+// What counts against the fit, and how much. Whoever passes by hides walls; nobody makes one transparent, so that tells
+// most of a place that only looks alike.
+constexpr double kInTheWay = 0.5;
+constexpr double kThroughWall = 2;
 constexpr double kImpossible =
     0.1;  // likelihood of a reading through a wall, as a share of one from anywhere
 constexpr double kConverged = 1e-4;  // [m, rad] a step this small is the last
@@ -35,7 +38,7 @@ struct Cells {
 }  // namespace
 
 double Fit::share() const {
-  const double against = static_cast<double>(through) + static_cast<double>(kInTheWay) * shorts;
+  const double against = kThroughWall * through + kInTheWay * shorts;
   return hits > 0 ? hits / (hits + against) : 0.0;
 }
 

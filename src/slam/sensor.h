@@ -19,7 +19,8 @@ struct Fit {
   double log_likelihood = 0;
 
   int readings() const { return hits + shorts + through; }
-  /// Share of readings that the map explains; something in the way counts half against it. 0 without readings.
+  /// Share of readings that the map explains; one in the way counts half against it, one through a wall double. 0
+  /// without readings.
   double share() const;
 };
 

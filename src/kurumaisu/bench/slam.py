@@ -20,7 +20,8 @@ from kurumaisu.bench.slam_fresh import drives, fresh
 from kurumaisu.bench.slam_localise_office import office_logs
 from kurumaisu.bench.slam_models import models
 from kurumaisu.bench.slam_peers import Peer
-from kurumaisu.bench.slam_real import real
+from kurumaisu.bench.slam_real import real, real_logs
+from kurumaisu.bench.slam_real_models import mapping_models
 from kurumaisu.bench.table import Table
 from kurumaisu.driving import Driver, load_route
 from kurumaisu.localization import load_localizer_settings
@@ -31,6 +32,7 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world import World, load_world
 
 _DRIVES, _LONG = 3, 300.0  # fresh drives and their time [s]
+_MODEL_SEEDS = 3  # of each variant of the models
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -50,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             told += _fresh(options)
         if options.only in (None, "real"):
             real(options.recordings, gmapping, folder, options.pictures)
+        if options.only in (None, "real", "models"):
+            _recorded_models(options)
     print()
     for line in told:
         print(line)
@@ -104,6 +108,13 @@ def _fresh(options: argparse.Namespace) -> list[str]:
         if options.only != "fresh":
             models(f"{name}, {_DRIVES} fresh drives: median (worst)", logs, grid, settings, error, process)
     return told
+
+
+def _recorded_models(options: argparse.Namespace) -> None:
+    seeds = min(options.seeds, _MODEL_SEEDS)
+    mapping_models([(log.name[-20:], log, None) for log in real_logs(options.recordings)], seeds)
+    if options.office is not None:
+        mapping_models(list(office_logs(options.office, options.mount)), seeds)
 
 
 def _building(seeds: int, seconds: float) -> None:
