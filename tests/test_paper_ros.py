@@ -98,7 +98,7 @@ def test_all_figures_are_repeated_and_one_that_fails_is_not_forgotten(monkeypatc
 
     monkeypatch.setattr(paper_parts, "drive", part("3-6", 1))
     monkeypatch.setattr(paper_parts.commands_wall, "figures_wall_of", part("7-9", 0))
-    monkeypatch.setattr(paper_parts.commands_wall, "conjecture", part("conjecture", 0))
+    monkeypatch.setattr(paper_parts.commands_wall, "asked", part("conjecture", 0))
     monkeypatch.setattr(paper_parts, "dac", part("10", 0))
     monkeypatch.setattr(paper_parts, "simulated_wall", part("11-12", 0))
     assert main(["all", "--out", str(tmp_path)]) == 1
