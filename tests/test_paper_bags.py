@@ -106,6 +106,11 @@ def test_the_map_is_made_of_it(bags, kind, tmp_path):
 
 @pytest.mark.parametrize("kind", ["simulator", "robot"])
 def test_the_critic_takes_it_and_finds_nothing_wrong_with_the_data(bags, kind, tmp_path):
-    assert cli.main([str(bags / kind / "test.bag"), "-o", str(tmp_path), "--quiet"]) in (0, 3, 4, 5)  # a verdict, not an error
+    assert cli.main([str(bags / kind / "test.bag"), "-o", str(tmp_path), "--quiet"]) in (
+        0,
+        3,
+        4,
+        5,
+    )  # a verdict, not an error
     verdict = (tmp_path / "verdict.json").read_text()
     assert '"invalid_data"' not in verdict

@@ -124,6 +124,21 @@ def test_what_is_recorded_is_packed_and_split_and_each_part_is_readable_alone(tm
     assert all(run.pose is not None and run.voltage is not None for run in runs)
 
 
+def test_nobody_there_is_told(tmp_path):
+    said = tmp_path / "said"
+    with (
+        master() as ros,
+        running([program("calibrate"), "record", str(tmp_path / "a.bag"), "--every", "0.5"], said, ros) as watcher,
+    ):
+        wait_for(lambda: "no voltages, or no poses on ground_truth or odom" in said.read_text())
+        watcher.send_signal(signal.SIGINT)
+        assert watcher.wait(PATIENCE) == 1
+    alone = {**os.environ, "ROS_MASTER_URI": "http://localhost:1"}
+    with running([program("calibrate"), "record", str(tmp_path / "b.bag")], said, alone) as watcher:
+        assert watcher.wait(PATIENCE) == 1
+    assert "no ROS master at http://localhost:1: start robot.launch" in said.read_text()
+
+
 def test_a_recorder_that_dies_is_no_drive_that_is_enough(tmp_path):
     bag = tmp_path / "drive.bag"
     with chair(tmp_path, str(bag)) as (watcher, said):

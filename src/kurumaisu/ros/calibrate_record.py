@@ -9,10 +9,12 @@ import time
 from pathlib import Path
 
 import numpy as np
+import rosgraph
 import rospy
 from nav_msgs.msg import Odometry
 
 from kurumaisu.critic.recording import Run, Series
+from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper import advice
 from kurumaisu.paper.options import Options
@@ -77,6 +79,8 @@ def _table(rows: list[tuple[float, ...]]) -> FloatArray:
 
 def record(bag: Path, options: Options, every: float, split: int) -> int:
     """Record until nothing is missing, or Ctrl-C; return 0, or 1 when something is. Raise Error as Recorder does."""
+    if not rosgraph.is_master_online():
+        raise Error(f"no ROS master at {rosgraph.get_master_uri()}: start robot.launch, or sim.launch, first")
     rospy.init_node("calibrate", anonymous=True, disable_signals=True)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
