@@ -12,6 +12,7 @@ from kurumaisu.bench import paper_scans
 from kurumaisu.critic import cli
 from kurumaisu.critic.reading import read_recording
 from kurumaisu.paper import drive
+from kurumaisu.paper.options import load_options
 from kurumaisu.ros import calibrate_command, paper_command
 
 AS_ITS_MODEL = (1.0, 1.0)
@@ -114,3 +115,14 @@ def test_the_critic_takes_it_and_finds_nothing_wrong_with_the_data(bags, kind, t
     )  # a verdict, not an error
     verdict = (tmp_path / "verdict.json").read_text()
     assert '"invalid_data"' not in verdict
+
+
+def test_without_a_reference_the_chairs_law_is_found_and_not_the_models():
+    """The odometry believes the model; a filter drawn to it would find the model's slopes."""
+    other = (0.85, 1.10)
+    recording = paper_scans.blind(paper_scans.recorded(other, 5))
+    options = load_options()
+    own, models = (paper_scans.judge(recording, factors, options) for factors in (other, AS_ITS_MODEL))
+    assert own.refused == 0
+    assert sum(own.held) >= 5  # of eight, each in 9 of 10; fewer than five once in 200
+    assert not any(models.held[0::2])  # slopes
