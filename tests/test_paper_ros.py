@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The paper's experiments through the chair's own programs, at small size: docs/paper.md has them in full."""
 
+import contextlib
 import os
 import signal
+import subprocess
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import rosbag
 
 from kurumaisu.bench.processes import master, program, running
+from kurumaisu.critic.reading import read_recording
 from kurumaisu.errors import Error
 from kurumaisu.paper import drive
 from kurumaisu.params import shipped
-from kurumaisu.ros import paper_parts, paper_run
+from kurumaisu.ros import paper_parts, paper_run, recorder
 from kurumaisu.ros.paper_command import main
 
 SPEEDS = (0.3, 0.9, -0.4)
@@ -80,6 +84,97 @@ def test_a_drive_is_watched_while_it_is_recorded(tmp_path):
         assert {"voltages", "ground_truth"} <= {name.lstrip("/") for name in topics}
 
 
+@contextlib.contextmanager
+def chair(tmp_path, *arguments):
+    """A chair that stands, on a master of its own; calibrate record beside it, and what it says."""
+    said = tmp_path / "said"
+    with (
+        master() as ros,
+        running(["roslaunch", "kurumaisu", "sim.launch"], tmp_path / "sim.log", ros),
+    ):
+        command = ["rostopic", "echo", "-n", "1", "--noarr", "/scan"]
+        subprocess.run(command, env=ros, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
+        with running([program("calibrate"), "record", *arguments, "--every", "0.5"], said, ros) as watcher:
+            yield watcher, said
+
+
+def wait_for(condition):
+    deadline = time.monotonic() + PATIENCE
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert condition()
+
+
+def test_what_is_recorded_is_packed_and_split_and_each_part_is_readable_alone(tmp_path):
+    bag = tmp_path / "drive.bag"
+    with chair(tmp_path, str(bag), "--split", "3") as (watcher, said):
+        wait_for((tmp_path / "drive_2.bag.active").exists)
+        watcher.send_signal(signal.SIGINT)
+        assert watcher.wait(PATIENCE) == 1
+    parts = sorted(tmp_path.glob("drive_*.bag"))
+    assert len(parts) >= 3
+    assert " ".join(map(str, parts)) in said.read_text()
+    assert "stretches of steady motion to this side, 8 are needed" in said.read_text()  # it stood
+    for part in parts[:-1]:  # the last had just begun
+        with rosbag.Bag(part) as recorded:
+            assert recorded.get_compression_info().compression == "lz4"
+            topics = {name.lstrip("/") for name in recorded.get_type_and_topic_info().topics}
+        assert {"voltages", "ground_truth", "scan", "tf_static"} <= topics
+    runs = [read_recording(part).runs[0] for part in parts[:-1]]
+    assert all(run.pose is not None and run.voltage is not None for run in runs)
+
+
+def test_nobody_there_is_told(tmp_path):
+    said = tmp_path / "said"
+    with (
+        master() as ros,
+        running([program("calibrate"), "record", str(tmp_path / "a.bag"), "--every", "0.5"], said, ros) as watcher,
+    ):
+        wait_for(lambda: "no voltages, or no poses on ground_truth or odom" in said.read_text())
+        watcher.send_signal(signal.SIGINT)
+        assert watcher.wait(PATIENCE) == 1
+    alone = {**os.environ, "ROS_MASTER_URI": "http://localhost:1"}
+    with running([program("calibrate"), "record", str(tmp_path / "b.bag")], said, alone) as watcher:
+        assert watcher.wait(PATIENCE) == 1
+    assert "no ROS master at http://localhost:1: start robot.launch" in said.read_text()
+
+
+def test_a_recorder_that_dies_is_no_drive_that_is_enough(tmp_path):
+    bag = tmp_path / "drive.bag"
+    with chair(tmp_path, str(bag)) as (watcher, said):
+        wait_for(lambda: "still missing" in said.read_text())
+        (writer,) = [
+            int(path.parent.name)
+            for path in Path("/proc").glob("[0-9]*/cmdline")
+            if str(bag).encode() in (line := path.read_bytes()) and line.split(b"\0")[0].endswith(b"/record")
+        ]
+        os.kill(writer, signal.SIGKILL)
+        assert watcher.wait(PATIENCE) == 1
+    assert "rosbag record ended by itself; what it wrote: rosbag reindex" in said.read_text()
+
+
+def test_a_full_disk_is_told_before_and_while_it_is_recorded(tmp_path, monkeypatch):
+    left = [5 * 2**30]
+    monkeypatch.setattr(recorder.shutil, "disk_usage", lambda _: SimpleNamespace(free=left[0]))
+    monkeypatch.setattr(recorder.Recorder, "_wait_until_heard", lambda *_: None)
+    monkeypatch.setattr(recorder.rospy, "resolve_name", lambda name: name)
+    with master() as ros:
+        for name, value in ros.items():
+            monkeypatch.setenv(name, value)
+        watched = recorder.Recorder(tmp_path / "a.bag", ["voltages"])
+        wait_for((tmp_path / "a.bag.active").exists)
+        watched.check()
+        left[0] = 2**29
+        with pytest.raises(Error, match=r"0\.50 GiB are free: below 1 GiB rosbag record writes nothing"):
+            watched.check()
+        watched.close()
+        assert watched.bags == [tmp_path / "a.bag"]
+        with pytest.raises(Error, match="GiB are free"):
+            recorder.Recorder(tmp_path / "b.bag", ["voltages"])
+    with pytest.raises(Error, match=r"a\.bag: is there already"):
+        recorder.Recorder(tmp_path / "a.bag", ["voltages"])
+
+
 def test_programs_are_where_rosrun_looks():
     for name in ("paper", "calibrate"):
         assert os.access(program(name), os.X_OK)
@@ -98,7 +193,7 @@ def test_all_figures_are_repeated_and_one_that_fails_is_not_forgotten(monkeypatc
 
     monkeypatch.setattr(paper_parts, "drive", part("3-6", 1))
     monkeypatch.setattr(paper_parts.commands_wall, "figures_wall_of", part("7-9", 0))
-    monkeypatch.setattr(paper_parts.commands_wall, "conjecture", part("conjecture", 0))
+    monkeypatch.setattr(paper_parts.commands_wall, "asked", part("conjecture", 0))
     monkeypatch.setattr(paper_parts, "dac", part("10", 0))
     monkeypatch.setattr(paper_parts, "simulated_wall", part("11-12", 0))
     assert main(["all", "--out", str(tmp_path)]) == 1

@@ -38,6 +38,32 @@ def test_a_twist_without_a_stamp_counts_when_received(tmp_path):
     assert_same(run, read_recording(tmp_path).runs[0], atol=1e-12)
 
 
+def test_twists_received_in_one_tick_are_no_copies_and_the_last_of_them_holds(tmp_path):
+    """A clock of 0.1 s, as that of a simulation at speed: three at a time, some with the same content."""
+    bag = Bag(tmp_path / "drive.bag")
+    asked = [(0.0, 0.0), (0.1, 0.0), (0.3, 0.1), (0.3, 0.1), (0.3, 0.1), (0.3, 0.1), (0.5, 0.0), (0.4, 0.0), (0.2, 0.0)]
+    for n, command in enumerate(asked):
+        bag.write("/cmd_vel", bag.twist(*command), 1.0 + 0.1 * (n // 3))
+        bag.write("/odom", bag.odometry(1.0 + 0.03 * n, (0.01 * n, 0.0, 0.0), 0.3, 0.0), 1.0 + 0.03 * n)
+    bag.writer.close()
+    recording = read_recording(tmp_path / "drive.bag")
+    assert recording.invalid == ()
+    (told,) = (words for words in recording.problems if "cmd_vel" in words)
+    assert "6 messages were received in one tick of the clock with a later one: the last of each tick holds" in told
+    command = recording.runs[0].command
+    np.testing.assert_allclose(command.t, [1.0, 1.1, 1.2])
+    np.testing.assert_array_equal(command.values, [asked[2], asked[5], asked[8]])
+
+
+def test_stamped_rows_that_repeat_are_copies_as_before(tmp_path):
+    bag = Bag(tmp_path / "drive.bag")
+    for n in range(30):
+        bag.write("/cmd_vel", bag.twist_stamped(1.0 + n // 3, 0.1 * (n // 3), 0.0), 1.0 + 0.3 * n)
+        bag.write("/odom", bag.odometry(1.0 + 0.3 * n, (0.1 * n, 0.0, 0.0), 0.3, 0.0), 1.0 + 0.3 * n)
+    bag.writer.close()
+    assert any("repeats its rows" in words for words in read_recording(tmp_path / "drive.bag").invalid)
+
+
 def test_topics_recorded_by_relative_names_count_too(tmp_path):
     """As `rosbag record scan odom` writes them."""
     run = full_run()

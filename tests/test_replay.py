@@ -15,6 +15,7 @@ from kurumaisu.bench.processes import master, running
 
 PATIENCE = 60.0  # [s] of wall time for a process to end
 TICK = 0.02  # [s] of base_node
+CLOCK = 0.005  # [s] between messages of replay.launch's clock
 DRIVES = (("0.5", "0.4"), ("-0.2", "0.5"))  # v [m/s], w [rad/s]
 
 
@@ -69,7 +70,7 @@ def record(bag: Path, *arguments: str, maps: Path | None = None) -> None:
                     subprocess.run(
                         ["rostopic", "pub", "-r", "20", "/cmd_vel", "geometry_msgs/Twist", twist],
                         env=environment,
-                        timeout=3.0,
+                        timeout=6.0,  # of which starting it may take some
                         stdout=subprocess.DEVNULL,
                         check=True,
                     )
@@ -95,6 +96,13 @@ def poses(bag: rosbag.Bag, topic: str) -> np.ndarray:
     return np.array(rows)
 
 
+def reached(bag: rosbag.Bag, topic: str) -> np.ndarray:
+    """Return when the speed that was put out passed half of each that was commanded, going and coming (4,) [s]."""
+    rows = np.array([(m.header.stamp.to_sec(), m.v) for _, m, _ in bag.read_messages(topic)])
+    beyond = [(rows[:, 1] / float(v) > 0.5).astype(int) for v, _ in DRIVES]
+    return np.concatenate([rows[1:, 0][np.diff(flags) != 0] for flags in beyond])
+
+
 def test_the_base_run_again_goes_where_it_went(tmp_path):
     bag, out = tmp_path / "drive.bag", tmp_path / "again.bag"
     record(bag)
@@ -109,6 +117,12 @@ def test_the_base_run_again_goes_where_it_went(tmp_path):
         frames = {t.child_frame_id for _, m, _ in both.read_messages("/tf") for t in m.transforms}
     assert frames == {"base_link"}  # of the base that runs now; the recorded tf is out of the way
     assert np.hypot(*np.diff(then[:, 1:3], axis=0).T).sum() > 1.0  # it has driven
+    with rosbag.Bag(out) as both:
+        changes = [reached(both, topic) for topic in ("/recorded/voltages", "/voltages")]
+    # A tick and a step of the clock, docs/robot.md; and what a busy computer delivers later to the one than the other.
+    apart = np.abs(np.subtract(*changes))
+    assert np.median(apart) <= TICK + CLOCK + 1e-6
+    assert apart.max() < 0.15
     at = np.interp(then[-1, 0], now[:, 0], now[:, 1]), np.interp(then[-1, 0], now[:, 0], now[:, 2])
     # Each of two starts and two ends of commands may be taken a tick earlier or later.
     assert math.dist(at, then[-1, 1:3]) < 4 * 0.5 * TICK + 0.02

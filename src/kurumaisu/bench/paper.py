@@ -61,6 +61,8 @@ CASES = (
     Case("corrected (2)", steering=CORRECTED),
     Case("nobody tells signs", told=False),
     Case("slow noise", sd_v=0.02, sd_w=0.03, tau=2.0),
+    Case("slower noise, 6 s", sd_v=0.02, sd_w=0.03, tau=6.0),
+    Case("slowest noise, 20 s", sd_v=0.02, sd_w=0.03, tau=20.0),
     Case("poor reference, not told", pose_sd=0.02, known=False),
     Case("12 bits over 5 V", code=5 / 4095),
     Case("lag of 0.2 s", lag=0.2),

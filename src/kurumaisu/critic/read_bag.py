@@ -46,6 +46,7 @@ def read_bag_run(path: Path, topics: dict[str, str], faults: Faults) -> Run:
     for part in sorted(set(_parts(topics)) - set(found)):
         faults.add(f"{path.name}: there is no topic {wanted[part]}")
     _check_clocks(path.name, found, faults)
+    found = {part: _last_of_each_time(f"{path.name} {topic.name}", topic, faults) for part, topic in found.items()}
     series: dict[str, Series | None] = {}
     fan, covariates = None, {}
     for part, topic in found.items():
@@ -81,6 +82,26 @@ def _check_clocks(name: str, found: dict[str, Topic], faults: Faults) -> None:
     if clocks and max(clocks) - min(clocks) > CLOCK_TOLERANCE:
         told = ", ".join(f"{topic} {value:+.3g} s" for topic, value in stamped.items())
         faults.add(f"{name}: stamps come from different clocks; receipt minus stamp: {told}", fatal=True)
+
+
+def _last_of_each_time(where: str, topic: Topic, faults: Faults) -> Topic:
+    """Return a topic without stamps with one message for each time of receipt: the last, which holds from then on.
+
+    The clock of receipt has ticks, those of a simulation or of a replay coarse ones: what comes within one is no copy.
+    """
+    if any(topic.stamps):
+        return topic
+    received = np.array(topic.received)
+    keep = np.flatnonzero(np.r_[received[1:] != received[:-1], True])
+    dropped = len(received) - len(keep)
+    if not dropped:
+        return topic
+    are = "message was" if dropped == 1 else "messages were"
+    faults.add(
+        f"{where}: {dropped} {are} received in one tick of the clock with a later one: the last of each tick holds"
+    )
+    rows, stamps = [topic.rows[i] for i in keep], [topic.stamps[i] for i in keep]
+    return replace(topic, received=received[keep].tolist(), stamps=stamps, rows=rows)
 
 
 def _scan(where: str, topic: Topic, faults: Faults) -> tuple[Series | None, Fan | None]:

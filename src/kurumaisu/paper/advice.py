@@ -34,7 +34,8 @@ def plan(options: Options) -> list[str]:
         '  cd "$(rospack find kurumaisu)"',
         "  critic experiment identification --file launch/paper/identification.yaml --bag ~/train.bag",
         "  critic experiment held_out --file launch/paper/held_out.yaml --bag ~/test.bag",
-        "By hand, robot.launch's joystick, while `calibrate record train.bag` watches and says what is missing:",
+        "By hand, robot.launch's joystick, while `calibrate record train.bag` watches and says what is missing; then",
+        "  the same again as test.bag, by another way:",
         f"  hold the stick still for {hold:g} s and more, its voltages within {o.steady:g} V, then another position;",
         f"  at least {o.least_blocks} times each ahead, backwards, left and right, slow ones and fast ones;",
         "  do not turn the same way whenever you go fast: the two voltages must not go together.",
@@ -46,6 +47,9 @@ def plan(options: Options) -> list[str]:
         "  not in order; a bag each, named so that they sort as their distances are given:",
         "  rosbag record -O a.bag --duration 6 scan",
         "Then: calibrate laser a.bag b.bag c.bag d.bag e.bag --distances 1 0.2 4 0.5 2 --out DIR",
+        "Whether near walls are noisier by range or by incidence: the same bags in a folder with their poses and world",
+        "  (docs/recording.md), beams from straight ahead to 70 degrees, so no nearer than 0.2 m to a board of 1 m:",
+        "  paper conjecture DIR --distances 1 0.2 4 0.5 2 --out OUT",
     ]
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from kurumaisu._core import LaserError
 from kurumaisu.critic.recording import Recording
 from kurumaisu.errors import Error
-from kurumaisu.paper import bench_wall, drawing, figures_wall, laser_file, laser_law
+from kurumaisu.paper import bench_wall, conjecture, drawing, figures_wall, laser_file, laser_law
 from kurumaisu.paper.commands import read_all
 from kurumaisu.paper.laser_law import NAMES, Agreement, LaserLaw
 from kurumaisu.paper.options import Options, load_options
@@ -121,16 +121,33 @@ def figure_12(recordings: Sequence[Path], bench_model: Path, out: Path, settings
     return int(bool(wrong))
 
 
-def conjecture(model: Path, recordings: Sequence[Path], out: Path, seed: int, say: Callable[[str], None]) -> int:
-    """Ask the critic whether noise rises with range or with incidence: of recordings, or of data made either way."""
-    lines = []
+def asked(
+    model: Path,
+    recordings: Sequence[Path],
+    out: Path,
+    *,
+    distances: Sequence[float],
+    seed: int,
+    settings: Path | None,
+    say: Callable[[str], None],
+) -> int:
+    """Ask the critic whether noise rises with range or with incidence: of recordings, or of data made either way.
+
+    distances [m]: of the runs, in the order of their names; then the law of the beams straight ahead is found first.
+    """
+    options, lines = load_options(settings), []
     if recordings:
-        asked = frozenset({"laser.incidence_noise", "laser.range_noise"})
-        answer = lab.laser_answer(read_all(recordings), load_model(model), asked)
-        lines.append(f"range or incidence, by every beam: {answer.told()}")
+        whole, own = read_all(recordings), load_model(model)
+        if distances:
+            found = conjecture.answer(whole, distances, own, bench_wall.resolution(model), options)
+            words = "held against the law of the beams straight ahead"
+        else:
+            found = lab.laser_answer(whole, own, conjecture.ASKED)
+            words = f"held against the law of {model.name}; with --distances against that of the beams straight ahead"
+        lines.append(f"range or incidence, by every beam, {words}: {found.told()}")
         print(lines[-1])
     else:
-        for line in figure9.tell(seed):
+        for line in (*figure9.tell(seed), *conjecture.tell(seed, bench_wall.resolution(model), options)):
             print(line, flush=True)
             lines.append(line)
     drawing.write(out / "conjecture.txt", "\n".join(lines) + "\n")

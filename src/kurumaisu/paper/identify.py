@@ -18,8 +18,7 @@ from kurumaisu.paper.options import Options
 from kurumaisu.paper.samples import Samples, samples_of
 from kurumaisu.params import Model
 
-# What was commanded is not looked at: what the D/A put out counts. Twists have no stamps, and in a simulation that runs
-# faster than time several come at one moment of its clock, which the reader takes for copies.
+# What was commanded is not looked at: what the D/A put out counts.
 _COMMAND = ("cmd_vel", "experiment_vel", "command.csv")
 Progress = Callable[[str], None]
 

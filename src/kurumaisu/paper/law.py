@@ -3,18 +3,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import t as student
 
 from kurumaisu._core import AxisLaw, Branch
-from kurumaisu.paper import lines
+from kurumaisu.paper import colour, lines
 from kurumaisu.paper.options import Bootstrap, Options
 from kurumaisu.paper.samples import Samples
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 SIDES = {"positive": 1.0, "negative": -1.0}
+_ROUNDS = 2  # of telling motion from rest
+_MOVES = 0.5  # of the level of rest: the line tells motion from rest better than a sample does
+_FAR = 2.5  # standard deviations to which residuals are cut before their colour is looked at
 
 
 @dataclass(frozen=True)
@@ -123,22 +127,74 @@ def overlaps(law: AxisLaw) -> bool:
 
 def fit_axis(axis: Axis, samples: Samples, options: Options) -> AxisFit:
     """Return the law of an axis; each side is fitted, or refused, for itself."""
-    level = axis.rest_level(options)
     rng = np.random.default_rng(options.bootstrap.seed)
-    fits = [_fit_branch(axis, samples, _on_side(axis, samples, side, level), options, rng) for side in SIDES.values()]
+    sides = [_on_side(axis, samples, side, options) for side in SIDES.values()]
+    wider = _widening(axis, samples, sides, options)
+    fits = [_fit_branch(axis, samples, *side, options, rng) for side in zip(sides, wider, strict=True)]
     return AxisFit(axis.name, axis.unit, *fits)
 
 
-def _on_side(axis: Axis, samples: Samples, side: float, level: float) -> BoolArray:
+def _widening(axis: Axis, samples: Samples, sides: Sequence[BoolArray], options: Options) -> list[FloatArray]:
+    """Return for each side by how much noise that outlasts a block widens slope and intercept, as variances (2,)."""
+    lined = [on if _spread(axis, on, options) else np.zeros_like(on) for on in sides]
+    used = np.logical_or(*lined)
+    design, rate, influence = np.zeros((len(used), 4)), np.zeros(len(used)), np.zeros((4, len(used)))
+    for n, on in enumerate(lined):
+        if not on.any():
+            continue
+        line = _line(axis, on, options)
+        off = axis.rate[on] - (axis.volts[on] - line.intercept) / line.slope
+        far = _FAR * float(np.median(np.abs(off))) / lines.NORMAL_MAD
+        rate[on] = np.clip(off, -far, far)
+        design[on, 2 * n], design[on, 2 * n + 1] = 1.0, axis.volts[on]
+        influence[2 * n : 2 * n + 2, on] = _influence(axis.volts[on], line)
+    if not used.any():
+        return [np.ones(2), np.ones(2)]
+    found = colour.Residuals(samples.t[used], samples.run[used], samples.block[used], rate[used], design[used])
+    wider = colour.widening(found, influence[:, used])
+    return [wider[:2], wider[2:]]
+
+
+def _influence(volts: FloatArray, line: lines.Lines) -> FloatArray:
+    """Return what an error of each rate does to slope and intercept, but for a factor (2, n): of rate = a volts + b."""
+    about = volts - volts.mean()
+    of_a = about / (about @ about)
+    of_b = 1 / len(volts) - volts.mean() * of_a
+    return np.stack([of_a, of_b + line.intercept * of_a])  # intercept = -b / a, and b = -intercept / slope
+
+
+def _on_side(axis: Axis, samples: Samples, side: float, options: Options) -> BoolArray:
     """Return which samples are steady and move to a side.
 
-    By what the reference saw: on a chair whose dead zone is wider than its model's, a command is no motion.
+    By what the reference saw: on a chair whose dead zone is wider than its model's, a command is no motion. But not
+    sample by sample: of slow ones those that noise slows down further would be left out, and the line be biased. So
+    the clear ones make a line, and the line says from which voltage on the chair moves.
     """
-    told = np.isnan(axis.side) | (axis.side == side)
-    return np.asarray(samples.steady & told & (side * axis.rate > level) & (axis.volts != 0))
+    level = axis.rest_level(options)
+    unknown = np.isnan(axis.side)
+    able = samples.steady & (unknown | (axis.side == side)) & (axis.volts != 0)
+    on = able & (side * axis.rate > level)
+    able &= ~unknown | (side * axis.rate > 0)
+    for _ in range(_ROUNDS):
+        if len(np.unique(samples.block[on])) < options.drive.least_blocks or not _spread(axis, on, options):
+            break
+        line = _line(axis, on, options)
+        on = able & (side * (axis.volts - line.intercept) / line.slope > level * _MOVES)
+    return np.asarray(on)
 
 
-def _fit_branch(axis: Axis, samples: Samples, on: BoolArray, options: Options, rng: np.random.Generator) -> BranchFit:
+def _spread(axis: Axis, on: BoolArray, options: Options) -> bool:
+    """Return whether there are voltages enough for a line."""
+    return bool(on.any()) and bool(np.ptp(axis.volts[on]) >= options.drive.steady)
+
+
+def _line(axis: Axis, on: BoolArray, options: Options) -> lines.Lines:
+    return lines.robust(axis.rate[on], axis.volts[on], np.ones(int(on.sum())), options.drive.voltage_sd)
+
+
+def _fit_branch(
+    axis: Axis, samples: Samples, on: BoolArray, wider: FloatArray, options: Options, rng: np.random.Generator
+) -> BranchFit:
     rate, volts, block = axis.rate[on], axis.volts[on], samples.block[on]
     blocks = len(np.unique(block))
     if blocks < options.drive.least_blocks:
@@ -149,13 +205,13 @@ def _fit_branch(axis: Axis, samples: Samples, on: BoolArray, options: Options, r
         span = f"{volts.min():.3f} to {volts.max():.3f} V"
         return _none(rate, blocks, f"all its voltages are from {span}: slope and intercept cannot be told apart")
     ones = np.ones(len(rate))
-    line = lines.robust(rate, volts, ones, options.drive.voltage_sd)
+    line = _line(axis, on, options)
     drawn = lines.robust(
         rate, volts, lines.block_counts(block, options.bootstrap.resamples, rng), options.drive.voltage_sd
     )
     plain = lines.least_squares(rate, volts, ones)
-    slope = interval(float(line.slope), drawn.slope, blocks, options.bootstrap)
-    intercept = interval(float(line.intercept), drawn.intercept, blocks, options.bootstrap)
+    slope = interval(float(line.slope), drawn.slope, blocks, float(wider[0]), options.bootstrap)
+    intercept = interval(float(line.intercept), drawn.intercept, blocks, float(wider[1]), options.bootstrap)
     return BranchFit(
         samples=len(rate),
         blocks=blocks,
@@ -175,8 +231,8 @@ def _none(rate: FloatArray, blocks: int, why: str) -> BranchFit:
     return BranchFit(len(rate), blocks, float(size.min()), float(size.max()), None, None, None, np.nan, np.nan, why)
 
 
-def interval(value: float, drawn: FloatArray, blocks: int, options: Bootstrap) -> Coefficient:
-    """Return an estimate with Student's interval by the bootstrap's sd.
+def interval(value: float, drawn: FloatArray, blocks: int, wider: float, options: Bootstrap) -> Coefficient:
+    """Return an estimate with Student's interval by the bootstrap's sd; wider: factor of the variance by slow noise.
 
     Few blocks scatter by less than they should about a line fitted to them, by the root of (n - 2) / n, and Student
     knows that their scatter is a guess, too. Percentiles of the bootstrap know neither.
@@ -184,7 +240,7 @@ def interval(value: float, drawn: FloatArray, blocks: int, options: Bootstrap) -
     finite = drawn[np.isfinite(drawn)]
     if len(finite) < 0.9 * len(drawn):
         return Coefficient(value, -np.inf, np.inf)
-    sd = float(np.std(finite)) * np.sqrt(blocks / (blocks - 2))
+    sd = float(np.std(finite)) * np.sqrt(wider * blocks / (blocks - 2))
     half = float(student.ppf(0.5 + options.level / 2, blocks - 2)) * sd
     return Coefficient(value, value - half, value + half)
 

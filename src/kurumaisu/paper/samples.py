@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,8 @@ class Samples:
 
     t: middle [s]; v [m/s], w [rad/s] by the reference; v_f, v_s [V], mean; side_v, side_w: the sign of the rate that
     the voltages stood for, nan where nobody says; steady: whether the voltages were, in the window and before it;
-    block: windows of one block are drawn together; sd_v, sd_w: what the reference's own error makes of them.
+    block: windows of one block are drawn together, a stretch of steady voltages, or a part of a long one; run: of which
+    drive; sd_v, sd_w: what the reference's own error makes of them.
     """
 
     t: FloatArray
@@ -32,6 +33,7 @@ class Samples:
     side_w: FloatArray
     steady: BoolArray
     block: IntArray
+    run: IntArray
     sd_v: FloatArray
     sd_w: FloatArray
 
@@ -51,16 +53,21 @@ def samples_of(runs: Sequence[Run], truth: tuple[float, float] | None, options: 
     """
     rows = [_windows(run, options) for run in runs]
     blocks = np.cumsum([0, *(1 + max((row.block for row in some), default=0) for some in rows)])
-    table = [(row, row.block + first) for some, first in zip(rows, blocks, strict=False) for row in some]
+    table = [
+        (row, row.block + first, number)
+        for number, (some, first) in enumerate(zip(rows, blocks, strict=False))
+        for row in some
+    ]
     if not table:
         raise Error(f"{', '.join(run.name for run in runs)}: no {options.window:g} s of voltages and poses together")
-    sd = truth if truth is not None else _scatter([row for row, _ in table])
+    sd = truth if truth is not None else _scatter([row for row, _, _ in table])
     return Samples(
-        **{name: np.array([getattr(row, name) for row, _ in table]) for name in _Row.PLAIN},
-        steady=np.array([row.steady for row, _ in table]),
-        block=np.array([block for _, block in table]),
-        sd_v=np.array([sd[0] * row.gain for row, _ in table]),
-        sd_w=np.array([sd[1] * row.gain for row, _ in table]),
+        **{name: np.array([getattr(row, name) for row, _, _ in table]) for name in _Row.PLAIN},
+        steady=np.array([row.steady for row, _, _ in table]),
+        block=np.array([block for _, block, _ in table]),
+        run=np.array([number for _, _, number in table]),
+        sd_v=np.array([sd[0] * row.gain for row, _, _ in table]),
+        sd_w=np.array([sd[1] * row.gain for row, _, _ in table]),
     )
 
 
@@ -101,11 +108,23 @@ def _windows(run: Run, options: Drive) -> list[_Row]:
         begin = first + k * options.window
         inside = slice(*np.searchsorted(pose.t, [begin - 1e-9, begin + options.window + 1e-9]))
         if inside.stop - inside.start >= options.poses:
-            rows.append(_row(pose.t[inside], pose.values[inside], voltage, first, options))
-    return rows
+            rows.append(_row(pose.t[inside], pose.values[inside], voltage, options))
+    return _in_blocks(rows, options)
 
 
-def _row(t: FloatArray, poses: FloatArray, voltage: Series, first: float, options: Drive) -> _Row:
+def _in_blocks(rows: Sequence[_Row], options: Drive) -> list[_Row]:
+    """Return rows with their blocks: stretches of steady voltages, long ones in parts of options.block."""
+    found: list[_Row] = []
+    block, begin = 0, -np.inf
+    for n, row in enumerate(rows):
+        follows = n > 0 and row.steady and rows[n - 1].steady and row.t - rows[n - 1].t < 1.5 * options.window
+        if not follows or row.t - begin > options.block - 0.5 * options.window:
+            block, begin = block + 1, row.t
+        found.append(replace(row, block=block))
+    return found
+
+
+def _row(t: FloatArray, poses: FloatArray, voltage: Series, options: Drive) -> _Row:
     """Return v and w by least squares, and the mean of the voltages with the weights that these give to each moment."""
     about = t - t.mean()
     slope = about / (about @ about)  # slope @ y is the slope of y
@@ -126,7 +145,7 @@ def _row(t: FloatArray, poses: FloatArray, voltage: Series, first: float, option
         side_v=sides[0],
         side_w=sides[1],
         steady=bool((np.ptp(before, axis=0) < options.steady).all()),
-        block=int((t[0] - first) / options.block + 1e-9),
+        block=0,
         gain=float(np.sqrt(slope @ slope)),
         scatter=(position, float(np.sqrt(np.sum((poses[:, 2] - heading) ** 2) / (n - 2)))),
     )

@@ -35,7 +35,7 @@ def _plan(options: argparse.Namespace) -> int:
 def _record(options: argparse.Namespace) -> int:
     from kurumaisu.ros.calibrate_record import record
 
-    return record(options.bag, load_options(options.settings), options.every)
+    return record(options.bag, load_options(options.settings), options.every, options.split)
 
 
 def _drive(options: argparse.Namespace) -> int:
@@ -60,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     record.set_defaults(command=_record)
     record.add_argument("bag", type=Path, help="to write")
     record.add_argument("--every", type=float, default=5.0, help="seconds between two looks")
+    record.add_argument("--split", type=int, default=0, help="seconds after which a new bag begins; 0: one bag")
     drive = parts.add_parser("drive", help="from drives to a model file with the law of the chair")
     drive.set_defaults(command=_drive)
     drive.add_argument("train", nargs="+", type=Path, help="recordings to fit")

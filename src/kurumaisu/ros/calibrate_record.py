@@ -9,10 +9,12 @@ import time
 from pathlib import Path
 
 import numpy as np
+import rosgraph
 import rospy
 from nav_msgs.msg import Odometry
 
 from kurumaisu.critic.recording import Run, Series
+from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper import advice
 from kurumaisu.paper.options import Options
@@ -75,20 +77,23 @@ def _table(rows: list[tuple[float, ...]]) -> FloatArray:
     return np.array(rows, dtype=np.float64)
 
 
-def record(bag: Path, options: Options, every: float) -> int:
+def record(bag: Path, options: Options, every: float, split: int) -> int:
     """Record until nothing is missing, or Ctrl-C; return 0, or 1 when something is. Raise Error as Recorder does."""
+    if not rosgraph.is_master_online():
+        raise Error(f"no ROS master at {rosgraph.get_master_uri()}: start robot.launch, or sim.launch, first")
     rospy.init_node("calibrate", anonymous=True, disable_signals=True)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     heard = Heard()
-    recorder = Recorder(bag, _TOPICS)
+    recorder = Recorder(bag, _TOPICS, split=split)
     said: list[str] = []
     missing = ["nothing was heard yet"]
     try:
         due = time.monotonic() + every
         while missing and not stop.is_set() and not rospy.is_shutdown():
             if time.monotonic() >= due:
+                recorder.check()
                 missing = _look(heard, options)
                 if missing != said:
                     _tell(missing, heard)
@@ -97,7 +102,10 @@ def record(bag: Path, options: Options, every: float) -> int:
             time.sleep(_GLANCE)
     finally:
         recorder.close()
-    print(f"calibrate: {bag}: {'enough' if not missing else 'not enough; --keep branches, or drive again'}", flush=True)
+    names = " ".join(map(str, recorder.bags))
+    print(
+        f"calibrate: {names}: {'enough' if not missing else 'not enough; --keep branches, or drive again'}", flush=True
+    )
     return int(bool(missing))
 
 

@@ -59,7 +59,15 @@ def _wall(options: argparse.Namespace) -> int:
 
 
 def _conjecture(options: argparse.Namespace) -> int:
-    return commands_wall.conjecture(options.model, options.recordings, options.out, options.seed, commands.say)
+    return commands_wall.asked(
+        options.model,
+        options.recordings,
+        options.out,
+        distances=options.distances,
+        seed=options.seed,
+        settings=options.settings,
+        say=commands.say,
+    )
 
 
 def _dac(options: argparse.Namespace) -> int:
@@ -112,6 +120,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     conjecture.add_argument(
         "recordings", nargs="*", type=Path, help="of a wall, with its world; none: data made either way"
+    )
+    conjecture.add_argument(
+        "--distances", nargs="+", type=float, default=[], help="[m] of the runs, by name: finds the law ahead first"
     )
     dac = _part(parts, "dac", _dac, "figure 10: voltages at the D/A converter")
     dac.add_argument("--speeds", type=Path, help="script of speeds in place of launch/paper/figure_10.yaml")

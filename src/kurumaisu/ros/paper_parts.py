@@ -75,7 +75,9 @@ def everything(model: Path, out: Path, *, seed: int, settings: Path | None) -> i
         ),
         (
             "The conjecture: range, or incidence",
-            lambda: commands_wall.conjecture(model, [], out, _RIDDLE_SEED, commands.say),
+            lambda: commands_wall.asked(
+                model, [], out, distances=(), seed=_RIDDLE_SEED, settings=settings, say=commands.say
+            ),
         ),
         ("Figure 10", lambda: dac(model, out, None)),
         (
