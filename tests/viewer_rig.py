@@ -34,7 +34,7 @@ HALF = 4.0  # [m] half of the room's edge
 RADIUS = 2.0  # [m] of the circle
 SPEED = 0.5  # [m/s]
 BEAMS = 682
-ABILITIES = frozenset(COMMANDS) - {"seek", "play", "rate"}
+ABILITIES = frozenset(COMMANDS) - {"seek", "play", "rate", "run"}
 CHAIR, BOX = 1, 2  # places in the world's bodies
 
 

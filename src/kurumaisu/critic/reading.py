@@ -33,7 +33,7 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
     faults = Faults()
     laser = meta.laser
     runs = []
-    for source in _chosen(sources(path), wanted):
+    for source in chosen(sources(path), wanted):
         run, mount = read_run(source, meta, faults)
         laser = laser or mount
         check_run(run, laser, faults)
@@ -95,7 +95,7 @@ def read_run(
     return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
 
 
-def _chosen(sources: list[Path], wanted: Sequence[str]) -> list[Path]:
+def chosen(sources: list[Path], wanted: Sequence[str]) -> list[Path]:
     """Return the sources of the runs that are wanted, in their own order."""
     if not wanted:
         return sources

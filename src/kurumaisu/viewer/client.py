@@ -180,7 +180,9 @@ class Client:
     def _hello(self, session: str | None) -> protocol.Hello:
         source = self._source
         abilities = tuple(sorted(source.abilities)) if self._keys is not None else ()
-        return protocol.Hello(source.title, source.mode, self._control, abilities, source.limits, session)
+        return protocol.Hello(
+            source.title, source.mode, self._control, abilities, source.limits, session, self._hub.report
+        )
 
 
 def _why_not(keys: Keys | None) -> str:

@@ -54,6 +54,7 @@ class Hub:
         self._map_number = 0
         self.maps: dict[int, bytes] = {}  # PNG files by number
         self.dropped = 0  # messages that clients who have gone lost
+        self.report: str | None = None  # address of the critic's report, if there is one
 
     def world(self, world: protocol.World) -> None:
         """Show other bodies; their scans are to come."""
@@ -69,6 +70,10 @@ class Hub:
     def effects(self, groups: tuple[protocol.Group, ...]) -> None:
         """Show which effects act."""
         self._put({("effects", 0): protocol.text(protocol.Effects(groups))})
+
+    def paths(self, paths: protocol.Paths) -> None:
+        """Show the ways of a recorded run."""
+        self._put({("paths", 0): protocol.text(paths)})
 
     def particles(self, poses: Any) -> None:
         """Show particles (n, 3)."""

@@ -39,6 +39,7 @@ class Hello:
     abilities: tuple[str, ...]
     limits: Mapping[str, float] | None
     session: str | None = None  # only after a token
+    report: str | None = None  # address of the critic's report, if there is one
     version: int = VERSION
 
 
@@ -93,13 +94,15 @@ class Note:
 
 @dataclass(frozen=True)
 class Playback:
-    """Where a recording is: times [s], rate: recorded seconds per second."""
+    """Where a recording is: times [s] by the run's own clock, rate: recorded seconds per second; run: one of runs."""
 
     begin: float
     end: float
     t: float
     rate: float
     playing: bool
+    run: str
+    runs: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -128,6 +131,22 @@ class State:
     notes: tuple[Note, ...] = ()
     playback: Playback | None = None
     driver: str | None = None  # the input that drives
+
+
+@dataclass(frozen=True)
+class Line:
+    """A way from above, whole: points [m], None where it is torn; body: whose, as truth, odom or a body's id."""
+
+    body: str
+    points: tuple[Point | None, ...]
+
+
+@dataclass(frozen=True)
+class Paths:
+    """The ways of a recorded run, before and after the moment that is shown."""
+
+    run: str
+    lines: tuple[Line, ...]
 
 
 @dataclass(frozen=True)
@@ -192,10 +211,11 @@ _TYPES: dict[type, str] = {
     MapPicture: "map",
     State: "state",
     Effects: "effects",
+    Paths: "paths",
     Reply: "reply",
 }
 _RENAMED = {"begin": "from", "end": "to"}  # `from` is a word of Python
-Text = Hello | World | MapPicture | State | Effects | Reply
+Text = Hello | World | MapPicture | State | Effects | Paths | Reply
 
 
 def text(message: Text) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 from aiohttp import web
 
 from kurumaisu.errors import Error
-from kurumaisu.viewer import access
+from kurumaisu.viewer import access, report
 from kurumaisu.viewer.access import Keys
 from kurumaisu.viewer.client import Client
 from kurumaisu.viewer.hub import Hub
@@ -138,7 +138,8 @@ class Server:
         path = self.reports.get(request.match_info["name"])
         if path is None:
             raise web.HTTPNotFound
-        return _served(path)
+        body, headers = report.page(path.read_bytes())
+        return web.Response(body=body, headers=headers, content_type="text/html", charset="utf-8")
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         access.check_origin(request.headers.get("Origin"), request.headers.get("Host"))
