@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Who may do what: a command that the source does not know has no control; one that is not ours is there, and says why not.
+
+import {News} from "./dom.js";
+
+const WHY = {
+  off: "Not connected",
+  robot: "View only: this page has no control of the robot. The launch file must say control:=true, and the page must be opened by the link that the viewer printed.",
+  sim: "View only: open the link that the viewer printed to take control.",
+  bag: "View only: open the link that the viewer printed to take control.",
+};
+
+/** News: "change". */
+export class Permit extends News {
+  #line = false;
+
+  constructor(scene, connection) {
+    super();
+    this.scene = scene;
+    scene.on("hello", () => this.#apply());
+    connection.on("line", ({state}) => {
+      this.#line = state === "on";
+      if (!this.#line) this.#apply(); // otherwise hello comes at once
+    });
+  }
+
+  /** Say why nothing may be commanded, or nothing. */
+  get why() {
+    const hello = this.scene.hello;
+    if (!this.#line || !hello) return WHY.off;
+    return hello.control ? "" : (hello.why ?? WHY[hello.mode] ?? WHY.sim);
+  }
+
+  knows(name) {
+    return this.scene.hello?.abilities.includes(name) ?? false;
+  }
+
+  can(name) {
+    return this.knows(name) && !this.why;
+  }
+
+  #apply() {
+    const mode = this.scene.hello?.mode ?? "none";
+    document.body.dataset.mode = mode;
+    for (const element of document.querySelectorAll("[data-only]")) element.hidden = element.dataset.only !== mode;
+    for (const element of document.querySelectorAll("[data-needs]")) {
+      const name = element.dataset.needs;
+      const keep = element.hasAttribute("data-keep") && mode !== "bag";
+      element.hidden = !this.knows(name) && !keep;
+      if (element.getAttribute("role") === "tab" || element.tagName === "LABEL") continue; // what is in it tells
+      if (element.tagName === "FORM") element.firstElementChild.disabled = !this.can(name);
+      else element.disabled = !this.can(name);
+      element.dataset.title ??= element.title;
+      element.title = this.can(name) ? element.dataset.title : this.why || "The source does not take this command";
+    }
+    this.tell("change");
+  }
+}
