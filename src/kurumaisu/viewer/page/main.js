@@ -14,6 +14,8 @@ import {Options} from "./options.js";
 import {Permit} from "./permit.js";
 import {Places} from "./places.js";
 import {Pointer} from "./pointer.js";
+import {Recording} from "./recording.js";
+import {Residuals} from "./residuals.js";
 import {Scene} from "./scene.js";
 import {setUpHelp, setUpTabs, setUpTheme} from "./shell.js";
 import {Status} from "./status.js";
@@ -50,6 +52,7 @@ const quietly = (name, values) => connection.command(name, values);
 
 const transport = new Transport(scene, permit, ask, stick);
 const bag = new Bag(scene, permit, ask);
+new Residuals(scene, picture, new Recording(scene, connection, picture, ask), say);
 const edit = new Edit(picture, scene, options, {
   can: (name) => permit.can(name), ask: quietly, failed: (text) => say(text, true),
 });
