@@ -7,11 +7,14 @@ const CLOSE = 60; // [px/m] at least: the place shall be seen
 export class Places {
   #place = null;
   #gone = false;
+  #moment = NaN; // [s] to be sought as soon as we may
 
   constructor(picture, scene, permit, options, bag) {
     Object.assign(this, {picture, permit, options, bag});
     // not again after a reconnect: the user has long been elsewhere
     scene.on("hello", () => this.#gone || this.go());
+    permit.on("change", () => this.#seek());
+    scene.on("state", () => this.#seek());
     picture.extras.push((context) => this.#place && this.#draw(context));
   }
 
@@ -19,13 +22,20 @@ export class Places {
     this.#gone = true;
     const values = new URLSearchParams(location.hash.slice(1));
     const [t, x, y] = ["t", "x", "y"].map((name) => Number.parseFloat(values.get(name)));
-    if (Number.isFinite(t) && this.permit.can("seek")) this.bag.seek(t);
+    this.#moment = t;
+    this.#seek();
     if (!Number.isFinite(x) || !Number.isFinite(y)) return;
     const {camera} = this.picture;
     Object.assign(camera, {x, y, scale: Math.max(camera.scale, CLOSE)});
     this.#place = [x, y];
     this.picture.fitted = true;
     this.options.set({follow: null});
+  }
+
+  #seek() {
+    if (!Number.isFinite(this.#moment) || !this.bag.playback || !this.permit.can("seek")) return;
+    this.bag.seek(this.#moment);
+    this.#moment = NaN;
   }
 
   #draw(context) {
