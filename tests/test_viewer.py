@@ -4,11 +4,19 @@
 import asyncio
 import json
 import struct
+import time
 
 import aiohttp
 import numpy as np
 import pytest
 from viewer_rig import BEAMS, CHAIR, Running
+
+
+def wait_for(condition, what):
+    deadline = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.01)
 
 
 def talk(running, conversation, **options):
@@ -94,7 +102,7 @@ def test_a_page_is_told_all_that_there_is_to_see(running):
         assert len(particles) == 8 + 4 * 3 * 200
 
     talk(running, look)
-    assert running.rig.watched == [True, False]
+    wait_for(lambda: running.rig.watched == [True, False], "the source to know that nobody looks any more")
 
 
 def test_a_token_is_good_once_and_lets_command(running):

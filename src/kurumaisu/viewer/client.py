@@ -15,7 +15,7 @@ from kurumaisu.errors import Error
 from kurumaisu.viewer import commands, protocol
 from kurumaisu.viewer.access import Keys
 from kurumaisu.viewer.commands import Command, Credential
-from kurumaisu.viewer.hub import Hub, Mailbox
+from kurumaisu.viewer.hub import Hub, Mailbox, Payload
 from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
 
@@ -58,7 +58,11 @@ class Client:
             link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
         loop = asyncio.get_running_loop()
         self._say(self._hello(None))
-        mailbox = self._hub.join(lambda: loop.call_soon_threadsafe(self._news.set))
+
+        def notify() -> None:
+            loop.call_soon_threadsafe(self._news.set)
+
+        mailbox = self._hub.join(notify)
         self._news.set()
         tasks = [asyncio.create_task(self._send(mailbox)), asyncio.create_task(self._obey())]
         try:
@@ -85,11 +89,17 @@ class Client:
             try:
                 async with asyncio.timeout(self._settings.patience):
                     for payload in (*replies, *mailbox.take()):
-                        await (self._socket.send_str if isinstance(payload, str) else self._socket.send_bytes)(payload)
+                        await self._give(payload)
             except (TimeoutError, ConnectionError, RuntimeError):
                 self.abort()
                 return
             await asyncio.sleep(pause)
+
+    async def _give(self, payload: Payload) -> None:
+        if isinstance(payload, str):
+            await self._socket.send_str(payload)
+        else:
+            await self._socket.send_bytes(payload)
 
     async def _hear(self) -> None:
         async for message in self._socket:
