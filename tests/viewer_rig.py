@@ -127,10 +127,10 @@ class Rig:
         self.show()
         return Outcome("stopped" if on else "released")
 
-    def do_effect(self, id, enabled, values):
-        if id not in self.effects:
-            raise Error(f"effect: there is no {id!r}")
-        self.effects[id] = (enabled, values.get("size", self.effects[id][1]))
+    def do_effect(self, effect, enabled, values):
+        if effect not in self.effects:
+            raise Error(f"effect: there is no {effect!r}")
+        self.effects[effect] = (enabled, values.get("size", self.effects[effect][1]))
         self.show_effects()
         return Outcome("acts" if enabled else "is off")
 

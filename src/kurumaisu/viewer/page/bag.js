@@ -7,10 +7,13 @@ const NUDGE = 0.1; // [s] of a key
 
 export class Bag {
   #held = false; // the user has the slider
+  #send;
+  #wanted = null; // [s] asked for, until the recording has moved there
+  #before = null; // [s] where it was then
 
   constructor(scene, permit, ask) {
     Object.assign(this, {scene, permit});
-    this.seek = newest((t) => ask("seek", {t}));
+    this.#send = newest((t) => ask("seek", {t}), (reply) => reply.ok || (this.#wanted = null));
     this.ask = ask;
     const scrubber = byId("scrubber");
     scene.on("state", () => this.#show());
@@ -22,6 +25,11 @@ export class Bag {
       this.seek(Number(scrubber.value));
       this.#tell(Number(scrubber.value));
     });
+  }
+
+  seek(t) {
+    [this.#wanted, this.#before] = [t, this.playback.t];
+    this.#send(t);
   }
 
   get playback() {
@@ -36,7 +44,7 @@ export class Bag {
   nudge(steps) {
     const {playback} = this;
     if (!playback || !this.permit.can("seek")) return;
-    this.seek(Math.min(playback.to, Math.max(playback.from, playback.t + steps * NUDGE)));
+    this.seek(Math.min(playback.to, Math.max(playback.from, (this.#wanted ?? playback.t) + steps * NUDGE)));
   }
 
   #show() {
@@ -46,9 +54,10 @@ export class Bag {
     const {from, to, t, playing, rate} = playback;
     Object.assign(scrubber, {min: from, max: to, step: 0.01});
     setText(byId("play"), playing ? "Hold" : "Play");
+    if (t !== this.#before) this.#wanted = null;
     if (!this.#held) {
-      scrubber.value = t;
-      this.#tell(t);
+      scrubber.value = this.#wanted ?? t;
+      this.#tell(this.#wanted ?? t);
     }
     const choice = byId("rate");
     if (document.activeElement !== choice) choice.value = String(rate);

@@ -8,7 +8,7 @@ import {drawBodies, drawNames} from "./draw_bodies.js";
 import {drawGrid, drawWalls} from "./draw_ground.js";
 import {drawLegend} from "./draw_legend.js";
 import {drawMap} from "./draw_map.js";
-import {drawScans} from "./draw_scans.js";
+import {drawFans, drawScans} from "./draw_scans.js";
 import {drawParticles, drawPoses, drawTrails} from "./draw_traces.js";
 
 export class Picture {
@@ -122,6 +122,7 @@ export class Picture {
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, this.front.width, this.front.height);
     const {layers} = this.options;
+    if (layers.fans) drawFans(context, this);
     if (layers.trails) drawTrails(context, this);
     if (layers.scans) drawScans(context, this);
     if (layers.particles) drawParticles(context, this);

@@ -22,8 +22,7 @@ export function drawLegend(context, picture) {
   bar(context, LEFT, y, width, colors);
   label(context, length >= 1 ? `${short(length)} m` : `${short(length * 1000)} mm`, LEFT, y - 6, colors);
   if (scene.state) {
-    context.textAlign = "right";
-    label(context, `t ${fixed(scene.state.t, 2)} s`, LEFT + Math.max(width, LEAST), y - 6, colors);
+    label(context, `t = ${fixed(scene.state.t, 2)} s`, LEFT + width + 10, y + 4, colors); // for saved pictures
   }
   if (options.layers.scans && scene.scans.size && options.scanColor !== "plain") {
     scaleOfColors(context, LEFT, y - 44, picture);

@@ -8,7 +8,6 @@ const DOT = 2.6; // [px]
 export function drawScans(context, picture) {
   const {scene, options, colors} = picture;
   const scans = [...scene.scans.values()];
-  if (options.layers.fans) for (const scan of scans) drawFan(context, picture, scan);
   const high = options.scanColor === "intensity" ? strongest(scans) : 0;
   const paths = new Map();
   for (const scan of scans) dots(paths, picture, scan, high);
@@ -58,7 +57,12 @@ function stepOf(scan, i, options, high) {
 }
 
 /** No return means free as far as the laser sees; an invalid reading means nothing, so the area has a gap there. */
-function drawFan(context, {camera, colors, ratio}, scan) {
+export function drawFans(context, picture) {
+  const scans = [...picture.scene.scans.values()];
+  for (const scan of scans) drawFan(context, picture, scan, 0.3 / (scans.length + 2)); // many overlap
+}
+
+function drawFan(context, {camera, colors, ratio}, scan, strength) {
   camera.apply(context, ratio);
   context.beginPath();
   context.moveTo(scan.x, scan.y);
@@ -69,7 +73,7 @@ function drawFan(context, {camera, colors, ratio}, scan) {
     context.lineTo(scan.x + far * Math.cos(angle), scan.y + far * Math.sin(angle));
   }
   context.closePath();
-  context.globalAlpha = 0.1;
+  context.globalAlpha = strength;
   context.fillStyle = colors.accent;
   context.fill();
   context.globalAlpha = 1;

@@ -17,13 +17,13 @@ export class EffectRow {
       this.#draft = false;
       this.take(this.group);
     });
-    this.toggle = make("input", {type: "checkbox", role: "switch", aria: {label: `${group.title} (${group.id})`}});
+    this.toggle = make("input", {type: "checkbox", role: "switch", aria: {label: `${group.id}: ${group.title}`}});
     this.toggle.addEventListener("change", () => this.#switched());
     this.values = make("span", {className: "effect-values"});
     this.element = make("details", {className: "effect", data: {effect: group.id}},
       make("summary", {},
-        make("span", {className: "effect-title", textContent: group.title}),
-        make("span", {className: "effect-line"}, make("code", {textContent: group.id}), this.values)));
+        make("span", {className: "effect-line"}, make("code", {textContent: group.id}), this.values),
+        make("span", {className: "effect-title", textContent: group.title})));
     // beside the summary, not in it: a switch in a button has no name of its own
     this.row = make("div", {className: "effect-row"}, this.toggle, this.element);
     this.element.addEventListener("toggle", () => this.#unfold());
@@ -69,7 +69,7 @@ export class EffectRow {
   /** Sliders are made when they are first seen: there are hundreds. */
   #unfold() {
     if (!this.element.open || this.#sliders.length) return;
-    this.#sliders = this.group.parameters.map((one) => slider(one, this.group.title, () => this.#moved()));
+    this.#sliders = this.group.parameters.map((one) => slider(one, this.group.id, () => this.#moved()));
     this.element.append(...this.#sliders.map(({row}) => row));
     this.permit();
   }
@@ -100,7 +100,7 @@ export class EffectRow {
   }
 
   #give() {
-    this.send({id: this.group.id, enabled: this.active, values: Object.fromEntries(this.#values())});
+    this.send({effect: this.group.id, enabled: this.active, values: Object.fromEntries(this.#values())});
   }
 
   #summarize() {

@@ -85,6 +85,7 @@ click("zoom-in", () => picture.camera.zoom(1.4) ?? picture.dirty());
 click("zoom-out", () => picture.camera.zoom(1 / 1.4) ?? picture.dirty());
 click("fit", () => picture.fit());
 click("follow", follow);
+click("more", () => byId("more").setAttribute("aria-expanded", String(document.body.classList.toggle("all"))));
 click("clear", () => scene.forget());
 click("screenshot", () => picture.flat().toBlob((blob) => {
   const t = scene.state ? `_${scene.state.t.toFixed(2)}s` : "";

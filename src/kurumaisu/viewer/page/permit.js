@@ -3,12 +3,9 @@
 
 import {News} from "./dom.js";
 
-const WHY = {
-  off: "Not connected",
-  robot: "View only: this page has no control of the robot. The launch file must say control:=true, and the page must be opened by the link that the viewer printed.",
-  sim: "View only: open the link that the viewer printed to take control.",
-  bag: "View only: open the link that the viewer printed to take control.",
-};
+const OFF = "Not connected";
+const CLOSED = "View only: the viewer was started without control.";
+const NO_TOKEN = "View only: to take control open the link that the viewer printed when it started, or ask it for a new one.";
 
 /** News: "change". */
 export class Permit extends News {
@@ -27,8 +24,9 @@ export class Permit extends News {
   /** Say why nothing may be commanded, or nothing. */
   get why() {
     const hello = this.scene.hello;
-    if (!this.#line || !hello) return WHY.off;
-    return hello.control ? "" : (hello.why ?? WHY[hello.mode] ?? WHY.sim);
+    if (!this.#line || !hello) return OFF;
+    if (hello.control) return "";
+    return hello.abilities.length ? NO_TOKEN : CLOSED;
   }
 
   knows(name) {

@@ -14,6 +14,7 @@ export class Places {
     // not again after a reconnect: the user has long been elsewhere
     scene.on("hello", () => this.#gone || this.go());
     permit.on("change", () => this.#seek());
+    scene.on("state", () => this.#seek());
     picture.extras.push((context) => this.#place && this.#draw(context));
   }
 
@@ -33,11 +34,11 @@ export class Places {
 
   /** The first greeting comes before we have shown that we may command. */
   #seek() {
-    if (!this.#moment || !this.permit.can("seek")) return;
+    if (!this.#moment || !this.bag.playback || !this.permit.can("seek")) return;
     const {run, t} = this.#moment;
     this.#moment = null;
     if (run !== null) this.bag.ask("run", {name: run}); // commands are obeyed in turn
-    if (Number.isFinite(t)) this.bag.seek(t);
+    if (Number.isFinite(t)) this.bag.ask("seek", {t});
   }
 
   #draw(context) {

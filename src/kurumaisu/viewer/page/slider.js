@@ -14,10 +14,10 @@ export function law(min, max) {
   return {
     place: (value) => (STEPS * (root(value - middle) - low)) / (high - low || 1),
     value: (place) => {
-      const value = middle + (low + ((high - low) * place) / STEPS) ** BEND;
-      const nearest = Number(value.toPrecision(3));
-      const quiet = Math.abs(value - middle) < 1e-9 * (max - min) ? middle : nearest;
-      return Math.min(max, Math.max(min, quiet));
+      const offset = (low + ((high - low) * place) / STEPS) ** BEND;
+      const quiet = Math.abs(offset) < 1e-9 * (max - min) ? 0 : Number(offset.toPrecision(3));
+      const value = Number((middle + quiet).toPrecision(9));
+      return Math.min(max, Math.max(min, value));
     },
   };
 }
