@@ -78,7 +78,7 @@ COMMANDS: Mapping[str, _Kinds] = {
     "seek": {"t": _number},
     "play": {"on": _flag},
     "rate": {"value": _number},
-    "run": {"name": _word},
+    "run": {"run": _word},
     "initial_pose": {"x": _number, "y": _number, "yaw": _number},
 }
 

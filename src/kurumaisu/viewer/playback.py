@@ -71,7 +71,7 @@ class Playback:
     def command(self, name: str, arguments: Mapping[str, Any]) -> Outcome:
         """Obey. Raise Error for a time, rate or run that there is not."""
         if name == "run":
-            self._change(arguments["name"])
+            self._change(arguments["run"])
             return Outcome("")
         with self._news:
             now = time.monotonic()

@@ -37,7 +37,7 @@ export class Places {
     if (!this.#moment || !this.bag.playback || !this.permit.can("seek")) return;
     const {run, t} = this.#moment;
     this.#moment = null;
-    if (run !== null) this.bag.ask("run", {name: run}); // commands are obeyed in turn
+    if (run !== null) this.bag.ask("run", {run}); // commands are obeyed in turn
     if (Number.isFinite(t)) this.bag.ask("seek", {t});
   }
 

@@ -14,7 +14,7 @@ export class Recording {
     window.name = "kurumaisu-viewer"; // the report leads to this window
     connection.on("message", (message) => message.type === "paths" && this.#take(message));
     scene.on("state", () => this.#show());
-    byId("run").addEventListener("change", (event) => ask("run", {name: event.target.value}));
+    byId("run").addEventListener("change", (event) => ask("run", {run: event.target.value}));
     picture.extras.push((context) => this.#draw(context));
   }
 

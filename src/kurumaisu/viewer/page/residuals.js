@@ -4,6 +4,8 @@
 import {byId, make, setText} from "./dom.js";
 import {fragment, largest, pictures, quantity, told} from "./report_data.js";
 
+// Of the report's page only the data are wanted; its styles may not act here, and each would be complained about.
+const STYLES = /<style[^>]*>[^]*?<\/style>| style="[^"]*"/g;
 const MARKED = 100;
 const LISTED = 25;
 const LARGEST = 11; // [px] radius of the mark of what is furthest off
@@ -26,7 +28,7 @@ export class Residuals {
     try {
       const answer = await fetch(address);
       if (!answer.ok) throw new Error(`${answer.status}`);
-      const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+      const page = new DOMParser().parseFromString((await answer.text()).replace(STYLES, ""), "text/html");
       this.#pictures = pictures(page).filter(({samples}) => samples.some(({value}) => value !== null));
     } catch (error) {
       this.tell(`The report could not be read: ${error.message}`, true);
