@@ -56,11 +56,11 @@ class Showing:
         front, rear, side = c.axle_to_front, c.axle_to_front - c.length, c.width / 2
         outline = ((front, side), (rear, side), (rear, -side), (front, -side))
         bodies = [] if self._map is None else [_walls(self._map)]
-        bodies.append(Body(CHAIR, "chair, as measured", "robot", "#606870", False, (outline,)))
         for name in self._models:
             said, color = SIMULATED[name]
             bodies.append(Body(name, said, "robot", color, False, (outline,)))
-        return World(tuple(bodies), self._bounds())
+        bodies.append(Body(CHAIR, "measured", "robot", "#606870", False, (outline,)))  # above the others
+        return World(tuple(bodies), self._bounds(), CHAIR)
 
     def tape(self, name: str) -> Tape:
         """Return a run, simulated by the models."""

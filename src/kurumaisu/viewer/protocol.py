@@ -58,10 +58,14 @@ class Body:
 
 @dataclass(frozen=True)
 class World:
-    """All bodies, walls too; bounds: smallest x, y, largest x, y [m], or None where nothing is known."""
+    """All bodies, walls too; bounds: smallest x, y, largest x, y [m], or None where nothing is known.
+
+    chair: id of the body that truth, odometry and estimate are about; None: the first robot.
+    """
 
     bodies: tuple[Body, ...]
     bounds: tuple[float, float, float, float] | None
+    chair: str | None = None
 
 
 @dataclass(frozen=True)
@@ -101,8 +105,8 @@ class Playback:
     t: float
     rate: float
     playing: bool
-    run: str
-    runs: tuple[str, ...]
+    run: str = ""
+    runs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
