@@ -119,6 +119,13 @@ def test_what_is_held_holds_until_the_next():
     assert held.at(77.0) == (0.3, 0.4)
 
 
+def test_a_scan_is_found_by_its_time_as_a_report_writes_it():
+    times = np.array([1.0004, 1.1004, 1.2004])
+    one = Tape("a", 1.0, 2.0, scan_times=times)
+    assert [one.scan_at(float(f"{t:.3f}")) for t in times] == [0, 1, 2]
+    assert [one.scan_at(t) for t in (0.9, 1.15, 2.1, 2.3)] == [-1, 1, 2, -1]
+
+
 WORLD = World((Body(CHAIR, "chair", "robot", "#000000", False),), None, CHAIR)
 
 
