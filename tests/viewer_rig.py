@@ -41,7 +41,7 @@ CHAIR, BOX = 1, 2  # places in the world's bodies
 def viewer_settings(**changes) -> ViewerSettings:
     """Return the shipped settings with a free port, and with other values for some keys."""
     top = settings.load(shipped("launch/viewer.yaml"))
-    tree = {key: top.take(key) for key in top.names()}
+    tree = {key: top.take(key) for key in top.names() if key in ViewerSettings.__annotations__}
     return read_settings(settings.Section({**tree, "port": 0, **changes}, "rig"))
 
 
@@ -127,10 +127,10 @@ class Rig:
         self.show()
         return Outcome("stopped" if on else "released")
 
-    def do_effect(self, id, enabled, values):
-        if id not in self.effects:
-            raise Error(f"effect: there is no {id!r}")
-        self.effects[id] = (enabled, values.get("size", self.effects[id][1]))
+    def do_effect(self, effect, enabled, values):
+        if effect not in self.effects:
+            raise Error(f"effect: there is no {effect!r}")
+        self.effects[effect] = (enabled, values.get("size", self.effects[effect][1]))
         self.show_effects()
         return Outcome("acts" if enabled else "is off")
 

@@ -72,7 +72,7 @@ COMMANDS: Mapping[str, _Kinds] = {
     "set_pose": {"body": _word, "x": _number, "y": _number, "yaw": _number},
     "drive": {"v": _number, "w": _number},
     "estop": {"on": _flag},
-    "effect": {"id": _word, "enabled": _flag, "values": _values},
+    "effect": {"effect": _word, "enabled": _flag, "values": _values},
     "save_model": {},
     "record": {"on": _flag},
     "seek": {"t": _number},
