@@ -41,7 +41,7 @@ CHAIR, BOX = 1, 2  # places in the world's bodies
 def viewer_settings(**changes) -> ViewerSettings:
     """Return the shipped settings with a free port, and with other values for some keys."""
     top = settings.load(shipped("launch/viewer.yaml"))
-    tree = {key: top.take(key) for key in top.names()}
+    tree = {key: top.take(key) for key in top.names() if key in ViewerSettings.__annotations__}
     return read_settings(settings.Section({**tree, "port": 0, **changes}, "rig"))
 
 

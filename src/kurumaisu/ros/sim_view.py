@@ -94,7 +94,7 @@ class ViewTopics:
         view.header.stamp, view.header.frame_id = stamp_of(now), self._frame
         view.real_time_factor = 0.0 if paused else self._factor(wall, now)
         view.poses = np.ascontiguousarray(machinery.frames[:-1, PLANAR]).reshape(-1)
-        view.hit = self._hit.astype(np.uint8)
+        view.hit = self._hit.tobytes()
         self._add_scans(view)
         self._view.publish(view)
         self._hit = np.zeros_like(machinery.stalled)
