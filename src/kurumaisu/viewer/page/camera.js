@@ -12,6 +12,11 @@ export class Camera {
   width = 1;
   height = 1;
 
+  /** A text that is the same for the same view. */
+  get place() {
+    return `${this.x} ${this.y} ${this.scale}`;
+  }
+
   toScreen(x, y) {
     return [this.width / 2 + (x - this.x) * this.scale, this.height / 2 - (y - this.y) * this.scale];
   }

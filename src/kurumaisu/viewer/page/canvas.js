@@ -17,6 +17,7 @@ export class Picture {
   extras = []; // functions (context, picture) that draw above all: tools
   #dirty = new Set();
   #asked = false;
+  #whole = ""; // place of the camera when everything was shown
   fitted = false; // once is enough: a map that grows must not move the view
 
   constructor(ground, front, scene, options) {
@@ -45,7 +46,10 @@ export class Picture {
 
   fit() {
     const bounds = this.#bounds();
-    if (bounds) this.camera.fit(bounds);
+    if (bounds) {
+      this.camera.fit(bounds);
+      this.#whole = this.camera.place;
+    }
     this.dirty();
   }
 
@@ -90,11 +94,13 @@ export class Picture {
   #resize() {
     const {clientWidth, clientHeight} = this.front;
     this.ratio = devicePixelRatio || 1;
+    const whole = this.#whole === this.camera.place;
     Object.assign(this.camera, {width: Math.max(clientWidth, 1), height: Math.max(clientHeight, 1)});
     for (const canvas of [this.ground, this.front]) {
       canvas.width = Math.round(this.camera.width * this.ratio);
       canvas.height = Math.round(this.camera.height * this.ratio);
     }
+    if (whole) this.fit(); // what showed everything goes on to
     this.#dirty.add("ground").add("front");
     this.#draw(); // at once: a resized canvas is empty
   }

@@ -7,8 +7,12 @@ const VERSION = 1;
 const WAITS = [250, 500, 1000, 2000, 4000, 8000]; // [ms] between attempts, the last one for good
 const SESSION = "kurumaisu.session";
 
-/** News: "message" (an object), "binary" (an ArrayBuffer), "line" ("on", "off" or "wrong", and seconds to wait). */
+/**
+ * News: "message" (an object), "binary" (an ArrayBuffer), "line" ({state: "on", "off" or "wrong", seconds to wait}),
+ * "refused" (why a one-time secret is not good).
+ */
 export class Connection extends News {
+  asking = null; // "token" or "session" while the answer to it is awaited
   #socket = null;
   #attempt = 0;
   #timer = 0;
@@ -62,6 +66,7 @@ export class Connection extends News {
 
   #introduce() {
     const session = sessionStorage.getItem(SESSION);
+    this.asking = this.#token ? "token" : session && "session";
     if (this.#token) this.#socket.send(JSON.stringify({type: "token", token: this.#token}));
     else if (session) this.#socket.send(JSON.stringify({type: "session", session}));
     this.#token = null;
@@ -70,10 +75,11 @@ export class Connection extends News {
   #take(data) {
     if (typeof data !== "string") return this.tell("binary", data);
     const message = JSON.parse(data);
-    if (message.type === "reply") return this.#settle(message.id, message);
+    if (message.type === "reply") return message.id === null ? this.#turnedAway(message) : this.#settle(message.id, message);
     if (message.type === "hello") {
       if (message.version !== VERSION) return this.tell("line", {state: "wrong"});
       this.#attempt = 0;
+      if (message.control) this.asking = null;
       if (message.session) sessionStorage.setItem(SESSION, message.session);
       this.tell("line", {state: "on"});
     }
@@ -84,6 +90,14 @@ export class Connection extends News {
     const resolve = this.#pending.get(id);
     this.#pending.delete(id);
     resolve?.(reply);
+  }
+
+  /** A session is that of a server that has ended, so no message is due; a secret was given on purpose. */
+  #turnedAway({message}) {
+    if (this.asking === "session") sessionStorage.removeItem(SESSION);
+    const why = this.asking === "token" ? message : "";
+    this.asking = null;
+    this.tell("refused", why);
   }
 
   #lost(socket) {

@@ -4,6 +4,7 @@
 import {News} from "./dom.js";
 
 const OFF = "Not connected";
+const ASKING = "Asking for control";
 const CLOSED = "View only: the viewer was started without control.";
 const NO_TOKEN = "View only: to take control open the link that the viewer printed when it started, or ask it for a new one.";
 
@@ -13,7 +14,8 @@ export class Permit extends News {
 
   constructor(scene, connection) {
     super();
-    this.scene = scene;
+    Object.assign(this, {scene, connection});
+    connection.on("refused", () => this.#apply());
     scene.on("hello", () => this.#apply());
     connection.on("line", ({state}) => {
       this.#line = state === "on";
@@ -25,8 +27,14 @@ export class Permit extends News {
   get why() {
     const hello = this.scene.hello;
     if (!this.#line || !hello) return OFF;
+    if (!hello.control && this.connection.asking) return ASKING;
     if (hello.control) return "";
     return hello.abilities.length ? NO_TOKEN : CLOSED;
+  }
+
+  /** Say so to everybody, not only on a control. */
+  get notice() {
+    return this.#line && !this.connection.asking ? this.why : "";
   }
 
   knows(name) {

@@ -28,6 +28,7 @@ export class Status {
       this.#heard = performance.now();
       this.#tellLine();
     });
+    connection.on("refused", (why) => why && this.say(why, true));
     setInterval(() => this.#tellLine(), LOOK);
   }
 
@@ -74,10 +75,8 @@ export class Status {
 
   #explain() {
     const banner = byId("banner");
-    const {why} = this.permit;
-    const shown = this.#line.state === "on" && why;
-    setText(banner, shown ? why : "");
-    banner.hidden = !shown;
+    setText(banner, this.permit.notice);
+    banner.hidden = !this.permit.notice;
   }
 
   #show(state) {
