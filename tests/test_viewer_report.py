@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """From a point of the critic's report to its moment in the recording, in a real browser; and without any server."""
 
-import re, time
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -90,7 +90,7 @@ def test_a_point_of_the_report_leads_to_its_moment_and_place(browser, served):
         expect(page.locator("figure p").first).to_contain_text(f"{NAMES[1]}, t = 5029.90 s")
         svg.click(position={"x": left * scale, "y": top * scale})
         until(lambda: playback(served).run == NAMES[1], "the other run is shown")
-        time.sleep(2); print(playback(served), viewer.url, viewer.locator("#log").text_content()); until(lambda: playback(served).t == pytest.approx(5029.9), "its moment is shown")
+        until(lambda: playback(served).t == pytest.approx(5029.9), "its moment is shown")
         assert len(visit.context.pages) == 2  # the viewer's own window, not another one
         place = dict(part.split("=") for part in viewer.url.split("#")[1].split("&"))
         pose = served.source._state(5029.9).truth

@@ -54,12 +54,12 @@ function lead(picture) {
     said.textContent = sample ? `${quantity(sample.value, unit)} ${told(sample)}`.trim() : hint;
     return sample;
   };
-  svg.addEventListener("pointermove", point);
+  // what is ringed is what a click means: a click's own place is rounded to whole pixels
+  let ringed = null;
+  svg.addEventListener("pointermove", (event) => (ringed = point(event)));
+  svg.addEventListener("pointerdown", (event) => event.pointerType !== "mouse" && (ringed = point(event)));
   svg.addEventListener("pointerleave", () => ring.setAttribute("visibility", "hidden"));
-  svg.addEventListener("click", (event) => {
-    const sample = point(event);
-    if (sample) show(sample);
-  });
+  svg.addEventListener("click", () => ringed && show(ringed));
   const worst = largest(picture.samples, LISTED);
   if (worst.length) figure.append(list(worst, unit));
 }
