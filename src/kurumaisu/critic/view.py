@@ -48,10 +48,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _serve(options: argparse.Namespace) -> None:
     folder = _report_folder(options.recording, options.report)
+    print(f"view: reading {options.recording}", file=sys.stderr, flush=True)
     server = opened(options.recording, options.runs, options.model, folder, viewer_settings(options.port))
-    with server:
-        print(f"{server.told}\nopen {server.address}", flush=True)
-        signal.sigwait({signal.SIGINT, signal.SIGTERM})
+    ends = {signal.SIGINT, signal.SIGTERM}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ends)  # before threads begin: they inherit it
+    try:
+        with server:
+            print(f"{server.told}\nopen {server.address}", flush=True)
+            signal.sigwait(ends)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class Opened:
@@ -109,8 +115,7 @@ def models(recording: Recording, model_file: Path | None, folder: Path | None) -
 def viewer_settings(port: int | None) -> ViewerSettings:
     """Return launch/viewer.yaml, with another port if one is given. Raise Error naming file and key."""
     top = settings.load(shipped("launch/viewer.yaml"))
-    how = read_settings(top)
-    top.end()
+    how = read_settings(top)  # the other keys are the node's
     return how if port is None else replace(how, port=port)
 
 

@@ -38,12 +38,11 @@ class Showing:
 
     def __init__(self, album: Album, models: Mapping[str, Model], place: Map | None) -> None:
         self._album, self._models, self._map = album, models, place
+        self._tapes: dict[str, Tape] = {}
         first = next(iter(models.values()))
         self._chassis, self._laser = first.chassis, first.laser
-        mount = album.recording.laser
-        height = self._laser.mount.z
-        self._rays = None if place is None else Rays(walls_at(place, height))
-        self._mount = mount
+        self._rays = None if place is None else Rays(walls_at(place, self._laser.mount.z))
+        self._mount = album.recording.laser
 
     @property
     def runs(self) -> tuple[str, ...]:
@@ -63,7 +62,12 @@ class Showing:
         return World(tuple(bodies), self._bounds(), CHAIR)
 
     def tape(self, name: str) -> Tape:
-        """Return a run, simulated by the models."""
+        """Return a run, simulated by the models; the second time, the same."""
+        if name not in self._tapes:
+            self._tapes[name] = self._made(name)
+        return self._tapes[name]
+
+    def _made(self, name: str) -> Tape:
         recording = self._album.recording
         run = next(run for run in recording.runs if run.name == name)
         notes = [Note("error" if said in recording.invalid else "warning", said) for said in recording.problems]
