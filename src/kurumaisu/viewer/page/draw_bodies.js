@@ -3,6 +3,8 @@
 
 const HEX = /^#[0-9a-f]{6}$/i;
 const LEAST = 3; // [px] radius under which a body is drawn as a dot
+const SMALL = 9; // [px] radius of a body that has no room for a name
+const LARGE = 90; // [px] size of one that has room for it inside
 const NOSE = 0.32; // share of a robot's length
 
 export function drawBodies(context, picture) {
@@ -93,11 +95,21 @@ export function drawNames(context, {scene, camera, colors, ratio, options}) {
   Object.assign(context, {font: "12px system-ui, sans-serif", textAlign: "center", textBaseline: "top"});
   for (const body of scene.world.bodies) {
     const pose = body.kind === "wall" ? null : scene.poseOf(body);
-    const radius = body.radius * camera.scale;
-    if (!pose || (radius < 9 && body.id !== options.selected)) continue;
-    const [px, py] = camera.toScreen(pose[0], pose[1]);
-    label(context, body.name, px, py + radius + 3, colors);
+    if (!pose || (body.radius * camera.scale < SMALL && body.id !== options.selected)) continue;
+    const [x0, y0, x1, y1] = boxOf(body, pose);
+    const [px, py] = camera.toScreen((x0 + x1) / 2, y0);
+    const inside = (y1 - y0) * camera.scale > LARGE && (x1 - x0) * camera.scale > LARGE;
+    label(context, body.name, px, inside ? py - ((y1 - y0) * camera.scale) / 2 - 6 : py + 4, colors);
   }
+}
+
+/** Return what a body covers of the world's axes: [x0, y0, x1, y1]. */
+function boxOf({extent: [x0, y0, x1, y1]}, [x, y, yaw]) {
+  const [c, s] = [Math.cos(yaw), Math.sin(yaw)];
+  const corners = [[x0, y0], [x0, y1], [x1, y0], [x1, y1]];
+  const xs = corners.map(([u, v]) => x + c * u - s * v);
+  const ys = corners.map(([u, v]) => y + s * u + c * v);
+  return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
 }
 
 /** Write with a halo of the ground's colour, so that it reads above anything. */
