@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Robots, people and things: footprint, nose, name, contact.
+// Robots, people and things: footprint, nose, contact.
 
 const HEX = /^#[0-9a-f]{6}$/i;
 const LEAST = 3; // [px] radius under which a body is drawn as a dot
-const SMALL = 9; // [px] radius of a body that has no room for a name
-const LARGE = 90; // [px] size of one that has room for it inside
 const NOSE = 0.32; // share of a robot's length
 
 export function drawBodies(context, picture) {
@@ -25,7 +23,6 @@ export function drawBodies(context, picture) {
     if (body.id === options.selected) outline(context, body, {lineWidth: 4 * pixel, strokeStyle: colors.accent});
     if (hit.has(body.id)) contact(context, body, colors, pixel);
   }
-  if (options.layers.marks) drawMarks(context, picture);
 }
 
 function fill(context, body, color, colors, pixel) {
@@ -37,7 +34,7 @@ function fill(context, body, color, colors, pixel) {
   // ground first: a scan under a half transparent body would look like part of it
   context.fillStyle = colors.paper;
   context.fill(body.closed);
-  context.globalAlpha = 0.6;
+  context.globalAlpha = 0.5;
   context.fillStyle = color;
   context.fill(body.closed);
   context.globalAlpha = 1;
@@ -76,7 +73,7 @@ function contact(context, body, colors, pixel) {
   context.stroke();
 }
 
-function drawMarks(context, {scene, camera, colors, ratio}) {
+export function drawMarks(context, {scene, camera, colors, ratio}) {
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   Object.assign(context, {strokeStyle: colors.mark, lineWidth: 2});
   context.beginPath();
@@ -88,33 +85,4 @@ function drawMarks(context, {scene, camera, colors, ratio}) {
     context.lineTo(px + 4, py - 4);
   }
   context.stroke();
-}
-
-export function drawNames(context, {scene, camera, colors, ratio, options}) {
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  Object.assign(context, {font: "12px system-ui, sans-serif", textAlign: "center", textBaseline: "top"});
-  for (const body of scene.world.bodies) {
-    const pose = body.kind === "wall" ? null : scene.poseOf(body);
-    if (!pose || (body.radius * camera.scale < SMALL && body.id !== options.selected)) continue;
-    const [x0, y0, x1, y1] = boxOf(body, pose);
-    const [px, py] = camera.toScreen((x0 + x1) / 2, y0);
-    const inside = (y1 - y0) * camera.scale > LARGE && (x1 - x0) * camera.scale > LARGE;
-    label(context, body.name, px, inside ? py - ((y1 - y0) * camera.scale) / 2 - 6 : py + 4, colors);
-  }
-}
-
-/** Return what a body covers of the world's axes: [x0, y0, x1, y1]. */
-function boxOf({extent: [x0, y0, x1, y1]}, [x, y, yaw]) {
-  const [c, s] = [Math.cos(yaw), Math.sin(yaw)];
-  const corners = [[x0, y0], [x0, y1], [x1, y0], [x1, y1]];
-  const xs = corners.map(([u, v]) => x + c * u - s * v);
-  const ys = corners.map(([u, v]) => y + s * u + c * v);
-  return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
-}
-
-/** Write with a halo of the ground's colour, so that it reads above anything. */
-export function label(context, text, x, y, colors, ink = colors.ink) {
-  Object.assign(context, {lineWidth: 3, lineJoin: "round", strokeStyle: colors.paper, fillStyle: ink});
-  context.strokeText(text, x, y);
-  context.fillText(text, x, y);
 }

@@ -3,7 +3,7 @@
 
 import {BUCKETS} from "./colors.js";
 import {fixed, short} from "./dom.js";
-import {label} from "./draw_bodies.js";
+import {label} from "./draw_names.js";
 import {niceLength} from "./draw_ground.js";
 import {strongest} from "./draw_scans.js";
 
