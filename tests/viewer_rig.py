@@ -200,6 +200,8 @@ class Running:
         self.close()
 
     def close(self):
+        if self._stop.is_set():
+            return
         self._stop.set()
         self._thread.join()
         self.server.close()

@@ -59,7 +59,10 @@ def check_host(host: str | None, names: tuple[str, ...]) -> None:
     Anything else may be a foreign page whose name was bent to our address (DNS rebinding). The port is not looked at:
     behind ssh -L it is another one.
     """
-    name = urlsplit(f"//{host}").hostname if host else None
+    try:
+        name = urlsplit(f"//{host}").hostname if host else None
+    except ValueError:  # no address between its brackets
+        name = None
     if name is None or not (name == "localhost" or name in names or _is_address(name)):
         raise Error(f"Host {host!r}: is no name of this server; see `names` in its settings")
 
