@@ -200,7 +200,7 @@ def test_a_robot_that_may_only_be_seen_looks_like_it(browser):
         page.mouse.move(x + 100, y, steps=3)
         page.mouse.up()
         page.keyboard.press("p")
-        page.keyboard.press("d")
+        page.keyboard.press("t")
         page.keyboard.press("Space")
         before = page.locator("#read-t").text_content()
         expect(page.locator("#read-t")).not_to_have_text(before)

@@ -127,7 +127,7 @@ def test_keys_pause_step_stop_and_turn(visit, shown):
 
 def test_what_is_written_is_no_command(visit, shown):
     visit.page.locator("#tab-effects").click()
-    visit.page.locator("#effect-search").press_sequentially("dp. ?")
+    visit.page.locator("#effect-search").press_sequentially("tp. ?")
     expect(visit.page.locator("#effect-count")).to_contain_text("0 of")
     visit.page.locator("#seed").fill("7")
     visit.page.locator("#seed").press("Enter")
@@ -167,8 +167,7 @@ def test_a_slider_on_a_slow_line_sends_what_is_newest_only(visit, shown):
     page.locator("#effect-search").fill("base.lag_v")
     row = page.locator(".effect-row:visible")
     row.get_by_role("switch").check()
-    until(lambda: rig.acting, "on")
-    row.locator("summary").click()
+    until(lambda: rig.acting == {"base.lag_v": {"tau": 0.1}}, "on, with its typical size")
     rig.slow.set()
     slider = row.get_by_role("slider")
     for place in range(0, 1001, 40):
@@ -278,8 +277,14 @@ def test_the_stick_is_taken_away_when_nobody_may_be_there(visit, shown):
         expect(page.locator("#alarm")).to_contain_text("The stick was taken away")
         stopped(shown, visit)
         expect(page.locator("#stick-box")).to_be_hidden()
+        count = len(drives(shown))
         page.keyboard.down("w")  # as the repeats of a key that is still held
         expect(page.locator("#stick-box")).to_be_hidden()
+        take_stick(visit)
+        page.keyboard.down("w")  # nor does it drive when the stick is taken again: it must be let go first
+        page.keyboard.press("Escape")
+        expect(page.locator("#stick-box")).to_be_hidden()
+        assert len(drives(shown)) == count
         page.keyboard.up("w")
         page.evaluate("() => { delete document.hidden; document.getElementById('alarm').textContent = ''; }")
         assert drives(shown)[-1] == (0.0, 0.0)
@@ -337,7 +342,7 @@ def test_nobody_drives_by_a_line_that_is_too_slow(visit, shown):
     take_stick(visit)
     visit.page.keyboard.down("w")
     expect(visit.page.locator("#alarm")).to_contain_text("too slow to drive by")
-    assert len(drives(shown)) <= 6
+    assert len(drives(shown)) <= 11
     jam.set()
     stopped(shown, visit)
 

@@ -33,7 +33,16 @@ def catalogue(acting):
             effect.sentence,
             effect.id in acting,
             tuple(
-                Value(p.name, "", p.unit, p.lower, p.upper, acting.get(effect.id, {}).get(p.name, p.null))
+                Value(
+                    p.name,
+                    "",
+                    p.unit,
+                    p.lower,
+                    p.upper,
+                    acting.get(effect.id, {}).get(p.name, p.null),
+                    p.null,
+                    p.scale if p.null == 0 else p.null,
+                )
                 for p in effect.parameters
             ),
         )

@@ -101,7 +101,16 @@ class EffectSwitches:
             title=f"{effect.sentence}: {effect.formula}",
             enabled=on,
             parameters=tuple(
-                Value(p.name, f"typically {p.scale:g}", p.unit, p.lower, p.upper, float(values[p.name]))
+                Value(
+                    name=p.name,
+                    description=f"typically {p.scale:g}",
+                    unit=p.unit,
+                    min=p.lower,
+                    max=p.upper,
+                    value=float(values[p.name]),
+                    neutral=p.null,
+                    typical=p.scale if p.null == 0 else p.null,  # of a form that has a middle, the middle
+                )
                 for p in effect.parameters
             ),
         )

@@ -155,7 +155,7 @@ class Paths:
 
 @dataclass(frozen=True)
 class Value:
-    """A parameter of an effect, as a slider needs it."""
+    """A parameter of an effect, as a slider needs it; neutral: with it nothing happens; typical: with it something."""
 
     name: str
     description: str
@@ -163,6 +163,8 @@ class Value:
     min: float
     max: float
     value: float
+    neutral: float | None = None
+    typical: float | None = None
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,11 @@
 
 import {Camera} from "./camera.js";
 import {readColors} from "./colors.js";
-import {drawBodies, drawNames} from "./draw_bodies.js";
+import {drawBodies, drawMarks} from "./draw_bodies.js";
 import {drawGrid, drawWalls} from "./draw_ground.js";
 import {drawLegend} from "./draw_legend.js";
 import {drawMap} from "./draw_map.js";
+import {drawNames} from "./draw_names.js";
 import {drawFans, drawScans} from "./draw_scans.js";
 import {drawParticles, drawPoses, drawTrails} from "./draw_traces.js";
 
@@ -130,9 +131,10 @@ export class Picture {
     const {layers} = this.options;
     if (layers.fans) drawFans(context, this);
     if (layers.trails) drawTrails(context, this);
-    if (layers.scans) drawScans(context, this);
-    if (layers.particles) drawParticles(context, this);
     if (layers.bodies) drawBodies(context, this);
+    if (layers.scans) drawScans(context, this); // echoes lie on the edges of bodies
+    if (layers.particles) drawParticles(context, this);
+    if (layers.marks) drawMarks(context, this);
     drawPoses(context, this);
     if (layers.names) drawNames(context, this);
     for (const extra of this.extras) extra(context, this);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Robots, people and things: footprint, nose, name, contact.
+// Robots, people and things: footprint, nose, contact.
 
 const HEX = /^#[0-9a-f]{6}$/i;
 const LEAST = 3; // [px] radius under which a body is drawn as a dot
@@ -24,7 +24,6 @@ export function drawBodies(context, picture) {
     if (body.id === options.selected) outline(context, body, {lineWidth: 4 * pixel, strokeStyle: colors.accent});
     if (hit.has(body.id)) contact(context, body, colors, pixel);
   }
-  if (options.layers.marks) drawMarks(context, picture);
 }
 
 function fill(context, body, color, colors, pixel) {
@@ -36,7 +35,7 @@ function fill(context, body, color, colors, pixel) {
   // ground first: a scan under a half transparent body would look like part of it
   context.fillStyle = colors.paper;
   context.fill(body.closed);
-  context.globalAlpha = 0.6;
+  context.globalAlpha = 0.5;
   context.fillStyle = color;
   context.fill(body.closed);
   context.globalAlpha = 1;
@@ -75,7 +74,7 @@ function contact(context, body, colors, pixel) {
   context.stroke();
 }
 
-function drawMarks(context, {scene, camera, colors, ratio}) {
+export function drawMarks(context, {scene, camera, colors, ratio}) {
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   Object.assign(context, {strokeStyle: colors.mark, lineWidth: 2});
   context.beginPath();
@@ -88,6 +87,7 @@ function drawMarks(context, {scene, camera, colors, ratio}) {
   }
   context.stroke();
 }
+<<<<<<< HEAD
 
 export function drawNames(context, {scene, camera, colors, ratio, options}) {
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -111,3 +111,5 @@ export function label(context, text, x, y, colors, ink = colors.ink) {
   context.strokeText(text, x, y);
   context.fillText(text, x, y);
 }
+=======
+>>>>>>> viewer-page

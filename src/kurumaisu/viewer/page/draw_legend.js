@@ -3,14 +3,14 @@
 
 import {BUCKETS} from "./colors.js";
 import {fixed, short} from "./dom.js";
-import {label} from "./draw_bodies.js";
+import {label} from "./draw_names.js";
 import {niceLength} from "./draw_ground.js";
 import {strongest} from "./draw_scans.js";
 
 const LEFT = 14; // [px]
 const BOTTOM = 16;
 const LEAST = 60; // [px] width of the scale bar
-const COLORS = 132; // [px] width of the colour scale
+const COLORS = 140; // [px] width of the colour scale
 
 export function drawLegend(context, picture) {
   const {camera, colors, ratio, options, scene} = picture;
@@ -19,14 +19,22 @@ export function drawLegend(context, picture) {
   const y = camera.height - BOTTOM;
   const length = niceLength(camera.scale, LEAST);
   const width = length * camera.scale;
+  const scale = options.layers.scans && scene.scans.size && options.scanColor !== "plain";
+  back(context, y, scale, Math.max(width + 84, scale ? COLORS + 12 : 0), colors);
   bar(context, LEFT, y, width, colors);
   label(context, length >= 1 ? `${short(length)} m` : `${short(length * 1000)} mm`, LEFT, y - 6, colors);
   if (scene.state) {
     label(context, `t = ${fixed(scene.state.t, 2)} s`, LEFT + width + 10, y + 4, colors); // for saved pictures
   }
-  if (options.layers.scans && scene.scans.size && options.scanColor !== "plain") {
-    scaleOfColors(context, LEFT, y - 44, picture);
-  }
+  if (scale) scaleOfColors(context, LEFT, y - 46, picture);
+}
+
+function back(context, y, scale, width, colors) {
+  const height = scale ? 74 : 30;
+  context.globalAlpha = 0.8;
+  context.fillStyle = colors.paper;
+  context.fillRect(LEFT - 6, y + 6 - height, width + 12, height);
+  context.globalAlpha = 1;
 }
 
 function bar(context, x, y, width, colors) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Trails, particles, and where the chair is according to whom.
 
-import {label} from "./draw_bodies.js";
-
 // Radius of the ellipse that holds 95 % of a Gaussian in two dimensions [sigma]: sqrt(-2 ln 0.05)
 const ELLIPSE = Math.sqrt(-2 * Math.log(0.05));
 const DASHES = {truth: [], odom: [7, 4], estimate: [2, 3]}; // told apart by form, too
@@ -42,13 +40,13 @@ export function drawParticles(context, {scene, camera, colors, ratio}) {
 export function drawPoses(context, picture) {
   const {scene, options} = picture;
   const {truth, odom, estimate} = scene.state ?? {};
-  if (odom && options.layers.odom) drawGhost(context, picture, odom, "odom", "odometry");
+  if (odom && options.layers.odom) drawGhost(context, picture, odom, "odom");
   if (estimate?.pose && options.layers.estimate) drawEstimate(context, picture, estimate);
   if (truth && options.layers.truth) drawCross(context, picture, truth);
 }
 
 /** Outline of the chair where something believes that it is. */
-function drawGhost(context, {scene, camera, colors, ratio, options}, pose, name, text) {
+function drawGhost(context, {scene, camera, colors, ratio}, pose, name) {
   const chair = scene.chair;
   camera.apply(context, ratio);
   context.translate(pose[0], pose[1]);
@@ -62,17 +60,11 @@ function drawGhost(context, {scene, camera, colors, ratio, options}, pose, name,
   context.moveTo(0, 0);
   context.lineTo(Math.max(chair?.extent[2] ?? 0.3, 0.1), 0);
   context.stroke();
-  if (!options.layers.names) return;
-  const [px, py] = camera.toScreen(pose[0], pose[1]);
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  Object.assign(context, {font: "11px system-ui, sans-serif", textAlign: "center", textBaseline: "bottom"});
-  const shift = name === "odom" ? 0 : 12;
-  label(context, text, px, py - (chair?.radius ?? 0.3) * camera.scale - 2 - shift, colors, colors[name]);
 }
 
 function drawEstimate(context, picture, {pose, covariance}) {
   const {camera, colors, ratio} = picture;
-  drawGhost(context, picture, pose, "estimate", "localization");
+  drawGhost(context, picture, pose, "estimate");
   if (!covariance) return;
   const [xx, xy, yy, aa] = covariance;
   // eigenvalues of a symmetric 2 x 2 matrix

@@ -2,7 +2,7 @@
 // The dead-man: commands go out only while somebody holds something, and one zero when he lets go.
 
 const PERIOD = 100; // [ms] between commands
-const UNANSWERED = 5; // commands without a reply: the line is too slow to drive by
+const UNANSWERED = 10; // commands without a reply: what is seen is a second old, and nobody can drive by that
 const BACKLOG = 2000; // [bytes] that the network has not taken: what waits there would be obeyed too late
 
 export class Drive {

@@ -2,7 +2,7 @@
 // Choosing, moving and turning bodies; measuring; telling the localization where the chair is.
 
 import {newest, short} from "./dom.js";
-import {label} from "./draw_bodies.js";
+import {label} from "./draw_names.js";
 import {covers} from "./shapes.js";
 
 const HANDLE = 26; // [px] from a body's edge to the handle that turns it

@@ -92,7 +92,7 @@ export class EffectRow {
   #choose() {
     this.element.open = true;
     this.#unfold();
-    this.group.parameters.forEach(({typical}, i) => typical === undefined || this.#sliders[i].show(typical));
+    this.group.parameters.forEach(({typical}, i) => typical === null || this.#sliders[i].show(typical));
   }
 
   #values() {

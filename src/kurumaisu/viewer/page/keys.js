@@ -26,7 +26,8 @@ export function keyTable({picture, options, transport, bag, stick, edit, pointer
     {keys: ["p"], shown: "p", meaning: "pause or run; play or hold a recording", act: () => (bag.playback ? bag.togglePlay() : transport.togglePause())},
     {keys: ["."], shown: ".", meaning: "one step of a paused simulation; 0.1 s on in a recording", act: () => (bag.playback ? bag.nudge(1) : transport.step())},
     {keys: [","], shown: ",", meaning: "0.1 s back in a recording", act: () => bag.nudge(-1)},
-    {keys: ["d"], shown: "d", meaning: "take the stick, or lay it down", act: () => stick.toggle()},
+    // none of the keys that drive: who holds those while the stick is taken away must not take it again
+    {keys: ["t"], shown: "t", meaning: "take the stick, or lay it down", act: () => stick.toggle()},
     {shown: "Arrows, W A S D", meaning: "with the stick taken: hold to drive; let go to stop. Any other key stops"},
     {keys: ["ArrowUp"], act: pan(0, PAN), onMap: true},
     {keys: ["ArrowDown"], act: pan(0, -PAN), onMap: true},

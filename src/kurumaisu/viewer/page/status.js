@@ -90,7 +90,7 @@ export class Status {
     setText(byId("read-vw"), pair(state.v == null ? null : [state.v, state.w], 2, speed));
     setText(byId("read-commanded"), pair(state.commanded, 2, speed));
     setText(byId("read-volts"), pair(state.volts, 3, ["V", "V"]));
-    setText(byId("read-driver"), state.driver ?? "–");
+    setText(byId("read-driver"), state.driver || "–");
   }
 
   #showNotes(notes) {

@@ -77,6 +77,8 @@ export class Stick {
     if (event.code in KEYS && !writing) {
       event.preventDefault();
       event.stopImmediatePropagation();
+      // a key that was down when the stick was taken must be let go first
+      if (event.repeat && !this.#down.has(event.code)) return;
       this.#down.add(event.code);
       this.#byKeys();
     } else if (!HARMLESS.includes(event.key) && this.drive.held) {
