@@ -3,7 +3,6 @@
 
 const HEX = /^#[0-9a-f]{6}$/i;
 const LEAST = 3; // [px] radius under which a body is drawn as a dot
-const APART = [70, 14]; // [px] between names: a simulated chair may stand on the measured one
 const NOSE = 0.32; // share of a robot's length
 
 export function drawBodies(context, picture) {
@@ -87,29 +86,3 @@ export function drawMarks(context, {scene, camera, colors, ratio}) {
   }
   context.stroke();
 }
-<<<<<<< HEAD
-
-export function drawNames(context, {scene, camera, colors, ratio, options}) {
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  Object.assign(context, {font: "12px system-ui, sans-serif", textAlign: "center", textBaseline: "top"});
-  const taken = [];
-  for (const body of scene.world.bodies) {
-    const pose = body.kind === "wall" ? null : scene.poseOf(body);
-    const radius = body.radius * camera.scale;
-    if (!pose || (radius < 9 && body.id !== options.selected)) continue;
-    const [px, py] = camera.toScreen(pose[0], pose[1]);
-    let top = py + radius + 3;
-    while (taken.some(([x, y]) => Math.abs(x - px) < APART[0] && Math.abs(y - top) < APART[1])) top += APART[1];
-    taken.push([px, top]);
-    label(context, body.name, px, top, colors);
-  }
-}
-
-/** Write with a halo of the ground's colour, so that it reads above anything. */
-export function label(context, text, x, y, colors, ink = colors.ink) {
-  Object.assign(context, {lineWidth: 3, lineJoin: "round", strokeStyle: colors.paper, fillStyle: ink});
-  context.strokeText(text, x, y);
-  context.fillText(text, x, y);
-}
-=======
->>>>>>> viewer-page
