@@ -43,7 +43,7 @@ function wanted({scene, camera, options, colors}) {
     const pose = body.kind === "wall" ? null : scene.poseOf(body);
     const selected = body.id === options.selected;
     if (!pose || (body.radius * camera.scale < SMALL && !selected)) continue;
-    list.push({rank: selected ? 0 : (RANK[body.kind] ?? 4), text: body.name, box: boxOf(body, pose)});
+    list.push({rank: selected ? 0 : body === chair ? 0.75 : (RANK[body.kind] ?? 4), text: body.name, box: boxOf(body, pose)});
   }
   return list.sort((a, b) => a.rank - b.rank);
 }

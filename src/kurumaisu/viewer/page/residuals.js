@@ -5,7 +5,7 @@ import {byId, make, setText} from "./dom.js";
 import {fragment, largest, pictures, quantity, told} from "./report_data.js";
 
 // Of the report's page only the data are wanted; its styles may not act here, and each would be complained about.
-const STYLES = /<style[^>]*>[^]*?<\/style>| style="[^"]*"/g;
+const STYLES = /<(style)\b[^>]*>[^]*?<\/\1>|\bstyle="[^"]*"/g;
 const MARKED = 100;
 const LISTED = 25;
 const LARGEST = 11; // [px] radius of the mark of what is furthest off
