@@ -48,7 +48,7 @@ async function ask(name, values) {
 // a drag is refused at many places on its way: what counts is the last one
 const quietly = (name, values) => connection.command(name, values);
 
-const transport = new Transport(scene, permit, ask, stick);
+const transport = new Transport(scene, permit, ask, stick, say);
 const bag = new Bag(scene, permit, ask);
 const edit = new Edit(picture, scene, options, {
   can: (name) => permit.can(name), ask: quietly, failed: (text) => say(text, true),

@@ -5,7 +5,7 @@ import {byId, make, setText} from "./dom.js";
 
 const THEMES = ["auto", "light", "dark"];
 const STORE = "kurumaisu.theme";
-const NARROW = matchMedia("(max-width: 760px)");
+const NARROW = matchMedia("(max-width: 900px)");
 
 /** Set up the tabs; a narrow page begins with the picture, and shows one when it is asked for. */
 export function setUpTabs() {

@@ -111,7 +111,8 @@ export class Stick {
   }
 
   #show(x, y) {
-    byId("knob").style.transform = `translate(${50 * x}px, ${50 * y}px)`;
+    const reach = this.pad.clientWidth / 3; // the knob's middle, when its edge is at the rim
+    byId("knob").style.transform = `translate(${reach * x}px, ${reach * y}px)`;
   }
 
   #changed(reason, say) {
