@@ -123,6 +123,16 @@ def test_any_other_key_stops(visit, shown, key):
         until(lambda: shown.rig.estop, "the emergency stop too")
 
 
+def test_space_stops_whatever_has_the_focus_while_the_stick_is_taken(visit, shown):
+    take_stick(visit)
+    visit.page.locator("#pause").focus()
+    visit.page.keyboard.press("Space")
+    until(lambda: shown.rig.estop, "emergency stop")
+    expect(visit.page.locator("#estop")).to_have_attribute("aria-pressed", "true")
+    assert [name for name, _ in shown.rig.commands] == ["estop"]  # the button was not pressed
+    expect(visit.page.locator("#drive")).to_be_disabled()  # until it is released
+
+
 def test_a_lost_connection_lets_go_and_the_page_comes_back(browser, shown):
     with Visit(browser, shown.link) as visit:
         page = visit.page

@@ -49,6 +49,7 @@ async function ask(name, values) {
 const quietly = (name, values) => connection.command(name, values);
 
 const transport = new Transport(scene, permit, ask, stick, say);
+stick.emergency = () => transport.stop();
 const bag = new Bag(scene, permit, ask);
 const edit = new Edit(picture, scene, options, {
   can: (name) => permit.can(name), ask: quietly, failed: (text) => say(text, true),

@@ -38,7 +38,7 @@ export function setUpTabs() {
   });
   show(NARROW.matches ? null : byId("tab-view"));
   return {
-    show: (name) => show(byId(`tab-${name}`)),
+    show: (name) => byId(`tab-${name}`).hidden || show(byId(`tab-${name}`)),
     get current() {
       return tabs.find((tab) => tab.getAttribute("aria-selected") === "true") ?? null;
     },
