@@ -32,6 +32,7 @@ NAMES = (
     "slam_localise",
     "predict",
     "paper",
+    "viewer",
 )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import threading
 import time
 from collections import Counter
@@ -14,6 +15,7 @@ from typing import Any
 import aiohttp
 
 _PATIENCE = 20.0  # [s]
+_ESTABLISHED = 1  # as the kernel counts a connection's states
 
 
 class Page:
@@ -79,6 +81,12 @@ class Page:
     def stall(self) -> None:
         """Take nothing any more, as a page that hangs."""
         self._reads = False
+
+    @property
+    def cut_off(self) -> bool:
+        """Whether the other end has ended the connection of a page that hangs: the kernel knows."""
+        link = self._socket.get_extra_info("socket")
+        return link is None or link.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != _ESTABLISHED
 
     @property
     def closed(self) -> bool:

@@ -22,11 +22,13 @@ from kurumaisu.ros.messages import stamp_of
 from kurumaisu.sim.chair import Observation as ChairObservation
 from kurumaisu.sim.fans import spread
 from kurumaisu.sim.machinery import Machinery
+from kurumaisu.sim.scans import Scans
 from kurumaisu.sim.scenery import Piece, bounds, scenery
 from kurumaisu.sim.simulator import Simulator
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import FloatArray
 
 _NS = 1_000_000_000
+_View = numpy_msg(View)  # a plain View would be packed number by number, on any topic
 _OF_LATE = 16  # views over which the real-time factor is taken
 
 
@@ -47,6 +49,10 @@ class Fans(Protocol):
     def places(self, machinery: Machinery) -> list[dict[str, Any]]:
         """Return for each fan its body's row, bearings and gate."""
 
+    @property
+    def fresh(self) -> bool:
+        """Whether there may be no newer ones in the next step."""
+
     def looks(self) -> Looks | None:
         """Return the newest scans, None before the first."""
 
@@ -58,10 +64,9 @@ class ViewTopics:
         """Advertise; rate [Hz] at most; machinery: tells what runs now."""
         self._period, self._frame = 1 / rate, frame
         self._machinery, self._fans = machinery, fans
-        self._view = rospy.Publisher("~view", numpy_msg(View), queue_size=1, tcp_nodelay=True)
+        self._view = rospy.Publisher("~view", _View, queue_size=1, tcp_nodelay=True)
         self._world = rospy.Publisher("~world", String, queue_size=1, latch=True)
         self._known: Machinery | None = None
-        self._hit: BoolArray = np.zeros(0, dtype=np.bool_)
         self._number = 0
         self._run = 0
         self._due = 0.0  # [s] of wall time
@@ -69,9 +74,14 @@ class ViewTopics:
         self._sent: Sequence[int] = ()  # stamps of the scans that were
 
     @property
-    def wanted(self) -> bool:
-        """Whether anybody looks."""
-        return bool(self._view.get_num_connections())
+    def due(self) -> bool:
+        """Whether somebody looks and should see something new; asked in every step, so there is no more to it."""
+        if time.monotonic() < self._due:
+            return False
+        if self._view.get_num_connections():
+            return True
+        self._sent = ()  # who comes next wants the scans, too
+        return False
 
     def carried(self) -> None:
         """Note that a robot was put elsewhere: its odometry does not know."""
@@ -79,25 +89,22 @@ class ViewTopics:
 
     def show(self, now: int, paused: bool, speed: float) -> None:
         """Publish if a view is due and wanted; to be called after every step and change; now [ns] of /clock."""
-        if not self.wanted:
-            self._sent = ()  # who comes next wants the scans, too
+        if not self.due:
             return
+        wall = time.monotonic()
+        if not (self._fans.fresh or paused or wall >= self._due + self._period):
+            return  # the next step may bring scans
         machinery = self._machinery()
         if machinery is not self._known:
             self._describe(machinery)
-        self._hit |= machinery.stalled
-        wall = time.monotonic()
-        if wall < self._due:
-            return
         self._due = wall + self._period
-        view = View(world=self._number, run=self._run, paused=paused, speed=speed)
+        view = _View(world=self._number, run=self._run, paused=paused, speed=speed)
         view.header.stamp, view.header.frame_id = stamp_of(now), self._frame
         view.real_time_factor = 0.0 if paused else self._factor(wall, now)
         view.poses = np.ascontiguousarray(machinery.frames[:-1, PLANAR]).reshape(-1)
-        view.hit = self._hit.tobytes()
+        view.hit = machinery.stalled.tobytes()
         self._add_scans(view)
         self._view.publish(view)
-        self._hit = np.zeros_like(machinery.stalled)
 
     def _factor(self, wall: float, now: int) -> float:
         if self._late and (now < self._late[-1][1] or wall - self._late[-1][0] > 1.0):
@@ -122,7 +129,7 @@ class ViewTopics:
 
     def _describe(self, machinery: Machinery) -> None:
         """Tell of other bodies."""
-        self._known, self._hit = machinery, np.zeros_like(machinery.stalled)
+        self._known = machinery
         self._number += 1
         self._sent = ()
         pieces = scenery(machinery)
@@ -184,6 +191,11 @@ class ChairFan:
             }
         ]
 
+    @property
+    def fresh(self) -> bool:
+        """A scan keeps the place where it was made."""
+        return True
+
     def looks(self) -> Looks | None:
         """Return its newest scan."""
         return self._looks
@@ -194,26 +206,19 @@ class FleetFans:
 
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
-        self._counts: tuple[int, ...] = ()
-        self._looks: Looks | None = None
+        self.fresh = False
+        self._newest: tuple[int, Scans, FloatArray] | None = None  # [ns], and the bodies' frames then
 
     def note(self, now: int) -> None:
-        """Hear of a step, while somebody looks; now [ns]."""
-        scans = self._simulator.scans
-        counts = tuple(sweep.count for sweep in scans.sweeps)
-        fans = self._simulator.rangers
-        if counts == self._counts or not fans:
-            return
-        self._counts = counts
-        machinery = self._simulator.machinery
-        frames = machinery.frames[[fan.body for fan in fans]]
-        poses = attached(frames, np.array([fan.mount for fan in fans]))[:, PLANAR]
-        returns = np.concatenate([scan.returns for scan in scans])
-        self._looks = Looks([now] * len(fans), poses, scans.ranges, machinery.rangers.truths, returns)
+        """Hear of a step at the end of which a view is due; now [ns]. Only now is it known where the fans measured."""
+        scans, time = self._simulator.scans, self._simulator.time
+        self.fresh = not len(scans) or any(sweep.time == time for sweep in scans.sweeps)
+        if self.fresh and len(scans):
+            self._newest = now, scans, self._simulator.machinery.frames.copy()
 
     def places(self, machinery: Machinery) -> list[dict[str, Any]]:
         """Return those of the models that there are now."""
-        self._counts, self._looks = (), None
+        self._newest = None
         return [
             {
                 "row": fan.body,
@@ -228,4 +233,12 @@ class FleetFans:
 
     def looks(self) -> Looks | None:
         """Return their newest scans."""
-        return self._looks
+        if self._newest is None:
+            return None
+        self.fresh = False
+        stamp, scans, frames = self._newest
+        machinery = self._simulator.machinery
+        bodies, mounts = [fan.body for fan in machinery.fans], np.array([fan.mount for fan in machinery.fans])
+        poses = attached(frames[bodies], mounts)[:, PLANAR]
+        returns = np.concatenate([scan.returns for scan in scans])
+        return Looks((stamp,) * len(bodies), poses, scans.ranges, machinery.rangers.truths, returns)

@@ -83,7 +83,7 @@ class Session:
         if timeout > 0 and now - self._last_command >= timeout * _NS:
             self._commands[:] = 0.0  # of all robots: any command for any robot keeps all going, as in 1.8.0
         self._publisher.publish(observation, self._model_poses, self._number, divmod(now, _NS))
-        if self._view.wanted:
+        if self._view.due:
             self._fans.note(now)
 
     def show(self, speed: float) -> None:
