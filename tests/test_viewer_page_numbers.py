@@ -3,12 +3,13 @@
 
 import base64
 import io
+import math
 
 import numpy as np
 import pytest
 from PIL import Image
 from playwright.sync_api import expect, sync_playwright
-from viewer_page_rig import Shown, Visit, open_browser
+from viewer_page_rig import Shown, Visit, open_browser, until
 
 from kurumaisu.viewer import Fan, protocol
 
@@ -60,6 +61,32 @@ def test_a_saved_picture_shows_the_sign_of_range_errors(browser, shown):
         box = page.locator("#front").bounding_box()
         assert picture.shape[:2] == (round(box["height"]), round(box["width"]))
         assert redder[0.15] > redder[-0.15] + 300
+
+
+def test_a_map_lies_where_its_origin_and_resolution_say(browser):
+    greys = np.full((40, 60), 254, np.uint8)
+    greys[:20, :30] = 0  # the upper left quarter is occupied
+    greys[20:, 30:] = 205  # the lower right one is unknown
+    file = io.BytesIO()
+    Image.fromarray(greys).save(file, "PNG")
+    with Shown(mode="robot") as shown, Visit(browser, shown.server.address, color_scheme="light") as visit:
+        shown.hub.map(file.getvalue(), 60, 40, 0.1, (2.0, -3.0, math.pi / 2))  # its first axis points up
+        page = visit.page
+        show_tab(page, "view")
+        for box in page.locator("[data-layer]:not([data-layer=map])").all():
+            box.uncheck()
+        corner = page.locator("#front").bounding_box()
+
+        def shade(picture, x, y):
+            px, py = visit.spot(x, y)
+            return picture[round(py - corner["y"]), round(px - corner["x"])].tolist()
+
+        outside = shade(image_of(page), -3.0, 0.0)
+        assert outside == [255, 255, 255]
+        until(lambda: sum(shade(image_of(page), -1.0, -1.5)) < 400, "a wall")
+        picture = image_of(page)
+        assert shade(picture, 1.0, 1.5) == outside
+        assert outside != shade(picture, 1.0, -1.5) == shade(picture, -1.0, 1.5)
 
 
 def test_binary_messages_are_read_as_they_were_written(browser, shown):
