@@ -2,7 +2,9 @@
 // Colours of the canvas. Names: the palette of Okabe and Ito. Numbers: blue to orange of the same palette for a sign,
 // cividis for a size. All can be told apart with the usual kinds of colour blindness.
 
-const TOKENS = ["paper", "panel", "ink", "soft", "faint", "strong-faint", "accent", "truth", "odom", "estimate", "mark", "scan", "free"];
+const TOKENS = [
+  "paper", "ink", "soft", "faint", "strong-faint", "accent", "truth", "odom", "estimate", "mark", "scan", "free",
+];
 export const BUCKETS = 24; // steps of a colour scale
 
 // The inner two thirds read on white and on near-black alike.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Names of bodies and of poses. Where two would overlap, the less important one is left out.
+// Names of bodies and of poses. Where two would overlap, the less important one goes a line or two further off, a
+// thing's is left out.
 
 const SMALL = 9; // [px] radius of a body that has no room for a name
 const LARGE = 90; // [px] size of one that has room for it inside
@@ -14,16 +15,19 @@ export function drawNames(context, picture) {
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   Object.assign(context, {font: FONT, textAlign: "center", textBaseline: "top"});
   const taken = [];
-  for (const {text, box: [x0, y0, x1, y1], above, color} of wanted(picture)) {
+  for (const {rank, text, box: [x0, y0, x1, y1], above, color} of wanted(picture)) {
     const [px, bottom] = camera.toScreen((x0 + x1) / 2, y0);
     const [width, height] = [(x1 - x0) * camera.scale, (y1 - y0) * camera.scale];
     const inside = Math.min(width, height) > LARGE && !above;
     const py = above ? bottom - height - HEIGHT - 2 : bottom + (inside ? -height / 2 - HEIGHT / 2 : 4);
     const half = widthOf(context, text) / 2;
-    const place = [px - half, py, px + half, py + HEIGHT];
-    if (taken.some((other) => overlap(place, other))) continue;
-    taken.push(place);
-    label(context, text, px, py, colors, color ?? colors.ink);
+    const step = above ? -HEIGHT : HEIGHT;
+    const place = (line) => [px - half, py + line * step, px + half, py + line * step + HEIGHT];
+    const free = (line) => !taken.some((other) => overlap(place(line), other));
+    const line = (rank < RANK.obstacle ? [0, 1, 2] : [0]).find(free);
+    if (line === undefined) continue;
+    taken.push(place(line));
+    label(context, text, px, py + line * step, colors, color ?? colors.ink);
   }
 }
 

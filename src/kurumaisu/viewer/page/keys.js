@@ -23,8 +23,14 @@ export function keyTable({picture, options, transport, bag, stick, edit, pointer
   };
   return [
     {keys: [" "], shown: "Space", meaning: "emergency stop", act: () => transport.stop(), onMap: true},
-    {keys: ["p"], shown: "p", meaning: "pause or run; play or hold a recording", act: () => (bag.playback ? bag.togglePlay() : transport.togglePause())},
-    {keys: ["."], shown: ".", meaning: "one step of a paused simulation; 0.1 s on in a recording", act: () => (bag.playback ? bag.nudge(1) : transport.step())},
+    {
+      keys: ["p"], shown: "p", meaning: "pause or run; play or hold a recording",
+      act: () => (bag.playback ? bag.togglePlay() : transport.togglePause()),
+    },
+    {
+      keys: ["."], shown: ".", meaning: "one step of a paused simulation; 0.1 s on in a recording",
+      act: () => (bag.playback ? bag.nudge(1) : transport.step()),
+    },
     {keys: [","], shown: ",", meaning: "0.1 s back in a recording", act: () => bag.nudge(-1)},
     // none of the keys that drive: who holds those while the stick is taken away must not take it again
     {keys: ["t"], shown: "t", meaning: "take the stick, or lay it down", act: () => stick.toggle()},
@@ -39,7 +45,10 @@ export function keyTable({picture, options, transport, bag, stick, edit, pointer
     {keys: ["f"], shown: "f", meaning: "follow the chosen robot, else the chair", act: follow},
     {keys: ["["], act: turn(TURN)},
     {keys: ["]"], shown: "[ ]", meaning: "turn the chosen body by 5°", act: turn(-TURN)},
-    {keys: ["m"], shown: "m", meaning: "measure: drag in the picture", act: () => options.set({tool: options.tool === "measure" ? null : "measure"})},
+    {
+      keys: ["m"], shown: "m", meaning: "measure: drag in the picture",
+      act: () => options.set({tool: options.tool === "measure" ? null : "measure"}),
+    },
     {keys: ["e"], shown: "e", meaning: "effects", act: () => tabs.show("effects")},
     {keys: ["v"], shown: "v", meaning: "what is shown", act: () => tabs.show("view")},
     {
@@ -52,7 +61,10 @@ export function keyTable({picture, options, transport, bag, stick, edit, pointer
       },
     },
     {keys: ["?"], shown: "?", meaning: "this list", act: () => document.getElementById("help-dialog").showModal()},
-    {shown: "drag, tap", meaning: "on a body: choose and move it (a finger: tap it first); on its round handle: turn it; elsewhere: move the view"},
+    {
+      shown: "drag, tap",
+      meaning: "on a body: choose and move it (a finger: tap it first); on its round handle: turn it; elsewhere: move the view",
+    },
   ];
 }
 

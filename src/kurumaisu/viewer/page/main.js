@@ -50,7 +50,8 @@ async function ask(name, values) {
 // a drag is refused at many places on its way: what counts is the last one
 const quietly = (name, values) => connection.command(name, values);
 
-const transport = new Transport(scene, permit, ask, stick);
+const transport = new Transport(scene, permit, ask, stick, say);
+stick.emergency = () => transport.stop();
 const bag = new Bag(scene, permit, ask);
 new Residuals(scene, picture, new Recording(scene, connection, picture, ask), say);
 const edit = new Edit(picture, scene, options, {

@@ -5,7 +5,7 @@ import {byId, make, setText} from "./dom.js";
 
 const THEMES = ["auto", "light", "dark"];
 const STORE = "kurumaisu.theme";
-const NARROW = matchMedia("(max-width: 760px)");
+const NARROW = matchMedia("(max-width: 900px)");
 
 /** Set up the tabs; a narrow page begins with the picture, and shows one when it is asked for. */
 export function setUpTabs() {
@@ -38,7 +38,7 @@ export function setUpTabs() {
   });
   show(NARROW.matches ? null : byId("tab-view"));
   return {
-    show: (name) => show(byId(`tab-${name}`)),
+    show: (name) => byId(`tab-${name}`).hidden || show(byId(`tab-${name}`)),
     get current() {
       return tabs.find((tab) => tab.getAttribute("aria-selected") === "true") ?? null;
     },

@@ -13,6 +13,7 @@ const HARMLESS = ["Shift", "Control", "Alt", "Meta", "Tab"];
 export class Stick {
   #down = new Set(); // codes of keys
   #pointer = null;
+  emergency = () => {}; // what Space does while the stick is taken, whatever has the focus
 
   /** say(text): tells the driver why the stick was taken away. */
   constructor(connection, scene, say) {
@@ -81,6 +82,10 @@ export class Stick {
       if (event.repeat && !this.#down.has(event.code)) return;
       this.#down.add(event.code);
       this.#byKeys();
+    } else if (event.code === "Space" && !writing) {
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      this.emergency();
     } else if (!HARMLESS.includes(event.key) && this.drive.held) {
       this.drive.disarm(); // whatever else is pressed in a fright stops
     }
@@ -111,7 +116,8 @@ export class Stick {
   }
 
   #show(x, y) {
-    byId("knob").style.transform = `translate(${50 * x}px, ${50 * y}px)`;
+    const reach = this.pad.clientWidth / 3; // the knob's middle, when its edge is at the rim
+    byId("knob").style.transform = `translate(${reach * x}px, ${reach * y}px)`;
   }
 
   #changed(reason, say) {

@@ -4,9 +4,9 @@
 import {byId, setPressed, setText} from "./dom.js";
 
 export class Transport {
-  /** ask(name, values): a command, failures are said elsewhere; stick: to be let go at a stop. */
-  constructor(scene, permit, ask, stick) {
-    Object.assign(this, {scene, permit, ask, stick});
+  /** ask(name, values): a command, failures are said elsewhere; stick: to be let go at a stop; say(text). */
+  constructor(scene, permit, ask, stick, say) {
+    Object.assign(this, {scene, permit, ask, stick, say});
     scene.on("state", () => this.#show());
     permit.on("change", () => this.#show());
     const click = (id, action) => byId(id).addEventListener("click", action);
@@ -14,7 +14,7 @@ export class Transport {
     click("step", () => this.step());
     click("reset", () => ask("reset"));
     click("reseed", () => this.#reseed());
-    click("record", () => ask("record", {on: !this.scene.state?.recording}));
+    click("record", () => this.#record());
     click("estop", () => (this.stopped ? ask("estop", {on: false}) : this.stop()));
     byId("speed").addEventListener("change", (event) => ask("speed", {value: Number(event.target.value)}));
     byId("seed").addEventListener("keydown", (event) => event.key === "Enter" && this.#reseed());
@@ -36,6 +36,11 @@ export class Transport {
 
   step() {
     if (!byId("step").disabled && !byId("step").hidden) this.ask("step");
+  }
+
+  async #record() {
+    const reply = await this.ask("record", {on: !this.scene.state?.recording});
+    if (reply.ok) this.say(reply.message); // where the bag is
   }
 
   #reseed() {
