@@ -3,7 +3,7 @@
 // thing's is left out.
 
 const SMALL = 9; // [px] radius of a body that has no room for a name
-const LARGE = 90; // [px] size of one that has room for it inside
+const LARGE = 90; // [px] size of a thing that has room for it inside
 const HEIGHT = 15; // [px] of a line
 const RANK = {robot: 1, person: 2, obstacle: 3};
 const FONT = "12px system-ui, sans-serif";
@@ -18,7 +18,7 @@ export function drawNames(context, picture) {
   for (const {rank, text, box: [x0, y0, x1, y1], above, color} of wanted(picture)) {
     const [px, bottom] = camera.toScreen((x0 + x1) / 2, y0);
     const [width, height] = [(x1 - x0) * camera.scale, (y1 - y0) * camera.scale];
-    const inside = Math.min(width, height) > LARGE && !above;
+    const inside = rank >= RANK.obstacle && Math.min(width, height) > LARGE;
     const py = above ? bottom - height - HEIGHT - 2 : bottom + (inside ? -height / 2 - HEIGHT / 2 : 4);
     const half = widthOf(context, text) / 2;
     const step = above ? -HEIGHT : HEIGHT;

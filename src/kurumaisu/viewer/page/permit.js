@@ -5,7 +5,7 @@ import {News} from "./dom.js";
 
 const OFF = "Not connected";
 const ASKING = "Asking for control";
-const CLOSED = "View only: the viewer was started without control.";
+const CLOSED = "View only: the viewer was started without control (viewer_control:=true gives it).";
 const NO_TOKEN = "View only: to take control open the link that the viewer printed when it started, or ask it for a new one.";
 
 /** News: "change". */
