@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from kurumaisu.critic.story import Bins, Misfit, Noise, Overlay, Rival, Story
+from kurumaisu.critic.story import Bins, Misfit, Moments, Noise, Overlay, Rival, Story
 from kurumaisu.critic.verdict import (
     Cause,
     Estimate,
@@ -38,7 +38,13 @@ def full_story():
     y = 0.1 * x + rng.normal(size=3000)
     bins = Bins(np.array([-1.0, 1.0]), np.array([-0.1, 0.1]), np.array([-0.2, 0.0]), np.array([0.0, 0.2]))
     curve = np.array([[-1.0, -0.1], [1.0, 0.1]])
-    runs = [Overlay(f"run_{i}", path, path + 0.3, path + 0.003, i == 6, 10.0, 0.424, 0.004) for i in range(1, 7)]
+    runs = [
+        Overlay(f"run_{i}", path, path + 0.3, path + 0.003, i == 6, 10.0, 0.424, 0.004, 1.7e9 + 0.1 * np.arange(50))
+        for i in range(1, 7)
+    ]
+    moments = Moments(
+        ("run_1", "run_2"), np.arange(3000) % 2, 1.7e9 + 0.1 * np.arange(3000), rng.normal(size=(3000, 2))
+    )
     return Story(
         recording="corridor",
         model="MD-100",
@@ -47,7 +53,9 @@ def full_story():
         pose_source="measured",
         provenance={"seed": "1"},
         overlays=tuple(runs),
-        misfits=(Misfit("yaw rate", "rad/s", "change of w", "rad/s", x, y, bins, "base.lag_w", curve),),
+        misfits=(
+            Misfit("yaw rate", "rad/s", "change of w", "rad/s", x, y, bins, "base.lag_w", curve, None, None, moments),
+        ),
         rivals=(Rival("base.delay", -6.1, "fits worse by 6.1 nats"),),
         noise=(Noise("heading", 0.0049, 0.0041, 0.0057, "rad"), Noise("tau", 0.3, float("nan"), float("nan"), "s")),
         unexplained=("Nothing that these drives show.",),

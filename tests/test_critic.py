@@ -72,11 +72,28 @@ def test_wrong_data_are_said_and_not_fitted(columns, words):
     assert words in verdict.problems[0]
 
 
+def moments_are_rows_of_their_runs(criticism, data):
+    """Return of how many samples: each was taken where the reference says that the chair was then."""
+    runs = {run.name: run.pose for run in data.runs}
+    count = 0
+    for misfit in criticism.story.misfits:
+        moments = misfit.moments
+        assert len(moments.t) == len(moments.run) == len(moments.places) == len(misfit.residual)
+        for run, t, place in zip(moments.run, moments.t, moments.places, strict=True):
+            pose = runs[moments.runs[run]]
+            row = int(np.searchsorted(pose.t, t))
+            assert pose.t[row] == t
+            assert list(pose.values[row, :2]) == list(place)
+            count += 1
+    return count
+
+
 def test_the_extended_model_leaves_nothing_to_find(tmp_path):
     data = recording("base.lag_w", 0.1, 92, 40.0)
     criticism = criticise(data)
     pipeline.write(criticism, MD100, tmp_path)
     assert [cause.id for cause in read_verdict(tmp_path / "verdict.json").causes] == ["base.lag_w"]
+    assert moments_are_rows_of_their_runs(criticism, data) > 500
     assert "base.lag_w" in (tmp_path / "report.html").read_text(encoding="utf-8")
     extended = tmp_path / "extended.yaml"
     assert {setting.id for setting in load_model(extended).effects} == {"base.lag_w", "base.process_noise"}

@@ -18,6 +18,7 @@ from kurumaisu.critic.laser.still import repeatability
 from kurumaisu.critic.laser.verdicts import criticise
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
+from kurumaisu.world import load_world
 
 MD100 = shipped("launch/md100.yaml")
 MODEL = load_model(MD100)
@@ -86,9 +87,23 @@ def test_an_effect_on_the_scatter_is_named_and_measured(tmp_path):
     assert finding.causes[0].parameters["probability"].estimate == pytest.approx(0.04, rel=0.25)
 
 
+def assert_taken_in_scans_and_on_walls(moments, data):
+    """Of each reading: its scan's time, and a place that lies on a wall of the map."""
+    scans = {run.name: run.scan.t for run in data.runs}
+    ends = load_world(data.world).segments
+    start, way = ends[:, :2], ends[:, 2:] - ends[:, :2]
+    for run, t, place in zip(moments.run[::20], moments.t[::20], moments.places[::20], strict=True):
+        assert np.abs(scans[moments.runs[run]] - t).min() < 1e-9
+        share = np.clip(np.sum((place - start) * way, axis=1) / np.sum(way**2, axis=1), 0, 1)
+        assert np.hypot(*(start + share[:, np.newaxis] * way - place).T).min() < 1e-6
+
+
 def test_the_pipeline_tells_of_scans_without_commands(tmp_path):
     data = recording(tmp_path, "laser.quadratic", 0.003, 7, scans=30)
     criticism = pipeline.criticise(data, MD100, say)
+    (misfit,) = criticism.story.misfits
+    assert_taken_in_scans_and_on_walls(misfit.moments, data)
+    assert len(misfit.moments.t) == len(misfit.residual)
     pipeline.write(criticism, MD100, tmp_path / "out")
     verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
     assert [cause["id"] for cause in verdict["causes"]] == ["laser.quadratic"]

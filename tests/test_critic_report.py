@@ -21,10 +21,11 @@ from kurumaisu.critic.misfit import explained
 from kurumaisu.critic.pictures import comparison_picture, misfit_picture, overlay_picture, thinned
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.results import summary, table
-from kurumaisu.critic.story import Bins, Comparison, Overlay
+from kurumaisu.critic.story import Bins, Comparison, Moments, Overlay
 from kurumaisu.critic.verdict import Cause, Estimate, Verdict
 from kurumaisu.critic.words import grouped, named, wrong
 
+NOWHERE = ["", "", "", ""]  # a mean is of no single moment
 NBSP = "\N{NO-BREAK SPACE}"
 
 
@@ -40,11 +41,14 @@ def long_story():
     path = np.cumsum(rng.normal(scale=0.05, size=(3000, 2)), axis=0)
     torn = path.copy()
     torn[100::101] = np.nan
-    overlays = tuple(Overlay(f"run_{i}", path, torn, torn + 0.01, False, 10.0, 0.3, 0.1) for i in range(12))
+    t = 1.7e9 + 0.1 * np.arange(36000)
+    overlays = tuple(Overlay(f"run_{i}", path, torn, torn + 0.01, False, 10.0, 0.3, 0.1, t[:3000]) for i in range(12))
     x, y = rng.normal(size=36000), rng.normal(size=36000)
     misfit = full_story().misfits[0]
     bins = Bins(*(np.linspace(-1, 1, 15) for _ in range(4)))
-    return replace(full_story(), overlays=overlays, misfits=(replace(misfit, covariate=x, residual=y, after=bins),) * 6)
+    moments = Moments(("run_1", "run_2"), np.arange(36000) % 2, t, rng.normal(size=(36000, 2)))
+    whole = replace(misfit, covariate=x, residual=y, after=bins, moments=moments)
+    return replace(full_story(), overlays=overlays, misfits=(whole,) * 6)
 
 
 def test_an_hour_makes_a_small_page(tmp_path):
@@ -81,11 +85,11 @@ def test_the_pieces_of_a_path_are_told_apart_in_its_data():
     path = np.array([[0.0, 0.0], [1.0, 0.5], [np.nan, np.nan], [2.0, 1.5]])
     picture = overlay_picture(Overlay("a", path[[0, 1, 3]], path, None, False, 10.0, 0.25, None), "run0")
     rows = rows_of(picture)
-    assert rows[0] == ["path", "piece", "x [m]", "y [m]"]
+    assert rows[0] == ["path", "piece", "x [m]", "y [m]", "run", "t [s]"]
     assert [row for row in rows if row[0] == "baseline"] == [
-        ["baseline", "1", "0", "0"],
-        ["baseline", "1", "1", "0.5"],
-        ["baseline", "2", "2", "1.5"],
+        ["baseline", "1", "0", "0", "", ""],
+        ["baseline", "1", "1", "0.5", "", ""],
+        ["baseline", "2", "2", "1.5", "", ""],
     ]
     assert picture.caption.replace(NBSP, " ") == "After 10 s off by 0.250 m with the model as it was (rms)."
 
@@ -94,9 +98,9 @@ def test_a_misfits_data_hold_the_means_before_and_after():
     misfit = full_story().misfits[0]
     after = Bins(np.array([0.5]), np.array([0.01]), np.array([-0.02]), np.array([0.04]))
     rows = rows_of(misfit_picture(replace(misfit, after=after), "misfit0"))
-    assert ["mean after", "0.5", "0.01"] in rows
-    assert ["mean after, upper end", "0.5", "0.04"] in rows
-    assert ["mean before", "-1", "-0.1"] in rows
+    assert ["mean after", "0.5", "0.01", *NOWHERE] in rows
+    assert ["mean after, upper end", "0.5", "0.04", *NOWHERE] in rows
+    assert ["mean before", "-1", "-0.1", *NOWHERE] in rows
     assert not [row for row in rows_of(misfit_picture(misfit, "misfit0")) if row[0].startswith("mean after")]
 
 
@@ -204,3 +208,42 @@ def test_text_is_cut_by_the_cells_that_it_takes():
     assert cells(cut("走行記録", 4)) <= 4
     assert cut("plain", 0) == ""
     assert printable(f"3{NBSP}ms\x1b[2J") == "3 ms?[2J"
+
+
+def test_every_point_of_a_misfit_is_found_with_its_moment_and_its_place_where_the_picture_says():
+    """The dots of the SVG are matplotlib's own; data-at must lead from the data to them."""
+    story = long_story()
+    misfit = story.misfits[0]
+    picture = misfit_picture(misfit, "misfit0")
+    samples = [row for row in rows_of(picture) if row[0] == "sample"]
+    a, b, c, d = map(float, re.search(r'data-at="([^"]*)"', picture.svg)[1].split())
+    dots = {tuple(map(float, pair)) for pair in re.findall(r"M([\d.]+) ([\d.]+)h0", picture.svg)}
+    assert len(dots) > 1000
+    said = {(a + b * float(x), c + d * float(y)) for _, x, y, *_ in samples}
+    near = np.array(sorted(said))
+    off = [np.abs(near - dot).max(axis=1).min() for dot in dots]
+    assert max(off) < 0.06  # dots are rounded to a tenth of a point
+    for _, x, _, run, t, px, py in samples[::50]:
+        row = round((float(t) - 1.7e9) * 10)
+        assert float(x) == pytest.approx(misfit.covariate[row], rel=1e-4)
+        assert run == f"run_{row % 2 + 1}"
+        assert [float(px), float(py)] == pytest.approx(misfit.moments.places[row], rel=1e-4)
+
+
+def test_what_is_furthest_off_is_in_the_data_though_the_picture_leaves_it_out():
+    misfit = full_story().misfits[0]
+    residual = misfit.residual.copy()
+    residual[7] = -1e3
+    rows = rows_of(misfit_picture(replace(misfit, residual=residual), "misfit0"))
+    (row,) = [row for row in rows if row[0] == "sample" and row[2] == "-1000"]
+    assert row[3:5] == ["run_2", "1700000000.700"]
+
+
+def test_a_measured_path_tells_its_times_thinned_or_not():
+    overlay = full_story().overlays[0]
+    rows = [row for row in rows_of(overlay_picture(overlay, "run0")) if row[0] == "measured"]
+    assert [row[4:] for row in rows[:2]] == [["run_1", "1700000000.000"], ["run_1", "1700000000.100"]]
+    story = long_story()
+    for before, after in zip(story.overlays, thinned(story.overlays), strict=True):
+        index = np.searchsorted(before.times, after.times)
+        np.testing.assert_array_equal(before.measured[index], after.measured)

@@ -11,6 +11,7 @@ import pytest
 from stories import full_story, full_verdict
 
 from kurumaisu.critic.figures import MOST_POINTS, shown_points
+from kurumaisu.critic.pictures import LARGEST
 from kurumaisu.critic.report import quantities, write_report
 from kurumaisu.critic.story import Story
 from kurumaisu.critic.verdict import Verdict
@@ -117,11 +118,12 @@ def test_every_picture_has_words_and_its_data(tmp_path):
     assert len(links) == 7
     story = full_story()
     data = base64.b64decode(links[0]["href"].split(",")[1]).decode().splitlines()
-    assert data[0] == "kind,covariate [rad/s],misfit [rad/s]"
-    assert len([row for row in data if row.startswith("sample,")]) == len(story.misfits[0].residual)
+    assert data[0] == "kind,covariate [rad/s],misfit [rad/s],run,t [s],x [m],y [m]"
+    drawn = shown_points(story.misfits[0]).index.sum()
+    assert drawn <= len([row for row in data if row.startswith("sample,")]) <= drawn + LARGEST
     run = base64.b64decode(links[1]["href"].split(",")[1]).decode().splitlines()
-    assert run[0] == "path,piece,x [m],y [m]"
-    first = [float(cell) for cell in run[1].split(",")[2:]]
+    assert run[0] == "path,piece,x [m],y [m],run,t [s]"
+    first = [float(cell) for cell in run[1].split(",")[2:4]]
     np.testing.assert_allclose(first, story.overlays[5].measured[0], rtol=1e-4)
 
 

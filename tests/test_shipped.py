@@ -27,6 +27,7 @@ READERS = {
     "sim_node": "kurumaisu.ros.sim_settings:read_settings",
     "map_server": "kurumaisu.ros.map_server:read_settings",
     "stageros": "kurumaisu.ros.stageros_settings:read_settings",
+    "viewer": "kurumaisu.ros.viewer_settings:read_settings",
 }
 
 

@@ -175,6 +175,12 @@ def carpet():
 
 def test_an_unknown_effect_is_said_to_be_one(carpet, tmp_path):
     criticism = carpet[1]
+    misfit = criticism.story.misfits[0]
+    poses = {run.name: run.pose for run in carpet[0].recording.runs}
+    for run, moment, place in zip(misfit.moments.run, misfit.moments.t, misfit.moments.places, strict=True):
+        pose = poses[misfit.moments.runs[run]]
+        assert list(pose.values[np.searchsorted(pose.t, moment), :2]) == list(place)
+    assert len(misfit.moments.t) == len(misfit.residual) > 100
     verdict = criticism.verdict
     assert verdict.verdict == "unknown"
     assert not [cause for cause in verdict.causes if cause.p >= 0.9]

@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as folder, master() as environment:
         for robots in options.robots:
             world = Path(folder) / f"{robots}.world"
-            world.write_text(_world(robots, options.map))
+            world.write_text(world_of(robots, options.map))
             costs = _in_turn(nodes, world, robots, options, environment)
             for name, cost in costs.items():
                 ratio = cost.cpu / costs["stage_ros"].cpu if "stage_ros" in costs else math.nan
@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(dearer)
 
 
-def _world(robots: int, bitmap: Path | None) -> str:
+def world_of(robots: int, bitmap: Path | None) -> str:
     """Return a world file: robots on a lattice in a room of boxes, or around the middle of a map."""
     text = _MODELS.format(side=_SIDE, bitmap=f'bitmap "{bitmap.resolve()}"' if bitmap else "")
     columns = math.ceil(math.sqrt(robots))

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -43,9 +44,12 @@ class Topic:
         return float(np.median(late)) / 1e9 if late else None
 
 
-def read_topics(path: Path, parts: dict[str, str]) -> dict[str, Topic]:
+def read_topics(
+    path: Path, parts: dict[str, str], instead: Mapping[str, Callable[[Any], Any]] = MappingProxyType({})
+) -> dict[str, Topic]:
     """Read the topics that are in the bag, by part of a run; parts: part by absolute topic.
 
+    instead: what to keep of a row in place of it, by part, where an hour of rows would fill the memory.
     Raise Error naming file, topic and type for what cannot be read.
     """
     found: dict[str, Topic] = {}
@@ -59,6 +63,7 @@ def read_topics(path: Path, parts: dict[str, str]) -> dict[str, Topic]:
                 part = parts[_absolute(connection.topic)]
                 topic = found.setdefault(part, Topic(connection.topic, _ros(connection.msgtype)))
                 message, row = convert[connection.id](data)
+                row = instead[part](row) if part in instead else row
                 topic.received.append(received)
                 topic.stamps.append(_stamp(message))
                 topic.rows.append(row)

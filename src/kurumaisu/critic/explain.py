@@ -6,12 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import scipy
 
-from kurumaisu import geometry
 from kurumaisu.critic import misfit, naming, replay, words
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import Drive, prepare
@@ -23,6 +21,7 @@ from kurumaisu.critic.next_experiment import Proposal
 from kurumaisu.critic.options import version
 from kurumaisu.critic.predict import Prediction
 from kurumaisu.critic.recording import Recording, Run
+from kurumaisu.critic.restarted import PICTURE, RESTART, restarted
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
 from kurumaisu.critic.verdict import Cause, Gain, Kind, Verdict
@@ -33,10 +32,6 @@ from kurumaisu.types import FloatArray
 # At usual rates, from which growing noise is named: alone, where less is no matter, and beside something else, which in
 # another form than ours leaves residuals that grow with the rates, too.
 _GROWTH_ALONE, _GROWTH_BESIDE = 0.2, 0.4
-_PICTURE = 0.1  # [s] between the poses drawn
-# [s] after which a simulated path begins again at the measured pose: the random wander of the heading adds up, and
-# after a minute hides what the model does.
-_RESTART = 10.0
 
 
 @dataclass(frozen=True)
@@ -186,24 +181,22 @@ def overlays(
 
 
 def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *, held_out: bool) -> Overlay:
-    drive = informed(prepare(run, model, _PICTURE), run)
+    drive = informed(prepare(run, model, PICTURE), run)
     baseline, off = _restarted(drive, replay.path(drive, model, ()))
     extended, off_extended = None, None
     if settings is not None:
         extended, off_extended = _restarted(drive, replay.path(drive, model, settings))
-    return Overlay(drive.name, drive.poses[:, :2], baseline, extended, held_out, _RESTART, off, off_extended)
+    path = drive.poses[:, :2]
+    return Overlay(drive.name, path, baseline, extended, held_out, RESTART, off, off_extended, drive.times)
 
 
 def _restarted(drive: Drive, path: FloatArray) -> tuple[FloatArray, float | None]:
     """Return a simulated path (n, 2) in pieces that begin at measured poses, nan between, and how far off they end."""
-    since = drive.times - drive.times[0]
-    bounds = np.unique([*np.flatnonzero(np.diff(since // _RESTART, prepend=-1.0)), len(since) - 1])
     pieces, off = [], []
-    for a, b in pairwise(bounds.tolist()):
-        piece = geometry.compose(drive.poses[a], geometry.between(path[a], path[a : b + 1]))[:, :2]
-        pieces += [piece, np.full((1, 2), np.nan)]
-        if since[b] - since[a] > _RESTART / 2:
-            off.append(np.sum((piece[-1] - drive.poses[b, :2]) ** 2))
+    for rows, poses in restarted(drive, path):
+        pieces += [poses[:, :2], np.full((1, 2), np.nan)]
+        if drive.times[rows][-1] - drive.times[rows][0] > RESTART / 2:
+            off.append(np.sum((poses[-1] - drive.poses[rows][-1])[:2] ** 2))
     return np.concatenate(pieces)[:-1], float(np.sqrt(np.mean(off))) if off else None
 
 

@@ -81,7 +81,7 @@ def overlay_svg(overlay: Overlay, name: str) -> str:
         axes.set_xlabel("x [m]")
         axes.set_ylabel("y [m]")
         _legend(figure, columns=4)
-        return _svg(figure, name)
+        return _placed(_svg(figure, name), axes, (1.0, 1.0))
 
 
 def misfit_svg(misfit: Misfit, shown: Shown, name: str) -> str:
@@ -111,7 +111,7 @@ def misfit_svg(misfit: Misfit, shown: Shown, name: str) -> str:
         axes.set_ylabel(_label(f"misfit of {misfit.channel}", y_unit))
         for line in _legend(figure, columns=5).get_lines():
             line.set_alpha(1.0)
-        return _svg(figure, name)
+        return _placed(_svg(figure, name), axes, (x, y))
 
 
 def comparison_svg(comparison: Comparison, name: str) -> str:
@@ -187,6 +187,19 @@ def _legend(figure: Figure, columns: int) -> Any:
     legend = figure.legend(loc="upper left", ncols=columns, fontsize=9, columnspacing=1.0, handletextpad=0.4)
     legend.set_in_layout(False)
     return legend
+
+
+def _placed(svg: str, axes: Any, scale: tuple[float, float]) -> str:
+    """Return a picture that tells where in it things are; scale: of its axes, as they are drawn over SI units.
+
+    data-at="a b c d": what is x, y in SI units lies at a + b x, c + d y of the picture's own coordinates.
+    """
+    width, height = (72 * inches for inches in axes.figure.get_size_inches())
+    box, (x0, x1), (y0, y1) = axes.get_position(), axes.get_xlim(), axes.get_ylim()
+    across, down = width * box.width / (x1 - x0), -height * box.height / (y1 - y0)
+    left, top = width * box.x0 - across * x0, height * (1 - box.y0) - down * y0
+    at = f"{left:.6g} {across * scale[0]:.6g} {top:.6g} {down * scale[1]:.6g}"
+    return svg.replace("<svg ", f'<svg data-at="{at}" ', 1)
 
 
 def _label(name: str, unit: str) -> str:

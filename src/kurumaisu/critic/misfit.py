@@ -11,7 +11,7 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.evidence import Fit, Problem
-from kurumaisu.critic.story import Bins, Misfit
+from kurumaisu.critic.story import Bins, Misfit, Moments
 from kurumaisu.critic.verdict import NORMAL90
 from kurumaisu.effects import Follows, Rate
 from kurumaisu.geometry import wrap
@@ -100,6 +100,18 @@ def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[ef
         explained_by=effect.id,
         curve=np.column_stack([curve.centre, curve.mean]),
         after=bins(x, left[:, channel]),
+        moments=moments(problem.drives),
+    )
+
+
+def moments(drives: Sequence[Drive]) -> Moments:
+    """Return when and where each increment of drives began."""
+    runs = tuple(dict.fromkeys(drive.name for drive in drives))
+    return Moments(
+        runs=runs,
+        run=np.concatenate([np.full(len(drive.times) - 1, runs.index(drive.name)) for drive in drives]),
+        t=np.concatenate([drive.times[:-1] for drive in drives]),
+        places=np.concatenate([drive.poses[:-1, :2] for drive in drives]),
     )
 
 

@@ -8,17 +8,20 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 
 import numpy as np
 from markupsafe import Markup
 
 from kurumaisu.critic import figures
 from kurumaisu.critic.digits import quantities
-from kurumaisu.critic.story import Bins, Comparison, Misfit, Overlay
-from kurumaisu.types import FloatArray
+from kurumaisu.critic.story import Bins, Comparison, Misfit, Moments, Overlay
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-MOST_SAMPLES = 3000  # of a misfit in its data: more are megabytes that nobody reads
-MOST_PLACES = 4000  # of all measured paths of a page together, likewise
+LARGEST = 100  # samples of a misfit in its data though the picture leaves them out: where to look first
+MOST_PLACES = 3000  # of all measured paths of a page together: more are megabytes that nobody reads
+_MOMENT = ("run", "t [s]", "x [m]", "y [m]")
+_NO_MOMENT = ("",) * len(_MOMENT)
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,7 @@ def thinned(overlays: Sequence[Overlay]) -> list[Overlay]:
             measured=_every(step, overlay.measured),
             baseline=_every(step, overlay.baseline),
             extended=None if overlay.extended is None else _every(step, overlay.extended),
+            times=None if overlay.times is None else overlay.times[_kept(step, overlay.measured)],
         )
         for overlay in overlays
     ]
@@ -65,7 +69,7 @@ def overlay_picture(overlay: Overlay, name: str) -> Picture:
         alt=f"Paths of run {overlay.run} from above: measured and simulated. {told}",
         caption=told,
         file=f"{name}.csv",
-        data=_csv(("path", "piece", "x [m]", "y [m]"), _places(paths)),
+        data=_csv(("path", "piece", "x [m]", "y [m]", "run", "t [s]"), _places(overlay, paths)),
     )
 
 
@@ -84,7 +88,10 @@ def misfit_picture(misfit: Misfit, name: str) -> Picture:
         alt=f"What the model gets wrong in {misfit.channel}, over {misfit.covariate_name}, with binned means.",
         caption=" ".join(caption),
         file=f"{name}.csv",
-        data=_csv(("kind", f"covariate [{misfit.covariate_unit}]", f"misfit [{misfit.unit}]"), _misfit_rows(misfit)),
+        data=_csv(
+            ("kind", f"covariate [{misfit.covariate_unit}]", f"misfit [{misfit.unit}]", *_MOMENT),
+            _misfit_rows(misfit, shown),
+        ),
     )
 
 
@@ -109,39 +116,60 @@ def comparison_picture(comparison: Comparison, name: str) -> Picture:
 
 def _every(step: int, path: FloatArray) -> FloatArray:
     """Return every so manyth row, first and last of each piece among them."""
+    return np.asarray(path[_kept(step, path)])
+
+
+def _kept(step: int, path: FloatArray) -> BoolArray:
     gap = np.isnan(path[:, 0])
     beside = gap | np.roll(gap, 1) | np.roll(gap, -1)
     index = np.arange(len(path))
-    return np.asarray(path[beside | (index % step == 0) | (index == len(path) - 1)])
+    return np.asarray(beside | (index % step == 0) | (index == len(path) - 1))
 
 
-def _places(paths: dict[str, FloatArray | None]) -> Iterable[tuple[str | float, ...]]:
+def _places(overlay: Overlay, paths: dict[str, FloatArray | None]) -> Iterable[tuple[str | float, ...]]:
     for which, path in paths.items():
         piece = 1
-        for x, y in [] if path is None else path.tolist():
+        timed = which == "measured" and overlay.times is not None
+        times = overlay.times.tolist() if timed and overlay.times is not None else repeat(None)
+        for (x, y), t in zip([] if path is None else path.tolist(), times, strict=False):
             if x != x:  # nan parts the pieces
                 piece += 1
             else:
-                yield which, f"{piece}", x, y
+                yield which, f"{piece}", x, y, *(("", "") if t is None else (overlay.run, _seconds(t)))
 
 
-def _misfit_rows(misfit: Misfit) -> Iterable[tuple[str | float, ...]]:
-    step = max(1, -(-len(misfit.residual) // MOST_SAMPLES))
-    for x, y in zip(misfit.covariate[::step].tolist(), misfit.residual[::step].tolist(), strict=True):
-        yield "sample", x, y
+def _misfit_rows(misfit: Misfit, shown: figures.Shown) -> Iterable[tuple[str | float, ...]]:
+    """Yield the samples that are drawn and those that are furthest off, with their moments."""
+    size = np.where(np.isfinite(misfit.residual), np.abs(misfit.residual), -1.0)
+    index = np.union1d(np.flatnonzero(shown.index), np.argsort(-size, kind="stable")[:LARGEST])
+    moments = repeat(_NO_MOMENT) if misfit.moments is None else _moments(misfit.moments, index)
+    samples = zip(misfit.covariate[index].tolist(), misfit.residual[index].tolist(), strict=True)
+    for (x, y), moment in zip(samples, moments, strict=False):
+        yield "sample", x, y, *moment
     for which, bins in (("mean before", misfit.bins), ("mean after", misfit.after)):
         yield from () if bins is None else _bins_rows(which, bins)
     for x, y in [] if misfit.curve is None else misfit.curve.tolist():
-        yield "extension adds", x, y
+        yield "extension adds", x, y, *_NO_MOMENT
     for x, low, high in [] if misfit.band is None else misfit.band.tolist():
-        yield "extension, lower end", x, low
-        yield "extension, upper end", x, high
+        yield "extension, lower end", x, low, *_NO_MOMENT
+        yield "extension, upper end", x, high, *_NO_MOMENT
+
+
+def _moments(moments: Moments, index: IntArray) -> Iterable[tuple[str | float, ...]]:
+    rows = zip(moments.run[index].tolist(), moments.t[index].tolist(), moments.places[index].tolist(), strict=True)
+    for run, t, (x, y) in rows:
+        yield moments.runs[run], _seconds(t), x, y
+
+
+def _seconds(t: float) -> str:
+    """Return a time that finds its row again: five digits would not do for a date."""
+    return f"{t:.3f}"
 
 
 def _bins_rows(which: str, bins: Bins) -> Iterable[tuple[str | float, ...]]:
     for end, values in (("", bins.mean), (", lower end", bins.lo90), (", upper end", bins.hi90)):
         for x, y in zip(bins.centre.tolist(), values.tolist(), strict=True):
-            yield f"{which}{end}", x, y
+            yield f"{which}{end}", x, y, *_NO_MOMENT
 
 
 def _csv(columns: Sequence[str], rows: Iterable[tuple[str | float, ...]]) -> str:

@@ -19,11 +19,12 @@ from kurumaisu.critic.predict_extended import forecast_of
 from kurumaisu.critic.predict_motion import Settings
 from kurumaisu.critic.pruned import pruned
 from kurumaisu.critic.recording import Recording, Run
+from kurumaisu.critic.replay import model_of
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.verdict import Gain, write_verdict
 from kurumaisu.errors import Error
-from kurumaisu.params import Model, follow_commands, load_model
+from kurumaisu.params import Model
 
 _UNDRIVEN = worth.Extension(None, (), lambda _: ())
 
@@ -44,9 +45,7 @@ def criticise(
     slam: whether SLAM is run with both models on a run held out, which takes some seconds.
     Raise Error when a run has no reference, or nothing that drove the robot.
     """
-    model = load_model(model_file)
-    if not assume_law and recording.model is None and all(run.voltage is None for run in recording.runs):
-        model = follow_commands(model)
+    model = model_of(recording, model_file, assume_law=assume_law)
     whole = replace(recording, runs=tuple(run for run in recording.runs if not _withheld(recording, run)))
     wrong = [*recording.invalid, *sanity.examine(whole, model).invalid]
     if wrong:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from kurumaisu.critic.bag import Topic, read_topics
 from kurumaisu.critic.clean import Faults, Table, clean
 from kurumaisu.critic.recording import Fan, Run, Series, run_of_parts
 from kurumaisu.errors import Error
+from kurumaisu.types import FloatArray
 
 # Topic of each part, where meta.yaml names no other.
 TOPICS = {
@@ -30,9 +32,13 @@ PARTS = messages.PARTS
 CLOCK_TOLERANCE = 1.0
 
 
-def read_bag_run(path: Path, topics: dict[str, str], faults: Faults) -> Run:
+def read_bag_run(
+    path: Path, topics: dict[str, str], faults: Faults, put_aside: Callable[[FloatArray], int] | None = None
+) -> Run:
     """Read the topics of a bag. topics: from meta.yaml, by default name or by name of a covariate.
 
+    put_aside: takes the ranges of each scan and returns their number, which the run's scan then has for its only
+    column; None: it has the ranges.
     A message's time is its header's stamp, or where it has none, when the bag received it.
     Raise Error naming file, topic and type for what cannot be read.
     """
@@ -40,7 +46,8 @@ def read_bag_run(path: Path, topics: dict[str, str], faults: Faults) -> Run:
     shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
     if shared:
         raise Error(f"topics: {shared[0]} is given to two parts of a run")
-    found = read_topics(path, {topic: part for part, topic in wanted.items()})
+    instead = {} if put_aside is None else {"scan": lambda row: (row[0], np.array([put_aside(row[1])]))}
+    found = read_topics(path, {topic: part for part, topic in wanted.items()}, instead)
     if "command" not in found:
         found |= read_topics(path, {SCRIPTED: "command"})
     for part in sorted(set(_parts(topics)) - set(found)):
@@ -52,7 +59,7 @@ def read_bag_run(path: Path, topics: dict[str, str], faults: Faults) -> Run:
     for part, topic in found.items():
         where = f"{path.name} {topic.name}"
         if part == "scan":
-            series["scan"], fan = _scan(where, topic, faults)
+            series["scan"], fan = _scan(where, topic, faults, aside=put_aside is not None)
         elif part in PARTS:
             columns, rows = messages.COLUMNS[part], np.asarray(topic.rows, dtype=np.float64)
             if part == "voltage" and not np.nan_to_num(rows[:, 2:]).any():
@@ -104,14 +111,14 @@ def _last_of_each_time(where: str, topic: Topic, faults: Faults) -> Topic:
     return replace(topic, received=received[keep].tolist(), stamps=stamps, rows=rows)
 
 
-def _scan(where: str, topic: Topic, faults: Faults) -> tuple[Series | None, Fan | None]:
+def _scan(where: str, topic: Topic, faults: Faults, *, aside: bool) -> tuple[Series | None, Fan | None]:
     fan = topic.rows[0][0]
     keep = [i for i, (other, _) in enumerate(topic.rows) if other == fan]
     if len(keep) < len(topic.rows):
         faults.add(f"{where}: {len(topic.rows) - len(keep)} scans dropped: their fan is not that of the first")
     ranges = np.stack([topic.rows[i][1] for i in keep])
-    columns = tuple(f"r{i}" for i in range(fan.beams))
-    return clean(Table(where, topic.times()[keep], ranges, columns, "scan", 1), faults, ranges=True), fan
+    columns = ("row",) if aside else tuple(f"r{i}" for i in range(fan.beams))
+    return clean(Table(where, topic.times()[keep], ranges, columns, "scan", 1), faults, ranges=not aside), fan
 
 
 def _covariates(name: str, where: str, topic: Topic, faults: Faults) -> dict[str, Series]:

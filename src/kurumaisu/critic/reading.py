@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from kurumaisu.critic.read_rawlog import is_rawlog, rawlog_name, read_rawlog_run
 from kurumaisu.critic.recording import LaserMount, Recording, Run
 from kurumaisu.critic.selection import matching
 from kurumaisu.errors import Error
+from kurumaisu.types import FloatArray
 
 
 def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
@@ -32,8 +33,8 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
     faults = Faults()
     laser = meta.laser
     runs = []
-    for source in _chosen(_sources(path), wanted):
-        run, mount = _read_run(source, meta, faults)
+    for source in chosen(sources(path), wanted):
+        run, mount = read_run(source, meta, faults)
         laser = laser or mount
         check_run(run, laser, faults)
         runs.append(run)
@@ -53,7 +54,7 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
     )
 
 
-def _sources(path: Path) -> list[Path]:
+def sources(path: Path) -> list[Path]:
     """Return what each run is read from: a bag, a rawlog, or a folder of tables."""
     if path.is_file():
         if path.suffix != ".bag" and not is_rawlog(path):
@@ -81,18 +82,20 @@ def _sources(path: Path) -> list[Path]:
     return sorted(bags + folders, key=lambda item: item.stem)
 
 
-def _read_run(source: Path, meta: Meta, faults: Faults) -> tuple[Run, LaserMount | None]:
-    """Return a run, and the laser's mounting where the file itself states it."""
+def read_run(
+    source: Path, meta: Meta, faults: Faults, put_aside: Callable[[FloatArray], int] | None = None
+) -> tuple[Run, LaserMount | None]:
+    """Return a run, and the laser's mounting where the file itself states it; put_aside: of a bag, as read_bag_run."""
     if source.is_dir():
         return read_csv_run(source, source.resolve().name, faults), None
     if is_rawlog(source):
         return read_rawlog_run(source, faults)
-    run = read_bag_run(source, meta.topics, faults)
+    run = read_bag_run(source, meta.topics, faults, put_aside)
     queries = source.with_suffix("") / f"{QUERY}.csv"
     return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
 
 
-def _chosen(sources: list[Path], wanted: Sequence[str]) -> list[Path]:
+def chosen(sources: list[Path], wanted: Sequence[str]) -> list[Path]:
     """Return the sources of the runs that are wanted, in their own order."""
     if not wanted:
         return sources

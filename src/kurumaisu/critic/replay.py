@@ -7,16 +7,30 @@ from collections import OrderedDict
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from kurumaisu import effects, geometry
 from kurumaisu.critic.drive import GRID, Drive
-from kurumaisu.params import EffectSetting, Model
+from kurumaisu.critic.recording import Recording
+from kurumaisu.params import EffectSetting, Model, follow_commands, load_model
 from kurumaisu.sim import plant
 from kurumaisu.types import FloatArray
 
 _ROOM = 2**26  # bytes of increments that are kept
+
+
+def model_of(recording: Recording, model_file: Path, *, assume_law: bool) -> Model:
+    """Return the model that a recording is compared with.
+
+    Without voltages it is "velocity follows command", unless the recording names a model or assume_law says that the
+    robot has the model's voltage law.
+    """
+    model = load_model(model_file)
+    if assume_law or recording.model is not None or any(run.voltage is not None for run in recording.runs):
+        return model
+    return follow_commands(model)
 
 
 def extend(model: Model, settings: Sequence[EffectSetting]) -> Model:

@@ -15,7 +15,7 @@ from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import process_noise
 from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, confirmed, felt_share, moved_share
-from kurumaisu.critic.misfit import bins
+from kurumaisu.critic.misfit import bins, moments
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
 from kurumaisu.critic.recording import Recording
@@ -23,7 +23,7 @@ from kurumaisu.critic.smooth_fit import Extension, extend
 from kurumaisu.critic.smooth_judge import Beyond
 from kurumaisu.critic.story import Misfit, Rival
 from kurumaisu.critic.verdict import NORMAL90, Gain, Unknown
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray
 
 _LISTED = 3  # curves that may act, at most
 _PLAUSIBLE = 0.02  # posterior from which another curve is listed
@@ -65,10 +65,12 @@ def criticism(
 def figure(problem: Problem, extension: Extension) -> Misfit:
     """Return the residual without the curve over the covariate, and the curve with its band."""
     name, covariate, unit = smooth_words.covariate(extension.curve)
-    x, residual, left = (
+    x, residual, left, use = (
         np.concatenate(parts)
         for parts in zip(*(_samples(problem, drive, extension) for drive in problem.drives), strict=True)
     )
+    at_all = moments(problem.drives)
+    x, residual, left = x[use], residual[use], left[use]
     at = smooth_shapes.grid(extension)
     mean, sd = smooth_shapes.band(extension, at)
     return Misfit(
@@ -83,11 +85,17 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
         curve=np.column_stack([at, mean]),
         after=bins(x, left),
         band=np.column_stack([at, mean - NORMAL90 * sd, mean + NORMAL90 * sd]),
+        moments=replace(at_all, run=at_all.run[use], t=at_all.t[use], places=at_all.places[use]),
     )
 
 
-def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return covariate and residual rate without and with the curve, per increment in which the chair moves on."""
+def _samples(
+    problem: Problem, drive: Drive, extension: Extension
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Return covariate and residual rate without and with the curve, per increment, and which of them count.
+
+    That are those in which the chair moves on.
+    """
     rate = extension.curve.channel.removesuffix("_gain")
     channel = ("v", "lateral", "w").index(rate)
     motion = replay.motion(drive, problem.model, extension.fit.settings)
@@ -106,7 +114,7 @@ def _samples(problem: Problem, drive: Drive, extension: Extension) -> tuple[Floa
         rates = (motion.v if rate == "v" else motion.w)[middle]
         use &= np.abs(rates) > 0.3 * np.abs(rates).max()
         residual, left = (each / np.where(use, rates, 1.0) for each in (residual, left))
-    return x[use], residual[use], left[use]
+    return x, residual, left, use
 
 
 def _told(extension: Extension, beyond: Beyond, share: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kurumaisu.types import FloatArray
+from kurumaisu.types import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -13,7 +13,8 @@ class Overlay:
     """One run from above [m]: measured path (n, 2), simulated paths (m, 2); held_out: no model fitted it.
 
     restart [s]: after so long the simulation begins again at the measured pose (0: never); a row of nan parts pieces;
-    off, off_extended [m]: how far the pieces' ends are from the measured place, rms, None where there is none.
+    off, off_extended [m]: how far the pieces' ends are from the measured place, rms, None where there is none;
+    times (n,) [s] of the measured path, by the run's clock, None where nobody needs to find them again.
     """
 
     run: str
@@ -24,6 +25,7 @@ class Overlay:
     restart: float
     off: float | None = None
     off_extended: float | None = None
+    times: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -37,13 +39,27 @@ class Bins:
 
 
 @dataclass(frozen=True)
+class Moments:
+    """When and where samples were taken.
+
+    runs: names; run (n,): index into them; t (n,) [s] by the run's clock; places (n, 2) [m] in the map: of the chair,
+    or for a reading, of what the beam met, nan where that is nothing.
+    """
+
+    runs: tuple[str, ...]
+    run: IntArray
+    t: FloatArray
+    places: FloatArray
+
+
+@dataclass(frozen=True)
 class Misfit:
     """Measured minus simulated, over the covariate that explains it.
 
     covariate, residual: (n,) points; channel and covariate_name as a reader says them, with their units;
     explained_by: the id or shape that is blamed; curve: (m, 2) covariate and what the extension adds, if any;
     band: (m, 3) covariate and the ends of the curve's 90 % interval, if known; after: means of what is left with the
-    extension in.
+    extension in; moments: of the points.
     """
 
     channel: str
@@ -57,6 +73,7 @@ class Misfit:
     curve: FloatArray | None = None
     band: FloatArray | None = None
     after: Bins | None = None
+    moments: Moments | None = None
 
 
 @dataclass(frozen=True)

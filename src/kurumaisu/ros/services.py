@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -21,9 +22,19 @@ from std_srvs.srv import (
 )
 
 from kurumaisu.errors import Error
+from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.rotation import pose_of
-from kurumaisu.srv import Seed, SeedRequest, SetPose, SetPoseRequest, StateFile, StateFileRequest
+from kurumaisu.srv import (
+    Seed,
+    SeedRequest,
+    SetPose,
+    SetPoseRequest,
+    Speed,
+    SpeedRequest,
+    StateFile,
+    StateFileRequest,
+)
 from kurumaisu.types import FloatArray
 
 
@@ -53,16 +64,18 @@ class Simulation(Protocol):
 
 
 class Services:
-    """Advertises reset, pause, step, seed, set_pose, save and load."""
+    """Advertises reset, pause, step, speed, seed, set_pose, save and load."""
 
-    def __init__(self, simulation: Simulation, requests: Requests, prefix: str) -> None:
+    def __init__(self, simulation: Simulation, requests: Requests, pacer: Pacer, prefix: str) -> None:
         """prefix: of the names, `~` for private ones."""
         self._simulation = simulation
+        self._pacer = pacer
         self._requests = requests
         self._services = [
             rospy.Service(prefix + "reset", Empty, self._reset),
             rospy.Service(prefix + "pause", SetBool, self._pause),
             rospy.Service(prefix + "step", Trigger, self._step),
+            rospy.Service(prefix + "speed", Speed, self._speed),
             rospy.Service(prefix + "seed", Seed, self._seed),
             rospy.Service(prefix + "set_pose", SetPose, self._set_pose),
             rospy.Service(prefix + "save", StateFile, self._save),
@@ -86,6 +99,14 @@ class Services:
             self._simulation.step()
 
         return TriggerResponse(*self._outcome(step))
+
+    def _speed(self, request: SpeedRequest) -> tuple[bool, str]:
+        def pace() -> None:
+            if not (math.isfinite(request.speed) and request.speed >= 0):
+                raise Error(f"speed: must be a finite number of at least 0: {request.speed:g}")
+            self._pacer.speed = request.speed
+
+        return self._outcome(pace)
 
     def _seed(self, request: SeedRequest) -> tuple[bool, str]:
         return self._outcome(lambda: self._simulation.reset(request.seed))

@@ -24,6 +24,7 @@ from kurumaisu.ros.sim_effects import NAMESPACE, LiveEffects
 from kurumaisu.ros.sim_laser import LaserOutput, laser_output
 from kurumaisu.ros.sim_publish import SimTopics
 from kurumaisu.ros.sim_settings import SimSettings, read_settings
+from kurumaisu.ros.sim_view import ChairFan, ViewTopics
 from kurumaisu.sim.chair import ChairSimulator, Observation
 from kurumaisu.sim.holder import VoltageHolder
 from kurumaisu.types import FloatArray
@@ -55,7 +56,10 @@ class SimNode:
             for name in self._simulator.others
         ]
         self._requests = Requests()
-        self._services = Services(self, self._requests, "")
+        self._pacer = Pacer(settings.speed)
+        self._services = Services(self, self._requests, self._pacer, "")
+        self._fan = ChairFan(settings.model.laser, lambda: self._simulator.row)
+        self._view = ViewTopics(settings.view_rate, settings.map_frame, lambda: self._simulator.machinery, self._fan)
         self._effects = LiveEffects(settings.model.effects, self._switch)
 
     @property
@@ -72,11 +76,11 @@ class SimNode:
             self._laser.close()
 
     def _loop(self) -> None:
-        pacer = Pacer(self._settings.speed)
         self.reset()
         while not rospy.is_shutdown():
             if self._requests:
                 self._requests.serve()
+            self._view.show(self._now, self.paused, self._pacer.speed)
             if self.paused:
                 self._requests.wait(0.1)
                 continue
@@ -85,7 +89,7 @@ class SimNode:
             if self._requests:
                 continue
             self._advance()
-            pacer.wait(self._simulator.step_time)
+            self._pacer.wait(self._simulator.step_time)
 
     def step(self) -> None:
         """Go on by one step, as soon as the voltages have come that are due, and the scan that a driver makes."""
@@ -100,7 +104,10 @@ class SimNode:
 
     def set_pose(self, name: str, pose: FloatArray) -> None:
         """Put a model to x, y, z [m], heading [rad]. Raise Error for an unknown one."""
+        before = self._simulator.chair_pose
         self._simulator.set_pose(name, pose)
+        if (self._simulator.chair_pose != before).any():
+            self._view.carried()
 
     def save(self) -> bytes:
         """Return the state of all but the voltages that are yet to come."""
@@ -116,6 +123,7 @@ class SimNode:
             self._holder.clear()
             self._given_up = None
         self._epoch = self._now - round(observation.time * _NS)
+        self._view.carried()
         self._publish(observation)
 
     def _switch(self, settings: tuple[EffectSetting, ...]) -> None:
@@ -143,6 +151,7 @@ class SimNode:
     def _publish(self, observation: Observation) -> None:
         self._now = self._epoch + round(observation.time * _NS)
         self._topics.publish(observation, self._epoch, round(observation.time / self._simulator.step_time))
+        self._fan.note(observation, self._epoch)
 
     def _hear(self, message: Voltages) -> None:
         with self._lock:

@@ -42,6 +42,7 @@ class SimSettings:
     start_time: float
     clock_every: int  # [steps]
     ground_truth_every: int  # [steps]
+    view_rate: float
     map_frame: str
     base_frame: str
     voltage_timeout: float
@@ -67,6 +68,7 @@ def read_settings(values: Any, where: str) -> SimSettings:
         start_time=top.number("start_time", above=0),
         clock_every=_every(top, "clock_rate", step),
         ground_truth_every=_every(top, "ground_truth_rate", step),
+        view_rate=top.number("view_rate", above=0),
         map_frame=_frame(top, "map_frame"),
         base_frame=_frame(top, "base_frame"),
         voltage_timeout=top.number("voltage_timeout", above=0),

@@ -60,8 +60,9 @@ def main() -> int:
         return 1
     rospy.set_param("/use_sim_time", True)
     requests = Requests()
-    StagerosServices(session, requests)
-    _run(session, requests, Pacer(speed), world, stopped)
+    pacer = Pacer(speed)
+    StagerosServices(session, requests, pacer)
+    _run(session, requests, pacer, world, stopped)
     rospy.signal_shutdown("the simulation has ended")
     return 0
 
@@ -89,6 +90,7 @@ def _run(session: Session, requests: Requests, pacer: Pacer, world: World, stopp
     while not (stopped.is_set() or rospy.is_shutdown()):
         if requests:
             requests.serve()
+        session.show(pacer.speed)
         if session.paused:
             requests.wait(0.1)
             continue

@@ -6,6 +6,7 @@ from __future__ import annotations
 import rospy
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
+from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.rotation import pose_of
 from kurumaisu.ros.services import Services
@@ -16,8 +17,8 @@ from kurumaisu.srv import Delete, DeleteRequest, Spawn, SpawnRequest
 class StagerosServices(Services):
     """Advertises the services; what they do is done between two steps."""
 
-    def __init__(self, session: Session, requests: Requests) -> None:
-        super().__init__(session, requests, "~")
+    def __init__(self, session: Session, requests: Requests, pacer: Pacer) -> None:
+        super().__init__(session, requests, pacer, "~")
         self._session = session
         self._services += [
             rospy.Service("reset_positions", Empty, self._reset_positions),

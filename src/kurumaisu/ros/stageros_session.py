@@ -15,6 +15,7 @@ from geometry_msgs.msg import Pose, Twist
 
 from kurumaisu.errors import Error
 from kurumaisu.ros.rotation import pose_of
+from kurumaisu.ros.sim_view import FleetFans, ViewTopics
 from kurumaisu.ros.stageros_names import Names, names_of, names_of_another
 from kurumaisu.ros.stageros_newcomers import is_text, renumbered
 from kurumaisu.ros.stageros_plan import plan_world
@@ -22,6 +23,7 @@ from kurumaisu.ros.stageros_publish import Publisher
 from kurumaisu.ros.stageros_robot import Ears
 from kurumaisu.ros.stageros_saved import packed_names, unpacked_names
 from kurumaisu.ros.stageros_settings import StagerosSettings
+from kurumaisu.sim.partition import is_robot
 from kurumaisu.sim.simulator import Simulator
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World, read_snippet
@@ -55,6 +57,10 @@ class Session:
         self._publisher = Publisher(settings, world.interval, self._ears)
         self._take(self._home)
         self._publisher.check_rates()
+        self._fans = FleetFans(self._simulator)
+        self._view = ViewTopics(
+            settings.view_rate, settings.frames.ground_truth, lambda: self._simulator.machinery, self._fans
+        )
         self.heard = 0  # commands and poses, of any robot, since the start, dropped ones included
 
     @property
@@ -77,6 +83,12 @@ class Session:
         if timeout > 0 and now - self._last_command >= timeout * _NS:
             self._commands[:] = 0.0  # of all robots: any command for any robot keeps all going, as in 1.8.0
         self._publisher.publish(observation, self._model_poses, self._number, divmod(now, _NS))
+        if self._view.due:
+            self._fans.note(now)
+
+    def show(self, speed: float) -> None:
+        """Publish what a page draws, if one looks; speed: at which it runs."""
+        self._view.show(self._number * self._step_ns, self.paused, speed)
 
     def _ears(self, names: Names) -> Ears:
         return Ears(partial(self.hear, names), partial(self.carry, names))
@@ -115,15 +127,20 @@ class Session:
         """Start again as the file says, with the same or another seed; /clock runs on, as time must not jump back."""
         self._seed = self._seed if seed is None else seed
         self._simulator.reset(self._seed)
+        self._view.carried()
         self._take(self._home)
 
     def reset_positions(self) -> None:
         """Put the robots back to where they started; their odometry does not notice, as in 1.8.0."""
         self._simulator.reset_positions()
+        self._view.carried()
 
     def set_pose(self, name: str | Names, pose: FloatArray) -> None:
         """Put a model or a robot to x, y, z [m], heading [rad]. Raise Error for an unknown one."""
-        self._simulator.set_pose(self._model(name), pose)
+        model = self._model(name)
+        self._simulator.set_pose(model, pose)
+        if is_robot(model):
+            self._view.carried()
 
     def spawn(self, like: str, name: str, pose: FloatArray) -> None:
         """Add a copy of a model with all that stands on it, or what a text in the world's words describes.
@@ -157,6 +174,7 @@ class Session:
         prefixes, numbered, state = unpacked_names(saved)
         now = self._simulator.save()
         self._simulator.load(state)
+        self._view.carried()
         if len(set(prefixes)) != len(self._simulator.robots):
             self._simulator.load(now)
             raise Error(f"state: does not name each of its robots once: {prefixes}")
@@ -192,11 +210,13 @@ class Session:
         ]
 
     def _model(self, name: str | Names) -> Model:
-        """Return the model of a name in the world file, or a robot's by the front of its topics, as robot_1."""
+        """Return the model of a name in the world file, of # and its key, or a robot's by its topics', as robot_1."""
         for names, row in self._rows.items():
             if name in (names, names.prefix or ""):
                 return self._simulator.robots[row]
         found = [model for model in self._simulator.models if model.name == name]
+        if isinstance(name, str) and name.startswith("#") and not found:
+            return self._simulator.models[self._simulator.machinery.population.index(name)]
         if len(found) != 1:
             known = ", ".join(sorted({model.name for model in self._simulator.models if model.name}))
             raise Error(f"name {name!r}: {'several models have' if found else 'no model has'} it; there are: {known}")

@@ -48,6 +48,7 @@ class StagerosSettings:
     publish_collision: bool
     publish_devices: tuple[str, ...]  # types of models: bumper, fiducial
     rates: Rates
+    view_rate: float
     headless_rate: float
     seed: int
     options: Options
@@ -82,6 +83,7 @@ def read_settings(values: Any, where: str) -> StagerosSettings:
         publish_collision=top.flag("publish_collision"),
         publish_devices=devices,
         rates=read_rates(top.section("rates")),
+        view_rate=top.number("view_rate", above=0),
         headless_rate=top.number("headless_rate", at_least=0),
         seed=top.integer("seed", at_least=0),
         options=_options(_mapping(top, "simulator"), where, devices),

@@ -17,6 +17,7 @@ from kurumaisu.sim import state
 from kurumaisu.sim.chair_body import seat
 from kurumaisu.sim.chair_data import NEUTRAL, Command, Observation
 from kurumaisu.sim.chair_walls import Walls
+from kurumaisu.sim.machinery import Machinery
 from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.plant import Plant
 from kurumaisu.sim.scanner import Scan, Scanner
@@ -172,6 +173,21 @@ class ChairSimulator:
     def models(self) -> tuple[WorldModel, ...]:
         """All models that there are, the chair among them."""
         return self._world.machinery.population.models
+
+    @property
+    def machinery(self) -> Machinery:
+        """What runs, to be looked at; another one when models come, go, or walls move."""
+        return self._world.machinery
+
+    @property
+    def chair_pose(self) -> FloatArray:
+        """Where the chair is (3,), theta not wrapped."""
+        return self._world.pose.copy()
+
+    @property
+    def row(self) -> int:
+        """The chair's place among the bodies that move."""
+        return self._world.body
 
     @property
     def robot(self) -> int:

@@ -145,6 +145,7 @@ class ChairWorld:
             return False
         machinery.before, machinery.frames = machinery.frames, machinery.before
         machinery.frames[0] = poses[0]
+        machinery.stalled[0] = False
         return True
 
     def _look(self) -> None:

@@ -34,9 +34,14 @@ class Population:
         return cls(tuple(models), np.array(poses).reshape(-1, 4), np.arange(count), np.zeros(count, dtype=np.int64))
 
     def index(self, model: str | int | Model) -> int:
-        """Return the place of a model given by name, place or itself. Raise Error if there is none, or several."""
+        """Return the place of a model given by name, `#` and key, place or itself.
+
+        Raise Error if there is none, or several.
+        """
         if isinstance(model, str):
             found = [m.index for m in self.models if m.name == model]
+            if not found and model[:1] == "#" and model[1:].isdecimal():
+                found = np.flatnonzero(self.keys == int(model[1:])).tolist()
         else:
             number = model.index if isinstance(model, Model) else model
             found = [number] if 0 <= number < len(self.models) else []

@@ -54,6 +54,16 @@ class Rangers:
         """The newest scan of each fan."""
         return self._scans
 
+    @property
+    def truths(self) -> FloatArray | None:
+        """How far all beams of the newest scans went [m], in the order of the fans; None: as far as they say."""
+        known = [cohort.truths for cohort in self._cohorts]
+        if all(truths is None for truths in known):
+            return None
+        true = [s.ranges if t is None else t for s, t in zip(self._scans.sweeps, known, strict=True)]
+        together: FloatArray = np.concatenate([true[number][start:stop] for number, start, stop in self._places])
+        return together
+
     def start(self, time: float, frames: FloatArray, rng: np.random.Generator) -> None:
         """Look once with all fans, before their first update, from frames (b + 1, 4): bodies and the map."""
         self._eyes.follow(frames)
@@ -84,6 +94,8 @@ class Rangers:
     def keep(self, sweeps: tuple[Sweep, ...]) -> None:
         """Have these as the newest scans, of the same cohorts."""
         self._scans = Scans(sweeps, self._places)
+        for cohort in self._cohorts:
+            cohort.truths = None
 
     def _note(self, time: float, before: FloatArray, now: FloatArray) -> None:
         for body, effects in self._touched:
@@ -102,6 +114,9 @@ class _Cohort:
         touched: Mapping[int, FanEffects],
     ) -> None:
         self.every, self.phase = rhythm
+        self.truths: FloatArray | None = (
+            None  # how far the beams went, where noise or effects make something else of it
+        )
         self._eyes = eyes
         self._body = np.array([fan.body for fan in fans], dtype=np.int64)
         self._trees = np.array([fan.model.root for fan in fans], dtype=np.int64)
@@ -122,6 +137,7 @@ class _Cohort:
         looks = [fan.look(time, off if off is None else off[part]) for part, fan in self._touched]
         for (part, _), look in zip(self._touched, looks, strict=True):
             ranges[part], returns[part] = look.ranges, look.returns
+        self.truths = ranges.copy() if looks or self._noise.on_ranges else None
         if self._noise.on_ranges:
             ranges = self._noise.readings(ranges, rng)
         for (part, effects), look in zip(self._touched, looks, strict=True):

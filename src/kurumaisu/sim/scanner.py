@@ -23,13 +23,14 @@ class Scan:
     """Readings (beams,) [m]: +inf no return, NaN no valid reading, as one below range_min.
 
     time [s] on the scan's stamp, which is that of the first beam; pose (3,): base_link in the map at that time;
-    returns (beams,): reflectance of what the beams met, 0 where that is nothing.
+    returns (beams,): reflectance of what the beams met, 0 where that is nothing; truths (beams,): how far they went.
     """
 
     time: float
     pose: FloatArray
     ranges: FloatArray
     returns: FloatArray
+    truths: FloatArray
 
 
 class Scanner:
@@ -105,14 +106,14 @@ class Scanner:
         self._beams = self._chain.aim(Beams(stamp, said, self._mount, height, self._bearings, level))
         self._complete = max(said[-1], self._beams.times.max())
 
-    def _readings(self, beams: Beams, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _readings(self, beams: Beams, poses: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         error = self._laser.error
         origins = compose(poses, beams.mount)
         look = self.sight.look(beams.times, beams.height)
         level, returns = look.cast(origins, beams.bearings)
         noise = self._rng.standard_normal(len(level))
         if self._chain.empty:
-            return error.reading(level, noise), returns
+            return error.reading(level, noise), returns, level
         ranges = slanted(level, beams)
         oblique = self._chain.oblique
         echoes = Echoes(
@@ -128,4 +129,4 @@ class Scanner:
             origins=origins,
         )
         # What the law, without its noise, makes of the range that it means by a reading: rounding and gate are left.
-        return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges))), returns
+        return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges))), returns, ranges

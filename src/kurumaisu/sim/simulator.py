@@ -23,6 +23,7 @@ from kurumaisu.sim.observation import Observation
 from kurumaisu.sim.options import Options
 from kurumaisu.sim.partition import is_robot
 from kurumaisu.sim.population import Population
+from kurumaisu.sim.scans import Scans
 from kurumaisu.sim.sensing import Sensing
 from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
 from kurumaisu.sim.sensors.suite import Reading
@@ -192,6 +193,16 @@ class Simulator:
     def rangers(self) -> tuple[RangerFan, ...]:
         """All fans of all rangers, in the order of an observation's scans."""
         return self._machinery.fans
+
+    @property
+    def scans(self) -> Scans:
+        """The newest scan of each fan."""
+        return self._machinery.rangers.scans
+
+    @property
+    def machinery(self) -> Machinery:
+        """What runs, to be looked at; another one when models come or go."""
+        return self._machinery
 
     @property
     def models(self) -> tuple[Model, ...]:

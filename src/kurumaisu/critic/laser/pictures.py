@@ -4,15 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.search import Found
 from kurumaisu.critic.misfit import FOLLOWED, bins, explained
-from kurumaisu.critic.story import Comparison, Misfit, Noise, Rival
-from kurumaisu.types import FloatArray
+from kurumaisu.critic.story import Comparison, Misfit, Moments, Noise, Rival
+from kurumaisu.types import FloatArray, IntArray
 
 _SAMPLES = 20_000  # readings of which means are drawn, evenly taken: of 170 000, no mean is a picture's width off
 _RIVALS = 6
@@ -49,9 +49,23 @@ def misfits(assembly: Assembly, normal: Normal, parts: Sequence[Part]) -> tuple[
     step = max(1, int(normal.beam_noise.valid.sum()) // _SAMPLES)
     rows = np.flatnonzero(normal.beam_noise.valid & np.isfinite(left))[::step]
     over = {name: (unit, values.ravel()[rows]) for name, (unit, values) in _covariates(assembly).items()}
+    when = _moments(assembly, rows)
     return tuple(
-        _misfit(part.id, over, left.ravel()[rows], each.ravel()[rows]) for part, each in zip(parts, added, strict=True)
+        replace(_misfit(part.id, over, left.ravel()[rows], each.ravel()[rows]), moments=when)
+        for part, each in zip(parts, added, strict=True)
     )
+
+
+def _moments(assembly: Assembly, rows: IntArray) -> Moments:
+    """Return when and where readings were taken; rows: places of them in arrays (k, b) made flat."""
+    shots, seen = assembly.shots, assembly.marks.seen
+    scan, beam = np.divmod(rows, seen.ranges.shape[1])
+    origins, bearings = assembly.origins()
+    laser = origins[scan, beam]
+    along = laser[:, 2] + bearings[scan, beam]
+    reach = np.where(np.isfinite(seen.level), seen.level, np.nan)[scan, beam, np.newaxis]
+    places = laser[:, :2] + reach * np.column_stack([np.cos(along), np.sin(along)])
+    return Moments(shots.runs, shots.run[scan], shots.stamps[scan] + shots.zero, places)
 
 
 def _left(assembly: Assembly, normal: Normal, error: FloatArray) -> FloatArray:

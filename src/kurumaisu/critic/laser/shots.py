@@ -34,7 +34,8 @@ class Track:
 class Shots:
     """Scans that can be predicted.
 
-    stamps (k,) [s] since the laser's time 0; run (k,): index into tracks; measured (k, b) [m], nan no valid reading,
+    stamps (k,) [s] since the laser's time 0, which is `zero` [s] by the clock of the runs; run (k,): index into tracks
+    and runs, their names; measured (k, b) [m], nan no valid reading,
     inf no return; said (b,) [s] after the stamp at which beams are fired by the model. Times of tracks count alike.
     known: what else was recorded, by name, at each scan (k,).
     shift (k, b, 3): how far the tracks have been moved from the reference, to where the readings put the chair. All is
@@ -51,6 +52,8 @@ class Shots:
     said: FloatArray
     shift: FloatArray
     known: Mapping[str, FloatArray]
+    zero: float
+    runs: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,8 @@ def gather(recording: Recording, model: Model) -> Shots:
         said=laser.time_increment * np.arange(laser.beams),
         shift=np.zeros((*readings.shape, 3)),
         known={name: np.concatenate(parts) for name, parts in known.items()},
+        zero=zero,
+        runs=tuple(run.name for run in runs),
     )
 
 

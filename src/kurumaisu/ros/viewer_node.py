@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""viewer_node: the page of a simulation or a robot, at an address that it prints."""
+
+from __future__ import annotations
+
+import sys
+
+import rospy
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+
+from kurumaisu.errors import Error, one_line
+from kurumaisu.ros.viewer_settings import read_settings
+from kurumaisu.ros.viewer_source import RosSource
+from kurumaisu.viewer.hub import Hub
+from kurumaisu.viewer.server import Server
+
+
+def main() -> None:
+    """Run the node; exit with 1 and one line for bad configuration or a port that is taken."""
+    rospy.init_node("viewer_node")
+    try:
+        settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
+        hub = Hub()
+        source = RosSource(hub, settings)
+        server = Server(settings.server, hub, source, settings.control)
+        server.start()
+    except Error as error:
+        rospy.logfatal(one_line(error))
+        sys.exit(1)
+
+    def new_token(_request: TriggerRequest) -> TriggerResponse:
+        # Who reaches this service can publish commands, too: nothing is given away.
+        return TriggerResponse(settings.control, server.new_address() if settings.control else server.address)
+
+    service = rospy.Service("~new_token", Trigger, new_token)
+    # to the terminal only, for the log and /rosout are read by others
+    if settings.control:
+        print(f"viewer, with control, good once: {server.new_address()}")
+    print(f"viewer, to look: {server.address}", flush=True)
+    try:
+        source.run(settings.server.rate)
+    finally:
+        service.shutdown()
+        source.close()
+        server.close()

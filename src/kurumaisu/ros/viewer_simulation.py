@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A simulation behind ROS as a page sees it, sim_node or stageros: its topics `world` and `view`, and its services."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import Point, Pose
+from std_msgs.msg import String
+from std_srvs.srv import Empty, SetBool, Trigger
+
+from kurumaisu.errors import Error
+from kurumaisu.msg import View
+from kurumaisu.ros.rotation import quaternion_of
+from kurumaisu.ros.viewer_calls import call, done
+from kurumaisu.ros.viewer_topics import Newest
+from kurumaisu.srv import Seed, SetPose, Speed
+from kurumaisu.types import FloatArray
+from kurumaisu.viewer.hub import Hub
+from kurumaisu.viewer.protocol import Body, Fan, World
+from kurumaisu.viewer.source import Outcome
+
+ABILITIES = frozenset({"pause", "step", "speed", "reset", "seed", "set_pose"})
+
+
+class Simulation:
+    """Puts the world into the hub, and tells of the moment."""
+
+    def __init__(self, hub: Hub, node: str, services: str) -> None:
+        """node: its name; services: what is in front of its services' names."""
+        self._hub = hub
+        self._services = services
+        self._view = Newest(f"{node}/view", View)
+        self._described = Newest(f"{node}/world", String)
+        self._world: dict[str, Any] = {}
+        self.run = -1  # goes up when a robot was put elsewhere
+        self._known: dict[str, Any] = {}  # of the last view
+
+    def open(self) -> None:
+        """Listen."""
+        self._described.open()
+        self._view.open()
+
+    def close(self) -> None:
+        """Listen no longer."""
+        self._view.close()
+        self._described.close()
+        self._world, self._known = {}, {}
+
+    def moment(self) -> tuple[dict[str, Any], dict[int, Fan]] | None:
+        """Return what goes into a State, and the scans that are new; None before there is anything."""
+        if (described := self._described.take()) is not None:
+            self._show(json.loads(described.data))
+        view = self._view.take()
+        if view is None or view.world != self._world.get("world"):  # its description is yet to come
+            return (self._known, {}) if self._known else None
+        self.run = view.run
+        moving = np.asarray(view.poses).reshape(-1, 3)
+        poses = {body["id"]: tuple(body["pose"]) for body in self._world["bodies"] if body["row"] < 0}
+        poses |= {self._rows[row]: tuple(pose) for row, pose in enumerate(moving.tolist()) if row in self._rows}
+        robot = self._world["first"]
+        self._known = {
+            "t": view.header.stamp.to_sec(),
+            "rtf": float(view.real_time_factor),
+            "paused": bool(view.paused),
+            "poses": poses,
+            "hit": tuple(
+                self._rows[row]
+                for row in np.flatnonzero(np.frombuffer(view.hit, np.uint8)).tolist()
+                if row in self._rows
+            ),
+            "truth": poses.get(robot) if robot is not None else None,
+        }
+        return self._known, self._scans(view)
+
+    def command(self, name: str, arguments: dict[str, Any]) -> Outcome:
+        """Obey. Raise Error with the reason where it cannot be."""
+        front = self._services
+        match name:
+            case "pause":
+                return Outcome(done(f"{front}pause", SetBool, arguments["on"]))
+            case "step":
+                return Outcome(done(f"{front}step", Trigger))
+            case "speed":
+                return Outcome(done(f"{front}speed", Speed, arguments["value"]))
+            case "seed":
+                return Outcome(done(f"{front}seed", Seed, arguments["value"]))
+            case "reset":
+                call(f"{front}reset", Empty)
+                return Outcome("back at the start")
+            case "set_pose":
+                return Outcome(self._put(**arguments))
+        raise Error(f"{name}: is nothing that a simulation does")
+
+    def _put(self, body: str, x: float, y: float, yaw: float) -> str:
+        known = {one["id"]: one for one in self._world.get("bodies", [])}
+        if body not in known:
+            raise Error(f"set_pose: there is no body {body!r}")
+        if not known[body]["movable"]:
+            raise Error(f"set_pose: {known[body]['name']} is a wall, which nobody moves")
+        pose = Pose(Point(x, y, known[body]["z"]), quaternion_of(yaw))
+        return done(f"{self._services}set_pose", SetPose, body, pose)
+
+    def _show(self, world: dict[str, Any]) -> None:
+        self._world = world
+        self._rows = {body["row"]: body["id"] for body in world["bodies"] if body["row"] >= 0}
+        self._places = {body["row"]: place for place, body in enumerate(world["bodies"]) if body["row"] >= 0}
+        world["first"] = next((body["id"] for body in world["bodies"] if body["kind"] == "robot"), None)
+        self._hub.world(World(tuple(map(_body, world["bodies"])), world["bounds"]))
+
+    def _scans(self, view: Any) -> dict[int, Fan]:
+        """Return the scans of a view, by their robots' places among the bodies; of several the first."""
+        if not view.stamps:
+            return {}
+        fans, sensors = self._world["fans"], np.asarray(view.sensors).reshape(-1, 3)
+        ends = np.cumsum([0, *(fan["beams"] for fan in fans)])
+        scans: dict[int, Fan] = {}
+        for number, fan in enumerate(fans):
+            place = self._places.get(fan["row"], -1)
+            if place not in scans:
+                scans[place] = _fan(fan, sensors[number], view, slice(ends[number], ends[number + 1]))
+        return scans
+
+
+def _fan(fan: dict[str, Any], sensor: FloatArray, view: Any, part: slice) -> Fan:
+    ranges = np.asarray(view.ranges[part])
+    with np.errstate(invalid="ignore"):
+        error = ranges - view.truths[part] if len(view.truths) else np.zeros(len(ranges), dtype=np.float32)
+    error[~np.isfinite(error) | ~np.isfinite(ranges)] = np.nan
+    x, y, yaw = sensor.tolist()
+    return Fan(
+        pose=(x, y, yaw),
+        angle_min=fan["angle_min"],
+        angle_increment=fan["angle_increment"],
+        range_min=fan["range_min"],
+        range_max=fan["range_max"],
+        ranges=ranges,
+        error=error,
+        intensities=view.intensities[part],
+    )
+
+
+def _body(body: dict[str, Any]) -> Body:
+    return Body(
+        id=body["id"],
+        name=body["name"],
+        kind=body["kind"],
+        color=body["color"],
+        movable=body["movable"],
+        polygons=tuple(tuple((x, y) for x, y in polygon) for polygon in body["polygons"]),
+        segments=tuple(tuple(ends) for ends in body["segments"]),
+    )

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Topics of which only the newest message counts, read when it is wanted and not when it comes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import rospy
+from tf2_msgs.msg import TFMessage
+
+from kurumaisu.geometry import between, compose
+from kurumaisu.ros.rotation import yaw_of
+from kurumaisu.types import FloatArray
+
+
+class Newest:
+    """The newest message of a topic; what nobody asks for is never unpacked."""
+
+    def __init__(self, name: str, kind: type) -> None:
+        """Hear nothing before open."""
+        self._name, self._kind = name, kind
+        self._raw: Any = None
+        self._subscriber: Any = None
+        self.last: Any = None  # as of the last take
+
+    def open(self) -> None:
+        """Listen."""
+        self._subscriber = rospy.Subscriber(self._name, rospy.AnyMsg, self._hear, queue_size=1, tcp_nodelay=True)
+
+    def close(self) -> None:
+        """Listen no longer; what was heard is forgotten."""
+        if self._subscriber is not None:
+            self._subscriber.unregister()
+        self._subscriber = self._raw = self.last = None
+
+    def take_raw(self) -> bytes | None:
+        """Return the bytes of the newest message, None if there is none since the last take."""
+        raw, self._raw = self._raw, None
+        return None if raw is None else raw._buff
+
+    def take(self) -> Any:
+        """Return the newest message, its arrays as numpy has them; None if there is none since the last take."""
+        raw = self.take_raw()
+        if raw is None:
+            return None
+        self.last = self._kind()
+        self.last.deserialize_numpy(raw, np)
+        return self.last
+
+    def _hear(self, message: rospy.AnyMsg) -> None:
+        self._raw = message
+
+
+class Transforms:
+    """What /tf says in the plane, from the newest message of each publisher; enough for a picture."""
+
+    def __init__(self) -> None:
+        self._raw: dict[str, bytes] = {}
+        self._parents: dict[str, tuple[str, FloatArray]] = {}
+        self._subscriber: Any = None
+
+    def open(self) -> None:
+        """Listen."""
+        self._subscriber = rospy.Subscriber("tf", rospy.AnyMsg, self._hear, queue_size=10, tcp_nodelay=True)
+
+    def close(self) -> None:
+        """Listen no longer."""
+        if self._subscriber is not None:
+            self._subscriber.unregister()
+        self._subscriber = None
+        self._raw, self._parents = {}, {}
+
+    def lookup(self, target: str, source: str) -> FloatArray | None:
+        """Return target_from_source (3,) of x, y [m], yaw [rad]; None where tf does not say so."""
+        self._read()
+        here, frame, seen = np.zeros(3), source, {source}
+        while frame != target:
+            if frame not in self._parents:
+                return None
+            frame, step = self._parents[frame]
+            if frame in seen:
+                return None
+            seen.add(frame)
+            here = compose(step, here)
+        return here
+
+    def _read(self) -> None:
+        while self._raw:
+            _, raw = self._raw.popitem()
+            message = TFMessage()
+            message.deserialize(raw)
+            for one in message.transforms:
+                place = one.transform.translation
+                pose = np.array([place.x, place.y, yaw_of(one.transform.rotation)])
+                self._parents[one.child_frame_id.lstrip("/")] = one.header.frame_id.lstrip("/"), pose
+
+    def _hear(self, message: Any) -> None:
+        self._raw[message._connection_header["callerid"]] = message._buff
+
+
+class Alignment:
+    """Lays one account of where the robot is on another: both agree where it begins."""
+
+    def __init__(self) -> None:
+        self._offset: FloatArray | None = None
+
+    def begin(self) -> None:
+        """Agree anew at the next pose."""
+        self._offset = None
+
+    def laid(self, pose: FloatArray, on: FloatArray | None) -> FloatArray | None:
+        """Return a pose (3,) of one account in the frame of the other, which has the robot `on` now."""
+        if self._offset is None:
+            if on is None:
+                return None
+            self._offset = compose(on, between(pose, np.zeros(3)))
+        return compose(self._offset, pose)

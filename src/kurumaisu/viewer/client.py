@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One connected page: what it is sent, and what it asks for."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import struct
+from collections import deque
+from concurrent.futures import Executor
+from typing import Any
+
+from aiohttp import WSCloseCode, WSMsgType, web
+
+from kurumaisu.errors import Error
+from kurumaisu.viewer import commands, protocol
+from kurumaisu.viewer.access import Keys
+from kurumaisu.viewer.commands import Command, Credential
+from kurumaisu.viewer.hub import Hub, Mailbox, Payload
+from kurumaisu.viewer.settings import ViewerSettings
+from kurumaisu.viewer.source import Source
+
+_URGENT = ("drive", "estop")  # they do not wait for what was asked before
+_MOST_WAITING = 32  # commands of one client
+_MOST_REPLIES = 256  # that one client has not taken
+_MOST_WRONG = 5  # credentials
+_SEND_BUFFER = 1 << 18  # [bytes] in the kernel, which would keep megabytes of old frames for a slow client
+
+
+class Client:
+    """Lives as long as its connection."""
+
+    def __init__(
+        self, settings: ViewerSettings, hub: Hub, source: Source, keys: Keys | None, workers: Executor
+    ) -> None:
+        """keys: None where nobody may command."""
+        self._settings = settings
+        self._hub = hub
+        self._source = source
+        self._keys = keys
+        self._workers = workers
+        self._control = False
+        self._wrong = 0
+        self._socket = web.WebSocketResponse(
+            max_msg_size=settings.longest_message, compress=False, timeout=1.0, heartbeat=settings.patience
+        )
+        self._transport: asyncio.Transport | None = None
+        self._news = asyncio.Event()
+        self._asked = asyncio.Event()
+        self._waiting: deque[Command] = deque()
+        self._replies: deque[str] = deque()
+
+    async def serve(self, request: web.Request) -> web.WebSocketResponse:
+        """Send and hear until the connection ends."""
+        await self._socket.prepare(request)
+        self._transport = request.transport
+        if self._transport is not None:
+            link = self._transport.get_extra_info("socket")
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+        loop = asyncio.get_running_loop()
+        self._say(self._hello(None))
+
+        def notify() -> None:
+            loop.call_soon_threadsafe(self._news.set)
+
+        mailbox = self._hub.join(notify)
+        self._news.set()
+        tasks = [asyncio.create_task(self._send(mailbox)), asyncio.create_task(self._obey())]
+        try:
+            await self._hear()
+        finally:
+            self._hub.leave(mailbox)
+            for task in tasks:
+                task.cancel()
+            self.abort()
+        return self._socket
+
+    def abort(self) -> None:
+        """End the connection at once, whatever is still to be sent."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    def _cut_off(self) -> None:
+        """End the connection, and have the kernel throw away what was to be sent: it would keep it for minutes."""
+        if self._transport is not None and not self._transport.is_closing():
+            link = self._transport.get_extra_info("socket")
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        self.abort()
+
+    async def _send(self, mailbox: Mailbox) -> None:
+        """Send what is newest, as fast as the client takes it but not faster than the rate; end it if it stalls."""
+        pause = 1 / self._settings.rate
+        while True:
+            await self._news.wait()
+            self._news.clear()
+            replies, self._replies = self._replies, deque()
+            try:
+                async with asyncio.timeout(self._settings.patience):
+                    for payload in (*replies, *mailbox.take()):
+                        await self._give(payload)
+            except (TimeoutError, ConnectionError, RuntimeError):
+                self._cut_off()
+                return
+            await asyncio.sleep(pause)
+
+    async def _give(self, payload: Payload) -> None:
+        if isinstance(payload, str):
+            await self._socket.send_str(payload)
+        else:
+            await self._socket.send_bytes(payload)
+
+    async def _hear(self) -> None:
+        async for message in self._socket:
+            if message.type != WSMsgType.TEXT:
+                await self._socket.close(code=WSCloseCode.UNSUPPORTED_DATA)
+                return
+            try:
+                self._take(commands.read(message.data))
+            except Error as error:
+                self._answer(commands.number_of(message.data), False, str(error))
+            if self._wrong >= _MOST_WRONG or len(self._replies) > _MOST_REPLIES:
+                await self._socket.close(code=WSCloseCode.POLICY_VIOLATION)
+                return
+
+    def _take(self, said: Command | Credential) -> None:
+        if isinstance(said, Credential):
+            self._let_in(said)
+            return
+        if not self._control:
+            raise Error(f"{said.name}: {_why_not(self._keys)}")
+        if said.name not in self._source.abilities:
+            raise Error(f"{said.name}: is nothing that a {self._source.mode} does here")
+        if said.name in _URGENT:
+            self._run(said)
+            return
+        self._overtake(said)
+        if len(self._waiting) >= _MOST_WAITING:
+            raise Error(f"{said.name}: {_MOST_WAITING} commands are waiting already")
+        self._waiting.append(said)
+        self._asked.set()
+
+    def _overtake(self, newer: Command) -> None:
+        """Drop a pose that waits for its turn when a newer one of the same body comes, as while it is dragged."""
+        if newer.name != "set_pose":
+            return
+        for older in [one for one in self._waiting if one.name == newer.name]:
+            if older.arguments["body"] == newer.arguments["body"]:
+                self._waiting.remove(older)
+                self._answer(older.id, False, "set_pose: overtaken by a newer one")
+
+    def _let_in(self, said: Credential) -> None:
+        session = None
+        try:
+            if self._keys is None:
+                raise Error(_why_not(None))
+            if said.kind == "token":
+                session = self._keys.redeem(said.secret)
+            else:
+                self._keys.check(said.secret)
+        except Error:
+            self._wrong += 1
+            raise
+        self._control = True
+        self._say(self._hello(session))
+
+    async def _obey(self) -> None:
+        """Have commands done one after another."""
+        while True:
+            await self._asked.wait()
+            self._asked.clear()
+            while self._waiting:
+                await self._run(self._waiting.popleft())
+
+    def _run(self, command: Command) -> asyncio.Future[None]:
+        done = asyncio.get_running_loop().run_in_executor(self._workers, self._do, command)
+
+        async def answer() -> None:
+            self._say(await done)
+
+        return asyncio.ensure_future(answer())
+
+    def _do(self, command: Command) -> protocol.Reply:
+        try:
+            outcome = self._source.command(command.name, command.arguments)
+        except Error as error:
+            return protocol.Reply(command.id, False, str(error))
+        except Exception as error:  # a fault of ours must not leave the page waiting
+            return protocol.Reply(command.id, False, f"{command.name}: failed: {error!r}")
+        return protocol.Reply(command.id, True, outcome.message, outcome.result)
+
+    def _answer(self, number: int | str | None, ok: bool, message: str) -> None:
+        self._say(protocol.Reply(number, ok, message))
+
+    def _say(self, message: Any) -> None:
+        self._replies.append(protocol.text(message))
+        self._news.set()
+
+    def _hello(self, session: str | None) -> protocol.Hello:
+        source = self._source
+        abilities = tuple(sorted(source.abilities)) if self._keys is not None else ()
+        return protocol.Hello(
+            source.title, source.mode, self._control, abilities, source.limits, session, self._hub.report
+        )
+
+
+def _why_not(keys: Keys | None) -> str:
+    if keys is None:
+        return "this viewer only shows: it was not started with control"
+    return "needs a token: open the address that the viewer printed, or ask it for a new one"

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Puts the parts together.
+
+import {Bag} from "./bag.js";
+import {BodyPanel} from "./body_panel.js";
+import {Picture} from "./canvas.js";
+import {Connection} from "./connection.js";
+import {byId} from "./dom.js";
+import {Edit} from "./edit.js";
+import {Effects} from "./effects.js";
+import {download} from "./files.js";
+import {keyTable, listen} from "./keys.js";
+import {Options} from "./options.js";
+import {Permit} from "./permit.js";
+import {Places} from "./places.js";
+import {Pointer} from "./pointer.js";
+import {Recording} from "./recording.js";
+import {Residuals} from "./residuals.js";
+import {Scene} from "./scene.js";
+import {setUpHelp, setUpTabs, setUpTheme} from "./shell.js";
+import {Status} from "./status.js";
+import {Stick} from "./stick.js";
+import {Transport} from "./transport.js";
+
+/** Take the one-time secret out of the address: it must not stay in the history. */
+function takeToken() {
+  const values = new URLSearchParams(location.hash.slice(1));
+  const token = values.get("token");
+  if (token === null) return null;
+  values.delete("token");
+  history.replaceState(null, "", values.size ? `#${values}` : location.pathname + location.search);
+  return token;
+}
+
+const scene = new Scene();
+const connection = new Connection(takeToken());
+const permit = new Permit(scene, connection);
+const status = new Status(scene, permit, connection);
+const say = (text, bad) => status.say(text, bad);
+const options = new Options();
+const picture = new Picture(byId("ground"), byId("front"), scene, options);
+const stick = new Stick(connection, scene, (text) => say(text, true));
+
+/** Give a command; what is refused is said. */
+async function ask(name, values) {
+  const reply = await connection.command(name, values);
+  if (!reply.ok) say(reply.message, true);
+  return reply;
+}
+// a drag is refused at many places on its way: what counts is the last one
+const quietly = (name, values) => connection.command(name, values);
+
+const transport = new Transport(scene, permit, ask, stick, say);
+stick.emergency = () => transport.stop();
+const bag = new Bag(scene, permit, ask);
+new Residuals(scene, picture, new Recording(scene, connection, picture, ask), say);
+const edit = new Edit(picture, scene, options, {
+  can: (name) => permit.can(name), ask: quietly, failed: (text) => say(text, true),
+});
+const pointer = new Pointer(byId("front"), picture, {
+  grab: (...place) => edit.grab(...place),
+  click: (...place) => edit.click(...place),
+  panned: () => options.follow !== null && options.set({follow: null}),
+});
+new Effects(scene, permit, ask, say);
+new BodyPanel(scene, options, permit, ask, say);
+
+function chosen() {
+  return options.selected === null ? null : scene.body(options.selected);
+}
+
+function follow() {
+  const body = chosen() ?? scene.chair;
+  options.set({follow: options.follow === null && body ? body.id : null});
+  scene.tell("state", scene.state);
+}
+
+const tabs = setUpTabs();
+const table = keyTable({picture, options, transport, bag, stick, edit, pointer, tabs, follow, chosen});
+listen(table);
+setUpHelp(table.filter(({shown}) => shown).map(({shown, meaning}) => [shown, meaning]));
+setUpTheme(() => picture.recolor());
+
+const click = (id, action) => byId(id).addEventListener("click", action);
+click("zoom-in", () => picture.camera.zoom(1.4) ?? picture.dirty());
+click("zoom-out", () => picture.camera.zoom(1 / 1.4) ?? picture.dirty());
+click("fit", () => picture.fit());
+click("follow", follow);
+click("more", () => byId("more").setAttribute("aria-expanded", String(document.body.classList.toggle("all"))));
+click("clear", () => scene.forget());
+click("screenshot", () => picture.flat().toBlob((blob) => {
+  const t = scene.state ? `_${scene.state.t.toFixed(2)}s` : "";
+  download(blob, `kurumaisu${t}.png`);
+  say("The picture was saved.");
+}));
+
+permit.on("change", () => {
+  // the panel of effects is the one to begin with where there are any
+  if (tabs.current?.hidden) tabs.show("view");
+});
+const places = new Places(picture, scene, permit, options, bag);
+addEventListener("hashchange", () => {
+  const token = takeToken();
+  if (token !== null) connection.useToken(token);
+  places.go();
+});
+
+connection.on("message", (message) => scene.take(message));
+connection.on("binary", (buffer) => scene.takeBinary(buffer));
+connection.start();

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The web server: pages, pictures of maps, and a WebSocket for each client; its loop runs in a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import threading
+from collections.abc import Awaitable, Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from aiohttp import web
+
+from kurumaisu.errors import Error
+from kurumaisu.viewer import access, report
+from kurumaisu.viewer.access import Keys
+from kurumaisu.viewer.client import Client
+from kurumaisu.viewer.hub import Hub
+from kurumaisu.viewer.settings import ViewerSettings
+from kurumaisu.viewer.source import Source
+
+PAGE = Path(__file__).with_name("page")
+_TYPES = {
+    ".html": "text/html",
+    ".css": "text/css",
+    ".js": "text/javascript",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+}
+_NAME = re.compile(r"[\w-]+(\.[\w-]+)*")
+_WORKERS = 8  # commands that are under way at a time, of all clients
+_PATIENCE = 5.0  # [s] for the loop to begin, and to end
+
+_Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Server:
+    """Serves one source."""
+
+    def __init__(self, settings: ViewerSettings, hub: Hub, source: Source, control: bool) -> None:
+        """control: whether anybody may command, given a token. Nothing happens before start."""
+        self._settings = settings
+        self._hub = hub
+        self._source = source
+        self._control = control
+        self._keys = Keys()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="viewer", daemon=True)
+        self._workers = ThreadPoolExecutor(_WORKERS, "viewer_command")
+        self._open: set[Client] = set()
+        self._runner: web.AppRunner | None = None
+        self._port = 0
+        self.reports: Mapping[str, Path] = {}  # files below /report/, by name
+
+    def start(self) -> None:
+        """Begin to listen. Raise Error for an address that cannot be had."""
+        self._thread.start()
+        asyncio.run_coroutine_threadsafe(self._begin(), self._loop).result(_PATIENCE)
+
+    def close(self) -> None:
+        """End all connections; the last one who looked is gone."""
+        asyncio.run_coroutine_threadsafe(self._end(), self._loop).result(_PATIENCE)
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(_PATIENCE)
+        self._workers.shutdown(wait=False, cancel_futures=True)
+
+    @property
+    def address(self) -> str:
+        """Where the page is."""
+        host = self._settings.host
+        return f"http://{f'[{host}]' if ':' in host else host}:{self._port}/"
+
+    def new_address(self) -> str:
+        """Return where the page is, with a token to command, which is good once. Raise Error if nobody may."""
+        if not self._control:
+            raise Error("this viewer only shows: it was not started with control")
+        return f"{self.address}#token={self._keys.new_token()}"
+
+    async def _begin(self) -> None:
+        app = web.Application(middlewares=[self._guard])
+        app.add_routes(
+            [
+                web.get("/", self._index),
+                web.get("/page/{name}", self._file),
+                web.get(r"/map/{number:\d+}.png", self._map),
+                web.get("/report/{name}", self._report),
+                web.get("/ws", self._socket),
+            ]
+        )
+        # access_log: a line for each request would fill the log
+        self._runner = web.AppRunner(app, access_log=None, handle_signals=False)
+        await self._runner.setup()
+        site = web.TCPSite(self._runner, self._settings.host, self._settings.port)
+        try:
+            await site.start()
+        except OSError as error:
+            await self._runner.cleanup()
+            raise Error(
+                f"viewer: {self._settings.host}:{self._settings.port} cannot be had: {error.strerror}; "
+                "another port may be free, port 0 takes any"
+            ) from error
+        self._port = self._runner.addresses[0][1]
+
+    async def _end(self) -> None:
+        for client in list(self._open):
+            client.abort()
+        if self._runner is not None:
+            await self._runner.cleanup()
+
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
+        try:
+            access.check_host(request.headers.get("Host"), self._settings.names)
+            response = await handler(request)
+        except Error as error:
+            response = web.Response(status=403, text=str(error))
+        except web.HTTPException as error:
+            response = web.Response(status=error.status, text=error.reason)
+        if not response.prepared:
+            for name, value in access.HEADERS.items():
+                response.headers.setdefault(name, value)
+        return response
+
+    async def _index(self, _request: web.Request) -> web.StreamResponse:
+        return _served(PAGE / "index.html")
+
+    async def _file(self, request: web.Request) -> web.StreamResponse:
+        return _served(PAGE / request.match_info["name"])
+
+    async def _map(self, request: web.Request) -> web.StreamResponse:
+        png = self._hub.maps.get(int(request.match_info["number"]))
+        if png is None:
+            raise web.HTTPNotFound
+        return web.Response(body=png, content_type="image/png")
+
+    async def _report(self, request: web.Request) -> web.StreamResponse:
+        path = self.reports.get(request.match_info["name"])
+        if path is None:
+            raise web.HTTPNotFound
+        body, headers = report.page(path.read_bytes())
+        return web.Response(body=body, headers=headers, content_type="text/html", charset="utf-8")
+
+    async def _socket(self, request: web.Request) -> web.StreamResponse:
+        access.check_origin(request.headers.get("Origin"), request.headers.get("Host"))
+        if len(self._open) >= self._settings.most_clients:
+            raise web.HTTPServiceUnavailable(reason=f"{self._settings.most_clients} look already")
+        client = Client(self._settings, self._hub, self._source, self._keys if self._control else None, self._workers)
+        self._open.add(client)
+        try:
+            if len(self._open) == 1:
+                self._source.watch(True)
+            return await client.serve(request)
+        finally:
+            self._open.discard(client)
+            if not self._open:
+                self._source.watch(False)
+
+
+def _served(path: Path) -> web.Response:
+    """Return a small file; of a folder's, only what has a plain name."""
+    kind = _TYPES.get(path.suffix)
+    if kind is None or not _NAME.fullmatch(path.name) or not path.is_file():
+        raise web.HTTPNotFound
+    return web.Response(
+        body=path.read_bytes(), content_type=kind, charset="utf-8" if kind.startswith("text/") else None
+    )

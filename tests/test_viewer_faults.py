@@ -1,0 +1,366 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What clients, and networks, do wrong to the viewer's server."""
+
+import asyncio
+import json
+import socket
+import time
+import urllib.error
+import urllib.request
+
+import aiohttp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from viewer_rig import Running, viewer_settings
+
+from kurumaisu.bench.viewer_page import Page
+from kurumaisu.errors import Error
+from kurumaisu.settings import Section
+from kurumaisu.viewer import access, commands, protocol, read_settings
+from kurumaisu.viewer.hub import Hub
+from kurumaisu.viewer.server import Server
+
+
+@pytest.fixture
+def running():
+    with Running() as one:
+        yield one
+
+
+@pytest.fixture
+def page(running):
+    one = Page(running.server.address)
+    yield one
+    one.close()
+
+
+@pytest.fixture
+def driver(running, page):
+    """A page with control."""
+    page.let_in(running.server.new_address())
+    return page
+
+
+def get(running, path, **headers):
+    """Return status, headers and body of a request."""
+    request = urllib.request.Request(running.server.address.rstrip("/") + path, headers=headers)
+    try:
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            return answer.status, answer.headers, answer.read()
+    except urllib.error.HTTPError as error:
+        return error.code, error.headers, error.read()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "no JSON"),
+        ("", "no JSON"),
+        ("[" * 50000, "no JSON"),
+        ("[]", "must be an object"),
+        ('{"type": "moon"}', "token, session or command: 'moon'"),
+        ('{"type": "token"}', "must be a text"),
+        ('{"type": "token", "token": {"a": 1}}', "must be a text"),
+        ('{"type": "command", "name": "pause", "on": true}', "id: must be"),
+        ('{"type": "command", "id": 1, "name": "__init__"}', "no command '__init__'"),
+        ('{"type": "command", "id": 1, "name": ["pause"]}', "no command"),
+        ('{"type": "command", "id": 1, "name": "pause"}', "on is missing"),
+        ('{"type": "command", "id": 1, "name": "pause", "on": 1}', "on must be true or false"),
+        ('{"type": "command", "id": 1, "name": "pause", "on": true, "off": 1}', "has no 'off'"),
+        ('{"type": "command", "id": 1, "name": "speed", "value": NaN}', "no JSON"),
+        ('{"type": "command", "id": 1, "name": "speed", "value": 1e999}', "finite number"),
+        ('{"type": "command", "id": 1, "name": "speed", "value": "1"}', "finite number"),
+        ('{"type": "command", "id": 1, "name": "seed", "value": 1.5}', "integer"),
+        (
+            '{"type": "command", "id": 1, "name": "effect", "effect": "a", "enabled": true, "values": [1]}',
+            "by their names",
+        ),
+        (
+            '{"type": "command", "id": 1, "name": "effect", "effect": "a", "enabled": true, "values": {"b": null}}',
+            "finite",
+        ),
+        ('{"type": "command", "id": 1, "name": "set_pose", "body": "", "x": 0, "y": 0, "yaw": 0}', "1 to 200"),
+    ],
+)
+def test_nonsense_is_answered_and_nothing_is_done(driver, running, text, words):
+    before = driver.counts["reply"]
+    driver.send(text)
+    driver.wait(lambda: driver.counts["reply"] > before, "an answer")
+    reply = driver.newest["reply"]
+    assert not reply["ok"]
+    assert words in reply["message"]
+    assert running.rig.commands == []
+    assert driver.ask("pause", on=True)["ok"]  # goes on
+
+
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.floats() | st.text(),
+        lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    )
+)
+def test_no_json_at_all_surprises_the_reader(content):
+    for message in (json.dumps(content), json.dumps({"type": "command", "id": 1, "name": "set_pose", "x": content})):
+        with pytest.raises(Error):
+            commands.read(message)
+        commands.number_of(message)
+
+
+def test_a_refusal_of_the_source_reaches_the_page(driver):
+    reply = driver.ask("set_pose", body="moon", x=0.0, y=0.0, yaw=0.0)
+    assert not reply["ok"]
+    assert "no body 'moon'" in reply["message"]
+
+
+def test_a_fault_of_the_source_reaches_the_page(driver, running):
+    def broken(**_):
+        raise ZeroDivisionError("ours")
+
+    running.rig.do_reset = broken
+    assert "ZeroDivisionError" in driver.ask("reset")["message"]
+    assert driver.ask("pause", on=True)["ok"]
+
+
+def test_what_the_source_cannot_do_is_refused(driver):
+    assert "is nothing that a sim does here" in driver.ask("seek", t=1.0)["message"]
+
+
+def test_a_message_of_ten_megabytes_ends_the_connection_and_nobody_elses(driver, running):
+    other = Page(running.server.address)
+    long = driver._socket.send_str("x" * 10_000_000)
+    asyncio.run_coroutine_threadsafe(long, driver._loop)  # it will be cut off before it has said all
+    driver.wait(lambda: driver.closed, "the end of the connection")
+    other.state(lambda _: True, "the others go on")
+    other.close()
+
+
+def test_binary_messages_end_the_connection(page):
+    asyncio.run_coroutine_threadsafe(page._socket.send_bytes(b"\0" * 10), page._loop).result(10)
+    page.wait(lambda: page.closed, "the end of the connection")
+
+
+def test_more_connections_than_allowed_are_refused(running):
+    with Running(most_clients=3) as few:
+        pages = [Page(few.server.address) for _ in range(3)]
+        with pytest.raises(aiohttp.WSServerHandshakeError) as refusal:
+            Page(few.server.address)
+        assert refusal.value.status == 503
+        pages[0].close()
+        pages[1].wait(lambda: few.hub.clients == 2, "room")
+        Page(few.server.address).close()
+        for page in pages:
+            page.close()
+
+
+def test_a_token_is_good_once(running, driver):
+    address = running.server.new_address()
+    second = Page(address)
+    second.let_in(address)
+    third = Page(address)
+    third.say(type="token", token=address.split("#token=")[1])
+    third.wait(lambda: None in third.replies, "a refusal")
+    assert "used already" in third.replies[None]["message"]
+    for page in (second, third):
+        page.close()
+
+
+def test_guessing_tokens_ends_the_connection(page):
+    for _ in range(5):
+        page.say(type="token", token="guess")
+    page.wait(lambda: page.closed, "the end of the connection")
+
+
+def test_without_control_no_token_is_good_and_nobody_commands():
+    with Running(control=False, mode="robot") as robot:
+        with pytest.raises(Error, match="only shows"):
+            robot.server.new_address()
+        page = Page(robot.server.address)
+        page.wait(lambda: "hello" in page.newest, "hello")
+        assert page.newest["hello"]["abilities"] == []
+        for name, arguments in (("drive", {"v": 0.1, "w": 0.0}), ("estop", {"on": False}), ("reset", {})):
+            assert "only shows" in page.ask(name, **arguments)["message"]
+        assert robot.rig.commands == []
+        page.close()
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "", "https://127.0.0.1", "http://127.0.0.1:1"])
+def test_a_foreign_page_cannot_connect(running, origin):
+    with pytest.raises(aiohttp.WSServerHandshakeError) as refusal:
+        Page(running.server.address, origin=origin)
+    assert refusal.value.status == 403
+    assert running.hub.clients == 0
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:8642", "localhost.evil.example", "127.0.0.1.nip.io", "[", ""]
+)
+def test_a_foreign_name_is_refused(running, host):
+    """DNS rebinding: a page of evil.example, whose name suddenly means 127.0.0.1."""
+    status, _, body = get(running, "/", Host=host)
+    assert status in (400, 403)
+    assert b"kurumaisu</title>" not in body
+
+
+@pytest.mark.parametrize("host", ["localhost:9000", "127.0.0.1", "[::1]:9000", "192.168.0.7:8642"])
+def test_addresses_and_localhost_are_no_foreign_names(running, host):
+    assert get(running, "/", Host=host)[0] == 200
+
+
+def test_a_name_can_be_allowed():
+    access.check_host("Chair.local:8642", ("chair.local",))
+    with pytest.raises(Error, match="names"):
+        access.check_host("chair.local", ())
+    with pytest.raises(Error, match="None"):
+        access.check_host(None, ())
+
+
+def test_every_answer_has_the_policy(running):
+    for path in ("/", "/page/moon.js", "/map/7.png", "/report/moon.html", "/moon"):
+        _, headers, _ = get(running, path)
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy
+        assert "unsafe" not in policy
+        assert headers["X-Content-Type-Options"] == "nosniff"
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/page/../server.py", "/page/..%2Fserver.py", "/page/%2e%2e/hub.py", "/page//etc/passwd", "/page/.hidden.js"],
+)
+def test_no_file_beside_the_page_is_served(running, path):
+    status, _, body = get(running, path)
+    assert status in (400, 403, 404)
+    assert b"import" not in body
+    assert b"root:" not in body
+
+
+def test_a_port_that_is_taken_is_said():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(Error, match=f"127.0.0.1:{port} cannot be had.*port 0"):
+            Server(viewer_settings(port=port), Hub(), None, False).start()
+
+
+def test_an_unknown_setting_is_said():
+    with pytest.raises(Error, match="port: must be 0 to 65535: 70000"):
+        viewer_settings(port=70000)
+    with pytest.raises(Error, match="names"):
+        viewer_settings(names=[1])
+    with pytest.raises(Error, match="host: is missing"):
+        read_settings(Section({"names": [], "port": 1}, "here"))
+
+
+def test_a_stalled_client_is_cut_off_and_the_others_go_on():
+    with Running(patience=1.0, rate=100.0) as running:
+        stalled, other = Page(running.server.address), Page(running.server.address)
+        stalled.state(lambda _: True, "a state")
+        stalled.stall()
+        # big enough that no buffer on the way holds what a second brings
+        big = protocol.Fan((0.0, 0.0, 0.0), 0.0, 0.001, 0.0, 9.0, np.ones(60_000))
+        deadline = time.monotonic() + 20.0
+        while running.hub.clients == 2:
+            assert time.monotonic() < deadline
+            running.hub.state(protocol.State(t=0.0, wall=0.0), dict.fromkeys(range(5), big))
+            time.sleep(0.01)
+        assert running.hub.dropped > 0
+        other.wait(lambda: stalled.cut_off, "the kernel to throw away what was never sent")
+        seen = other.counts["state"]
+        other.wait(lambda: other.counts["state"] > seen + 10, "the other goes on")
+        stalled._reads = True
+        for page in (stalled, other):
+            page.close()
+
+
+def test_a_slow_client_gets_the_newest_and_memory_is_bounded():
+    hub = Hub()
+    mailbox = hub.join(lambda: None)
+    for t in range(1000):
+        hub.state(protocol.State(t=float(t), wall=0.0), {0: protocol.Fan((0, 0, 0), 0, 1, 0, 1, np.ones(10))})
+    waiting = mailbox.take()
+    assert len(waiting) == 2
+    assert json.loads(waiting[0])["t"] == 999.0
+    assert mailbox.dropped == 2 * 999
+    hub.leave(mailbox)
+    assert hub.dropped == 2 * 999
+    for _ in range(100):
+        hub.map(b"png", 1, 1, 0.05, (0.0, 0.0, 0.0))
+    assert sorted(hub.maps) == [99, 100]
+
+
+def test_scans_of_another_world_are_forgotten():
+    hub = Hub()
+    mailbox = hub.join(lambda: None)
+    hub.state(protocol.State(t=0.0, wall=0.0), {3: protocol.Fan((0, 0, 0), 0, 1, 0, 1, np.ones(10))})
+    hub.world(protocol.World((), None))
+    assert [type(message) for message in mailbox.take()] == [str, str]
+    late = hub.join(lambda: None)
+    assert [type(message) for message in late.take()] == [str, str]
+
+
+def test_a_page_comes_back_after_the_server_was_started_anew(running):
+    page = Page(running.server.address)
+    page.let_in(running.server.new_address())
+    session = page.newest["hello"]["session"]
+    port = running.server.address.rsplit(":", 1)[1].strip("/")
+    running.close()
+    page.wait(lambda: page.closed, "the end")
+    with Running(port=int(port)) as again:
+        page = Page(again.server.address)
+        page.say(type="session", session=session)
+        page.wait(lambda: None in page.replies, "an answer")
+        assert "started anew" in page.replies[None]["message"]
+        page.let_in(again.server.new_address())
+        page.close()
+
+
+def test_poses_of_a_drag_overtake_each_other_and_urgent_commands_everything(driver, running):
+    running.rig.slow.set()
+    driver.say(type="command", id=100, name="reset")
+    driver.wait(lambda: ("reset", {}) in running.rig.commands, "a command under way")
+    for number in range(20):
+        driver.say(type="command", id=200 + number, name="set_pose", body="2", x=0.1 * number, y=0.0, yaw=0.0)
+    driver.say(type="command", id=300, name="estop", on=True)
+    driver.wait(lambda: 300 in driver.replies, "the stop, before anything else")
+    assert running.rig.estop
+    running.rig.slow.clear()
+    driver.wait(lambda: 219 in driver.replies, "the last pose")
+    driver.wait(lambda: {200 + n for n in range(20)} <= driver.replies.keys(), "an answer to each")
+    assert [n for n in range(200, 220) if driver.replies[n]["ok"]] == [219]
+    assert [name for name, _ in running.rig.commands].count("set_pose") == 1
+
+
+def test_too_many_commands_are_refused(driver, running):
+    running.rig.slow.set()
+    for number in range(100):
+        driver.say(type="command", id=number, name="pause", on=True)
+    driver.wait(lambda: 99 in driver.replies, "a refusal")
+    assert "waiting already" in driver.replies[99]["message"]
+    running.rig.slow.clear()
+    driver.wait(lambda: len(driver.replies) == 100, "an answer to each")
+
+
+def test_a_client_that_goes_in_the_middle_of_a_command_harms_nobody(driver, running):
+    other = Page(running.server.address)
+    running.rig.slow.set()
+    driver.say(type="command", id=1, name="reset")
+    driver.wait(lambda: running.rig.commands, "a command under way")
+    driver.close()
+    running.rig.slow.clear()
+    other.state(lambda _: True, "the other goes on")
+    other.close()
+
+
+def test_numbers_that_are_none_become_null():
+    state = protocol.State(t=float("nan"), wall=np.float64(1.5), poses={"1": (np.float32(0.5), float("inf"), 0)})
+    content = json.loads(protocol.text(state))
+    assert content["t"] is None
+    assert content["poses"]["1"] == [0.5, None, 0]
+    with pytest.raises(ValueError, match="equally long"):
+        protocol.scan(protocol.Fan((0, 0, 0), 0, 1, 0, 1, [1.0], error=[1.0, 2.0]), 0)
+    with pytest.raises(ValueError, match="room for 65535"):
+        protocol.scan(protocol.Fan((0, 0, 0), 0, 1, 0, 1, np.ones(70_000)), 0)
+    assert len(protocol.particles(np.zeros((200_000, 3)))) < 8 + 12 * 65_536
