@@ -267,6 +267,7 @@ def test_a_stalled_client_is_cut_off_and_the_others_go_on():
             running.hub.state(protocol.State(t=0.0, wall=0.0), dict.fromkeys(range(5), big))
             time.sleep(0.01)
         assert running.hub.dropped > 0
+        other.wait(lambda: stalled.cut_off, "the kernel to throw away what was never sent")
         seen = other.counts["state"]
         other.wait(lambda: other.counts["state"] > seen + 10, "the other goes on")
         stalled._reads = True

@@ -59,14 +59,17 @@ class RosSource:
         self._stick: Stick | None = None
         driving = settings.driving
         self.limits: Mapping[str, float] | None = None
+        self._initial: Any = None
+        if settings.control:
+            self._initial = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=1)
         if settings.control and driving.topic != NONE:
             self._stick = Stick(driving.topic, driving.rate, driving.dead_man, driving.v, driving.w)
-            self._initial = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=1)
             self.limits = {"v": driving.v, "w": driving.w}
         self._map_frame, _, self._base_frame = settings.frames
         self.abilities = self._can()
         self._watched = threading.Event()
         self._open = False
+        self._shown: Any = None  # of the scene, last
 
     def watch(self, watched: bool) -> None:
         """Hear whether anybody looks; the loop opens and closes the topics."""
@@ -107,7 +110,7 @@ class RosSource:
                 return self._effects.model()
             case "record":
                 return self._bags.record(**arguments)
-            case "initial_pose":
+            case "initial_pose" if self._initial is not None:
                 return self._guess(**arguments)
             case _ if isinstance(self._scene, Simulation):
                 return self._scene.command(name, dict(arguments))
@@ -131,7 +134,7 @@ class RosSource:
         for part in parts:
             if part is not None:
                 part.open() if on else part.close()
-        self._open, self._run = on, None
+        self._open, self._run, self._shown = on, None, None
 
     def _show(self) -> None:
         moment = self._scene.moment()
@@ -140,6 +143,9 @@ class RosSource:
         if moment is None:
             return
         parts, scans = moment
+        if parts is self._shown and self._chair is None:
+            return  # nothing is new
+        self._shown = parts
         truth = None if parts.get("truth") is None else np.array(parts["truth"])
         odom = self._odom(truth)
         chair = {} if self._chair is None else self._chair.parts()

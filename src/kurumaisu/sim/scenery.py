@@ -15,6 +15,7 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world.layout import placed
 from kurumaisu.world.model import Model
 
+_LONGEST_THING = 2.0  # [m] what stands and is longer is a wall, which nobody drags by mistake
 WALLS = "walls"  # id of the walls as effects have moved them
 
 
@@ -72,13 +73,13 @@ def _piece(machinery: Machinery, head: int, members: list[int], row: int) -> Pie
     segments = [np.empty((0, 4))]
     for index in members:
         member = population.models[index]
-        if member.ranger_return < 0 and not member.obstacle_return:
-            continue  # nobody can meet it
         place = relative(pose, population.poses[index])
         polygons += [_turned(polygon.corners, place) for polygon in member.shape.polygons]
         if not member.shape.polygons:
             segments.append(placed(member.shape.segments, place))
-    kind = _kind(model, row, bool(polygons))
+    solid = [np.empty((0, 2)), *polygons]
+    extent = np.ptp(np.concatenate(solid), axis=0).max() if polygons else np.inf
+    kind = _kind(model, row, float(extent))
     key = int(population.keys[head])
     return Piece(
         id=f"#{key}",
@@ -98,12 +99,12 @@ def _walls(machinery: Machinery) -> Piece:
     return Piece(WALLS, "walls", "wall", (0.3, 0.3, 0.3, 1.0), False, -1, np.zeros(4), (), faces)
 
 
-def _kind(model: Model, row: int, solid: bool) -> str:
+def _kind(model: Model, row: int, extent: float) -> str:
     if is_robot(model):
         return "robot"
     if model.walk is not None:
         return "person"
-    return "obstacle" if solid or row >= 0 else "wall"  # a bitmap is a floor plan, not a thing
+    return "obstacle" if row >= 0 or extent <= _LONGEST_THING else "wall"  # a bitmap is one, too
 
 
 def _turned(corners: FloatArray, pose: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import struct
 from collections import deque
 from concurrent.futures import Executor
 from typing import Any
@@ -79,6 +80,13 @@ class Client:
         if self._transport is not None:
             self._transport.abort()
 
+    def _cut_off(self) -> None:
+        """End the connection, and have the kernel throw away what was to be sent: it would keep it for minutes."""
+        if self._transport is not None and not self._transport.is_closing():
+            link = self._transport.get_extra_info("socket")
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        self.abort()
+
     async def _send(self, mailbox: Mailbox) -> None:
         """Send what is newest, as fast as the client takes it but not faster than the rate; end it if it stalls."""
         pause = 1 / self._settings.rate
@@ -91,7 +99,7 @@ class Client:
                     for payload in (*replies, *mailbox.take()):
                         await self._give(payload)
             except (TimeoutError, ConnectionError, RuntimeError):
-                self.abort()
+                self._cut_off()
                 return
             await asyncio.sleep(pause)
 
