@@ -27,22 +27,28 @@ def shown():
         yield one
 
 
+@pytest.fixture(scope="module")
+def look(browser, shown):
+    """A page for all that only look at it: each load costs a second on a busy machine."""
+    with Visit(browser, shown.link, reduced_motion="reduce") as visit:
+        yield visit
+
+
 def show_tab(page, name):
     page.locator(f"#tab-{name}").click()
     expect(page.locator(f"#panel-{name}")).to_be_visible()
 
 
-def test_it_says_what_it_shows(browser, shown):
-    with Visit(browser, shown.link) as visit:
-        page = visit.page
-        expect(page).to_have_title("made up - kurumaisu")
-        assert "token" not in page.url  # it must not stay in the history
-        expect(page.locator("#mode")).to_have_text("simulator")
-        expect(page.locator("#read-vw")).to_have_text("0.50 m/s, 0.25 rad/s")
-        expect(page.locator("#read-volts")).to_have_text("0.500 V, 0.200 V")
-        before = page.locator("#read-t").text_content()
-        expect(page.locator("#read-t")).not_to_have_text(before)  # it goes on
-        expect(page.locator("#effect-count")).to_have_text(re.compile(r"^\d\d effects, 0 on$"))
+def test_it_says_what_it_shows(look):
+    page = look.page
+    expect(page).to_have_title("made up - kurumaisu")
+    assert "token" not in page.url  # it must not stay in the history
+    expect(page.locator("#mode")).to_have_text("simulator")
+    expect(page.locator("#read-vw")).to_have_text("0.50 m/s, 0.25 rad/s")
+    expect(page.locator("#read-volts")).to_have_text("0.500 V, 0.200 V")
+    before = page.locator("#read-t").text_content()
+    expect(page.locator("#read-t")).not_to_have_text(before)  # it goes on
+    expect(page.locator("#effect-count")).to_have_text(re.compile(r"^\d\d effects, 0 on$"))
 
 
 def test_every_module_is_asked_for_at_once():
@@ -61,15 +67,14 @@ def test_nothing_of_the_page_is_inline_or_foreign():
     assert set(re.findall(r"https?://[\w./]+", text)) == {"http://www.w3.org/2000/svg"}  # a name, not an address
 
 
-def test_names_are_shown_as_text(browser, shown):
-    with Visit(browser, shown.link) as visit:
-        page = visit.page
-        show_tab(page, "body")
-        page.locator("#body-select").select_option(label=f"{HOSTILE} (obstacle)")
-        expect(page.locator("#body-pose")).to_have_text("2.500 m, −2.500 m, 0.0°")
-        show_tab(page, "notes")
-        expect(page.locator("#notes li")).to_have_text(f"warning MADE_UP {HOSTILE}")
-        assert page.locator("img, b").count() == 0
+def test_names_are_shown_as_text(look):
+    page = look.page
+    show_tab(page, "body")
+    page.locator("#body-select").select_option(label=f"{HOSTILE} (obstacle)")
+    expect(page.locator("#body-pose")).to_have_text("2.500 m, −2.500 m, 0.0°")
+    show_tab(page, "notes")
+    expect(page.locator("#notes li")).to_have_text(f"warning MADE_UP {HOSTILE}")
+    assert page.locator("img, b").count() == 0
 
 
 def interactive(page):
@@ -93,25 +98,24 @@ def interactive(page):
     return [(node["role"]["value"], node["name"]["value"].strip()) for node in seen if node["role"]["value"] in roles]
 
 
-def test_every_control_has_a_name_and_can_be_reached_by_keys(browser, shown):
-    with Visit(browser, shown.link) as visit:
-        page = visit.page
-        for name in TABS:
-            show_tab(page, name)
-            if name == "effects":
-                page.locator("#effect-search").fill("base.sign")
-                page.locator("summary:visible").click()
-            found = interactive(page)
-            assert len(found) > 15
-            assert [role for role, text in found if not text] == []
-        unreachable = page.evaluate("""[...document.querySelectorAll('button, input, select, a, summary')].filter(
-            (one) => one.checkVisibility() && one.tabIndex < 0 && one.role !== 'tab').map((one) => one.id)""")
-        assert unreachable == []
-        show_tab(page, "view")
-        page.keyboard.press("ArrowRight")  # tabs are one stop of Tab; arrows go on
-        expect(page.locator("#panel-body")).to_be_visible()
-        expect(page.locator("#tab-body")).to_be_focused()
-        assert page.locator("#connection[role=status], #toast[role=status], #alarm[role=alert]").count() == 3
+def test_every_control_has_a_name_and_can_be_reached_by_keys(look):
+    page = look.page
+    for name in TABS:
+        show_tab(page, name)
+        if name == "effects":
+            page.locator("#effect-search").fill("base.sign")
+            page.locator("summary:visible").click()
+        found = interactive(page)
+        assert len(found) > 15
+        assert [role for role, text in found if not text] == []
+    unreachable = page.evaluate("""[...document.querySelectorAll('button, input, select, a, summary')].filter(
+        (one) => one.checkVisibility() && one.tabIndex < 0 && one.role !== 'tab').map((one) => one.id)""")
+    assert unreachable == []
+    show_tab(page, "view")
+    page.keyboard.press("ArrowRight")  # tabs are one stop of Tab; arrows go on
+    expect(page.locator("#panel-body")).to_be_visible()
+    expect(page.locator("#tab-body")).to_be_focused()
+    assert page.locator("#connection[role=status], #toast[role=status], #alarm[role=alert]").count() == 3
 
 
 CONTRAST = """() => {
@@ -142,15 +146,16 @@ CONTRAST = """() => {
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_all_text_has_the_contrast_of_wcag_aa(browser, shown, scheme):
-    with Visit(browser, shown.link, color_scheme=scheme, reduced_motion="reduce") as visit:
-        page = visit.page
-        page.locator("#pause").hover()
-        for name in TABS:
-            show_tab(page, name)
-            assert page.evaluate(CONTRAST) == []
-        page.locator("#help").click()
+def test_all_text_has_the_contrast_of_wcag_aa(look, scheme):
+    page = look.page
+    page.emulate_media(color_scheme=scheme)
+    page.locator("#pause").hover()
+    for name in TABS:
+        show_tab(page, name)
         assert page.evaluate(CONTRAST) == []
+    page.locator("#help").click()
+    assert page.evaluate(CONTRAST) == []
+    page.keyboard.press("Escape")
 
 
 def test_the_switch_of_colours_beats_the_systems(browser, shown):
