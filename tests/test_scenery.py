@@ -13,7 +13,7 @@ from kurumaisu.world import load_world
 
 WORLD = """
 define laser ranger ( size [0.1 0.1 0.1] sensor ( range [0 5] fov 180 samples 7 ) )
-position ( name "robot" pose [1 2 0 90] size [0.4 0.2 0.5] color "red" laser ( pose [0.1 0 0 0] ) )
+position ( name "robot" pose [1 2 0 90] size [0.4 0.2 0.5] color "red" laser ( pose [0.1 0 0 0] ) model ( size [0.1 0.1 0.1] ) )
 model ( name "box" pose [3 0 0 0] size [1 0.5 1] )
 model ( name "long" pose [0 -3 0 0] size [8 0.1 1] )
 model ( pose [5 5 0 0] size [0.2 0.2 1] mass 3 )
@@ -43,7 +43,7 @@ def test_pieces_are_where_the_world_has_them(simulator):
     }
     assert not pieces["long"].movable
     robot = pieces["robot"]
-    assert len(robot.polygons) == 2  # its laser stands on it
+    assert len(robot.polygons) == 2  # what stands on it is part of it
     there = corners(robot, simulator.machinery.frames[robot.row])
     np.testing.assert_allclose([there.min(axis=0), there.max(axis=0)], [(0.9, 1.8), (1.1, 2.2)], atol=1e-9)
     assert bounds(pieces.values()) == pytest.approx((-4.0, -3.05, 5.1, 5.1))
