@@ -227,12 +227,21 @@ def test_every_answer_has_the_policy(running):
 
 @pytest.mark.parametrize(
     "path",
-    ["/page/../server.py", "/page/..%2Fserver.py", "/page/%2e%2e/hub.py", "/page//etc/passwd", "/page/.hidden.js"],
+    [
+        "/page/../server.py",
+        "/page/..%2Fserver.py",
+        "/page/..%2F..%2Fcritic%2Freport.html",  # of a kind that is served
+        "/page/%2e%2e%2f%2e%2e%2fcritic%2freport.html",
+        "/page/%2e%2e/hub.py",
+        "/page//etc/passwd",
+        "/page/.hidden.js",
+    ],
 )
 def test_no_file_beside_the_page_is_served(running, path):
     status, _, body = get(running, path)
     assert status in (400, 403, 404)
     assert b"import" not in body
+    assert b"<html" not in body
     assert b"root:" not in body
 
 
