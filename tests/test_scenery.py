@@ -13,7 +13,8 @@ from kurumaisu.world import load_world
 
 WORLD = """
 define laser ranger ( size [0.1 0.1 0.1] sensor ( range [0 5] fov 180 samples 7 ) )
-position ( name "robot" pose [1 2 0 90] size [0.4 0.2 0.5] color "red" laser ( pose [0.1 0 0 0] ) model ( size [0.1 0.1 0.1] ) )
+position ( name "robot" pose [1 2 0 90] size [0.4 0.2 0.5] color "red" laser ( pose [0.1 0 0 0] )
+  model ( size [0.1 0.1 0.1] ) )
 model ( name "box" pose [3 0 0 0] size [1 0.5 1] )
 model ( name "long" pose [0 -3 0 0] size [8 0.1 1] )
 model ( pose [5 5 0 0] size [0.2 0.2 1] mass 3 )
