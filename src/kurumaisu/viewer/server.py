@@ -126,7 +126,10 @@ class Server:
         return _served(PAGE / "index.html")
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
-        return _served(PAGE / request.match_info["name"])
+        name = request.match_info["name"]
+        if not _NAME.fullmatch(name):  # it may hold encoded slashes
+            raise web.HTTPNotFound
+        return _served(PAGE / name)
 
     async def _map(self, request: web.Request) -> web.StreamResponse:
         png = self._hub.maps.get(int(request.match_info["number"]))
@@ -158,9 +161,9 @@ class Server:
 
 
 def _served(path: Path) -> web.Response:
-    """Return a small file; of a folder's, only what has a plain name."""
+    """Return a small file, of a kind that pages are made of."""
     kind = _TYPES.get(path.suffix)
-    if kind is None or not _NAME.fullmatch(path.name) or not path.is_file():
+    if kind is None or not path.is_file():
         raise web.HTTPNotFound
     return web.Response(
         body=path.read_bytes(), content_type=kind, charset="utf-8" if kind.startswith("text/") else None
