@@ -342,6 +342,26 @@ def test_poses_of_a_drag_overtake_each_other_and_urgent_commands_everything(driv
     assert [name for name, _ in running.rig.commands].count("set_pose") == 1
 
 
+def test_the_stick_is_obeyed_in_order_and_stops_though_all_else_hangs(running):
+    """Nine pages, each with a command that hangs: more than are under way at a time."""
+    running.rig.slow.set()
+    pages = [Page(running.server.address) for _ in range(9)]
+    try:
+        for page in pages:
+            page.let_in(running.server.new_address())
+            page.say(type="command", id=1, name="reset")
+        speeds = [0.001 * number for number in range(200)]
+        for number, v in enumerate(speeds):
+            pages[-1].say(type="command", id=number, name="drive", v=v, w=0.0)
+        assert pages[-1].ask("estop", on=True)["ok"]
+        pages[-1].wait(lambda: len(pages[-1].replies) > len(speeds), "an answer to each")
+        assert [values["v"] for name, values in running.rig.commands if name == "drive"] == speeds
+    finally:
+        running.rig.slow.clear()
+        for page in pages:
+            page.close()
+
+
 def test_too_many_commands_are_refused(driver, running):
     running.rig.slow.set()
     for number in range(100):

@@ -4,21 +4,13 @@
 import re
 
 import pytest
-from playwright.sync_api import expect, sync_playwright
-from viewer_page_rig import BAG, HOSTILE, Shown, Visit, open_browser, until
+from playwright.sync_api import expect
+from viewer_page_rig import BAG, HOSTILE, Shown, Visit, until
 
 from kurumaisu.viewer.server import PAGE
 
 PHONE = {"viewport": {"width": 360, "height": 740}, "has_touch": True, "is_mobile": True}
 TABS = ("effects", "view", "body", "notes")
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        one = open_browser(playwright)
-        yield one
-        one.close()
 
 
 @pytest.fixture(scope="module")

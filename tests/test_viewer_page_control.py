@@ -4,18 +4,10 @@
 import math
 
 import pytest
-from playwright.sync_api import expect, sync_playwright
-from viewer_page_rig import Shown, Visit, open_browser, until
+from playwright.sync_api import expect
+from viewer_page_rig import Shown, Visit, until
 
 BOX = (-1.0, 1.0)  # where the rig's box stands
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        one = open_browser(playwright)
-        yield one
-        one.close()
 
 
 @pytest.fixture

@@ -5,22 +5,14 @@ import math
 import threading
 
 import pytest
-from playwright.sync_api import expect, sync_playwright
-from viewer_page_rig import Shown, Visit, open_browser, until
+from playwright.sync_api import expect
+from viewer_page_rig import Shown, Visit, until
 
 from kurumaisu.viewer import Outcome
 
 PHONE = {"viewport": {"width": 390, "height": 780}, "has_touch": True, "is_mobile": True}
 BOX = (-1.0, 1.0)  # where the rig's box stands
 LIMIT = 0.5  # [m/s] of the rig; the page begins with half of it
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        one = open_browser(playwright)
-        yield one
-        one.close()
 
 
 @pytest.fixture

@@ -8,18 +8,10 @@ import math
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import expect, sync_playwright
-from viewer_page_rig import Shown, Visit, open_browser, until
+from playwright.sync_api import expect
+from viewer_page_rig import Shown, Visit, until
 
 from kurumaisu.viewer import Fan, protocol
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        one = open_browser(playwright)
-        yield one
-        one.close()
 
 
 @pytest.fixture(scope="module")

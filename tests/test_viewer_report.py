@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from playwright.sync_api import expect, sync_playwright
+from playwright.sync_api import expect
 from stories import full_story, full_verdict
 from test_viewer_recording import LASER, ROOM, drive, meta
-from viewer_page_rig import Visit, open_browser, until
+from viewer_page_rig import Visit, until
 from viewer_rig import viewer_settings
 
 from kurumaisu.critic.report import write_report
@@ -18,14 +18,6 @@ from kurumaisu.critic.view import opened
 from kurumaisu.critic.write_csv import write_csv_run
 
 NAMES = ("early", 'late, "again" & <b>more')  # what a folder may be called
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        one = open_browser(playwright)
-        yield one
-        one.close()
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +20,7 @@ from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import NAMED
 from kurumaisu.critic.next_experiment import drives
 from kurumaisu.critic.noise import Noise
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error, failed
 from kurumaisu.experiments import Script
 from kurumaisu.params import Model, load_model, shipped
 from kurumaisu.types import FloatArray
@@ -54,8 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         causes = [cause(model, text) for text in question]
         print(table(question, plan(model, noise(), causes)))
     except Error as error:
-        print(f"critic plan: {one_line(error)}", file=sys.stderr)
-        return 1
+        return failed("critic plan", error)
     return 0
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from kurumaisu import settings
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.rehearsal import Manner, Rehearsal
 from kurumaisu.critic.write_csv import write_csv_run
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error, failed
 from kurumaisu.experiments import base_limits, load_script, names, shipped_script
 from kurumaisu.experiments.timeline import PERIOD
 from kurumaisu.params import load_model, shipped
@@ -30,8 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name in options.names:
             write(options.output, rehearse(name, options.model, options.effects, options.seed))
     except Error as error:
-        print(f"critic rehearse: {one_line(error)}", file=sys.stderr)
-        return 1
+        return failed("critic rehearse", error)
     print(f"recording: {options.output}")
     return 0
 

@@ -16,7 +16,7 @@ from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.replay import model_of
 from kurumaisu.critic.view_album import read_album
 from kurumaisu.critic.view_tape import Showing
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error, failed
 from kurumaisu.params import Model, load_model, shipped
 from kurumaisu.viewer import Hub, Server, ViewerSettings, read_settings, report
 from kurumaisu.viewer.playback import Playback
@@ -39,8 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _serve(options)
     except Error as error:
-        print(f"view: {one_line(error)}", file=sys.stderr)
-        return 1
+        return failed("view", error)
     except KeyboardInterrupt:
         return 0
     return 0

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -12,8 +11,10 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from kurumaisu.children import interrupt
 from kurumaisu.errors import Error
 
+_PATIENCE = 20.0  # [s] for one that was interrupted to end
 _TAIL = 15  # lines of the log shown after a failure
 
 
@@ -61,10 +62,4 @@ def _wait(process: subprocess.Popen[bytes], deadline: float, words: str) -> bool
             time.sleep(0.1)
         return False
     finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-            try:
-                process.wait(timeout=20)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        interrupt(process, _PATIENCE)

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error, failed
 
 # Module and what it is a recording of.
 NAMES = {
@@ -43,8 +43,7 @@ def main(arguments: Sequence[str]) -> int:
         with tempfile.TemporaryDirectory() as folder:
             module.run(options.data, Path(folder))
     except (Error, OSError) as error:
-        print(f"scripts/real: {one_line(error)}", file=sys.stderr)
-        return 1
+        return failed("scripts/real", error)
     return 0
 
 

@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error, failed
 
 NAMES = ("figure9", "offset", "equation2")
 
@@ -25,8 +25,7 @@ def main(arguments: Sequence[str]) -> int:
         for line in importlib.import_module(f"kurumaisu.riddles.{options.name}").tell(options.seed):
             print(line, flush=True)
     except Error as error:
-        print(f"kurumaisu.riddles: {one_line(error)}", file=sys.stderr)
-        return 1
+        return failed("kurumaisu.riddles", error)
     return 0
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error, failed
 from kurumaisu.paper import advice, calibrate
 from kurumaisu.paper.options import load_options
 from kurumaisu.params import shipped
@@ -23,8 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return command(options)
     except Error as error:
-        print(f"calibrate: {one_line(error)}", file=sys.stderr)
-        return 1
+        return failed("calibrate", error)
 
 
 def _plan(options: argparse.Namespace) -> int:

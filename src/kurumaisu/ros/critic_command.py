@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
 
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error, failed
 
 # Other commands, by the first word, and where their main is.
 _PARTS = {
@@ -37,5 +37,4 @@ def _told(command: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> 
     try:
         return command(arguments)
     except Error as error:
-        print(f"critic: {one_line(error)}", file=sys.stderr)
-        return 1
+        return failed("critic", error)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import rospy
 
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error, failed
 from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, write_map
 from kurumaisu.ros.map_messages import GridMessage, map_of
 
@@ -34,7 +34,6 @@ def main() -> int:
         print(f"map_saver: {rospy.resolve_name('map')}: no map came within {options.wait:g} s", file=sys.stderr)
         return 1
     except Error as error:
-        print(f"map_saver: {one_line(error)}", file=sys.stderr)
-        return 1
+        return failed("map_saver", error)
     print(f"written: {image}, {text}")
     return 0

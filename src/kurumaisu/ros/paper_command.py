@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error, failed
 from kurumaisu.paper import commands, commands_wall
 from kurumaisu.params import shipped
 
@@ -26,8 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return command(options)
     except Error as error:
-        print(f"paper: {one_line(error)}", file=sys.stderr)
-        return 1
+        return failed("paper", error)
 
 
 def _drive(options: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import socket
 import subprocess
 import tempfile
@@ -15,6 +14,7 @@ from pathlib import Path
 
 import roslib.packages
 
+from kurumaisu.children import interrupt
 from kurumaisu.critic.reading import read_recording
 from kurumaisu.errors import Error
 from kurumaisu.paper import bench_wall, dac_line
@@ -50,23 +50,11 @@ def launch(arguments: Sequence[str], log: Path, deadline: float) -> None:
         except subprocess.TimeoutExpired:
             why = f"was not done after {deadline:.0f} s"
         finally:
-            end(process)
+            interrupt(process, _PATIENCE)
     text = log.read_text(encoding="utf-8", errors="replace")
     if why or ("experiment: " in text and ": done, " not in text):
         tail = "\n".join(text.splitlines()[-_TAIL:])
         raise Error(f"roslaunch kurumaisu {arguments[0]} {why or 'was stopped'}; the end of {log}:\n{tail}")
-
-
-def end(process: subprocess.Popen[bytes]) -> None:
-    """End a process that may have ended: asked first."""
-    if process.poll() is not None:
-        return
-    process.send_signal(signal.SIGINT)
-    try:
-        process.wait(_PATIENCE)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
 
 
 def drive(model: Path, file: str, bag: Path, *, seed: int, speed: float) -> None:
@@ -124,7 +112,7 @@ def _board(device: Path, link: str, log: Path) -> Iterator[None]:
             time.sleep(_GLANCE)
         yield
     finally:
-        end(process)
+        interrupt(process, _PATIENCE)
 
 
 def _rewrite(source: Path, out: Path, values: dict[tuple[str, ...], str]) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import glob
 import shutil
-import signal
 import subprocess
 import time
 import xmlrpc.client
@@ -16,6 +15,7 @@ from typing import Any
 import rosgraph
 import rospy
 
+from kurumaisu.children import interrupt
 from kurumaisu.errors import Error
 from kurumaisu.ros.experiment_ground import publishers
 
@@ -59,12 +59,7 @@ class Recorder:
         """End the bag. Raise Error when it was not written."""
         if self._process.poll() is not None:
             self.check()
-        self._process.send_signal(signal.SIGINT)
-        try:
-            self._process.wait(_PATIENCE)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        interrupt(self._process, _PATIENCE)
         # `rosbag` is a wrapper, which may end before the recorder itself has given the bag its name.
         deadline = time.monotonic() + _PATIENCE
         while self._named(".active") and time.monotonic() < deadline:

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+from kurumaisu.children import interrupt
 from kurumaisu.errors import Error
 from kurumaisu.viewer.source import Outcome
 
@@ -76,15 +76,8 @@ class BagRecorder:
 
     def _stop(self) -> None:
         process, self._process = self._process, None
-        if process is None:
-            return
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-        try:
-            process.wait(_PATIENCE)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        if process is not None:
+            interrupt(process, _PATIENCE)
 
     def _wait(self, condition: Callable[[], bool]) -> None:
         deadline = time.monotonic() + _PATIENCE

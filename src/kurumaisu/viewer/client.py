@@ -7,6 +7,7 @@ import asyncio
 import socket
 import struct
 from collections import deque
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from typing import Any
 
@@ -20,7 +21,7 @@ from kurumaisu.viewer.hub import Hub, Mailbox, Payload
 from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
 
-_URGENT = ("drive", "estop")  # they do not wait for what was asked before
+URGENT = ("drive", "estop")  # they do not wait for what was asked before
 _MOST_WAITING = 32  # commands of one client
 _MOST_REPLIES = 256  # that one client has not taken
 _MOST_WRONG = 5  # credentials
@@ -31,9 +32,9 @@ class Client:
     """Lives as long as its connection."""
 
     def __init__(
-        self, settings: ViewerSettings, hub: Hub, source: Source, keys: Keys | None, workers: Executor
+        self, settings: ViewerSettings, hub: Hub, source: Source, keys: Keys | None, workers: Mapping[str, Executor]
     ) -> None:
-        """keys: None where nobody may command."""
+        """keys: None where nobody may command; workers: who does each urgent command, and under "" all others."""
         self._settings = settings
         self._hub = hub
         self._source = source
@@ -130,7 +131,7 @@ class Client:
             raise Error(f"{said.name}: {_why_not(self._keys)}")
         if said.name not in self._source.abilities:
             raise Error(f"{said.name}: is nothing that a {self._source.mode} does here")
-        if said.name in _URGENT:
+        if said.name in URGENT:
             self._run(said)
             return
         self._overtake(said)
@@ -172,7 +173,9 @@ class Client:
                 await self._run(self._waiting.popleft())
 
     def _run(self, command: Command) -> asyncio.Future[None]:
-        done = asyncio.get_running_loop().run_in_executor(self._workers, self._do, command)
+        done = asyncio.get_running_loop().run_in_executor(
+            self._workers[command.name if command.name in URGENT else ""], self._do, command
+        )
 
         async def answer() -> None:
             self._say(await done)

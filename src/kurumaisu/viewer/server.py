@@ -15,7 +15,7 @@ from aiohttp import web
 from kurumaisu.errors import Error
 from kurumaisu.viewer import access, report
 from kurumaisu.viewer.access import Keys
-from kurumaisu.viewer.client import Client
+from kurumaisu.viewer.client import URGENT, Client
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
@@ -29,7 +29,7 @@ _TYPES = {
     ".png": "image/png",
 }
 _NAME = re.compile(r"[\w-]+(\.[\w-]+)*")
-_WORKERS = 8  # commands that are under way at a time, of all clients
+_WORKERS = 8  # commands that are under way at a time, of all clients, beside the urgent ones
 _PATIENCE = 5.0  # [s] for the loop to begin, and to end
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
@@ -47,7 +47,9 @@ class Server:
         self._keys = Keys()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="viewer", daemon=True)
-        self._workers = ThreadPoolExecutor(_WORKERS, "viewer_command")
+        # An urgent command waits for none that hangs; and one thread for it keeps the order in which they were said.
+        self._workers = {name: ThreadPoolExecutor(1, f"viewer_{name}") for name in URGENT}
+        self._workers[""] = ThreadPoolExecutor(_WORKERS, "viewer_command")
         self._open: set[Client] = set()
         self._runner: web.AppRunner | None = None
         self._port = 0
@@ -63,7 +65,8 @@ class Server:
         asyncio.run_coroutine_threadsafe(self._end(), self._loop).result(_PATIENCE)
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(_PATIENCE)
-        self._workers.shutdown(wait=False, cancel_futures=True)
+        for workers in self._workers.values():
+            workers.shutdown(wait=False, cancel_futures=True)
 
     @property
     def address(self) -> str:
