@@ -51,6 +51,8 @@ def main() -> int:
     parser.add_argument("--fast", action="store_true", help="leave out what takes minutes: catkin build, rostests")
     parser.add_argument("-k", metavar="WORD", default="", help="only the checks and test files whose name has WORD")
     arguments = parser.parse_args()
+    # Started in the background of a script, it ignores Ctrl-C, and all its children would: tests interrupt theirs.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     LOGS.mkdir(parents=True, exist_ok=True)
     chosen = [c for c in [*_checks(), *_tests(arguments.k)] if arguments.k in c.name or _holds(c, arguments.k)]
     total = Counts(skipped=sum(c.slow for c in chosen) if arguments.fast else 0)
