@@ -41,8 +41,10 @@ class BaseNode(unittest.TestCase):
         self.odom = Topic("/odom", Odometry)
         self.diagnostics = Topic("/diagnostics", DiagnosticArray)
         self.commander = Commander("/cmd_vel")
-        self.voltages.wait(is_neutral, "neutral before the test")
-        wait_for(lambda: self.odom.last, "odometry")
+        neutral = self.voltages.wait(is_neutral, "neutral before the test")
+        # Odometry follows by a tick, and comes on another topic.
+        after = neutral.header.stamp + rospy.Duration.from_sec(0.1)
+        self.odom.wait(lambda m: m.header.stamp > after, "odometry at rest")
         wait_for(lambda: self.commander.publisher.get_num_connections(), "base_node listens")
 
     def tearDown(self) -> None:
