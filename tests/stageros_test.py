@@ -212,16 +212,11 @@ class Case(unittest.TestCase):
         return int(re.search(r"(\d+) commands heard", self.ask("pause", SetBool, True).message)[1])
 
     def transforms(self):
-        """Return those of now. They come on another topic than the clock, so they may have to come first."""
-
-        def of_now():
-            return {
-                (t.header.frame_id, t.child_frame_id): t.transform
-                for t in (self.tf.last.transforms if self.tf.last else ())
-                if t.header.stamp.to_sec() == self.now()
-            }
-
-        return wait_for(of_now, "transforms of now")
+        return {
+            (t.header.frame_id, t.child_frame_id): t.transform
+            for t in self.tf.last.transforms
+            if t.header.stamp.to_sec() == self.now()
+        }
 
     def set_pose(self, name, x, y, heading):
         pose = geometry_msgs.msg.Pose()
