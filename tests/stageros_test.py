@@ -299,11 +299,11 @@ class OneRobot(Case):
         assert self.clock.last.clock.nsecs % 100_000_000 == 0
         assert self.clock.messages[0].clock.to_sec() > 0
         assert {self.stamp(topic) for topic in self.stamped()} == {self.now()}
-        assert len(self.transforms()) == 3
+        wait_for(lambda: len(self.transforms()) == 3, "3 transforms of now")
 
     def test_transforms(self):
         self.step()
-        transforms = self.transforms()
+        transforms = wait_for(self.transforms, "transforms of now")
         assert set(transforms) == {
             *[("odom", "base_footprint"), ("base_footprint", "base_link"), ("base_link", "base_laser_link")]
         }
@@ -435,7 +435,7 @@ class OneRobot(Case):
             assert self.ask("save", StateFile, f"{folder}/state").success
             assert self.ask("delete", Delete, "second").success
             self.step()
-            assert len(self.transforms()) == 3
+            wait_for(lambda: len(self.transforms()) == 3, "3 transforms of now")
             loaded = self.ask("load", StateFile, f"{folder}/state")
             assert loaded.success, loaded.message
         self.step()
@@ -446,7 +446,7 @@ class OneRobot(Case):
         assert self.scan.last.ranges[2] == pytest.approx(3.89, abs=1e-5)
         assert self.ask("delete", Delete, "second").success
         self.step()
-        assert len(self.transforms()) == 3
+        wait_for(lambda: len(self.transforms()) == 3, "3 transforms of now")
         truth.close()
 
     def test_spawn_from_text(self):
@@ -454,7 +454,7 @@ class OneRobot(Case):
         done = self.ask("spawn", Spawn, 'base ( name "guest" size [0.3 0.3 0.3] )', "", pose)
         assert done.success, done.message
         self.step()
-        assert len(self.transforms()) == 6
+        wait_for(lambda: len(self.transforms()) == 6, "6 transforms of now")
         again = self.ask("spawn", Spawn, 'base ( name "guest" )', "", pose)
         assert (again.success, again.message) == (False, "name 'guest': there is a model of this name")
         bad = self.ask("spawn", Spawn, "base (\n size [1, 1] )", "other", pose).message
