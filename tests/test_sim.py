@@ -299,6 +299,22 @@ def test_the_holder_goes_by_stamps_and_never_lets_go() -> None:
     assert holder.at(500) == NEUTRAL
 
 
+def test_commands_are_due_when_the_usual_gap_has_passed() -> None:
+    holder = VoltageHolder()
+    assert not holder.is_due(10**9, lead=50)  # nobody has spoken yet
+    holder.put(100, NEUTRAL)
+    assert [holder.is_due(t, lead=50) for t in (149, 150)] == [False, True]
+    for stamp in (120, 140, 140, 170):
+        holder.put(stamp, NEUTRAL)
+    assert [holder.is_due(t, lead=50) for t in (199, 200)] == [False, True]
+    assert [holder.is_due(t, lead=25) for t in (194, 195)] == [False, True]
+    for stamp in range(190, 350, 20):
+        holder.put(stamp, NEUTRAL)
+    assert [holder.is_due(t, lead=50) for t in (349, 350)] == [False, True]
+    holder.clear()
+    assert not holder.is_due(10**9, lead=50)
+
+
 def test_urdf_says_what_the_model_says(model: Model) -> None:
     robot = ElementTree.fromstring(robot_description(model, "base_link"))
     assert [link.get("name") for link in robot.findall("link")] == ["base_link", "laser"]

@@ -165,7 +165,7 @@ class SimNode:
             self._lock.notify_all()
 
     def _wait_for_voltages(self) -> None:
-        """Let a controller keep up: wait until its voltages are at most voltage_lead old, within patience."""
+        """Let a controller keep up: wait for voltages that are due, within patience."""
         lead = round(self._settings.voltage_lead * _NS)
         if self._voltages.get_num_connections() == 0:
             return
@@ -179,8 +179,7 @@ class SimNode:
                 self._lock.wait(min(remaining, _GLANCE))
 
     def _behind(self, lead: int) -> bool:
-        newest = self._holder.newest
-        return newest is not None and newest != self._given_up and self._now - newest >= lead
+        return self._holder.newest != self._given_up and self._holder.is_due(self._now, lead)
 
     def _warn(self) -> None:
         newest = self._holder.newest

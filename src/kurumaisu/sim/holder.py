@@ -17,7 +17,10 @@ class VoltageHolder:
     late acts from the next step on. Times are whole nanoseconds.
     """
 
+    _REMEMBERED = 8  # gaps between stamps
+
     def __init__(self) -> None:
+        self._gaps: deque[int] = deque(maxlen=self._REMEMBERED)
         self._waiting: deque[tuple[int, Command]] = deque()
         self._held = NEUTRAL
         self.newest: int | None = None  # stamp of the newest command put
@@ -28,6 +31,8 @@ class VoltageHolder:
             raise Error(f"voltages: not finite: {command.v_f} V, {command.v_s} V")
         if self.newest is not None and stamp < self.newest:
             raise Error(f"voltages: stamp {stamp} ns is older than the last one, {self.newest} ns")
+        if self.newest is not None and stamp > self.newest:
+            self._gaps.append(stamp - self.newest)
         self.newest = stamp
         self._waiting.append((stamp, command))
 
@@ -37,8 +42,15 @@ class VoltageHolder:
             self._held = self._waiting.popleft()[1]
         return self._held
 
+    def is_due(self, time: int, lead: int) -> bool:
+        """Whether the next command should be here at a time: the usual gap has passed since the last, or the lead."""
+        if self.newest is None:
+            return False
+        return time - self.newest >= min(lead, max(self._gaps, default=lead))
+
     def clear(self) -> None:
         """Go back to neutral."""
         self._waiting.clear()
         self._held = NEUTRAL
+        self._gaps.clear()
         self.newest = None
