@@ -135,9 +135,9 @@ class LaserNode(unittest.TestCase):
             urg.show(fed_ranges())
             scans, diagnostics = Topic("/plain/scan", LaserScan), Diagnostics("plain")
             scan = scans.wait(lambda m: np.isfinite(m.ranges[0]), "scans")
-            # The youngest of some: the test itself may look late.
-            age = min((rospy.Time.now() - scans.wait(lambda _: True, "scans").header.stamp).to_sec() for _ in range(5))
-            assert 0.06 < age < 0.5  # it takes 71 ms to measure
+            # Of several: sensor and test are one process, which may have its turn late.
+            ages = [(rospy.Time.now() - scans.wait(lambda _: True, "scans").header.stamp).to_sec() for _ in range(11)]
+            assert 0.06 < np.median(ages) < 0.5  # it takes 71 ms to measure
             assert scan.header.frame_id == "front"
             np.testing.assert_allclose(scan.scan_time, 0.1, rtol=1e-6)
             self.check_fan(scan, 0, SENSOR.steps - 1)
