@@ -33,7 +33,7 @@ class Check:
 
     name: str
     command: list[str]
-    timeout: float = 600.0  # [s]
+    timeout: float = 1800.0  # [s] against what hangs: a busy machine may take long
     slow: bool = False  # left out by --fast
     results: str = ""  # pattern of its result files
     beside: bool = False  # needs no answer soon: runs beside the others, on what they leave of the cores
@@ -99,13 +99,13 @@ def _checks() -> list[Check]:
         Check("clang-format", ["clang-format", "--dry-run", "-Werror", *cpp]),
         Check("catkin_lint", ["catkin_lint", "--offline", "--strict", "-W2", str(ROOT / ".ws/src")]),
         # scripts/setup --dev built the rest; there, too, a warning is an error.
-        Check("build tests", ["cmake", "--build", str(BUILD), "--target", "tests"], timeout=1200),
-        Check("clang-tidy", ["python", str(ROOT / ".ci/tidy.py")], timeout=2400, beside=True),
-        Check("install space", ["bash", str(ROOT / ".ci/install_space.bash")], timeout=1200),
+        Check("build tests", ["cmake", "--build", str(BUILD), "--target", "tests"]),
+        Check("clang-tidy", ["python", str(ROOT / ".ci/tidy.py")], timeout=4200, beside=True),
+        Check("install space", ["bash", str(ROOT / ".ci/install_space.bash")]),
         Check(
             "catkin build",
             ["bash", str(ROOT / ".ci/catkin_build.bash")],
-            timeout=2400,
+            timeout=4200,
             slow=True,
             beside=True,
             reads=inside,
@@ -130,7 +130,7 @@ def _tests(word: str) -> list[Check]:
     if word and word not in "pytest":
         pytest = ["env", f"PYTEST_ADDOPTS=-k {word}", *pytest]
     # nodes wait more than they compute, which leaves the cores to what runs beside them: so pytest comes last
-    return [*checks, Check("pytest", pytest, timeout=1200, results="pytest-unit.xml")]
+    return [*checks, Check("pytest", pytest, timeout=3600, results="pytest-unit.xml")]
 
 
 def _pytest_files() -> set[str]:

@@ -123,6 +123,7 @@ class Alone(unittest.TestCase):
         try:
             commander.say(0.0, 0.0)
             voltages.wait(is_neutral, "the node")
+            wait_for(lambda: odom.last, "its odometry")
             wait_for(lambda: commander.publisher.get_num_connections(), "it listens")
             count = len(voltages.messages)
             wait_for(lambda: len(voltages.messages) > count + 50, "a zero heard")

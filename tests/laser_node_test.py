@@ -122,6 +122,11 @@ class LaserNode(unittest.TestCase):
     def pty(self, *faults: str, **options: Any) -> VirtualUrg:
         return VirtualUrg(SENSOR, Pty(self.link), faults=faults, **options)
 
+    @staticmethod
+    def age_of_next(scans: Topic) -> float:
+        stamp = scans.wait(lambda _: True, "scans").header.stamp
+        return float((rospy.Time.now() - stamp).to_sec())
+
     def check_fan(self, scan: Any, first: int, last: int) -> None:
         np.testing.assert_allclose(scan.angle_min, SENSOR.bearings[first], atol=1e-6)
         np.testing.assert_allclose(scan.angle_max, SENSOR.bearings[last], atol=1e-6)
@@ -135,8 +140,8 @@ class LaserNode(unittest.TestCase):
             urg.show(fed_ranges())
             scans, diagnostics = Topic("/plain/scan", LaserScan), Diagnostics("plain")
             scan = scans.wait(lambda m: np.isfinite(m.ranges[0]), "scans")
-            age = rospy.Time.now() - scan.header.stamp
-            assert 0.06 < age.to_sec() < 0.5  # it takes 71 ms to measure
+            ages = [self.age_of_next(scans) for _ in range(5)]
+            assert 0.06 < min(ages) < 0.5  # it takes 71 ms to measure; the test itself may look late
             assert scan.header.frame_id == "front"
             np.testing.assert_allclose(scan.scan_time, 0.1, rtol=1e-6)
             self.check_fan(scan, 0, SENSOR.steps - 1)
@@ -149,8 +154,8 @@ class LaserNode(unittest.TestCase):
         assert values["Device ID"] == "H0000000"
         assert values["Serial Port"] == str(self.link)
         assert values["Bad Sums"] == "0"
-        values = diagnostics.wait("Laser Scan", DiagnosticStatus.OK)
-        assert abs(float(values["Rate [1/s]"]) - 10) < 0.5
+        rate = lambda: float(diagnostics.wait("Laser Scan", DiagnosticStatus.OK)["Rate [1/s]"])  # noqa: E731
+        wait_for(lambda: abs(rate() - 10) < 0.5, "ten scans a second")
         latched = rospy.wait_for_message(f"/{name}/laser_status", DiagnosticStatus, PATIENCE)
         assert (latched.level, latched.message, latched.hardware_id) == (0, "Streaming", "H0000000")
         for service in ("update_laser_status", "laser_node/self_test", "laser_node/restart"):
@@ -162,11 +167,13 @@ class LaserNode(unittest.TestCase):
         try:
             front = SENSOR.front - SENSOR.first
             wanted = {"angle_min": -0.5, "angle_max": 0.5, "frame_id": "rear", "time_offset": 5.0, "skip": 1}
+            begin = rospy.Time.now()
             client.update_configuration(wanted)
             scan = scans.wait(lambda m: m.header.frame_id == "rear" and len(m.ranges) < SENSOR.steps, "a small fan")
             self.check_fan(scan, front - 81, front + 81)  # 0.5 rad are 81.49 steps
             np.testing.assert_allclose(scan.scan_time, 0.2, rtol=1e-6)
-            assert 4.0 < (scan.header.stamp - rospy.Time.now()).to_sec() < 5.0
+            assert (scan.header.stamp - begin).to_sec() > 5.0 - 0.5
+            assert (scan.header.stamp - rospy.Time.now()).to_sec() < 5.0
             client.update_configuration({"cluster": 3, "time_offset": 0.0, "skip": 0})
             clustered = scans.wait(lambda m: len(m.ranges) == len(scan.ranges) // 3, "clusters of three")
             np.testing.assert_allclose(clustered.angle_increment, 3 * SENSOR.increment, rtol=1e-6)
@@ -302,7 +309,7 @@ class LaserNode(unittest.TestCase):
             assert quiet.stdout == "H0000000\n"
         with VirtualUrg(SENSOR, Tcp(), faults=["blackhole"]) as urg:
             silent = subprocess.run(
-                [program("getID"), urg.address], capture_output=True, text=True, check=False, timeout=5
+                [program("getID"), urg.address], capture_output=True, text=True, check=False, timeout=PATIENCE
             )
             assert silent.returncode == 1
             assert silent.stdout == ""

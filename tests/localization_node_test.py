@@ -126,11 +126,10 @@ class LocalizationNode(unittest.TestCase):
         message.pose.pose.position.x, message.pose.pose.position.y = 4.0, 3.0
         message.pose.pose.orientation.w = 1.0
         message.pose.covariance[0] = message.pose.covariance[7] = message.pose.covariance[35] = 0.01
-        self.initial.publish(message)
         begin = len(self.poses.messages)
+        self.initial.publish(message)
         t = self.room.drive(1.0, first=2.0)
-        wrong = wait_for(lambda: self.poses.messages[begin:], "poses", DEADLINE)
-        assert any(np.hypot(*(pose_of(m)[:2] - [4.0, 3.0])) < 0.8 for m in wrong)
+        self.poses.wait(lambda m: np.hypot(*(pose_of(m)[:2] - [4.0, 3.0])) < 0.8, "a wrong pose", DEADLINE, since=begin)
         rospy.ServiceProxy("global_localization", Empty)()
         begin = len(self.poses.messages)
         t = self.room.drive(18.0, first=3.0)
@@ -155,7 +154,7 @@ class LocalizationNode(unittest.TestCase):
 
     def test_6_scans_without_transforms_are_counted_and_said(self):
         begin = time.monotonic()
-        while time.monotonic() - begin < 4.0 and not (self.status() and "NO_TRANSFORM" in self.status().message):
+        while time.monotonic() - begin < DEADLINE and not (self.status() and "NO_TRANSFORM" in self.status().message):
             self.room.step((time.monotonic() - begin), with_tf=False)
             time.sleep(0.05)
         self.wait_for_status(2, "LOCALIZATION_NO_TRANSFORM")

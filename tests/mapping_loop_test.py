@@ -14,7 +14,7 @@ from kurumaisu import geometry, slam_score
 from kurumaisu.maps import Grid
 from kurumaisu.params import shipped
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import Commander, Topic, pose_of, wait_for
+from kurumaisu.ros.testing import PATIENCE, Commander, Topic, pose_of, wait_for
 from kurumaisu.world import load_world
 
 WAY = 5.0  # [m]
@@ -29,7 +29,9 @@ class MappingLoop(unittest.TestCase):
         commander = Commander("cmd_vel")
         commander.release()
         commander.say(0.5, 0.0)
-        truth.wait(lambda m: pose_of(m)[0] - start[0] > WAY, "the chair to drive down the corridor", patience=60.0)
+        truth.wait(
+            lambda m: pose_of(m)[0] - start[0] > WAY, "the chair to drive down the corridor", patience=2 * PATIENCE
+        )
         commander.silence()
         rest = truth.wait(lambda m: m.twist.twist.linear.x == 0, "the chair at rest").header.stamp
         wait_for(lambda: maps.last and maps.last.header.stamp > rest, "a map after the drive")

@@ -135,8 +135,10 @@ class MappingNode(unittest.TestCase):
         )
         program = roslib.packages.find_node("kurumaisu", "mapping_node")[0]
         arguments = ["__ns:=/second", "scan:=/scan", "static_map:=/dynamic_map", "/diagnostics:=/second/diagnostics"]
+        before = self.room.connections()
         process = subprocess.Popen([program, *arguments])
         try:
+            self.room.wait_for_another(before)
             yield process
         finally:
             process.send_signal(signal.SIGTERM)
@@ -223,6 +225,7 @@ class MappingNode(unittest.TestCase):
             poses = Topic("/second/mapping_node/pose", PoseWithCovarianceStamped)
             first = wait_for(self.second_map, "its map", DEADLINE)
             assert first.info.width >= served.info.width - 1
+            wait_for(lambda: poses.is_published, "its poses", DEADLINE)
             last = self.room.drive(3.0, first=20.0)
             late = wait_for(
                 lambda: next((m for m in poses.messages if self.room.time_of(m) > last - 1.0), None), "pose", DEADLINE
@@ -253,7 +256,9 @@ class MappingNode(unittest.TestCase):
 
     def test_3_scans_without_transforms_are_counted_and_said(self):
         begin = time.monotonic()
-        while time.monotonic() - begin < 6.0 and not (self.status() and "scans come, but" in self.status().message):
+        while time.monotonic() - begin < DEADLINE and not (
+            self.status() and "scans come, but" in self.status().message
+        ):
             self.room.step(time.monotonic() - begin, with_tf=False)
             time.sleep(0.05)
         self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but no odometry: tf has no odom -> base_link")
@@ -262,7 +267,7 @@ class MappingNode(unittest.TestCase):
 
     def test_4_a_laser_that_nobody_has_placed_is_said(self):
         begin = time.monotonic()
-        while time.monotonic() - begin < 6.0 and not (self.status() and "nobody says" in self.status().message):
+        while time.monotonic() - begin < DEADLINE and not (self.status() and "nobody says" in self.status().message):
             self.room.step(time.monotonic() - begin, frame="nowhere")
             time.sleep(0.05)
         self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but nobody says where the laser is")
@@ -328,8 +333,6 @@ class MappingNode(unittest.TestCase):
             ]
 
         with self.second_node(mapper={"particles": 1000, "insert_distance": 0.2}):
-            connections = self.room.scan.get_num_connections
-            wait_for(lambda: connections() > 2, "its subscription", DEADLINE)
             wait_for(said, "its diagnostics", DEADLINE)
             for i in range(80):  # a burst
                 self.room.step(i * STEP)
@@ -338,6 +341,7 @@ class MappingNode(unittest.TestCase):
             except AssertionError as error:
                 raise AssertionError(f"not too slow: {set(said())}") from error
             poses = Topic("/second/mapping_node/pose", PoseWithCovarianceStamped)
+            wait_for(lambda: poses.is_published, "its poses", DEADLINE)
             last = self.room.drive(1.0, first=80 * STEP)
             wait_for(lambda: poses.last and self.room.time_of(poses.last) > last - 1.5, "its pose", DEADLINE)
             pose = poses.last.pose.pose.position

@@ -25,7 +25,7 @@ from std_srvs.srv import Empty
 
 from kurumaisu import effects
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import Topic, wait_for
+from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
 
 STEP = 0.01  # [s]
 
@@ -45,8 +45,9 @@ class SimEffectsTest(unittest.TestCase):
         cls.acting = Topic("sim_node/effects", String)
         cls.voltages = rospy.Publisher("voltages", Voltages, queue_size=10)
         wait_for(cls.voltages.get_num_connections, "sim_node listens to voltages")
-        cls.client = Client("/sim_node/live", timeout=20)
-        cls.start = dict(cls.client.get_configuration(timeout=20))
+        wait_for(lambda: cls.acting.last, "what acts")
+        cls.client = Client("/sim_node/live", timeout=PATIENCE)
+        cls.start = dict(cls.client.get_configuration(timeout=PATIENCE))
 
     def setUp(self):
         rospy.ServiceProxy("reset", Empty)()
@@ -69,7 +70,7 @@ class SimEffectsTest(unittest.TestCase):
             v=v,
             w=w,
         )
-        message.header.stamp = self.now() + rospy.Duration(0, 200_000_000)
+        message.header.stamp = self.now() + rospy.Duration(2)  # half a second of the wall's, to come in time
         self.voltages.publish(message)
         return message.header.stamp
 
@@ -102,8 +103,8 @@ class SimEffectsTest(unittest.TestCase):
         assert listed[0]["parameters"] == {"gain": 0.25}
 
     def test_every_parameter_has_its_bounds_unit_and_a_group(self):
-        described = {one["name"]: one for one in self.client.get_parameter_descriptions(timeout=20)}
-        groups = self.client.get_group_descriptions(timeout=20)["groups"]
+        described = {one["name"]: one for one in self.client.get_parameter_descriptions(timeout=PATIENCE)}
+        groups = self.client.get_group_descriptions(timeout=PATIENCE)["groups"]
         assert set(groups) == {"base", "laser", "world"}
         for effect in effects.ALL:
             group = groups[effect.id.split(".")[0]]["groups"][effect.id]

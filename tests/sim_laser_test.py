@@ -11,15 +11,23 @@ from pathlib import Path
 import numpy as np
 import rospy
 from kurumaisu.msg import Voltages
-from kurumaisu.srv import StateFile
+from kurumaisu.srv import Speed, StateFile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, SetBool, Trigger
 
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import Topic, wait_for
+from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
 
-SERVICES = {"reset": Empty, "pause": SetBool, "step": Trigger, "save": StateFile, "load": StateFile}
+SERVICES = {
+    "reset": Empty,
+    "pause": SetBool,
+    "step": Trigger,
+    "speed": Speed,
+    "save": StateFile,
+    "load": StateFile,
+}
+DAMAGED = 4.0  # [s] the damaged scan comes later
 STALE = 0.5  # [s] after which the driver takes a silent sensor for gone
 
 
@@ -36,12 +44,14 @@ class SimLaserTest(unittest.TestCase):
         )
         cls.voltages = rospy.Publisher("voltages", Voltages, queue_size=10)
         for name in SERVICES:
-            rospy.wait_for_service(name, timeout=20)
+            rospy.wait_for_service(name, PATIENCE)
         cls.call = {name: rospy.ServiceProxy(name, kind) for name, kind in SERVICES.items()}
         wait_for(cls.voltages.get_num_connections, "sim_node listens to voltages")
         wait_for(lambda: cls.fed.last and cls.scan.last, "scans from both")
         # From here on: what was sent before may have been heard by one ear only.
-        cls.first = wait_for(lambda: cls.scan.last, "a scan").header.stamp
+        cls.first = cls.scan.last.header.stamp
+        assert cls.first.to_sec() < DAMAGED, "the test began too late"
+        assert cls.call["speed"](rospy.get_param("~speed")).success
         cls.drive()
         cls.pause()
         cls.call["reset"]()

@@ -24,7 +24,7 @@ from tf2_msgs.msg import TFMessage
 
 from kurumaisu.params import load_model
 from kurumaisu.ros.rotation import quaternion_of
-from kurumaisu.ros.testing import Topic, pose_of, wait_for
+from kurumaisu.ros.testing import PATIENCE, Topic, pose_of, wait_for
 
 SERVICES = {
     "reset": Empty,
@@ -58,7 +58,7 @@ class SimWorldTest(unittest.TestCase):
     def setUpClass(cls):
         cls.model = load_model(Path(rospy.get_param("~model")))
         for name in SERVICES:
-            rospy.wait_for_service(name, timeout=20)
+            rospy.wait_for_service(name, PATIENCE)
         cls.call = {name: rospy.ServiceProxy(name, kind) for name, kind in SERVICES.items()}
         cls.clock, cls.truth = Topic("/clock", Clock), Topic("ground_truth", Odometry)
         cls.scan, cls.collision = Topic("scan", LaserScan), Topic("collision", Bool)
@@ -69,6 +69,7 @@ class SimWorldTest(unittest.TestCase):
 
     def setUp(self):
         self.call["reset"]()
+        self.begin = self.time_of(self.done("pause", False))
 
     def tearDown(self):
         self.call["pause"](False)
@@ -87,11 +88,17 @@ class SimWorldTest(unittest.TestCase):
         assert answer.success, answer.message
         return answer.message
 
-    def next_truth(self):
-        return self.truth.wait(lambda _: True, "the truth")
+    @staticmethod
+    def time_of(said):
+        """Return the time of a service's answer, at 1.230 s, which it gives to a millisecond."""
+        return rospy.Time.from_sec(float(said.split()[1]) + 0.001)
+
+    def truth_after(self, time):
+        """Return the first truth after a time: what is heard next may be of before."""
+        return self.truth.wait(lambda m: m.header.stamp > time, "the truth", since=0)
 
     def test_it_starts_where_the_launch_file_says(self):
-        np.testing.assert_allclose(pose_of(self.next_truth()), [0.5, 0.0, 0.0], atol=1e-9)
+        np.testing.assert_allclose(pose_of(self.truth_after(self.begin)), [0.5, 0.0, 0.0], atol=1e-9)
 
     def test_a_pause_holds_the_clock_and_steps_are_single(self):
         answer = self.call["step"]()
@@ -112,8 +119,8 @@ class SimWorldTest(unittest.TestCase):
         self.done("set_pose", "chair", pose(0.0, 1.0, 0.5))
         self.done("step")
         self.call["reset"]()
-        self.done("pause", False)
-        np.testing.assert_allclose(pose_of(self.next_truth()), [0.5, 0.0, 0.0], atol=1e-9)
+        time = self.time_of(self.done("pause", False))
+        np.testing.assert_allclose(pose_of(self.truth_after(time)), [0.5, 0.0, 0.0], atol=1e-9)
 
     def test_a_step_does_not_wait_long_for_voltages_that_do_not_come(self):
         self.drive(0.2)
@@ -124,8 +131,8 @@ class SimWorldTest(unittest.TestCase):
         self.truth.wait(lambda m: m.twist.twist.linear.x > 0.1, "the voltages are held")
 
     def test_set_pose(self):
-        self.done("set_pose", "chair", pose(1.0, 2.0, 1.0))
-        np.testing.assert_allclose(pose_of(self.next_truth()), [1.0, 2.0, 1.0], atol=1e-9)
+        time = self.time_of(self.done("set_pose", "chair", pose(1.0, 2.0, 1.0)))
+        np.testing.assert_allclose(pose_of(self.truth_after(time)), [1.0, 2.0, 1.0], atol=1e-9)
         for name, where, why in (("nobody", pose(0, 0, 0), "nobody"), ("chair", pose(-3, 0, 0), "does not fit")):
             answer = self.call["set_pose"](name, where)
             assert not answer.success
@@ -137,52 +144,46 @@ class SimWorldTest(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             file = f"{folder}/state"
             self.done("pause", True)
-            self.done("save", file)
-            saved = self.simulated_pose()
+            saved = self.simulated_pose(self.done("save", file))
             self.done("pause", False)
             moved = self.truth.wait(lambda m: pose_of(m)[0] > saved[0] + 0.3, "the chair to move on")
             self.done("pause", True)
-            self.done("load", file)
-            again = self.simulated_pose()
+            loaded = self.done("load", file)
+            assert self.time_of(loaded) > moved.header.stamp
+            again = self.simulated_pose(loaded)
             self.done("pause", False)
-            assert self.next_truth().header.stamp > moved.header.stamp
             # the truth is told within five steps after each of the two, one of them perhaps of before the pause
             np.testing.assert_allclose(again, saved, atol=0.0201)  # five steps of 0.4 m/s
             Path(file).write_bytes(b"nonsense")
             assert not self.call["load"](file).success
             assert "nowhere" in self.call["load"](f"{folder}/nowhere").message
 
-    def simulated_pose(self):
-        """Step on from a pause until the truth is told; return it."""
-        count = len(self.truth.messages)
+    def simulated_pose(self, said):
+        """Step on from a pause, in which a service was asked, until the truth is told; return it."""
         for _ in range(5):  # ground_truth_rate
             self.done("step")
-        return pose_of(wait_for(lambda: self.truth.messages[count:], "the truth of single steps")[0])
+        return pose_of(self.truth_after(self.time_of(said)))
 
     def test_seed(self):
         scans = []
         for seed in (3, 3, 4):
             self.done("pause", True)
-            self.done("seed", seed)
-            count = len(self.scan.messages)
+            time = rospy.Time.from_sec(self.time_of(self.done("seed", seed)).to_sec() - 0.002)
             for _ in range(10):
                 self.done("step")
-            scans.append(self.scan_after(count))
+            scan = self.scan.wait(lambda m, time=time: m.header.stamp > time, "a scan of the seed", since=0)
+            scans.append(np.array(scan.ranges))
             self.done("pause", False)
         np.testing.assert_array_equal(scans[0], scans[1])
         assert not np.array_equal(scans[0], scans[2])
 
-    def scan_after(self, count):
-        """Return the ranges of the next scan after so many."""
-        return np.array(wait_for(lambda: self.scan.messages[count:], "a scan")[0].ranges)
-
     def test_pushing_is_a_collision(self):
-        assert self.next_truth()
-        assert not self.collision.last.data
+        self.collision.wait_last(lambda m: not m.data, "no collision")
+        begin = len(self.collision.messages)
         self.done("set_pose", "box", pose(1.6, 0.0, 0.0))
         self.drive(0.5)
         self.truth.wait(lambda m: pose_of(m)[0] > 1.0, "the chair to push")
-        assert any(m.data for m in self.collision.messages)
+        self.collision.wait(lambda m: m.data, "a collision", since=begin)
         self.done("set_pose", "wall", pose(3.0, 0.0, 0.0))
         self.collision.wait(lambda m: m.data, "the box to be stopped by the wall")
         self.truth.wait(lambda m: abs(m.twist.twist.linear.x) < 0.01, "the chair to be stopped")
@@ -191,9 +192,10 @@ class SimWorldTest(unittest.TestCase):
         twist = Twist()
         twist.linear.x = 0.5
         self.other.publish(twist)
-        bearings, first = [], len(self.scan.messages)
-        for number in range(200):  # 20 s; the way takes 6
-            ranges = self.scan_after(first + number)
+        bearings, time = [], self.begin
+        for _ in range(200):  # 20 s; the way takes 6
+            scan = self.scan.wait(lambda m, time=time: m.header.stamp > time, "a scan", since=0)
+            time, ranges = scan.header.stamp, np.array(scan.ranges)
             ahead = self.model.laser.bearings[np.isfinite(ranges) & (np.abs(self.model.laser.bearings) < 1.2)]
             bearings.append(float(ahead.mean()))
             if bearings[-1] > 0.5:
@@ -220,8 +222,8 @@ class SimWorldTest(unittest.TestCase):
         buffer = tf2_ros.Buffer()
         tf2_ros.TransformListener(buffer)
         for frame in ("imu", "sonar_0", "sonar_1", "bumper_1", "fiducial", "laser"):
-            buffer.lookup_transform("base_link", frame, rospy.Time(0), rospy.Duration(10))
-        optical = buffer.lookup_transform("base_link", "camera", rospy.Time(0), rospy.Duration(10)).transform.rotation
+            buffer.lookup_transform("base_link", frame, rospy.Time(0), rospy.Duration(100))
+        optical = buffer.lookup_transform("base_link", "camera", rospy.Time(0), rospy.Duration(100)).transform.rotation
         x, y, z, w = optical.x, optical.y, optical.z, optical.w
         ahead = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])  # where its z looks
         np.testing.assert_allclose(ahead, [math.cos(0.2), 0.0, -math.sin(0.2)], atol=1e-9)

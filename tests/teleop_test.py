@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import pty
+import select
 import signal
 import subprocess
 import sys
@@ -32,6 +33,9 @@ class Teleop(unittest.TestCase):
         self.dead_man = Topic("/dead_man", Bool)
         self.addCleanup(self.dead_man.close)
 
+    def is_held(self) -> bool:
+        return self.dead_man.last is not None and self.dead_man.last.data
+
     def type(self, keys: str) -> None:
         os.write(self.master, keys.encode())
 
@@ -50,19 +54,21 @@ class Teleop(unittest.TestCase):
         )
         os.close(slave)
         self.addCleanup(self.process.kill)
-        wait_for(lambda: b"Ctrl-C ends" in os.read(self.master, 10000), "its help")
+        said = b""
+        while b"Ctrl-C ends" not in said:  # by pieces
+            assert select.select([self.master], [], [], PATIENCE)[0], f"its help: {said!r}"
+            said += os.read(self.master, 10000)
 
     def ends_at_rest(self, end: Callable[[], None]) -> None:
         commands = Topic("/key_vel", Twist)
         self.addCleanup(commands.close)
         self.start_keyboard()
-        self.type_until("i", lambda: commands.last)
-        assert commands.last.linear.x == 0.3
-        wait_for(lambda: self.dead_man.last and self.dead_man.last.data, "the dead-man")
+        # Both at once: a key is forgotten after a moment.
+        self.type_until("i", lambda: commands.last and commands.last.linear.x == 0.3 and self.is_held())
         end()
         assert self.process.wait(PATIENCE) == 0
-        wait_for(lambda: commands.last.linear.x == 0, "zero")
-        wait_for(lambda: not self.dead_man.last.data, "a dead-man let go")
+        commands.wait_last(lambda m: m.linear.x == 0, "zero")
+        self.dead_man.wait_last(lambda m: not m.data, "a dead-man let go")
 
     def test_ctrl_c(self) -> None:
         self.ends_at_rest(lambda: self.process.send_signal(signal.SIGINT))
@@ -80,13 +86,14 @@ class Teleop(unittest.TestCase):
         commands = Topic("/key_vel", Twist)
         self.addCleanup(commands.close)
         self.start_keyboard()
-        self.type_until("u", lambda: commands.last)
-        commands.wait(lambda m: m.linear.x == 0 and m.angular.z == 0, "zero")
-        wait_for(lambda: not self.dead_man.last.data, "a dead-man let go")
+        self.type_until("u", lambda: commands.last and commands.last.linear.x > 0 and self.is_held())
+        commands.wait_last(lambda m: m.linear.x == 0 and m.angular.z == 0, "zero")
+        self.dead_man.wait_last(lambda m: not m.data, "a dead-man let go")
+        count = len(commands.messages)
         self.type("i")
-        commands.wait(lambda m: m.linear.x == 0.3, "motion again")
+        commands.wait(lambda m: m.linear.x == 0.3, "motion again", since=count)
         self.type("k")
-        commands.wait(lambda m: m.linear.x == 0, "a stop")
+        commands.wait_last(lambda m: m.linear.x == 0, "a stop")
         self.process.terminate()
         self.process.wait(PATIENCE)
 
@@ -94,12 +101,10 @@ class Teleop(unittest.TestCase):
         commands = Topic("/joy_vel", Twist)
         joy = Repeated("/joy", Joy, 0.02)  # and the stick is held all the while
         joy.say(lambda: Joy(axes=[0.0, 1.0], buttons=HELD))
-        wait_for(lambda: commands.last and self.dead_man.last, "a command")
-        assert commands.last.linear.x == 0.4
-        assert self.dead_man.last.data
+        wait_for(lambda: commands.last and commands.last.linear.x == 0.4 and self.is_held(), "a command")
         rosnode.kill_nodes(["/teleop_joy"])
-        wait_for(lambda: commands.last.linear.x == 0, "zero")
-        wait_for(lambda: not self.dead_man.last.data, "a dead-man let go")
+        commands.wait_last(lambda m: m.linear.x == 0, "zero")
+        self.dead_man.wait_last(lambda m: not m.data, "a dead-man let go")
         joy.close()
         commands.close()
 

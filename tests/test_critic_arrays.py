@@ -109,3 +109,13 @@ def test_a_rolling_verdict_outlives_its_process():
     assert rolling.answer(299.0) is None
     assert rolling.answer(301.0) == Rolled(None, "no verdict: given up after 300 s")
     rolling.close()
+
+
+def test_of_rows_received_while_the_clock_stood_the_last_holds():
+    window, faults = Window(["command"], 10.0, 10000), Faults()
+    for t, v in ((1.0, 0.1), (1.0, 0.1), (1.0, 0.2), (1.5, 0.2), (1.5, 0.3)):
+        window.add_received("command", t, [v, 0.0])
+    run = window.run("window", faults)
+    assert run.command.t.tolist() == [1.0, 1.5]
+    assert run.command.values[:, 0].tolist() == [0.2, 0.3]
+    assert not faults.notes

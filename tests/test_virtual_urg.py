@@ -2,6 +2,7 @@
 """A virtual URG as its clients meet it: places, time, and what it says; by a client that shares no code with it."""
 
 import itertools
+import re
 import stat
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from urg_client import Client, number, until
+from urg_client import Client, in_its_turn, number, until
 
 from kurumaisu.errors import Error
 from kurumaisu.virtual_urg import Pty, Tcp, VirtualUrg, load_sensor
@@ -62,6 +63,10 @@ def place(urg):
 
 
 def test_ranges_arrive_a_turn_apart(at):
+    in_its_turn(lambda: check_a_turn_apart(at))
+
+
+def check_a_turn_apart(at):
     with VirtualUrg(USB, at) as urg:
         urg.show(RAMP)
         with Client(place(urg)) as client:
@@ -184,7 +189,7 @@ def test_a_client_that_does_not_read_costs_whole_scans(at):
             kept.append(urg.measure(0.1 * len(kept) + 0.1, 0.1 * len(kept), RAMP))
             waits.append(time.monotonic() - begin)
         assert len(kept) < turns  # somewhere the system has enough
-        assert max(waits) < patience + 0.5
+        assert max(waits) < patience + 5  # it would be for ever
         assert urg.counters["dropped"] == kept.count(False)
         clocks = [client.scan().clock for _ in range(kept.count(True))]
         assert clocks == [100 * turn for turn, there in enumerate(kept) if there]
@@ -255,9 +260,9 @@ def test_command(tmp_path, feed):
         client.stream()
         distances = np.array([client.scan().distances for _ in range(3)])
     process.send_signal(2)
-    counted = process.communicate(timeout=10)[0].decode()
+    counted = process.communicate(timeout=60)[0].decode()
     assert process.returncode == 0
-    assert "3 scans sent" in counted or "4 scans sent" in counted
+    assert int(re.search(r"(\d+) scans sent", counted)[1]) >= 3
     assert not link.is_symlink()
     front = distances[:, 384 - 44]
     if "--range" in feed:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from urg_client import Client, until
+from urg_client import Client, in_its_turn, until
 
 from kurumaisu.virtual_urg import Pty, Tcp, VirtualUrg, load_sensor
 
@@ -100,6 +100,10 @@ def hangs_up(client):
 
 
 def test_unplugged_and_back_as_another_terminal(tmp_path):
+    in_its_turn(lambda: check_unplugged(tmp_path))
+
+
+def check_unplugged(tmp_path):
     away = 0.3
     with VirtualUrg(USB, Pty(tmp_path / "urg"), faults=[f"hangup@2={away}"]):
         link = tmp_path / "urg"
@@ -148,6 +152,10 @@ def test_a_stalled_sensor_keeps_the_connection():
 
 
 def test_a_trickle_takes_its_time():
+    in_its_turn(check_a_trickle)
+
+
+def check_a_trickle():
     with at_tcp("dribble=0.06") as urg, Client(urg.port) as client:
         client.stream()
         took, parts = [], []

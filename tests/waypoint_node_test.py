@@ -11,7 +11,7 @@ import rosnode
 import rospy
 from nav_msgs.msg import Odometry
 
-from kurumaisu.ros.testing import Topic, wait_for
+from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
 
 END = np.array([1.0, 1.5])
 
@@ -24,7 +24,7 @@ class WaypointNode(unittest.TestCase):
             position = message.pose.pose.position
             return np.hypot(*(END - [position.x, position.y]))
 
-        truth.wait(lambda m: distance(m) < 0.2, "the last waypoint", patience=60.0)
+        truth.wait(lambda m: distance(m) < 0.2, "the last waypoint", patience=2 * PATIENCE)
         wait_for(lambda: "/driver" not in rosnode.get_node_names(), "the driver to end")
         rest = truth.wait(lambda m: m.twist.twist.linear.x == 0 and m.twist.twist.angular.z == 0, "rest")
         assert distance(rest) < 0.35
@@ -44,7 +44,7 @@ class WaypointNode(unittest.TestCase):
                     "import sys; from kurumaisu.ros.waypoint_node import main; sys.exit(main())",
                 ]
                 done = subprocess.run(
-                    [*node, "__name:=bad_driver"], capture_output=True, text=True, timeout=30, check=False
+                    [*node, "__name:=bad_driver"], capture_output=True, text=True, timeout=PATIENCE, check=False
                 )
                 said = done.stdout + done.stderr
                 assert done.returncode == 1, said

@@ -53,6 +53,16 @@ class Window:
         while len(rows) * (_OVERHEAD + values.nbytes) > self._limit:
             rows.popleft()
 
+    def add_received(self, part: str, t: float, row: Sequence[float] | FloatArray) -> None:
+        """Take a row without a stamp, received at t [s].
+
+        A simulation's clock has ticks, and may stand: what comes within one is no copy, and the last of it holds.
+        """
+        rows = self._rows[part]
+        if rows and rows[-1][0] == t:
+            rows.pop()
+        self.add(part, t, row)
+
     def clear(self) -> None:
         """Forget all."""
         for rows in self._rows.values():

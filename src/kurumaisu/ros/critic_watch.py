@@ -99,7 +99,11 @@ class CriticWatch:
 
     def _hear(self, part: str, message: Any) -> None:
         with self._lock:
-            self._window.add(part, _time(message), self._row(part, message))
+            row, stamp = self._row(part, message), _stamp(message)
+            if stamp is None:
+                self._window.add_received(part, float(rospy.get_time()), row)
+            else:
+                self._window.add(part, stamp, row)
 
     def _row(self, part: str, message: Any) -> Any:
         if part == "battery":
@@ -169,10 +173,10 @@ def _missing(topics: dict[str, tuple[bool, str]]) -> str:
     return told
 
 
-def _time(message: Any) -> float:
-    """Return when a message was measured [s]: its stamp, or now where it has none."""
+def _stamp(message: Any) -> float | None:
+    """Return when a message was measured [s]; None where it does not say so."""
     header = getattr(message, "header", None)
-    return float(header.stamp.to_sec()) if header is not None and header.stamp else float(rospy.get_time())
+    return float(header.stamp.to_sec()) if header is not None and header.stamp else None
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -17,7 +17,9 @@ from std_msgs.msg import String
 from kurumaisu.ros.rotation import planar
 from kurumaisu.types import FloatArray
 
-PATIENCE = 20.0  # [s] of wall time for things that take a moment; longer is a failure
+PATIENCE = (
+    60.0  # [s] of wall time for things that take a moment: a busy machine may take a while, a fault takes for ever
+)
 
 
 def wait_for(condition: Callable[[], Any], what: str, patience: float = PATIENCE) -> Any:
@@ -52,10 +54,26 @@ class Topic:
         """The latest message, or None."""
         return self.messages[-1] if self.messages else None
 
-    def wait(self, condition: Callable[[Any], bool], what: str, patience: float = PATIENCE) -> Any:
-        """Return the first message from now on that meets the condition."""
-        start = len(self.messages)
+    @property
+    def is_published(self) -> bool:
+        """Whether anything that publishes it is connected: after the last one has gone, nothing is under way."""
+        return bool(self._subscriber.get_num_connections())
+
+    def wait(
+        self, condition: Callable[[Any], bool], what: str, patience: float = PATIENCE, since: int | None = None
+    ) -> Any:
+        """Return the first message that meets the condition, from now on or from so many messages on."""
+        start = len(self.messages) if since is None else since
         return wait_for(lambda: next((m for m in self.messages[start:] if condition(m)), None), what, patience)
+
+    def wait_last(self, condition: Callable[[Any], bool], what: str, patience: float = PATIENCE) -> Any:
+        """Return the latest message as soon as it meets the condition: of what is said only when it changes."""
+
+        def found() -> Any:
+            last = self.last
+            return last if last is not None and condition(last) else None
+
+        return wait_for(found, what, patience)
 
     def close(self) -> None:
         """Stop listening."""
@@ -84,6 +102,7 @@ class Commander:
 
     def __init__(self, topic: str) -> None:
         self.publisher = rospy.Publisher(topic, Twist, queue_size=1, tcp_nodelay=True)
+        self._lock = threading.Lock()
         self._twist: Twist | None = None
         self._repeater = _Repeater(0.02, self._publish)
 
@@ -104,8 +123,9 @@ class Commander:
         wait_for(lambda: active.last and active.last.data, "base_node to obey")
 
     def silence(self) -> None:
-        """Command nothing any more."""
-        self._twist = None
+        """Command nothing any more: when this returns, the last command has been published."""
+        with self._lock:
+            self._twist = None
 
     def close(self) -> None:
         """End the topic."""
@@ -113,9 +133,9 @@ class Commander:
         self.publisher.unregister()
 
     def _publish(self) -> None:
-        twist = self._twist
-        if twist is not None:
-            self.publisher.publish(twist)
+        with self._lock:
+            if self._twist is not None:
+                self.publisher.publish(self._twist)
 
 
 class Repeated:

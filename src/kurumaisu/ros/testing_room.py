@@ -109,6 +109,14 @@ class Room:
         for publisher in (self.clock, self.scan, self.tf):
             wait_for(partial(_heard, publisher, count), f"subscriber of {publisher.name}", 40.0)
 
+    def connections(self) -> list[set[Any]]:
+        """Return who hears the clock, scans, transforms and those that stay."""
+        return [set(p.impl.connections) for p in (self.clock, self.scan, self.tf, self._static.pub_tf)]
+
+    def wait_for_another(self, before: list[set[Any]]) -> None:
+        """Return when one more node hears all of it; to count would not do, as one that has gone is noticed late."""
+        wait_for(lambda: all(now - then for now, then in zip(self.connections(), before, strict=True)), "one more node")
+
     def begin_anew(self) -> None:
         """Set the clock back, and the odometry to where it starts."""
         self.begin -= 1000
