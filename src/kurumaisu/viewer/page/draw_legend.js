@@ -52,13 +52,14 @@ function bar(context, x, y, width, colors) {
 
 function scaleOfColors(context, x, y, {colors, options, scene}) {
   const error = options.scanColor === "error";
+  const high = error ? options.errorScale : strongest(scene.scans.values());
+  if (!high) return label(context, "no intensities are known", x, y + 24, colors);
   const steps = colors[options.scanColor];
   const step = COLORS / BUCKETS;
   steps.forEach((color, i) => {
     context.fillStyle = color;
     context.fillRect(x + i * step, y, step + 0.5, 8);
   });
-  const high = error ? options.errorScale : strongest(scene.scans.values());
   context.textAlign = "left";
   label(context, error ? "range − true range [m]" : "intensity", x, y - 2, colors);
   context.textBaseline = "top";
