@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -60,10 +60,17 @@ class Fans(Protocol):
 class ViewTopics:
     """Publishes at a rate of wall time, whatever the pace of the simulated one."""
 
-    def __init__(self, rate: float, frame: str, machinery: Callable[[], Machinery], fans: Fans) -> None:
-        """Advertise; rate [Hz] at most; machinery: tells what runs now."""
+    def __init__(
+        self,
+        rate: float,
+        frame: str,
+        machinery: Callable[[], Machinery],
+        fans: Fans,
+        drives: Callable[[], Mapping[int, str]],
+    ) -> None:
+        """Advertise; rate [Hz] at most; machinery: tells what runs now; drives: topics of commands by bodies' rows."""
         self._period, self._frame = 1 / rate, frame
-        self._machinery, self._fans = machinery, fans
+        self._machinery, self._fans, self._drives = machinery, fans, drives
         self._view = rospy.Publisher("~view", _View, queue_size=1, tcp_nodelay=True)
         self._world = rospy.Publisher("~world", String, queue_size=1, latch=True)
         self._known: Machinery | None = None
@@ -72,6 +79,9 @@ class ViewTopics:
         self._due = 0.0  # [s] of wall time
         self._late: deque[tuple[float, int]] = deque(maxlen=_OF_LATE)
         self._sent: Sequence[int] = ()  # stamps of the scans that were
+        self._looked = False  # somebody did, when last asked
+        self._stalled = b""  # as of the last step
+        self._contacts = np.zeros(0, dtype=np.uint32)
 
     @property
     def due(self) -> bool:
@@ -81,6 +91,7 @@ class ViewTopics:
         if self._view.get_num_connections():
             return True
         self._sent = ()  # who comes next wants the scans, too
+        self._looked = False
         return False
 
     def carried(self) -> None:
@@ -89,6 +100,8 @@ class ViewTopics:
 
     def show(self, now: int, paused: bool, speed: float) -> None:
         """Publish if a view is due and wanted; to be called after every step and change; now [ns] of /clock."""
+        if self._looked:
+            self._count_contacts()
         if not self.due:
             return
         wall = time.monotonic()
@@ -98,13 +111,24 @@ class ViewTopics:
         if machinery is not self._known:
             self._describe(machinery)
         self._due = wall + self._period
+        self._looked = True
         view = _View(world=self._number, run=self._run, paused=paused, speed=speed)
         view.header.stamp, view.header.frame_id = stamp_of(now), self._frame
         view.real_time_factor = 0.0 if paused else self._factor(wall, now)
         view.poses = np.ascontiguousarray(machinery.frames[:-1, PLANAR]).reshape(-1)
         view.hit = machinery.stalled.tobytes()
+        view.contacts = self._contacts.copy()  # another thread may be sending it
         self._add_scans(view)
         self._view.publish(view)
+
+    def _count_contacts(self) -> None:
+        """Note what has begun in a step; in most nothing has, and bytes compare fastest."""
+        stalled = self._machinery().stalled
+        if (said := stalled.tobytes()) != self._stalled:
+            before = np.frombuffer(self._stalled, np.bool_)
+            if len(before) == len(stalled) == len(self._contacts):
+                self._contacts += stalled & ~before
+            self._stalled = said
 
     def _factor(self, wall: float, now: int) -> float:
         if self._late and (now < self._late[-1][1] or wall - self._late[-1][0] > 1.0):
@@ -132,11 +156,14 @@ class ViewTopics:
         self._known = machinery
         self._number += 1
         self._sent = ()
+        self._stalled = machinery.stalled.tobytes()
+        self._contacts = np.zeros(len(machinery.stalled), dtype=np.uint32)
         pieces = scenery(machinery)
+        drives = self._drives()
         content = {
             "world": self._number,
             "bounds": bounds(pieces),
-            "bodies": [_described(piece) for piece in pieces],
+            "bodies": [{**_described(piece), "drive": drives.get(piece.row)} for piece in pieces],
             "fans": self._fans.places(machinery),
         }
         self._world.publish(json.dumps(content))
