@@ -17,7 +17,8 @@ from kurumaisu.viewer.server import Server
 
 def main() -> None:
     """Run the node; exit with 1 and one line for bad configuration or a port that is taken."""
-    rospy.init_node("viewer_node")
+    # rostime stays off: it would hear every /clock of a simulator, though nobody looks
+    rospy.init_node("viewer_node", disable_rostime=True)
     try:
         settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
         hub = Hub()

@@ -13,7 +13,7 @@ from pathlib import Path
 from aiohttp import web
 
 from kurumaisu.errors import Error
-from kurumaisu.viewer import access, report
+from kurumaisu.viewer import access, files, report
 from kurumaisu.viewer.access import Keys
 from kurumaisu.viewer.client import URGENT, Client
 from kurumaisu.viewer.hub import Hub
@@ -21,13 +21,6 @@ from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
 
 PAGE = Path(__file__).with_name("page")
-_TYPES = {
-    ".html": "text/html",
-    ".css": "text/css",
-    ".js": "text/javascript",
-    ".svg": "image/svg+xml",
-    ".png": "image/png",
-}
 _NAME = re.compile(r"[\w-]+(\.[\w-]+)*")
 _WORKERS = 8  # commands that are under way at a time, of all clients, beside the urgent ones
 _PATIENCE = 5.0  # [s] for the loop to begin, and to end
@@ -125,14 +118,14 @@ class Server:
                 response.headers.setdefault(name, value)
         return response
 
-    async def _index(self, _request: web.Request) -> web.StreamResponse:
-        return _served(PAGE / "index.html")
+    async def _index(self, request: web.Request) -> web.StreamResponse:
+        return files.served(request, PAGE / "index.html")
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["name"]
         if not _NAME.fullmatch(name):  # it may hold encoded slashes
             raise web.HTTPNotFound
-        return _served(PAGE / name)
+        return files.served(request, PAGE / name)
 
     async def _map(self, request: web.Request) -> web.StreamResponse:
         png = self._hub.maps.get(int(request.match_info["number"]))
@@ -161,13 +154,3 @@ class Server:
             self._open.discard(client)
             if not self._open:
                 self._source.watch(False)
-
-
-def _served(path: Path) -> web.Response:
-    """Return a small file, of a kind that pages are made of."""
-    kind = _TYPES.get(path.suffix)
-    if kind is None or not path.is_file():
-        raise web.HTTPNotFound
-    return web.Response(
-        body=path.read_bytes(), content_type=kind, charset="utf-8" if kind.startswith("text/") else None
-    )
