@@ -33,7 +33,15 @@ def main() -> None:
         # Who reaches this service can publish commands, too: nothing is given away.
         return TriggerResponse(settings.control, server.new_address() if settings.control else server.address)
 
-    service = rospy.Service("~new_token", Trigger, new_token)
+    def clients(_request: TriggerRequest) -> TriggerResponse:
+        accounts, stalled = server.accounts()
+        lines = [
+            f"{one.address}: {one.seconds:.0f} s, {one.shown} frames, {one.missed} more were left out as it was slow"
+            for one in accounts
+        ]
+        return TriggerResponse(True, "\n".join([*lines, f"cut off so far, as they took nothing: {stalled}"]))
+
+    services = [rospy.Service("~new_token", Trigger, new_token), rospy.Service("~clients", Trigger, clients)]
     # to the terminal only, for the log and /rosout are read by others
     if settings.control:
         print(f"viewer, with control, good once: {server.new_address()}")
@@ -41,6 +49,7 @@ def main() -> None:
     try:
         source.run(settings.server.rate)
     finally:
-        service.shutdown()
+        for service in services:
+            service.shutdown()
         source.close()
         server.close()

@@ -15,7 +15,7 @@ from aiohttp import web
 from kurumaisu.errors import Error
 from kurumaisu.viewer import access, files, report
 from kurumaisu.viewer.access import Keys
-from kurumaisu.viewer.client import URGENT, Client
+from kurumaisu.viewer.client import URGENT, Account, Client
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
@@ -44,6 +44,7 @@ class Server:
         self._workers = {name: ThreadPoolExecutor(1, f"viewer_{name}") for name in URGENT}
         self._workers[""] = ThreadPoolExecutor(_WORKERS, "viewer_command")
         self._open: set[Client] = set()
+        self._stalled = 0
         self._runner: web.AppRunner | None = None
         self._port = 0
         self.reports: Mapping[str, Path] = {}  # files below /report/, by name
@@ -72,6 +73,14 @@ class Server:
         if not self._control:
             raise Error("this viewer only shows: it was not started with control")
         return f"{self.address}#token={self._keys.new_token()}"
+
+    def accounts(self) -> tuple[list[Account], int]:
+        """Return what each client has had, and how many others were cut off as they took nothing."""
+        return asyncio.run_coroutine_threadsafe(self._account(), self._loop).result(_PATIENCE)
+
+    async def _account(self) -> tuple[list[Account], int]:
+        known = [account for client in self._open if (account := client.account()) is not None]
+        return sorted(known, key=lambda account: -account.seconds), self._stalled
 
     async def _begin(self) -> None:
         app = web.Application(middlewares=[self._guard])
@@ -152,5 +161,6 @@ class Server:
             return await client.serve(request)
         finally:
             self._open.discard(client)
+            self._stalled += client.stalled
             if not self._open:
                 self._source.watch(False)
