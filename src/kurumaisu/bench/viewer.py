@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import math
 import os
 import statistics
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -24,6 +27,7 @@ from kurumaisu.bench.viewer_page import Page
 from kurumaisu.bench.viewer_rig import Rig, rig_of
 
 _LIMIT = 1.05
+_RATE = 30  # [1/s] views
 _NOBODY, _ONE, _TEN, _DEAD = "nobody looks", "one page", "ten pages, one hangs", "one page, viewer hangs"
 _PHASES = {"stageros": (_ONE, _TEN, _DEAD), "sim_node": (_ONE,)}
 _PAGES = {_NOBODY: 0, _ONE: 1, _TEN: 10, _DEAD: 1}
@@ -55,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             dearer |= _costs(rig, simulator, options)
             if options.soak and simulator == "stageros":
                 _soak(rig, options.soak)
+        _clock(simulator, options.robots, options.seconds * options.repeats)
     return int(dearer)
 
 
@@ -84,6 +89,24 @@ def _costs(rig: Rig, simulator: str, options: argparse.Namespace) -> bool:
         )
     _print(simulator, runs, ratios)
     return statistics.median(cpu for cpu, _ in ratios[_ONE]) >= _LIMIT
+
+
+def _clock(simulator: str, robots: int, seconds: float) -> None:
+    """Print what the thread that simulates does for one page, by its own clock."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "clock.json"
+        with rig_of(simulator, robots, file) as rig:
+            rig.look(1)
+            time.sleep(seconds)
+        frames, in_frames, calls, in_calls, passed = json.loads(file.read_text())
+    print(
+        f"\n{simulator}, by the clock of the thread that simulates: {1e6 * in_frames / frames:.0f} us for a view, "
+        f"{100 * _RATE * in_frames / frames:.2f} % of a core at {_RATE:g} a second; "
+        f"{1e6 * in_calls / calls:.1f} us to see that none is due (with the clock).\n"
+        f"Here {frames / passed:.0f} views in a second of its CPU time: {100 * in_frames / passed:.2f} % and "
+        f"{100 * in_calls / passed:.2f} % of that",
+        flush=True,
+    )
 
 
 def _print(simulator: str, runs: dict[str, list[_Cost]], ratios: dict[str, list[tuple[float, float]]]) -> None:

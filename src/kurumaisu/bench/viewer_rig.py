@@ -24,8 +24,7 @@ from kurumaisu.bench.viewer_page import Page
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 
-_STAGEROS = "from kurumaisu.ros.stageros import main; main()"
-_SIM_NODE = "from kurumaisu.ros.sim_node import main; main()"
+_NODE = "from kurumaisu.ros.{} import main; main()"
 _VIEWER = "from kurumaisu.ros.viewer_node import main; main()"
 _SETTLE = 0.5  # [s] after pages have come or gone
 # One process for all that is asked of the nodes: starting one takes longer than some thousand steps. With seconds it
@@ -102,23 +101,30 @@ class Rig:
 
 
 @contextlib.contextmanager
-def rig_of(simulator: str, robots: int) -> Iterator[Rig]:
-    """Run a simulator flat out: stageros with so many robots, or sim_node with the chair; and its viewer."""
+def rig_of(simulator: str, robots: int, clocked: Path | None = None) -> Iterator[Rig]:
+    """Run a simulator flat out: stageros with so many robots, or sim_node with the chair; and its viewer.
+
+    clocked: where the simulator is to leave what its thread did for the viewer, when it ends.
+    """
     with tempfile.TemporaryDirectory() as folder, master() as environment:
         if simulator == "stageros":
             world = Path(folder) / "bench.world"
             world.write_text(world_of(robots, None))
-            command, services = [sys.executable, "-c", _STAGEROS, "-g", str(world)], "/stageros/"
+            arguments, services = ["-g", str(world)], "/stageros/"
         else:
-            command, services = [sys.executable, "-c", _SIM_NODE], "/"
+            arguments, services = [], "/"
+        program = ["-c", _NODE.format(simulator)]
+        if clocked is not None:
+            program = ["-m", "kurumaisu.bench.viewer_thread", simulator, str(clocked)]
+        command = [sys.executable, *program, *arguments]
         viewer = [sys.executable, "-c", _VIEWER]
         parameters = Path(folder) / "parameters.yaml"
         parameters.write_text(yaml.safe_dump({"sim_node": _chair(), "viewer_node": _viewer(simulator)}))
         subprocess.run(["rosparam", "load", str(parameters)], env=environment, check=True)
         with running(command, environment=environment) as one, running(viewer, environment=environment) as other:
-            program = _ASK.format(pause=f"{services}pause", simulator=one.pid, viewer=other.pid, patience=PATIENCE)
+            questions = _ASK.format(pause=f"{services}pause", simulator=one.pid, viewer=other.pid, patience=PATIENCE)
             with subprocess.Popen(
-                [sys.executable, "-c", program],
+                [sys.executable, "-c", questions],
                 env=environment,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
