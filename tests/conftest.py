@@ -19,3 +19,38 @@ def browser():
         one = open_browser(playwright)
         yield one
         one.close()
+
+
+@pytest.fixture
+def shown():
+    """What the viewer's page is to show: a rig that is paused, behind a server."""
+    from viewer_page_rig import Shown
+
+    with Shown() as one:
+        one.rig.paused = True
+        yield one
+
+
+@pytest.fixture
+def visit(browser, shown):
+    """A page that may command it."""
+    from playwright.sync_api import expect
+    from viewer_page_rig import Visit
+
+    with Visit(browser, shown.link) as one:
+        expect(one.page.locator("#drive")).to_be_enabled()
+        yield one
+
+
+@pytest.fixture
+def two_runs(tmp_path):
+    """A recording of two drives in a room."""
+    from view_rig import LASER, ROOM, drive, meta
+
+    from kurumaisu.critic.write_csv import write_csv_run
+
+    (tmp_path / "room.world").write_text(ROOM)
+    meta(tmp_path, world="room.world", laser=LASER)
+    for run in (drive("early", 10.0), drive("late", 5000.0)):
+        write_csv_run(tmp_path / run.name, run)
+    return tmp_path

@@ -76,7 +76,7 @@ class Rig:
         self.simulator = Simulator(world, options)
         self.simulator.reset(1)
         self.fans = FleetFans(self.simulator)
-        self.topics = ViewTopics(10.0, "map", lambda: self.simulator.machinery, self.fans)
+        self.topics = ViewTopics(10.0, "map", lambda: self.simulator.machinery, self.fans, lambda: {0: "/cmd_vel"})
         self.number = 0
 
     def _publisher(self, name, *_, **__):

@@ -42,11 +42,13 @@ def test_as_genpy_has_it(frame, shape):
         wire.pace(True, 2.5, 1.25)
         wire.poses[:] = poses
         wire.hit[:] = 1
+        wire.contacts[:] = np.arange(shape.bodies) + 1000
         wire.fill(looks)
 
     view = View(world=5, run=6, paused=True, speed=2.5, real_time_factor=1.25)
     view.header.seq, view.header.stamp, view.header.frame_id = 8, rospy.Time(12, 34), frame
     view.poses, view.hit = poses.ravel().tolist(), bytes([1] * shape.bodies)
+    view.contacts = [1000 + i for i in range(shape.bodies)]
     view.stamps = [rospy.Time(i + 4, 5) for i in range(shape.fans)]
     view.sensors = looks.poses.ravel().tolist()
     view.ranges, view.intensities = looks.ranges.tolist(), looks.intensities.tolist()

@@ -82,6 +82,9 @@ def get(running, path, **headers):
             "finite",
         ),
         ('{"type": "command", "id": 1, "name": "set_pose", "body": "", "x": 0, "y": 0, "yaw": 0}', "1 to 200"),
+        ('{"type": "command", "id": 1, "name": "drive", "v": 0, "w": 0, "body": 3}', "body must be a text"),
+        ('{"type": "command", "id": 1, "name": "drive", "v": 0, "body": "1"}', "w is missing"),
+        ('{"type": "command", "id": 1, "name": "pause", "on": true, "body": "1"}', "has no 'body'"),
     ],
 )
 def test_nonsense_is_answered_and_nothing_is_done(driver, running, text, words):
@@ -273,7 +276,7 @@ def test_a_stalled_client_is_cut_off_and_the_others_go_on():
         deadline = time.monotonic() + 20.0
         while running.hub.clients == 2:
             assert time.monotonic() < deadline
-            running.hub.state(protocol.State(t=0.0, wall=0.0), dict.fromkeys(range(5), big))
+            running.hub.state(protocol.State(t=0.0, wall=0.0), dict.fromkeys([(i, 0) for i in range(5)], big))
             time.sleep(0.01)
         assert running.hub.dropped > 0
         other.wait(lambda: running.server.accounts()[1] == 1, "the server to have counted it")
@@ -292,7 +295,7 @@ def test_a_slow_client_gets_the_newest_and_memory_is_bounded():
     hub = Hub()
     mailbox = hub.join(lambda: None)
     for t in range(1000):
-        hub.state(protocol.State(t=float(t), wall=0.0), {0: protocol.Fan((0, 0, 0), 0, 1, 0, 1, np.ones(10))})
+        hub.state(protocol.State(t=float(t), wall=0.0), {(0, 0): protocol.Fan((0, 0, 0), 0, 1, 0, 1, np.ones(10))})
     waiting = mailbox.take()
     assert len(waiting) == 2
     assert json.loads(waiting[0])["t"] == 999.0
@@ -307,7 +310,7 @@ def test_a_slow_client_gets_the_newest_and_memory_is_bounded():
 def test_scans_of_another_world_are_forgotten():
     hub = Hub()
     mailbox = hub.join(lambda: None)
-    hub.state(protocol.State(t=0.0, wall=0.0), {3: protocol.Fan((0, 0, 0), 0, 1, 0, 1, np.ones(10))})
+    hub.state(protocol.State(t=0.0, wall=0.0), {(3, 1): protocol.Fan((0, 0, 0), 0, 1, 0, 1, np.ones(10))})
     hub.world(protocol.World((), None))
     assert [type(message) for message in mailbox.take()] == [str, str]
     late = hub.join(lambda: None)
@@ -393,7 +396,7 @@ def test_numbers_that_are_none_become_null():
     assert content["t"] is None
     assert content["poses"]["1"] == [0.5, None, 0]
     with pytest.raises(ValueError, match="equally long"):
-        protocol.scan(protocol.Fan((0, 0, 0), 0, 1, 0, 1, [1.0], error=[1.0, 2.0]), 0)
+        protocol.scan(protocol.Fan((0, 0, 0), 0, 1, 0, 1, [1.0], error=[1.0, 2.0]), (0, 0))
     with pytest.raises(ValueError, match="room for 65535"):
-        protocol.scan(protocol.Fan((0, 0, 0), 0, 1, 0, 1, np.ones(70_000)), 0)
+        protocol.scan(protocol.Fan((0, 0, 0), 0, 1, 0, 1, np.ones(70_000)), (0, 0))
     assert len(protocol.particles(np.zeros((200_000, 3)))) < 8 + 12 * 65_536

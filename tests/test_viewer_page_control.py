@@ -5,23 +5,9 @@ import math
 
 import pytest
 from playwright.sync_api import expect
-from viewer_page_rig import Shown, Visit, until
+from viewer_page_rig import until
 
 BOX = (-1.0, 1.0)  # where the rig's box stands
-
-
-@pytest.fixture
-def shown():
-    with Shown() as one:
-        one.rig.paused = True
-        yield one
-
-
-@pytest.fixture
-def visit(browser, shown):
-    with Visit(browser, shown.link) as one:
-        expect(one.page.locator("#drive")).to_be_enabled()
-        yield one
 
 
 def drag(visit, start, end, release=True):

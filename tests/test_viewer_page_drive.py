@@ -6,27 +6,13 @@ import threading
 
 import pytest
 from playwright.sync_api import expect
-from viewer_page_rig import Shown, Visit, until
+from viewer_page_rig import Visit, until
 
 from kurumaisu.viewer import Outcome
 
 PHONE = {"viewport": {"width": 390, "height": 780}, "has_touch": True, "is_mobile": True}
 BOX = (-1.0, 1.0)  # where the rig's box stands
 LIMIT = 0.5  # [m/s] of the rig; the page begins with half of it
-
-
-@pytest.fixture
-def shown():
-    with Shown() as one:
-        one.rig.paused = True
-        yield one
-
-
-@pytest.fixture
-def visit(browser, shown):
-    with Visit(browser, shown.link) as one:
-        expect(one.page.locator("#drive")).to_be_enabled()
-        yield one
 
 
 @pytest.fixture

@@ -84,7 +84,7 @@ def test_a_map_lies_where_its_origin_and_resolution_say(browser):
 def test_binary_messages_are_read_as_they_were_written(browser, shown):
     ranges = np.array([np.nan, np.inf, 0.02, 4.095], "f4")
     fan = Fan((1.0, 2.0, 3.0), -2.0, 0.1, 0.0625, 4.0, ranges, None, np.arange(4.0))
-    packed = [protocol.scan(fan, 7), protocol.scan(fan, None), protocol.particles([(1.0, 2.0, 0.5)])]
+    packed = [protocol.scan(fan, (7, 2)), protocol.scan(fan, (-1, 0)), protocol.particles([(1.0, 2.0, 0.5)])]
     with Visit(browser, shown.server.address) as visit:
         scan, nobody, cloud = visit.page.evaluate(
             """async (texts) => {
@@ -96,9 +96,10 @@ def test_binary_messages_are_read_as_they_were_written(browser, shown):
             }""",
             [base64.b64encode(one).decode() for one in packed],
         )
-    assert [scan[key] for key in ("kind", "body", "count", "x", "yaw", "rangeMin", "rangeMax")] == [
+    assert [scan[key] for key in ("kind", "body", "ranger", "count", "x", "yaw", "rangeMin", "rangeMax")] == [
         "scan",
         7,
+        2,
         4,
         1,
         3,

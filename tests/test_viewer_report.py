@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """From a point of the critic's report to its moment in the recording, in a real browser; and without any server."""
 
+import base64
+import hashlib
 import re
 from dataclasses import replace
 
@@ -8,7 +10,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 from stories import full_story, full_verdict
-from test_viewer_recording import LASER, ROOM, drive, meta
+from view_rig import LASER, ROOM, drive, meta
 from viewer_page_rig import Visit, until
 from viewer_rig import viewer_settings
 
@@ -16,6 +18,7 @@ from kurumaisu.critic.report import write_report
 from kurumaisu.critic.story import Moments, Overlay
 from kurumaisu.critic.view import opened
 from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.viewer import report
 
 NAMES = ("early", 'late, "again" & <b>more')  # what a folder may be called
 
@@ -90,6 +93,30 @@ def test_a_point_of_the_report_leads_to_its_moment_and_place(browser, served):
         assert complaints == []
 
 
+def test_a_report_in_a_tab_of_its_own_leads_to_the_viewers_tab(browser, served):
+    """Nobody opened it, so no window is known to it by name; a bookmark, or an address that was typed."""
+    with Visit(browser, served.address) as visit:
+        expect(visit.page.locator("#scrubber")).to_be_enabled()
+        page = visit.context.new_page()
+        page.goto(f"{served.server.address}report/report.html")
+        page.get_by_text("furthest off, in the viewer").click()
+        page.locator("figure a", has_text="t = 5010.00 s").click()
+        expect(page.get_by_role("status")).to_contain_text("t = 5010.00 s")
+        expect(page.get_by_role("status")).to_contain_text("shown in the viewer's tab")
+        until(lambda: playback(served).t == pytest.approx(5010.0), "its moment is shown")
+        assert len(visit.context.pages) == 2
+
+
+def test_a_report_says_why_the_viewers_tab_does_not_go_there(browser, served):
+    with Visit(browser, served.server.address) as visit:  # without a token
+        page = visit.context.new_page()
+        page.goto(f"{served.server.address}report/report.html")
+        page.get_by_text("furthest off, in the viewer").click()
+        page.locator("figure a", has_text="t = 5010.00 s").click()
+        expect(page.get_by_role("status")).to_contain_text("the link that the viewer printed")
+        assert playback(served).run == NAMES[0]
+
+
 def test_the_furthest_off_are_listed_and_marked_in_the_viewer(browser, served):
     with Visit(browser, served.address) as visit:
         page = visit.page
@@ -154,3 +181,17 @@ def test_what_the_report_serves_is_that_file_only(browser, served):
     assert answer.status == 200
     assert "'unsafe-inline'" not in re.search(r"script-src[^;]*", answer.headers["content-security-policy"])[0]
     context.close()
+
+
+def test_a_report_is_served_with_our_script_and_no_other():
+    evil = (
+        b"<html><head><style>a{}</style></head><body><style type='x'>b{}</style><script>alert(1)</script></body></html>"
+    )
+    body, headers = report.page(evil)
+    policy = dict(part.split(" ", 1) for part in headers["Content-Security-Policy"].split("; "))
+    assert policy["default-src"] == "'none'"
+    assert policy["script-src"] == "'self'"  # so the inline one does not run
+    for sheet in (b"a{}", b"b{}"):
+        assert base64.b64encode(hashlib.sha256(sheet).digest()).decode() in policy["style-src-elem"]
+    assert body.count(b'<script type="module" src="../page/report.js"></script>') == 1
+    assert body.index(b"report.js") < body.index(b"</body>")

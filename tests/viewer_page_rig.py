@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 from playwright.sync_api import expect
-from viewer_rig import BEAMS, HALF, Rig, room_ranges, viewer_settings, world
+from viewer_rig import BEAMS, CHAIR, HALF, Rig, room_ranges, viewer_settings, world
 
 from kurumaisu import effects
 from kurumaisu.errors import Error
@@ -51,14 +51,18 @@ def catalogue(acting):
 
 
 def crowd(count):
-    """Return a world of many robots, some people and things, one of them with a name that wants to be HTML."""
+    """Return a world of many robots, some people and things, one of them with a name that wants to be HTML.
+
+    With some robots, each of them can be driven, and the chair, too.
+    """
     chair = ((0.5, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.5, -0.3))
     octagon = tuple((0.25 * math.cos(a), 0.25 * math.sin(a)) for a in np.arange(8) * math.pi / 4)
     colors = ("#334d99", "#b06030", "#3d8060", "#806090")
-    robots = [Body(f"r{i}", f"robot {i}", "robot", colors[i % 4], True, (chair,)) for i in range(count)]
+    robots = [Body(f"r{i}", f"robot {i}", "robot", colors[i % 4], True, (chair,), drivable=True) for i in range(count)]
     bad = Body("bad", HOSTILE, "obstacle", "red;}", True, (octagon,))
     person = Body("person", "person 1", "person", "#806090", True, (octagon,))
-    return World((*world().bodies, bad, person, *robots), world().bounds)
+    others = [replace(body, drivable=count > 0 and body.kind == "robot") for body in world().bodies]
+    return World((*others, bad, person, *robots), world().bounds)
 
 
 class PageHub(Hub):
@@ -76,6 +80,8 @@ class PageRig(Rig):
     def __init__(self, hub, robots=0, **others):
         self.acting = {}
         self.robots = robots
+        self.contacts = {}
+        self.rear = None  # [m] that a second ranger of the chair, which looks back, sees everywhere
         self.playback = Playback(100.0, 100.0 + LONG, 100.0, 1.0, False) if others.get("mode") == "bag" else None
         super().__init__(hub, **others)
         hub.rig = self
@@ -113,11 +119,17 @@ class PageRig(Rig):
 
     def dressed(self, state):
         """Return the moment with a playback and a note that wants to be HTML."""
-        return replace(state, playback=self.playback, notes=(Note("warning", f"MADE_UP {HOSTILE}"),))
+        return replace(
+            state, playback=self.playback, contacts=dict(self.contacts), notes=(Note("warning", f"MADE_UP {HOSTILE}"),)
+        )
 
     def more_scans(self):
-        """Return a scan of each robot of the crowd, by its place in the world."""
-        return {5 + i: self._scan(self.poses[f"r{i}"]) for i in range(self.robots)}
+        """Return a scan of each robot of the crowd, and the chair's second one."""
+        scans = {(5 + i, 0): self._scan(self.poses[f"r{i}"]) for i in range(self.robots)}
+        if self.rear is not None:
+            x, y, yaw = self.poses["1"]
+            scans[CHAIR, 1] = Fan((x, y, yaw + math.pi), -0.5, 1.0 / 50, 0.1, 8.0, np.full(51, self.rear))
+        return scans
 
     def _scan(self, pose):
         bearings = np.linspace(-2.0943951, 2.0862138, BEAMS)

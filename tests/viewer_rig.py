@@ -163,6 +163,7 @@ class Rig:
             t=self.t,
             wall=time.time(),
             rtf=0.0 if self.paused else self.speed,
+            speed=self.speed,
             paused=self.paused,
             poses=dict(self.poses),
             hit=("2",) if self.estop else (),
@@ -177,7 +178,7 @@ class Rig:
             recording=self.recording,
             notes=(Note("warning", "MADE_UP <script>alert(1)</script>"),),
         )
-        self.hub.state(state, {CHAIR: fan})
+        self.hub.state(state, {(CHAIR, 0): fan})
         self.hub.particles(np.column_stack([self._noise.normal((x, y), 0.05, (200, 2)), np.full(200, yaw)]))
 
 

@@ -110,7 +110,8 @@ class ViewerTest(unittest.TestCase):
         assert 0.5 < np.nanmin(ranges[300:380]) < 2.0  # the laser sees it
         self.do("set_pose", body=self.body("wall"), x=-4.0, y=1.0, yaw=0.0)  # stands: others are built around it
         assert self.pose("wall", lambda pose: pose[0] < -3.5) == pytest.approx([-4.0, 1.0, 0.0], abs=1e-3)
-        assert "does not fit" in self.refused("set_pose", body=self.body("chair"), x=-4.0, y=1.0, yaw=0.0)
+        refusal = self.refused("set_pose", body=self.body("chair"), x=-4.0, y=1.0, yaw=0.0)
+        assert refusal.startswith("chair: does not fit")  # by its name, not by its id
         assert "no body" in self.refused("set_pose", body="moon", x=0.0, y=0.0, yaw=0.0)
         assert "within" in self.refused("set_pose", body=self.body("box"), x=1e300, y=0.0, yaw=0.0)
         self.page.send(
@@ -133,6 +134,14 @@ class ViewerTest(unittest.TestCase):
         time.sleep(0.3)
         assert len(topic.messages) == count  # silent: others may drive
         topic.close()
+
+    def test_another_robot_is_driven_by_its_own_topic(self):
+        deadline = time.monotonic() + PATIENCE
+        start, chair = self.pose("other robot"), self.pose("chair")
+        while np.hypot(*np.subtract(self.pose("other robot")[:2], start[:2])) < 0.2:
+            assert time.monotonic() < deadline, "it does not drive"
+            self.page.say(type="command", id=0, name="drive", v=0.5, w=0.0, body=self.body("other robot"))
+        assert np.hypot(*np.subtract(self.pose("chair")[:2], chair[:2])) < 0.01
 
     def test_estop_holds_until_it_is_released(self):
         self.do("estop", on=True)

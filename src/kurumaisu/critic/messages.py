@@ -58,7 +58,8 @@ def _yaw(q: Any) -> float:
     return math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
 
 
-def _scan(message: Any) -> tuple[Fan, Any]:
+def _scan(message: Any) -> tuple[Fan, Any, Any]:
+    """Return the fan, its ranges, and its intensities, None where there is not one for each."""
     ranges = np.round(np.asarray(message.ranges, dtype=np.float64), RANGE_DECIMALS)
     # REP 117 for drivers that predate it: below the limit there is no reading, above it no return.
     ranges[(ranges < round(message.range_min, RANGE_DECIMALS)) | (ranges <= 0)] = np.nan
@@ -66,7 +67,8 @@ def _scan(message: Any) -> tuple[Fan, Any]:
         ranges[ranges > round(message.range_max, RANGE_DECIMALS)] = np.inf
     numbers = (message.angle_min, message.angle_increment, message.time_increment, message.scan_time)
     angle_min, increment, time_increment, scan_time = (float(number) for number in numbers)
-    return Fan(angle_min, increment, len(ranges), time_increment, scan_time), ranges
+    intensities = message.intensities if len(message.intensities) == len(ranges) else None
+    return Fan(angle_min, increment, len(ranges), time_increment, scan_time), ranges, intensities
 
 
 def _numbers(message: Any, main: str) -> dict[str, float]:

@@ -28,17 +28,16 @@ TOPICS = {
 }
 SCRIPTED = "/experiment_vel"  # the command where there is no cmd_vel: critic experiment's
 PARTS = messages.PARTS
+PutAside = Callable[[FloatArray, FloatArray | None], int]
 # Stamps and times of receipt further apart than this do not come from one clock [s].
 CLOCK_TOLERANCE = 1.0
 
 
-def read_bag_run(
-    path: Path, topics: dict[str, str], faults: Faults, put_aside: Callable[[FloatArray], int] | None = None
-) -> Run:
+def read_bag_run(path: Path, topics: dict[str, str], faults: Faults, put_aside: PutAside | None = None) -> Run:
     """Read the topics of a bag. topics: from meta.yaml, by default name or by name of a covariate.
 
-    put_aside: takes the ranges of each scan and returns their number, which the run's scan then has for its only
-    column; None: it has the ranges.
+    put_aside: takes the ranges and the intensities of each scan and returns their number, which the run's scan then has
+    for its only column; None: it has the ranges.
     A message's time is its header's stamp, or where it has none, when the bag received it.
     Raise Error naming file, topic and type for what cannot be read.
     """
@@ -46,8 +45,12 @@ def read_bag_run(
     shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
     if shared:
         raise Error(f"topics: {shared[0]} is given to two parts of a run")
-    instead = {} if put_aside is None else {"scan": lambda row: (row[0], np.array([put_aside(row[1])]))}
-    found = read_topics(path, {topic: part for part, topic in wanted.items()}, instead)
+
+    def kept(row: tuple[Fan, FloatArray, FloatArray | None]) -> tuple[Fan, FloatArray]:
+        fan, ranges, intensities = row
+        return fan, ranges if put_aside is None else np.array([put_aside(ranges, intensities)], dtype=np.float64)
+
+    found = read_topics(path, {topic: part for part, topic in wanted.items()}, {"scan": kept})
     if "command" not in found:
         found |= read_topics(path, {SCRIPTED: "command"})
     for part in sorted(set(_parts(topics)) - set(found)):

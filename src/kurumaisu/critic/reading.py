@@ -3,20 +3,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from kurumaisu.critic.checks import check_run, usable
 from kurumaisu.critic.clean import Faults
 from kurumaisu.critic.meta import Meta, read_meta
-from kurumaisu.critic.read_bag import read_bag_run, resolve
+from kurumaisu.critic.read_bag import PutAside, read_bag_run, resolve
 from kurumaisu.critic.read_csv import QUERY, is_csv_run, read_csv_run, read_queries
 from kurumaisu.critic.read_rawlog import is_rawlog, rawlog_name, read_rawlog_run
 from kurumaisu.critic.recording import LaserMount, Recording, Run
 from kurumaisu.critic.selection import matching
 from kurumaisu.errors import Error
-from kurumaisu.types import FloatArray
 
 
 def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
@@ -83,7 +82,7 @@ def sources(path: Path) -> list[Path]:
 
 
 def read_run(
-    source: Path, meta: Meta, faults: Faults, put_aside: Callable[[FloatArray], int] | None = None
+    source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None = None
 ) -> tuple[Run, LaserMount | None]:
     """Return a run, and the laser's mounting where the file itself states it; put_aside: of a bag, as read_bag_run."""
     if source.is_dir():

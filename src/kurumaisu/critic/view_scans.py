@@ -39,7 +39,8 @@ class Scans:
         base = (0.0, 0.0, 0.0) if self.path is None else self.path.at(t)
         if base is None:
             return _NOWHERE
-        ranges = np.asarray(self.spool.get(int(self.series.values[number, 0])), dtype=np.float64)
+        read, intensities = self.spool.get(int(self.series.values[number, 0]))
+        ranges = np.asarray(read, dtype=np.float64)
         x, y, yaw = geometry.compose(np.array(base), mount).tolist()
         error = None if self.rays is None or self.path is None else ranges - self._true(t, mount, self.path, self.rays)
         return Fan(
@@ -50,6 +51,7 @@ class Scans:
             range_max=laser.range_max,
             ranges=ranges,
             error=None if error is None else np.where(np.isfinite(error), error, np.nan),
+            intensities=intensities,
         )
 
     def _true(self, t: float, mount: FloatArray, path: Track, rays: Rays) -> FloatArray:

@@ -115,7 +115,7 @@ class Showing:
             return None
         spool = self._album.spools[run.name]
         laser = laser_of(self._laser, self._mount, [run])
-        beams = len(spool.get(int(run.scan.values[0, 0])))
+        beams = len(spool.get(int(run.scan.values[0, 0]))[0])
         if beams != laser.beams:
             said = (
                 f"{run.name}: scans of {beams} beams are not shown: the laser has {laser.beams}; say laser in meta.yaml"

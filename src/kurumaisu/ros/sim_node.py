@@ -52,15 +52,19 @@ class SimNode:
         self._topics = SimTopics(settings, self._laser, self._simulator.robot, self._now)
         self._voltages = rospy.Subscriber("voltages", Voltages, self._hear, queue_size=100)
         self._commands: deque[tuple[str, Twist]] = deque()  # heard since the last step, for other robots
-        self._others = [
-            rospy.Subscriber(f"{re.sub(r'[^A-Za-z0-9_]', '_', name)}/cmd_vel", Twist, partial(self._command, name))
+        self._others = {
+            name: rospy.Subscriber(
+                f"{re.sub(r'[^A-Za-z0-9_]', '_', name)}/cmd_vel", Twist, partial(self._command, name)
+            )
             for name in self._simulator.others
-        ]
+        }
         self._requests = Requests()
         self._pacer = Pacer(settings.speed)
         self._services = Services(self, self._requests, self._pacer, "")
         self._fan = ChairFan(settings.model.laser, lambda: self._simulator.row)
-        self._view = ViewTopics(settings.view_rate, settings.map_frame, lambda: self._simulator.machinery, self._fan)
+        self._view = ViewTopics(
+            settings.view_rate, settings.map_frame, lambda: self._simulator.machinery, self._fan, self._drives
+        )
         self._effects = LiveEffects(settings.model.effects, self._switch)
 
     @property
@@ -130,6 +134,12 @@ class SimNode:
     def _switch(self, settings: tuple[EffectSetting, ...]) -> None:
         """Let other effects act from the next step on, asked by another thread."""
         self._requests.ask(partial(self._simulator.switch, settings))
+
+    def _drives(self) -> dict[int, str]:
+        """Return the topics that other robots are driven by; the chair has a controller of its own."""
+        machinery = self._simulator.machinery
+        rows = zip(machinery.robot_rows.tolist(), machinery.robots, strict=True)
+        return {row: self._others[robot.name].resolved_name for row, robot in rows if robot.name in self._others}
 
     def _has_requests(self) -> bool:
         return bool(self._requests)

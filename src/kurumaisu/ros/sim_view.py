@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -31,10 +31,17 @@ _BREATH = 0.002  # [s] after which what a socket did not take is offered again
 class ViewTopics:
     """Publishes at a rate of wall time, whatever the pace of the simulated one."""
 
-    def __init__(self, rate: float, frame: str, machinery: Callable[[], Machinery], fans: Fans) -> None:
-        """Advertise; rate [Hz] at most; machinery: tells what runs now."""
+    def __init__(
+        self,
+        rate: float,
+        frame: str,
+        machinery: Callable[[], Machinery],
+        fans: Fans,
+        drives: Callable[[], Mapping[int, str]],
+    ) -> None:
+        """Advertise; rate [Hz] at most; machinery: tells what runs now; drives: topics of commands by bodies' rows."""
         self._period, self._frame = 1 / rate, frame
-        self._machinery, self._fans = machinery, fans
+        self._machinery, self._fans, self._drives = machinery, fans, drives
         self._view = Outlet("~view", View, _NEWEST)
         self._world = rospy.Publisher("~world", String, queue_size=1, latch=True)
         self._known: Machinery | None = None
@@ -45,6 +52,9 @@ class ViewTopics:
         self._late: deque[tuple[float, int]] = deque(maxlen=_OF_LATE)
         self._sent: IntArray | None = None  # stamps of the scans that were
         self._wires: dict[Shape, ViewWire] = {}
+        self._looked = False  # somebody did, when last asked
+        self._stalled = b""  # as of the last step
+        self._contacts = np.zeros(0, dtype=np.uint32)
 
     @property
     def due(self) -> bool:
@@ -58,6 +68,7 @@ class ViewTopics:
         if self._view.wanted:
             return True
         self._sent = None  # who comes next wants the scans, too
+        self._looked = False
         self._due = wall + self._period
         return False
 
@@ -67,6 +78,8 @@ class ViewTopics:
 
     def show(self, now: int, paused: bool, speed: float) -> None:
         """Publish if a view is due and wanted; to be called after every step and change; now [ns] of /clock."""
+        if self._looked:
+            self._count_contacts()
         if not self.due:
             return
         wall = time.monotonic()
@@ -76,15 +89,26 @@ class ViewTopics:
         if machinery is not self._known:
             self._describe(machinery)
         self._due = wall + self._period
+        self._looked = True
         looks = self._new_looks()
         wire = self._wire(machinery, looks)
         wire.head(self._view.next_number(), divmod(now, _NS), self._number, self._run)
         wire.pace(paused, speed, 0.0 if paused else self._factor(wall, now))
         wire.poses[:] = machinery.frames[:-1, PLANAR]
         wire.hit[:] = machinery.stalled
+        wire.contacts[:] = self._contacts
         if looks is not None:
             wire.fill(looks)
         self._view.send(wire.data)
+
+    def _count_contacts(self) -> None:
+        """Note what has begun in a step; in most nothing has, and bytes compare fastest."""
+        stalled = self._machinery().stalled
+        if (said := stalled.tobytes()) != self._stalled:
+            before = np.frombuffer(self._stalled, np.bool_)
+            if len(before) == len(stalled) == len(self._contacts):
+                self._contacts += stalled & ~before
+            self._stalled = said
 
     def _factor(self, wall: float, now: int) -> float:
         if self._late and (now < self._late[-1][1] or wall - self._late[-1][0] > 1.0):
@@ -119,11 +143,14 @@ class ViewTopics:
         self._number += 1
         self._sent = None
         self._wires.clear()
+        self._stalled = machinery.stalled.tobytes()
+        self._contacts = np.zeros(len(machinery.stalled), dtype=np.uint32)
         pieces = scenery(machinery)
+        drives = self._drives()
         content = {
             "world": self._number,
             "bounds": bounds(pieces),
-            "bodies": [_described(piece) for piece in pieces],
+            "bodies": [{**_described(piece), "drive": drives.get(piece.row)} for piece in pieces],
             "fans": self._fans.places(machinery),
         }
         self._world.publish(json.dumps(content))

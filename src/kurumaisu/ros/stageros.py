@@ -90,11 +90,13 @@ def _run(session: Session, requests: Requests, pacer: Pacer, world: World, stopp
     while not (stopped.is_set() or rospy.is_shutdown()):
         if requests:
             requests.serve()
-        session.show(pacer.speed)
+            session.show(pacer.speed)
         if session.paused:
+            session.show(pacer.speed)
             requests.wait(0.1)
             continue
         session.step()
+        session.show(pacer.speed)  # before the pause: a step that is due when its scans are noted is due when shown
         if 0 < world.quit_time <= session.time:
             rospy.loginfo(f"{world.path}: quit_time {world.quit_time:g} s has come")
             break

@@ -60,7 +60,11 @@ class Session:
         self._publisher.check_rates()
         self._fans = FleetFans(self._simulator)
         self._view = ViewTopics(
-            settings.view_rate, settings.frames.ground_truth, lambda: self._simulator.machinery, self._fans
+            settings.view_rate,
+            settings.frames.ground_truth,
+            lambda: self._simulator.machinery,
+            self._fans,
+            self._drives,
         )
         self.heard = 0  # commands and poses, of any robot, since the start, dropped ones included
 
@@ -90,6 +94,10 @@ class Session:
     def show(self, speed: float) -> None:
         """Publish what a page draws, if one looks; speed: at which it runs."""
         self._view.show(self._number * self._step_ns, self.paused, speed)
+
+    def _drives(self) -> dict[int, str]:
+        rows = self._simulator.machinery.robot_rows.tolist()
+        return {rows[row]: rospy.resolve_name(names.topic("cmd_vel")) for names, row in self._rows.items()}
 
     def _ears(self, names: Names) -> Ears:
         return Ears(partial(self.hear, names), partial(self.carry, names))

@@ -38,6 +38,7 @@ class ViewWire:
         arrays = {
             "poses": ("<f8", 3, shape.bodies),
             "hit": ("u1", 1, shape.bodies),
+            "contacts": ("<u4", 1, shape.bodies),
             "stamps": ("<u4", 2, shape.fans),
             "sensors": ("<f8", 3, shape.fans),
             "ranges": ("<f4", 1, shape.beams),
@@ -60,7 +61,7 @@ class ViewWire:
         self._set("name", np.frombuffer(name, np.uint8))
         for field, number in counts.items():
             self._set(f"{field}_length", number)
-        self.poses, self.hit = self._row("poses"), self._row("hit")
+        self.poses, self.hit, self.contacts = map(self._row, ("poses", "hit", "contacts"))
         self.stamps, self.sensors = self._row("stamps"), self._row("sensors")
         self.ranges, self.truths, self.intensities = map(self._row, ("ranges", "truths", "intensities"))
 

@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the base controller says of itself, and how a page stops and drives it."""
+"""What the base controller says of itself, and how a page stops it."""
 
 from __future__ import annotations
 
-import threading
 import time
 from typing import Any
 
-import numpy as np
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -23,7 +21,6 @@ from kurumaisu.ros.viewer_topics import Newest
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.source import Outcome
 
-_LAST_WORDS = 5  # zeros, in case one is not heard
 _STOPPED = "emergency stop"  # state in base_node's diagnostics
 _FRESH = 1.5  # [s] that our own word about the stop is newer than diagnostics'
 
@@ -91,45 +88,3 @@ class Chair:
             if status.name.endswith("commands") and time.monotonic() - self._said > _FRESH:
                 states = [value.value for value in status.values if value.key == "state"]
                 self._stopped = states[0] == _STOPPED if states else self._stopped
-
-
-class Stick:
-    """Publishes what a page drives, as long as it goes on to say so: a dead-man."""
-
-    def __init__(self, topic: str, rate: float, dead_man: float, v: float, w: float) -> None:
-        """Rate [Hz]; dead_man [s] of silence end it; v [m/s], w [rad/s] at most."""
-        self._limits = np.array([v, w])
-        self._dead_man = dead_man
-        self._publisher = rospy.Publisher(topic, Twist, queue_size=1, tcp_nodelay=True)
-        self._command = np.zeros(2)
-        self._heard = -np.inf  # [s]
-        self._words = 0
-        self._news = threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(1 / rate,), daemon=True)
-        self._thread.start()
-
-    def drive(self, v: float, w: float) -> Outcome:
-        """Drive so until the next word, or the dead-man's end."""
-        self._command = np.clip([v, w], -self._limits, self._limits)
-        self._heard = time.monotonic()
-        self._news.set()
-        return Outcome("")
-
-    def rest(self) -> None:
-        """Let go at once."""
-        self._command, self._heard = np.zeros(2), -np.inf
-
-    def _run(self, period: float) -> None:
-        while not rospy.is_shutdown():
-            self._news.wait()
-            held = time.monotonic() - self._heard <= self._dead_man
-            v, w = self._command.tolist() if held else (0.0, 0.0)
-            self._words = _LAST_WORDS if held else self._words - 1
-            twist = Twist()
-            twist.linear.x, twist.angular.z = v, w
-            self._publisher.publish(twist)
-            if self._words <= 0:
-                self._news.clear()  # and silence: others may drive
-                if time.monotonic() - self._heard <= self._dead_man:
-                    self._news.set()  # it was said in between
-            time.sleep(period)

@@ -76,7 +76,9 @@ class Maps:
         assert offset is not None
         self._show(offset)
         x, y, yaw = laid.tolist()
-        c = self._pose.last.pose.covariance if known else (0.0,) * 36
+        if not known:
+            return Estimate((x, y, yaw), None)
+        c = self._pose.last.pose.covariance
         return Estimate((x, y, yaw), (float(c[0]), float(c[1]), float(c[7]), float(c[35])))
 
     def _show(self, offset: FloatArray) -> None:

@@ -14,7 +14,7 @@ from kurumaisu.params import Model
 from kurumaisu.ros.viewer_topics import Newest, Now, Transforms
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.hub import Hub
-from kurumaisu.viewer.protocol import Body, Fan, World
+from kurumaisu.viewer.protocol import Body, Fan, Ranger, World
 
 _ID = "chair"
 _COLOR = "#334d99"
@@ -39,7 +39,7 @@ class Robot:
 
     def open(self) -> None:
         """Listen."""
-        body = Body(_ID, _ID, "robot", _COLOR, movable=False, polygons=(self._footprint,))
+        body = Body(_ID, _ID, "robot", _COLOR, movable=False, polygons=(self._footprint,), drivable=True)
         self._hub.world(World((body,), None))
         self._scan.open()
         self._now.open()
@@ -50,7 +50,11 @@ class Robot:
         self._now.close()
         self._past.clear()
 
-    def moment(self) -> tuple[dict[str, Any], dict[int, Fan]] | None:
+    def drives(self) -> dict[str, str | None]:
+        """Return the one that can be driven: by the topic that the settings name."""
+        return {_ID: None}
+
+    def moment(self) -> tuple[dict[str, Any], dict[Ranger, Fan]] | None:
         """Return what goes into a State, and the scan if it is new."""
         now = self._now.time()
         pose = self._transforms.lookup(self._map, self._base)
@@ -71,7 +75,7 @@ class Robot:
         if not self._past or now > self._past[-1][0]:
             self._past.append((now, pose))
 
-    def _scans(self) -> dict[int, Fan]:
+    def _scans(self) -> dict[Ranger, Fan]:
         scan = self._scan.take()
         if scan is None:
             return {}
@@ -80,7 +84,7 @@ class Robot:
         then = interpolate(times, poses, np.array([scan.header.stamp.to_sec()]))[0]
         x, y, yaw = compose(then, self._mount).tolist()
         return {
-            0: Fan(
+            (0, 0): Fan(
                 pose=(x, y, yaw),
                 angle_min=scan.angle_min,
                 angle_increment=scan.angle_increment,

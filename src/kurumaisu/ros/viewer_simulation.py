@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from kurumaisu.ros.viewer_topics import Newest
 from kurumaisu.srv import Seed, SetPose, Speed
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.hub import Hub
-from kurumaisu.viewer.protocol import Body, Fan, World
+from kurumaisu.viewer.protocol import Body, Fan, Ranger, World
 from kurumaisu.viewer.source import Outcome
 
 ABILITIES = frozenset({"pause", "step", "speed", "reset", "seed", "set_pose"})
@@ -49,7 +50,7 @@ class Simulation:
         self._described.close()
         self._world, self._known = {}, {}
 
-    def moment(self) -> tuple[dict[str, Any], dict[int, Fan]] | None:
+    def moment(self) -> tuple[dict[str, Any], dict[Ranger, Fan]] | None:
         """Return what goes into a State, and the scans that are new; None before there is anything."""
         if (described := self._described.take()) is not None:
             self._show(json.loads(described.data))
@@ -59,18 +60,16 @@ class Simulation:
         self.run = view.run
         moving = np.asarray(view.poses).reshape(-1, 3)
         poses = {body["id"]: tuple(body["pose"]) for body in self._world["bodies"] if body["row"] < 0}
-        poses |= {self._rows[row]: tuple(pose) for row, pose in enumerate(moving.tolist()) if row in self._rows}
-        robot = self._world["first"]
+        rows, robot = self._rows, self._world["first"]
+        poses |= {rows[row]: tuple(pose) for row, pose in enumerate(moving.tolist()) if row in rows}
         self._known = {
             "t": view.header.stamp.to_sec(),
             "rtf": float(view.real_time_factor),
+            "speed": float(view.speed),
             "paused": bool(view.paused),
             "poses": poses,
-            "hit": tuple(
-                self._rows[row]
-                for row in np.flatnonzero(np.frombuffer(view.hit, np.uint8)).tolist()
-                if row in self._rows
-            ),
+            "hit": tuple(rows[row] for row in np.flatnonzero(np.frombuffer(view.hit, np.uint8)) if row in rows),
+            "contacts": {rows[row]: int(view.contacts[row]) for row in np.flatnonzero(view.contacts) if row in rows},
             "truth": poses.get(robot) if robot is not None else None,
         }
         return self._known, self._scans(view)
@@ -101,26 +100,41 @@ class Simulation:
         if not known[body]["movable"]:
             raise Error(f"set_pose: {known[body]['name']} is a wall, which nobody moves")
         pose = Pose(Point(x, y, known[body]["z"]), quaternion_of(yaw))
-        return done(f"{self._services}set_pose", SetPose, body, pose)
+        try:
+            return done(f"{self._services}set_pose", SetPose, body, pose)
+        except Error as error:  # the simulator says the id that it was told, which a person has never seen
+            raise Error(str(error).replace(body, known[body]["name"], 1)) from error
 
     def _show(self, world: dict[str, Any]) -> None:
         self._world = world
         self._rows = {body["row"]: body["id"] for body in world["bodies"] if body["row"] >= 0}
         self._places = {body["row"]: place for place, body in enumerate(world["bodies"]) if body["row"] >= 0}
-        world["first"] = next((body["id"] for body in world["bodies"] if body["kind"] == "robot"), None)
-        self._hub.world(World(tuple(map(_body, world["bodies"])), world["bounds"]))
+        robots = [body for body in world["bodies"] if body["kind"] == "robot"]
+        robots.sort(key=lambda body: body["drive"] is not None)  # the chair has a controller of its own
+        world["first"] = robots[0]["id"] if robots else None
+        bodies = tuple(_body(body, self._is_drivable(body)) for body in world["bodies"])
+        self._hub.world(World(bodies, world["bounds"], world["first"]))
 
-    def _scans(self, view: Any) -> dict[int, Fan]:
-        """Return the scans of a view, by their robots' places among the bodies; of several the first."""
+    def drives(self) -> dict[str, str | None]:
+        """Return the topics of the robots that can be driven; None: the chair, which has a controller of its own."""
+        bodies = self._world.get("bodies", [])
+        return {body["id"]: body["drive"] for body in bodies if self._is_drivable(body)}
+
+    def _is_drivable(self, body: dict[str, Any]) -> bool:
+        return body["drive"] is not None or body["id"] == self._world["first"]
+
+    def _scans(self, view: Any) -> dict[Ranger, Fan]:
+        """Return the scans of a view."""
         if not view.stamps:
             return {}
         fans, sensors = self._world["fans"], np.asarray(view.sensors).reshape(-1, 3)
         ends = np.cumsum([0, *(fan["beams"] for fan in fans)])
-        scans: dict[int, Fan] = {}
+        scans: dict[Ranger, Fan] = {}
+        of_robot: Counter[int] = Counter()
         for number, fan in enumerate(fans):
             place = self._places.get(fan["row"], -1)
-            if place not in scans:
-                scans[place] = _fan(fan, sensors[number], view, slice(ends[number], ends[number + 1]))
+            scans[place, of_robot[place]] = _fan(fan, sensors[number], view, slice(ends[number], ends[number + 1]))
+            of_robot[place] += 1
         return scans
 
 
@@ -142,7 +156,7 @@ def _fan(fan: dict[str, Any], sensor: FloatArray, view: Any, part: slice) -> Fan
     )
 
 
-def _body(body: dict[str, Any]) -> Body:
+def _body(body: dict[str, Any], drivable: bool) -> Body:
     return Body(
         id=body["id"],
         name=body["name"],
@@ -151,4 +165,5 @@ def _body(body: dict[str, Any]) -> Body:
         movable=body["movable"],
         polygons=tuple(tuple((x, y) for x, y in polygon) for polygon in body["polygons"]),
         segments=tuple(tuple(ends) for ends in body["segments"]),
+        drivable=drivable,
     )

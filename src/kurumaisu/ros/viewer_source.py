@@ -16,7 +16,7 @@ from kurumaisu.errors import Error
 from kurumaisu.params import load_model
 from kurumaisu.ros import viewer_effects, viewer_simulation
 from kurumaisu.ros.rotation import quaternion_of
-from kurumaisu.ros.viewer_chair import Chair, Stick
+from kurumaisu.ros.viewer_chair import Chair
 from kurumaisu.ros.viewer_effects import EffectSwitches
 from kurumaisu.ros.viewer_maps import Maps
 from kurumaisu.ros.viewer_notes import Notes
@@ -24,6 +24,7 @@ from kurumaisu.ros.viewer_record import BagRecorder
 from kurumaisu.ros.viewer_robot import Robot
 from kurumaisu.ros.viewer_settings import NONE, NodeSettings
 from kurumaisu.ros.viewer_simulation import Simulation
+from kurumaisu.ros.viewer_stick import Sticks
 from kurumaisu.ros.viewer_topics import Alignment, Transforms
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.hub import Hub
@@ -56,14 +57,14 @@ class RosSource:
         self._bags = BagRecorder(settings.bags)
         self._start = Alignment()  # of the odometry
         self._run: int | None = None
-        self._stick: Stick | None = None
+        self._sticks: Sticks | None = None
         driving = settings.driving
         self.limits: Mapping[str, float] | None = None
         self._initial: Any = None
         if settings.control:
             self._initial = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=1)
         if settings.control and driving.topic != NONE:
-            self._stick = Stick(driving.topic, driving.rate, driving.dead_man, driving.v, driving.w)
+            self._sticks = Sticks(driving, self._scene.drives)
             self.limits = {"v": driving.v, "w": driving.w}
         self._map_frame, _, self._base_frame = settings.frames
         self.abilities = self._can()
@@ -77,8 +78,8 @@ class RosSource:
             self._watched.set()
         else:
             self._watched.clear()
-            if self._stick is not None:
-                self._stick.rest()
+            if self._sticks is not None:
+                self._sticks.rest()
 
     def run(self, rate: float) -> None:
         """Show a moment at a rate [Hz], while somebody looks, until ROS ends."""
@@ -100,8 +101,8 @@ class RosSource:
     def command(self, name: str, arguments: Mapping[str, Any]) -> Outcome:
         """Obey. Raise Error where it cannot be done."""
         match name:
-            case "drive" if self._stick is not None:
-                return self._stick.drive(**arguments)
+            case "drive" if self._sticks is not None:
+                return self._sticks.drive(**arguments)
             case "estop" if self._chair is not None:
                 return self._chair.estop(**arguments)
             case "effect" if self._effects is not None:
@@ -118,7 +119,7 @@ class RosSource:
 
     def _can(self) -> frozenset[str]:
         able = {"record", "initial_pose"}
-        if self._stick is not None:
+        if self._sticks is not None:
             able.add("drive")
         if self._chair is not None:
             able.add("estop")

@@ -70,7 +70,7 @@ COMMANDS: Mapping[str, _Kinds] = {
     "reset": {},
     "seed": {"value": _seed},
     "set_pose": {"body": _word, "x": _number, "y": _number, "yaw": _number},
-    "drive": {"v": _number, "w": _number},
+    "drive": {"v": _number, "w": _number},  # and of several robots, which one
     "estop": {"on": _flag},
     "effect": {"effect": _word, "enabled": _flag, "values": _values},
     "save_model": {},
@@ -81,6 +81,7 @@ COMMANDS: Mapping[str, _Kinds] = {
     "run": {"run": _word},
     "initial_pose": {"x": _number, "y": _number, "yaw": _number},
 }
+_OPTIONAL: Mapping[str, _Kinds] = {"drive": {"body": _word}}
 
 
 def read(message: str) -> Command | Credential:
@@ -118,14 +119,17 @@ def _command(content: dict[str, Any]) -> Command:
         raise Error("id: must be an integer or a short text")
     if not isinstance(name, str) or name not in COMMANDS:
         raise Error(f"name: there is no command {str(name)[:_LONGEST_NAME]!r}")
-    kinds = COMMANDS[name]
+    required, kinds = COMMANDS[name], {**COMMANDS[name], **_OPTIONAL.get(name, {})}
     for key in content:
         if key not in kinds:
             raise Error(f"{name}: has no {key[:_LONGEST_NAME]!r}")
+    for key in required:
+        if key not in content:
+            raise Error(f"{name}: {key} is missing")
     arguments = {}
     for key, check in kinds.items():
         if key not in content:
-            raise Error(f"{name}: {key} is missing")
+            continue
         try:
             arguments[key] = check(content[key])
         except ValueError as error:

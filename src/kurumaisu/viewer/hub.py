@@ -13,7 +13,7 @@ from typing import Any
 from kurumaisu.viewer import protocol
 
 Payload = str | bytes
-Slot = tuple[str, int]  # kind of message, and which of them: a body's place, or 0
+Slot = tuple[str, int | protocol.Ranger]  # kind of message, and which of them: whose scan, or 0
 
 _KEPT_MAPS = 2  # a page may still be fetching the last but one
 _FRAME: Slot = ("state", 0)  # which every frame has one of
@@ -65,11 +65,11 @@ class Hub:
         """Show other bodies; their scans are to come."""
         self._put({("world", 0): protocol.text(world)}, forget=_OF_THE_WORLD)
 
-    def state(self, state: protocol.State, scans: Mapping[int, protocol.Fan] | None = None) -> None:
-        """Show a moment, with the scans that are new, by their robots' places in the world's bodies; -1: no robot's."""
+    def state(self, state: protocol.State, scans: Mapping[protocol.Ranger, protocol.Fan] | None = None) -> None:
+        """Show a moment, with the scans that are new, by whose they are."""
         news: dict[Slot, Payload] = {("state", 0): protocol.text(state)}
-        for body, fan in (scans or {}).items():
-            news["scan", body] = protocol.scan(fan, body if body >= 0 else None)
+        for ranger, fan in (scans or {}).items():
+            news["scan", ranger] = protocol.scan(fan, ranger)
         self._put(news)
 
     def effects(self, groups: tuple[protocol.Group, ...]) -> None:

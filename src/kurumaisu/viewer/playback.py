@@ -113,7 +113,7 @@ class Playback:
         scans = {}
         if number != self._shown:
             self._shown = number
-            scans[self._chair] = self._tape.fan(number) if number >= 0 and self._tape.fan is not None else _NO_SCAN
+            scans[self._chair, 0] = self._tape.fan(number) if number >= 0 and self._tape.fan is not None else _NO_SCAN
         self._hub.state(self._state(t), scans)
 
     def _state(self, t: float) -> State:

@@ -20,12 +20,13 @@ Pose = tuple[float, float, float]  # x, y [m], heading [rad]
 Kind = Literal["robot", "obstacle", "person", "wall"]
 Point = tuple[float, float]
 Segment = tuple[float, float, float, float]  # x, y [m] of both ends
+Ranger = tuple[int, int]  # a robot's place in World.bodies, -1: no robot's; and which of its rangers
 
 _SCAN, _PARTICLES = 1, 2
 _HAS_ERROR, _HAS_INTENSITIES = 1, 2
-_NO_BODY = 0xFFFFFFFF
+_NO_BODY = 0xFFFF
 _MOST = 0xFFFF  # count is 16 bits wide
-_HEAD = struct.Struct("<BBHI")  # kind, flags, count, body
+_HEAD = struct.Struct("<BBHHH")  # kind, flags, count, body, which of its rangers
 _FAN = struct.Struct("<7f")
 
 
@@ -45,7 +46,10 @@ class Hello:
 
 @dataclass(frozen=True)
 class Body:
-    """A thing of the world: outlines in its own frame [m]; what is no polygon, as a bitmap, has segments."""
+    """A thing of the world: outlines in its own frame [m]; what is no polygon, as a bitmap, has segments.
+
+    drivable: `drive` takes its id.
+    """
 
     id: str
     name: str
@@ -54,6 +58,7 @@ class Body:
     movable: bool
     polygons: tuple[tuple[Point, ...], ...] = ()
     segments: tuple[Segment, ...] = ()
+    drivable: bool = False
 
 
 @dataclass(frozen=True)
@@ -82,10 +87,10 @@ class MapPicture:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Where the robot believes to be; covariance: xx, xy, yy [m^2], aa [rad^2]."""
+    """Where the robot believes to be; covariance: xx, xy, yy [m^2], aa [rad^2], None: it does not say."""
 
     pose: Pose
-    covariance: tuple[float, float, float, float]
+    covariance: tuple[float, float, float, float] | None
 
 
 @dataclass(frozen=True)
@@ -113,16 +118,20 @@ class Playback:
 class State:
     """A moment: t of the simulation or recording, wall: of the server's clock [s]; None: not known here.
 
-    rtf: simulated seconds per second; hit: bodies that something keeps from moving; odom: in the world's frame;
-    v [m/s], w [rad/s]: as they are; commanded: as asked for; volts: forward and steering, from neutral [V].
+    rtf: simulated seconds per second, speed: those that are wanted, 0: as many as possible; hit: bodies that something
+    keeps from moving; contacts: how often that has begun, by body, so that none between two moments is missed; odom:
+    in the world's frame; v [m/s], w [rad/s]: as they are; commanded: as asked for; volts: forward and steering, from
+    neutral [V].
     """
 
     t: float
     wall: float
     rtf: float | None = None
+    speed: float | None = None
     paused: bool = False
     poses: Mapping[str, Pose] = dataclasses.field(default_factory=dict)
     hit: tuple[str, ...] = ()
+    contacts: Mapping[str, int] = dataclasses.field(default_factory=dict)
     truth: Pose | None = None
     odom: Pose | None = None
     estimate: Estimate | None = None
@@ -230,8 +239,8 @@ def text(message: Text) -> str:
     return json.dumps(content, allow_nan=False, separators=(",", ":"))
 
 
-def scan(fan: Fan, body: int | None) -> bytes:
-    """Return a scan in binary; body: its robot's place in World.bodies, None: unknown."""
+def scan(fan: Fan, ranger: Ranger) -> bytes:
+    """Return a scan in binary."""
     ranges = _floats(fan.ranges)
     flags, parts = 0, [ranges]
     for bit, further in ((_HAS_ERROR, fan.error), (_HAS_INTENSITIES, fan.intensities)):
@@ -240,7 +249,7 @@ def scan(fan: Fan, body: int | None) -> bytes:
             parts.append(_floats(further))
     if any(len(part) != len(ranges) for part in parts):
         raise ValueError(f"a scan's rows must be equally long: {[len(part) for part in parts]}")
-    head = _head(_SCAN, flags, len(ranges), body)
+    head = _head(_SCAN, flags, len(ranges), ranger)
     fixed = _FAN.pack(*fan.pose, fan.angle_min, fan.angle_increment, fan.range_min, fan.range_max)
     return b"".join([head, fixed, *(part.tobytes() for part in parts)])
 
@@ -249,13 +258,14 @@ def particles(poses: ArrayLike) -> bytes:
     """Return particles (n, 3) of x, y [m], heading [rad] in binary; of more than 65535 every k-th is shown."""
     rows = np.asarray(poses, dtype="<f4").reshape(-1, 3)
     rows = rows[:: max(1, math.ceil(len(rows) / _MOST))]
-    return _head(_PARTICLES, 0, len(rows), None) + rows.tobytes()
+    return _head(_PARTICLES, 0, len(rows), (-1, 0)) + rows.tobytes()
 
 
-def _head(kind: int, flags: int, count: int, body: int | None) -> bytes:
+def _head(kind: int, flags: int, count: int, ranger: Ranger) -> bytes:
     if count > _MOST:
         raise ValueError(f"{count} values: there is room for {_MOST}")
-    return _HEAD.pack(kind, flags, count, _NO_BODY if body is None else body)
+    body, number = ranger
+    return _HEAD.pack(kind, flags, count, _NO_BODY if body < 0 else body, number)
 
 
 def _floats(values: ArrayLike) -> NDArray[np.float32]:

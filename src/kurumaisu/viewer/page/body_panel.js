@@ -53,7 +53,7 @@ export class BodyPanel {
     const pose = body && this.scene.poseOf(body);
     const text = pose ? `${fixed(pose[0], 3)} m, ${fixed(pose[1], 3)} m, ${fixed(degrees(pose[2]), 1)}°` : "–";
     setText(byId("body-pose"), text);
-    setText(byId("body-hit"), body ? (this.scene.state?.hit?.includes(body.id) ? "touches something" : "none") : "–");
+    setText(byId("body-hit"), body ? (this.scene.touches(body) ? "touches something" : "none") : "–");
     if (!pose || this.#shown === body.id) return;
     this.#shown = body.id;
     byId("place-x").value = pose[0].toFixed(3);

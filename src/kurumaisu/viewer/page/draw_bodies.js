@@ -7,7 +7,6 @@ const NOSE = 0.32; // share of a robot's length
 
 export function drawBodies(context, picture) {
   const {scene, camera, colors, ratio, options} = picture;
-  const hit = new Set(scene.state?.hit ?? []);
   for (const body of scene.world.bodies) {
     const pose = body.kind === "wall" ? null : scene.poseOf(body);
     if (!pose) continue;
@@ -21,7 +20,7 @@ export function drawBodies(context, picture) {
     outline(context, body, lines);
     if (body.kind === "robot") nose(context, body, colors);
     if (body.id === options.selected) outline(context, body, {lineWidth: 4 * pixel, strokeStyle: colors.accent});
-    if (hit.has(body.id)) contact(context, body, colors, pixel);
+    if (scene.touches(body)) contact(context, body, colors, pixel);
   }
 }
 

@@ -7,6 +7,7 @@ const BACKLOG = 2000; // [bytes] that the network has not taken: what waits ther
 
 export class Drive {
   armed = false;
+  body = null; // id of the robot that is driven, where there are several
   #held = null; // [v, w] [m/s, rad/s]
   #timer = 0;
   #unanswered = 0;
@@ -67,7 +68,8 @@ export class Drive {
 
   async #command(v, w) {
     this.#unanswered += 1;
-    const reply = await this.connection.command("drive", {v, w});
+    const whom = this.body === null ? {} : {body: this.body};
+    const reply = await this.connection.command("drive", {v, w, ...whom});
     this.#unanswered -= 1;
     if (!reply.ok) this.disarm(reply.message);
   }

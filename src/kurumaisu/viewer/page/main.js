@@ -4,6 +4,7 @@
 import {Bag} from "./bag.js";
 import {BodyPanel} from "./body_panel.js";
 import {Picture} from "./canvas.js";
+import {answer} from "./channel.js";
 import {Connection} from "./connection.js";
 import {byId} from "./dom.js";
 import {Edit} from "./edit.js";
@@ -39,7 +40,7 @@ const status = new Status(scene, permit, connection);
 const say = (text, bad) => status.say(text, bad);
 const options = new Options();
 const picture = new Picture(byId("ground"), byId("front"), scene, options);
-const stick = new Stick(connection, scene, (text) => say(text, true));
+const stick = new Stick(connection, scene, options, (text) => say(text, true));
 
 /** Give a command; what is refused is said. */
 async function ask(name, values) {
@@ -99,6 +100,15 @@ permit.on("change", () => {
   if (tabs.current?.hidden) tabs.show("view");
 });
 const places = new Places(picture, scene, permit, options, bag);
+// the same link a second time changes no address
+addEventListener("click", ({target}) => target.closest?.("a")?.hash === location.hash && location.hash && places.go());
+answer((fragment) => {
+  if (!bag.playback) return "It shows no recording.";
+  if (!permit.can("seek")) return permit.why;
+  history.replaceState(null, "", fragment);
+  places.go();
+  return "";
+});
 addEventListener("hashchange", () => {
   const token = takeToken();
   if (token !== null) connection.useToken(token);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // In the critic's report, where the viewer serves it: a point leads to its moment and place.
 
+import {ask} from "./channel.js";
 import {fragment, largest, pictures, quantity, told} from "./report_data.js";
 
 const VIEWER = "kurumaisu-viewer"; // the window that the viewer is in
@@ -10,9 +11,27 @@ const SVG = "http://www.w3.org/2000/svg";
 
 const address = (sample) => new URL(`../${fragment(sample)}`, location.href).href;
 
-function show(sample) {
+const news = document.createElement("p");
+
+/** The viewer that led here is brought to the front. Opened in another way, this page has to ask which one there is. */
+async function show(sample) {
+  if (!window.opener || window.opener.closed) {
+    const {gone, why} = await ask(fragment(sample));
+    if (gone) return say(`${told(sample)}: shown in the viewer's tab.`);
+    if (why) return say(`The viewer's tab cannot show it. ${why}`);
+  }
   // an empty target would take this page away
   window.open(address(sample), VIEWER)?.focus();
+}
+
+function say(text) {
+  news.textContent = text;
+}
+
+function setUpNews() {
+  news.setAttribute("role", "status");
+  news.style.cssText = "position: sticky; bottom: 0; margin: 0; padding: 0.5em; background: Canvas; color: CanvasText";
+  document.body.append(news);
 }
 
 function ringIn(svg) {
@@ -72,6 +91,10 @@ function list(samples, unit) {
   const items = samples.map((sample) => {
     const link = document.createElement("a");
     Object.assign(link, {href: address(sample), target: VIEWER, textContent: `${quantity(sample.value, unit)} ${told(sample)}`});
+    link.addEventListener("click", (event) => {
+      event.preventDefault();
+      show(sample);
+    });
     const item = document.createElement("li");
     item.append(link);
     return item;
@@ -85,3 +108,4 @@ function list(samples, unit) {
 window.name ||= "kurumaisu-report";
 for (const hint of document.querySelectorAll(".unserved")) hint.hidden = true;
 for (const picture of pictures(document)) lead(picture);
+setUpNews();

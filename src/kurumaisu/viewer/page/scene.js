@@ -8,6 +8,7 @@ import {Trail} from "./trail.js";
 
 const JUMP = 1.0; // [s] that time must go back to be another run: messages may overtake each other
 const MARKS = 300; // collision marks, at most
+const SEEN = 600; // [ms] that a contact is shown, however short it was
 
 /** News: "hello", "world", "map", "state", "effects", "scan". */
 export class Scene extends News {
@@ -21,6 +22,8 @@ export class Scene extends News {
   trails = new Map();
   marks = [];
   #touching = new Set();
+  #contacts = null; // how many each body had, as of the last state
+  #shown = new Map(); // when each body's last contact began [ms]
 
   take(message) {
     if (message.type === "hello") this.hello = message;
@@ -34,7 +37,7 @@ export class Scene extends News {
 
   takeBinary(buffer) {
     const item = decode(buffer);
-    if (item?.kind === "scan") this.scans.set(item.body, item);
+    if (item?.kind === "scan") this.scans.set(`${item.body} ${item.ranger}`, item);
     else if (item) this.particles = item;
     if (item) this.tell("scan", item);
   }
@@ -54,6 +57,16 @@ export class Scene extends News {
     return this.state?.poses?.[body.id] ?? (body.kind === "wall" ? [0, 0, 0] : null);
   }
 
+  /** Say whether something touches a body, or did a moment ago. */
+  touches({id}) {
+    return this.#touching.has(id) || performance.now() - this.#shown.get(id) < SEEN;
+  }
+
+  /** The bodies that can be driven. */
+  get drivable() {
+    return this.world.bodies.filter(({drivable}) => drivable);
+  }
+
   forget() {
     this.trails.clear();
     this.marks.length = 0;
@@ -64,6 +77,7 @@ export class Scene extends News {
     this.world = {...message, bodies: message.bodies.map(prepare)};
     this.scans.clear();
     this.particles = null;
+    this.#contacts = null; // counted anew
   }
 
   #takeState(state) {
@@ -86,13 +100,18 @@ export class Scene extends News {
     this.trails.get(name).add(pose);
   }
 
-  /** Keep a mark where a contact began. */
+  /** Keep a mark where a contact began, also one that had ended before it could be seen. */
   #mark(state) {
     const touching = new Set(state.hit ?? []);
-    for (const id of touching) {
+    const contacts = state.contacts ?? {};
+    const before = this.#contacts ?? contacts;
+    const begun = Object.keys(contacts).filter((id) => contacts[id] > (before[id] ?? 0));
+    for (const id of new Set([...touching].filter((one) => !this.#touching.has(one)).concat(begun))) {
       const pose = state.poses?.[id];
-      if (pose && !this.#touching.has(id)) this.marks.push([pose[0], pose[1]]);
+      if (pose) this.marks.push([pose[0], pose[1]]);
+      this.#shown.set(id, performance.now());
     }
+    this.#contacts = contacts;
     if (this.marks.length > MARKS) this.marks.splice(0, this.marks.length - MARKS);
     this.#touching = touching;
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The stick on the screen and the keys that do the same.
 
-import {byId, fixed, setPressed, setText} from "./dom.js";
+import {byId, fixed, make, setPressed, setText} from "./dom.js";
 import {Drive} from "./drive.js";
 
 const KEYS = {
@@ -15,9 +15,9 @@ export class Stick {
   #pointer = null;
   emergency = () => {}; // what Space does while the stick is taken, whatever has the focus
 
-  /** say(text): tells the driver why the stick was taken away. */
-  constructor(connection, scene, say) {
-    this.scene = scene;
+  /** options: what is chosen; say(text): tells the driver why the stick was taken away. */
+  constructor(connection, scene, options, say) {
+    Object.assign(this, {scene, options});
     this.drive = new Drive(connection, (reason) => this.#changed(reason, say));
     this.pad = byId("stick");
     this.pad.addEventListener("pointerdown", (event) => this.#take(event));
@@ -28,6 +28,14 @@ export class Stick {
     addEventListener("keydown", (event) => this.#key(event), {capture: true});
     addEventListener("keyup", (event) => this.#down.delete(event.code) && this.#byKeys(), {capture: true});
     byId("drive").addEventListener("click", () => this.toggle());
+    scene.on("world", () => this.#listRobots());
+    options.on("change", () => this.#choose(options.selected));
+    byId("drive-body").addEventListener("change", (event) => {
+      const robot = this.#robots[event.target.value];
+      this.#choose(robot.id);
+      options.set({selected: robot.id});
+      byId("front").focus({preventScroll: true}); // or the keys would choose another one
+    });
     byId("share").addEventListener("input", () => this.#showShare());
   }
 
@@ -35,7 +43,33 @@ export class Stick {
     if (this.drive.armed) return this.drive.disarm();
     if (byId("drive").disabled || byId("drive").hidden) return;
     this.drive.arm();
+    if (this.#robots.length > 1) this.options.set({selected: this.drive.body}); // which one, in the picture, too
     byId("front").focus({preventScroll: true}); // or the keys would move a slider
+  }
+
+  #robots = [];
+
+  #listRobots() {
+    this.#robots = this.scene.drivable;
+    const entries = this.#robots.map(({name}, i) => make("option", {value: String(i), textContent: name}));
+    byId("drive-body").replaceChildren(...entries);
+    byId("drive-who").hidden = this.#robots.length < 2;
+    const known = this.#robots.some(({id}) => id === this.drive.body);
+    const first = this.#robots.includes(this.scene.chair) ? this.scene.chair : this.#robots[0];
+    this.#choose(known ? this.drive.body : (first?.id ?? null));
+  }
+
+  /** Drive another robot; the one so far is let go, and who holds a key or the stick must let go, too. */
+  #choose(id) {
+    const place = this.#robots.findIndex((robot) => robot.id === id);
+    if (place < 0 && this.#robots.length) return; // something that nobody drives was chosen
+    if (id !== this.drive.body) {
+      this.drive.release();
+      this.#down.clear();
+      this.#pointer = null;
+    }
+    this.drive.body = this.#robots.length ? id : null;
+    byId("drive-body").value = String(place);
   }
 
   get #share() {

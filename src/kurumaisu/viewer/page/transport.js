@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Pause, step, speed, reset, seed, record, emergency stop: what the simulator or the robot is told.
 
-import {byId, setPressed, setText} from "./dom.js";
+import {byId, make, setPressed, setText} from "./dom.js";
 
 export class Transport {
   /** ask(name, values): a command, failures are said elsewhere; stick: to be let go at a stop; say(text). */
@@ -48,9 +48,22 @@ export class Transport {
     if (seed.reportValidity() && seed.value !== "") this.ask("seed", {value: Number(seed.value)});
   }
 
+  /** Show the speed that is wanted, whoever asked for it. */
+  #showSpeed(speed) {
+    const choice = byId("speed");
+    if (speed == null || document.activeElement === choice) return;
+    const value = String(Number(speed.toPrecision(3))); // it may have been a float of 32 bits
+    if (choice.value === value) return;
+    if (![...choice.options].some((option) => option.value === value)) {
+      choice.append(make("option", {value, textContent: `${value}×`}));
+    }
+    choice.value = value;
+  }
+
   #show() {
     const state = this.scene.state;
     if (!state) return;
+    this.#showSpeed(state.speed);
     setText(byId("pause"), state.paused ? "Run" : "Pause");
     byId("step").disabled = !this.permit.can("step") || !state.paused;
     if (this.permit.can("step")) byId("step").title = state.paused ? byId("step").dataset.title : "Pause first";
