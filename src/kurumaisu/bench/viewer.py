@@ -50,16 +50,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--simulators", nargs="+", choices=_PHASES, default=list(_PHASES))
     parser.add_argument("--robots", type=int, default=10, help="in stageros, with 682 beams each")
     parser.add_argument("--seconds", type=float, default=0.7, help="of each measurement")
-    parser.add_argument("--repeats", type=int, default=7, help="of all, in turns; the median counts")
+    parser.add_argument("--repeats", type=int, default=7, help="of all, in turns; the median counts; 0: none")
     parser.add_argument("--soak", type=float, default=20.0, help="seconds of ten pages on stageros, one of which hangs")
     options = parser.parse_args(arguments)
     dearer = False
     for simulator in options.simulators:
         with rig_of(simulator, options.robots) as rig:
-            dearer |= _costs(rig, simulator, options)
+            if options.repeats:
+                dearer |= _costs(rig, simulator, options)
             if options.soak and simulator == "stageros":
                 _soak(rig, options.soak)
-        _clock(simulator, options.robots, options.seconds * options.repeats)
+        if options.repeats:
+            _clock(simulator, options.robots, options.seconds * options.repeats)
     return int(dearer)
 
 
