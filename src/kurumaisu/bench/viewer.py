@@ -121,17 +121,25 @@ def _print(simulator: str, runs: dict[str, list[_Cost]], ratios: dict[str, list[
         middle = [
             statistics.median(getattr(cost, key) for cost in costs) for key in ("cpu", "speed", "viewer", "frames")
         ]
-        cpu, speed = (_interval(column) for column in zip(*ratios[name], strict=True)) if name in ratios else ("1", "1")
+        cpu, speed = (_words(column) for column in zip(*ratios[name], strict=True)) if name in ratios else ("1", "1")
         table.row(name, 1e3 * middle[0], cpu, middle[1], speed, *(middle[2:]))
 
 
-def _interval(values: Sequence[float]) -> str:
-    """Return the median and, from order statistics, whatever the distribution is, where the true one lies."""
-    ordered, n = sorted(values), len(values)
-    outside = np.cumsum([math.comb(n, k) / 2**n for k in range(n)])  # chance that the true one is below the k-th
-    k = int(np.searchsorted(outside, (1 - _CERTAIN) / 2, side="right"))
-    low, high = ordered[max(k - 1, 0)], ordered[min(n - k, n - 1)]
-    return f"{statistics.median(values):.3f} ({low:.2f}-{high:.2f})"
+def interval(values: Sequence[float]) -> tuple[float, float] | None:
+    """Return where the true median lies, whatever the distribution is; None if there are too few to say.
+
+    By order statistics: each value is below the true median as likely as above.
+    """
+    n = len(values)
+    below = np.cumsum([math.comb(n, k) / 2**n for k in range(n)])  # chance that at most k values are
+    k = int(np.searchsorted(below, (1 - _CERTAIN) / 2, side="right"))
+    ordered = sorted(values)
+    return (ordered[k - 1], ordered[n - k]) if k else None
+
+
+def _words(values: Sequence[float]) -> str:
+    where = interval(values)
+    return f"{statistics.median(values):.3f}" + (f" ({where[0]:.2f}-{where[1]:.2f})" if where else "")
 
 
 def _measure(rig: Rig, phase: str, seconds: float) -> _Cost:
