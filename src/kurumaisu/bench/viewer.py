@@ -70,7 +70,7 @@ def _costs(rig: Rig, simulator: str, options: argparse.Namespace) -> bool:
     what = f"{options.robots} robots" if simulator == "stageros" else "the chair"
     phases = _PHASES[simulator]
     progress = Table(
-        f"{simulator}, {what} of 682 beams, flat out, {os.cpu_count()} cores: CPU time of its process, times nobody",
+        f"{simulator}, {what} of 682 beams, flat out in one thread, {os.cpu_count()} cores: CPU time, times nobody",
         *("turn of", *phases, "load average"),
     )
     runs: dict[str, list[_Cost]] = {name: [] for name in (_NOBODY, *phases)}

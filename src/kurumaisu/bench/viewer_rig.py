@@ -26,6 +26,8 @@ from kurumaisu.params import shipped
 
 _NODE = "from kurumaisu.ros.{} import main; main()"
 _VIEWER = "from kurumaisu.ros.viewer_node import main; main()"
+# What the ray caster's threads cost depends on which cores are free, by more than a page costs.
+_FLEET = {"simulator": {"threads": 1}}
 _SETTLE = 0.5  # [s] after pages have come or gone
 # One process for all that is asked of the nodes: starting one takes longer than some thousand steps. With seconds it
 # answers time, wall time, and CPU time of simulator and viewer, before and after; else with what the service says.
@@ -119,7 +121,8 @@ def rig_of(simulator: str, robots: int, clocked: Path | None = None) -> Iterator
         command = [sys.executable, *program, *arguments]
         viewer = [sys.executable, "-c", _VIEWER]
         parameters = Path(folder) / "parameters.yaml"
-        parameters.write_text(yaml.safe_dump({"sim_node": _chair(), "viewer_node": _viewer(simulator)}))
+        said = {"sim_node": _chair(), "stageros": _FLEET, "viewer_node": _viewer(simulator)}
+        parameters.write_text(yaml.safe_dump(said))
         subprocess.run(["rosparam", "load", str(parameters)], env=environment, check=True)
         with running(command, environment=environment) as one, running(viewer, environment=environment) as other:
             questions = _ASK.format(pause=f"{services}pause", simulator=one.pid, viewer=other.pid, patience=PATIENCE)
