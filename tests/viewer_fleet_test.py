@@ -72,6 +72,14 @@ class ViewerFleetTest(unittest.TestCase):
         assert abs(abs(headings[1] - headings[0]) - np.pi) < 1e-3
         assert abs(np.frombuffer(front, "<f4", offset=8)[7 + 45] - 3.8) < 0.01  # the wall before it
 
+    def test_walls_are_where_the_world_has_them(self):
+        for name, box in (("east", [[3.9, -4.0], [4.1, 4.0]]), ("north", [[-4.0, 4.9], [4.0, 5.1]])):
+            wall = self.bodies[name]
+            assert wall["kind"] == "wall"
+            corners = np.array(wall["polygons"]).reshape(-1, 2)
+            np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)], box, atol=1e-3)
+            assert wall["id"] not in self.page.newest["state"]["poses"]  # it is drawn as it is
+
     def test_a_contact_is_counted_and_not_missed(self):
         porter = self.bodies["porter"]["id"]
         before = self.page.newest["state"]["contacts"].get(porter, 0)

@@ -13,6 +13,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty, SetBool, Trigger
 
 from kurumaisu.errors import Error
+from kurumaisu.geometry import compose
 from kurumaisu.msg import View
 from kurumaisu.ros.rotation import quaternion_of
 from kurumaisu.ros.viewer_calls import call, done
@@ -59,7 +60,8 @@ class Simulation:
             return (self._known, {}) if self._known else None
         self.run = view.run
         moving = np.asarray(view.poses).reshape(-1, 3)
-        poses = {body["id"]: tuple(body["pose"]) for body in self._world["bodies"] if body["row"] < 0}
+        still = (body for body in self._world["bodies"] if body["row"] < 0 and body["kind"] != "wall")
+        poses = {body["id"]: tuple(body["pose"]) for body in still}
         rows, robot = self._rows, self._world["first"]
         poses |= {rows[row]: tuple(pose) for row, pose in enumerate(moving.tolist()) if row in rows}
         self._known = {
@@ -157,13 +159,24 @@ def _fan(fan: dict[str, Any], sensor: FloatArray, view: Any, part: slice) -> Fan
 
 
 def _body(body: dict[str, Any], drivable: bool) -> Body:
+    """Return a body as a page has it: walls have no pose there, so their outlines are in the world's frame."""
+    pose = np.array(body["pose"] if body["kind"] == "wall" else (0.0, 0.0, 0.0))
+    polygons = [_moved(pose, polygon) for polygon in body["polygons"]]
+    segments = _moved(pose, np.reshape(body["segments"], (-1, 2))).reshape(-1, 4)
     return Body(
         id=body["id"],
         name=body["name"],
         kind=body["kind"],
         color=body["color"],
         movable=body["movable"],
-        polygons=tuple(tuple((x, y) for x, y in polygon) for polygon in body["polygons"]),
-        segments=tuple(tuple(ends) for ends in body["segments"]),
+        polygons=tuple(tuple((x, y) for x, y in polygon.tolist()) for polygon in polygons),
+        segments=tuple(tuple(ends) for ends in segments.tolist()),
         drivable=drivable,
     )
+
+
+def _moved(pose: FloatArray, points: Any) -> FloatArray:
+    """Return points (k, 2) of a pose's (3,) frame in the world's."""
+    flat = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    moved: FloatArray = np.round(compose(pose, np.column_stack([flat, np.zeros(len(flat))]))[:, :2], 4)
+    return moved

@@ -11,6 +11,7 @@ const LEFT = 14; // [px]
 const BOTTOM = 16;
 const LEAST = 60; // [px] width of the scale bar
 const COLORS = 140; // [px] width of the colour scale
+const ROOM = 240; // [px] height of a picture that has room for it
 
 export function drawLegend(context, picture) {
   const {camera, colors, ratio, options, scene} = picture;
@@ -19,7 +20,7 @@ export function drawLegend(context, picture) {
   const y = camera.height - BOTTOM;
   const length = niceLength(camera.scale, LEAST);
   const width = length * camera.scale;
-  const scale = options.layers.scans && scene.scans.size && options.scanColor !== "plain";
+  const scale = camera.height >= ROOM && options.layers.scans && scene.scans.size && options.scanColor !== "plain";
   back(context, y, scale, Math.max(width + 84, scale ? COLORS + 12 : 0), colors);
   bar(context, LEFT, y, width, colors);
   label(context, length >= 1 ? `${short(length)} m` : `${short(length * 1000)} mm`, LEFT, y - 6, colors);
@@ -51,13 +52,14 @@ function bar(context, x, y, width, colors) {
 
 function scaleOfColors(context, x, y, {colors, options, scene}) {
   const error = options.scanColor === "error";
+  const high = error ? options.errorScale : strongest(scene.scans.values());
+  if (!high) return label(context, "no intensities are known", x, y + 24, colors);
   const steps = colors[options.scanColor];
   const step = COLORS / BUCKETS;
   steps.forEach((color, i) => {
     context.fillStyle = color;
     context.fillRect(x + i * step, y, step + 0.5, 8);
   });
-  const high = error ? options.errorScale : strongest(scene.scans.values());
   context.textAlign = "left";
   label(context, error ? "range − true range [m]" : "intensity", x, y - 2, colors);
   context.textBaseline = "top";

@@ -16,11 +16,14 @@ export function drawNames(context, picture) {
   Object.assign(context, {font: FONT, textAlign: "center", textBaseline: "top"});
   const taken = [];
   for (const {rank, text, box: [x0, y0, x1, y1], above, color} of wanted(picture)) {
-    const [px, bottom] = camera.toScreen((x0 + x1) / 2, y0);
+    const [middle, bottom] = camera.toScreen((x0 + x1) / 2, y0);
     const [width, height] = [(x1 - x0) * camera.scale, (y1 - y0) * camera.scale];
     const inside = rank >= RANK.obstacle && Math.min(width, height) > LARGE;
     const py = above ? bottom - height - HEIGHT - 2 : bottom + (inside ? -height / 2 - HEIGHT / 2 : 4);
     const half = widthOf(context, text) / 2;
+    const edge = half + 4; // what is seen shall have its whole name
+    const seen = middle > 0 && middle < camera.width;
+    const px = seen ? Math.min(Math.max(middle, edge), Math.max(camera.width - edge, edge)) : middle;
     const step = above ? -HEIGHT : HEIGHT;
     const place = (line) => [px - half, py + line * step, px + half, py + line * step + HEIGHT];
     const free = (line) => !taken.some((other) => overlap(place(line), other));

@@ -83,6 +83,9 @@ export class Status {
     this.#showNotes(state.notes ?? []);
     if (performance.now() - this.#read < READ && !state.paused) return;
     this.#read = performance.now();
+    for (const [id, value] of Object.entries({vw: state.v, commanded: state.commanded, volts: state.volts, driver: state.driver})) {
+      if (value != null) byId(`read-${id}`).parentElement.hidden = false; // it comes once there is such a thing here
+    }
     const pair = (values, digits, units) => values?.map((value, i) => fixed(value, digits, units[i])).join(", ") ?? "–";
     const speed = ["m/s", "rad/s"];
     setText(byId("read-t"), fixed(state.t, 2, "s"));
