@@ -28,12 +28,14 @@ _NODE = "from kurumaisu.ros.{} import main; main()"
 _VIEWER = "from kurumaisu.ros.viewer_node import main; main()"
 # What the ray caster's threads cost depends on which cores are free, by more than a page costs.
 _FLEET = {"simulator": {"threads": 1}}
-_SETTLE = 0.5  # [s] after pages have come or gone
+_SETTLE = 0.5  # [s] after pages have gone
+_COME = 1.5  # [s] after they have come: the first second costs more, as topics are asked for
 # One process for all that is asked of the nodes: starting one takes longer than some thousand steps. With seconds it
 # answers time, wall time, and CPU time of simulator and viewer, before and after; else with what the service says.
 _ASK = """
 import rospy, sys, time
 from std_srvs.srv import SetBool, Trigger
+rospy.wait_for_service("{pause}", {patience})
 pause = rospy.ServiceProxy("{pause}", SetBool)
 def clocks():
     said = pause(False).message
@@ -79,7 +81,7 @@ class Rig:
             page.wait(partial(page.counts.get, "scan"), "scans")
         if count > 1:
             self.pages[-1].stall()
-        time.sleep(_SETTLE)
+        time.sleep(_COME if count else _SETTLE)
 
     @contextlib.contextmanager
     def stopped(self) -> Iterator[None]:
