@@ -279,6 +279,10 @@ def test_a_stalled_client_is_cut_off_and_the_others_go_on():
             running.hub.state(protocol.State(t=0.0, wall=0.0), dict.fromkeys([(i, 0) for i in range(5)], big))
             time.sleep(0.01)
         assert running.hub.dropped > 0
+        other.wait(lambda: running.server.accounts()[1] == 1, "the server to have counted it")
+        (account,), _ = running.server.accounts()
+        assert account.shown > 0
+        assert account.seconds > 0
         other.wait(lambda: stalled.cut_off, "the kernel to throw away what was never sent")
         seen = other.counts["state"]
         other.wait(lambda: other.counts["state"] > seen + 10, "the other goes on")
@@ -295,7 +299,7 @@ def test_a_slow_client_gets_the_newest_and_memory_is_bounded():
     waiting = mailbox.take()
     assert len(waiting) == 2
     assert json.loads(waiting[0])["t"] == 999.0
-    assert mailbox.dropped == 2 * 999
+    assert (mailbox.dropped, mailbox.missed, mailbox.shown) == (2 * 999, 999, 1)
     hub.leave(mailbox)
     assert hub.dropped == 2 * 999
     for _ in range(100):

@@ -13,6 +13,7 @@ import rospy
 from geometry_msgs.msg import Point, Pose, PoseArray, PoseWithCovarianceStamped, Quaternion, TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from PIL import Image
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
 
@@ -36,7 +37,9 @@ class Topics:
 
     def __init__(self) -> None:
         self._heard: dict[str, Any] = {}
-        self.now = 0.0  # [s]
+
+    def clock(self, now: float) -> None:
+        self.publish("/clock", Clock(rospy.Time.from_sec(now)))
 
     def subscriber(self, name: str, kind: type, callback: Any, **_: Any) -> Any:
         self._heard[name] = callback
@@ -62,7 +65,7 @@ class Topics:
 def topics(monkeypatch):
     one = Topics()
     monkeypatch.setattr(rospy, "Subscriber", one.subscriber)
-    monkeypatch.setattr(rospy, "get_time", lambda: one.now)
+    monkeypatch.setattr(rospy, "get_param", lambda name, _=None: name == "/use_sim_time")
     return one
 
 
@@ -182,7 +185,7 @@ def scan(stamp: float, ranges: list[float], intensities: list[float]) -> LaserSc
 
 
 def test_a_robot_is_where_tf_has_it_in_the_map_before_odometry(topics, robot):
-    topics.now = 5.0
+    topics.clock(5.0)
     assert robot.what.moment() == ({"t": 5.0}, {})  # nobody knows
     topics.tf("odom", "base_link", 1.0, 0.0, 0.0)
     parts, _ = robot.what.moment()
@@ -197,7 +200,8 @@ def test_a_robot_is_where_tf_has_it_in_the_map_before_odometry(topics, robot):
 def test_a_scan_is_laid_where_the_laser_was_when_it_was_taken(topics, robot):
     model = load_model(shipped("launch/md100.yaml"))
     mount = model.laser.mount
-    for topics.now, x, yaw in ((10.0, 0.0, 3.0), (10.2, 0.4, -3.0 + 0.2)):  # over half a turn: it goes the short way
+    for now, x, yaw in ((10.0, 0.0, 3.0), (10.2, 0.4, -3.0 + 0.2)):  # over half a turn: it goes the short way
+        topics.clock(now)
         topics.tf("odom", "base_link", x, 1.0, yaw)
         robot.what.moment()
     topics.publish("scan", scan(10.1, [1.0, float("nan"), 5.0], [7.0, 8.0, 9.0]))
@@ -214,14 +218,15 @@ def test_a_scan_is_laid_where_the_laser_was_when_it_was_taken(topics, robot):
 
 
 def test_intensities_that_do_not_fit_are_left_out(topics, robot):
-    topics.now = 1.0
+    topics.clock(1.0)
     topics.tf("odom", "base_link", 0.0, 0.0, 0.0)
     topics.publish("scan", scan(1.0, [1.0, 2.0], []))
     assert robot.what.moment()[1][0, 0].intensities is None
 
 
 def test_a_clock_that_was_set_back_forgets_what_was(topics, robot):
-    for topics.now, x in ((10.0, 0.0), (11.0, 5.0), (2.0, 1.0)):
+    for now, x in ((10.0, 0.0), (11.0, 5.0), (2.0, 1.0)):
+        topics.clock(now)
         topics.tf("odom", "base_link", x, 0.0, 0.0)
         robot.what.moment()
     mount = load_model(shipped("launch/md100.yaml")).laser.mount

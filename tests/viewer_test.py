@@ -11,9 +11,12 @@ from pathlib import Path
 import aiohttp
 import numpy as np
 import pytest
+import rosgraph
 import rospy
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import TransformStamped, Twist
+from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
 
 from kurumaisu.bench.viewer_page import Page
 from kurumaisu.params import load_model
@@ -28,6 +31,19 @@ def errors_of(scan):
     count = int.from_bytes(scan[2:4], "little")
     values = np.frombuffer(scan, "<f4", offset=8)[7:]
     return values[:count], values[count : 2 * count]
+
+
+def is_silent(topic):
+    """Whether nothing comes for longer than the stick's rate leaves between two words."""
+    count = len(topic.messages)
+    time.sleep(0.3)
+    return len(topic.messages) == count
+
+
+def listens_to(topic):
+    """Whether the viewer does."""
+    _, subscribed, _ = rosgraph.Master(rospy.get_name()).getSystemState()
+    return "/viewer_node" in dict(subscribed).get(topic, [])
 
 
 class ViewerTest(unittest.TestCase):
@@ -133,10 +149,8 @@ class ViewerTest(unittest.TestCase):
             time.sleep(0.1)
         assert max(message.linear.x for message in topic.messages) == 0.6  # a full stick
         self.page.state(lambda state: abs(state["v"]) < 1e-3 and state["driver"] == "", "rest")
-        count = len(topic.messages)
         assert topic.last.linear.x == 0.0
-        time.sleep(0.3)
-        assert len(topic.messages) == count  # silent: others may drive
+        wait_for(lambda: is_silent(topic), "silence: others may drive")
         topic.close()
 
     def test_another_robot_is_driven_by_its_own_topic(self):
@@ -212,6 +226,38 @@ class ViewerTest(unittest.TestCase):
         assert "used already" in other.replies[None]["message"]
         other.close()
 
+    def test_transforms_are_heard_only_while_somebody_maps(self):
+        assert listens_to("/sim_node/view")
+        assert not listens_to("/clock")  # of which a simulator sends thousands a second, flat out
+        wait_for(lambda: not listens_to("/tf"), "tf to be left alone")
+        mapper = rospy.Publisher("map", OccupancyGrid, queue_size=1)
+        wait_for(lambda: listens_to("/tf"), "tf to be heard")
+        tf = rospy.Publisher("tf", TFMessage, queue_size=1)
+        correction = TransformStamped()
+        correction.header.frame_id, correction.child_frame_id = "map", "odom"
+        correction.transform.rotation.w = 1.0
+
+        def estimated():
+            tf.publish([correction])
+            return self.page.newest["state"]["estimate"]
+
+        wait_for(estimated, "an estimate of who maps")
+        mapper.unregister()
+        wait_for(lambda: not listens_to("/tf"), "tf to be left alone again")
+        self.page.state(lambda state: state["estimate"] is None, "the end of the estimate")
+        tf.unregister()
+
+    def test_the_viewer_says_who_looks(self):
+        other = Page(self.address)
+        other.wait(lambda: other.counts["state"] > 3, "some frames")
+        lines = call("viewer_node/clients", Trigger).message.splitlines()
+        assert len(lines) == 3
+        for line in lines[:-1]:
+            assert int(line.split(" frames")[0].split()[-1]) > 0
+        assert lines[-1] == "cut off so far, as they took nothing: 0"
+        other.close()
+        wait_for(lambda: len(call("viewer_node/clients", Trigger).message.splitlines()) == 2, "it to be gone")
+
     def test_another_origin_is_refused(self):
         with pytest.raises(aiohttp.WSServerHandshakeError) as refusal:
             Page(self.address, origin="http://evil.example")
@@ -226,6 +272,8 @@ class ViewerTest(unittest.TestCase):
         assert watching.newest["hello"]["abilities"] == []
         for name, arguments in (("drive", {"v": 0.1, "w": 0.0}), ("estop", {"on": True}), ("record", {"on": True})):
             assert "only shows" in watching.ask(name, **arguments)["message"]
+        t = watching.state(lambda state: state["t"] > 0, "the time of the simulation")["t"]
+        assert t < 1e6  # not this computer's
         watching.say(type="token", token="x")
         watching.wait(lambda: None in watching.replies, "an answer")
         assert "only shows" in watching.replies[None]["message"]

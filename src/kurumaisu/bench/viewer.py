@@ -1,188 +1,183 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the viewer costs a simulation that runs flat out: nobody looks, one page, ten of which one hangs; and a soak."""
+"""What the viewer costs a simulator that runs flat out: one page, ten of which one hangs, a dead viewer; and a soak.
+
+What else a machine does changes the cost of a step by more than a page does. So every measurement stands between two
+without pages, and is divided by their mean; of these ratios the median counts.
+"""
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import json
+import math
 import os
 import statistics
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from kurumaisu.bench.processes import PATIENCE, master, memory, running
-from kurumaisu.bench.stageros import world_of
+import numpy as np
+
+from kurumaisu.bench.processes import memory
 from kurumaisu.bench.table import Table
 from kurumaisu.bench.viewer_page import Page
-from kurumaisu.errors import Error
-from kurumaisu.params import shipped
+from kurumaisu.bench.viewer_rig import Rig, rig_of
 
-_STAGEROS = "from kurumaisu.ros.stageros import main; main()"
-_VIEWER = "from kurumaisu.ros.viewer_node import main; main()"
-_CALL = (
-    "import rospy, sys; from std_srvs.srv import {kind}; print(rospy.ServiceProxy('{name}', {kind})({said}).message)"
-)
-# In one process, without anything between: starting one takes longer than some thousand steps.
-_CLOCKS = """
-import rospy, time
-from std_srvs.srv import SetBool
-pause = rospy.ServiceProxy("/stageros/pause", SetBool)
-def clocks():
-    said = pause(False).message
-    return said.split()[1], time.monotonic(), *(time.clock_gettime((~pid << 3) | 2) for pid in ({simulator}, {viewer}))
-pause(False)
-before = clocks()
-time.sleep({seconds})
-print(*before, *clocks())
-"""
-_PHASES = {"nobody looks": 0, "one page": 1, "ten pages, one hangs": 10}
-_SETTLE = 0.5  # [s] after pages have come or gone
+_LIMIT = 1.05
+_RATE = 30  # [1/s] views
+_NOBODY, _ONE, _TEN, _DEAD = "nobody looks", "one page", "ten pages, one hangs", "one page, viewer hangs"
+_PHASES = {"stageros": (_ONE, _TEN, _DEAD), "sim_node": (_ONE,)}
+_PAGES = {_NOBODY: 0, _ONE: 1, _TEN: 10, _DEAD: 1}
+_CERTAIN = 0.9  # of the interval in which the median of the ratios is
 
 
-@dataclass
-class _Rig:
-    """The processes, and how they are asked."""
+@dataclass(frozen=True)
+class _Cost:
+    """CPU [s] per simulated second, simulated seconds per second, viewer's share of a core, frames a page had [1/s]."""
 
-    environment: dict[str, str]
-    simulator: int
-    viewer: int
-    address: str
-    pages: list[Page] = field(default_factory=list)
-
-    def passed(self, seconds: float) -> list[float]:
-        """Return simulated time, wall time, and CPU time [s] of simulator and viewer that have passed meanwhile."""
-        program = _CLOCKS.format(simulator=self.simulator, viewer=self.viewer, seconds=seconds)
-        numbers = [float(word) for word in _said(self.environment, program).split()]
-        return [b - a for a, b in zip(numbers[:4], numbers[4:], strict=True)]
-
-    def look(self, count: int) -> None:
-        """Have so many pages; the last of ten hangs, and comes again when it was cut off."""
-        for page in self.pages:
-            page.close()
-        self.pages = [Page(self.address) for _ in range(count)]
-        for page in self.pages:
-            page.wait(partial(page.counts.get, "scan"), "scans")
-        if count > 1:
-            self.pages[-1].stall()
-        time.sleep(_SETTLE)
+    cpu: float
+    speed: float
+    viewer: float
+    frames: float
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the tables. Return 1 if one page costs the simulator 5 % or more."""
+    """Print the tables. Return 1 if one page costs a simulator 5 % or more."""
     parser = argparse.ArgumentParser(prog="bench viewer")
-    parser.add_argument("--robots", type=int, default=10, help="with 682 beams each")
-    parser.add_argument("--seconds", type=float, default=3.0, help="of each measurement")
-    parser.add_argument("--repeats", type=int, default=5, help="of all, in turns; the median counts")
-    parser.add_argument("--soak", type=float, default=0.0, help="seconds of ten pages, one of which hangs, besides")
+    parser.add_argument("--simulators", nargs="+", choices=_PHASES, default=list(_PHASES))
+    parser.add_argument("--robots", type=int, default=10, help="in stageros, with 682 beams each")
+    parser.add_argument("--seconds", type=float, default=0.7, help="of each measurement")
+    parser.add_argument("--repeats", type=int, default=7, help="of all, in turns; the median counts; 0: none")
+    parser.add_argument("--soak", type=float, default=20.0, help="seconds of ten pages on stageros, one of which hangs")
     options = parser.parse_args(arguments)
-    with tempfile.TemporaryDirectory() as folder, master() as environment:
-        world = Path(folder) / "bench.world"
-        world.write_text(world_of(options.robots, None))
-        simulator = [sys.executable, "-c", _STAGEROS, "-g", str(world)]
-        viewer = [sys.executable, "-c", _VIEWER, *_parameters(environment)]
-        with running(simulator, environment=environment) as one, running(viewer, environment=environment) as other:
-            rig = _Rig(environment, one.pid, other.pid, _address(environment))
-            dearer = _costs(rig, options)
-            if options.soak:
+    dearer = False
+    for simulator in options.simulators:
+        with rig_of(simulator, options.robots) as rig:
+            if options.repeats:
+                dearer |= _costs(rig, simulator, options)
+            if options.soak and simulator == "stageros":
                 _soak(rig, options.soak)
-            rig.look(0)
+        if options.repeats:
+            _clock(simulator, options.robots, options.seconds * options.repeats)
     return int(dearer)
 
 
-def _costs(rig: _Rig, options: argparse.Namespace) -> bool:
+def _costs(rig: Rig, simulator: str, options: argparse.Namespace) -> bool:
     """Print what each phase costs; return whether one page costs too much."""
-    runs: dict[str, list[tuple[float, float, float, float]]] = {name: [] for name in _PHASES}
-    for _ in range(options.repeats):
-        for name, count in _PHASES.items():
-            rig.look(count)
-            runs[name].append(_measure(rig, options.seconds))
-    table = Table(
-        f"stageros flat out, {options.robots} robots of 682 beams, {os.cpu_count()} cores",
-        *("", "CPU s per simulated s", "times nobody", "real-time factor", "viewer, CPU [%]", "frames/s of a page"),
+    what = f"{options.robots} robots" if simulator == "stageros" else "the chair"
+    phases = _PHASES[simulator]
+    progress = Table(
+        f"{simulator}, {what} of 682 beams, flat out in one thread, {os.cpu_count()} cores: CPU time, times nobody",
+        *("turn of", *phases, "load average"),
     )
-    medians = {name: [statistics.median(column) for column in zip(*rows, strict=True)] for name, rows in runs.items()}
-    # of neighbours in time, so that what else the machine does counts for both
-    ratios = {
-        name: statistics.median(a[0] / b[0] for a, b in zip(rows, runs["nobody looks"], strict=True))
-        for name, rows in runs.items()
-    }
-    for name, (spent, speed, viewer, frames) in medians.items():
-        table.row(name, spent, ratios[name], speed, viewer, frames)
-    limit = 1.05
-    return ratios["one page"] >= limit
+    runs: dict[str, list[_Cost]] = {name: [] for name in (_NOBODY, *phases)}
+    ratios: dict[str, list[tuple[float, float]]] = {name: [] for name in phases}  # of CPU time, of speed
+    before = _measure(rig, _NOBODY, options.seconds)
+    for turn in range(options.repeats):
+        for name in phases:
+            cost = _measure(rig, name, options.seconds)
+            after = _measure(rig, _NOBODY, options.seconds)
+            runs[name].append(cost)
+            runs[_NOBODY].append(after)
+            ratios[name].append(
+                (2 * cost.cpu / (before.cpu + after.cpu), 2 * cost.speed / (before.speed + after.speed))
+            )
+            before = after
+        progress.row(
+            f"{turn + 1}/{options.repeats}", *(ratios[name][-1][0] for name in phases), f"{os.getloadavg()[0]:.1f}"
+        )
+    _print(simulator, runs, ratios)
+    return statistics.median(cpu for cpu, _ in ratios[_ONE]) >= _LIMIT
 
 
-def _measure(rig: _Rig, seconds: float) -> tuple[float, float, float, float]:
-    """Return CPU [s] and wall [s] per simulated second, the viewer's share of a core [%], states a page had [1/s]."""
-    count, start = rig.pages[0].counts["state"] if rig.pages else 0, time.monotonic()
-    simulated, wall, spent, viewer = rig.passed(seconds)
-    frames = rig.pages[0].counts["state"] - count if rig.pages else 0
-    return spent / simulated, simulated / wall, 100 * viewer / wall, frames / (time.monotonic() - start)
-
-
-def _soak(rig: _Rig, seconds: float) -> None:
-    """Print the viewer's memory over time with ten pages, one of which hangs, is cut off and comes again."""
-    table = Table(
-        "ten pages, one hangs", "[s]", "viewer [MB]", "simulator [MB]", "frames/s of a page", "cut off so far"
+def _clock(simulator: str, robots: int, seconds: float) -> None:
+    """Print what the thread that simulates does for one page, by its own clock."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "clock.json"
+        with rig_of(simulator, robots, file) as rig:
+            rig.look(1)
+            time.sleep(seconds)
+        frames, in_frames, calls, in_calls, passed = json.loads(file.read_text())
+    print(
+        f"\n{simulator}, by the clock of the thread that simulates: {1e6 * in_frames / frames:.0f} us for a view, "
+        f"{100 * _RATE * in_frames / frames:.2f} % of a core at {_RATE:g} a second; "
+        f"{1e6 * in_calls / calls:.1f} us to see that none is due (with the clock).\n"
+        f"Here {frames / passed:.0f} views in a second of its CPU time: {100 * in_frames / passed:.2f} % and "
+        f"{100 * in_calls / passed:.2f} % of that",
+        flush=True,
     )
-    rig.look(10)
-    begin = time.monotonic()
-    cut = 0
-    part = max(seconds / 10, 1.0)
-    while time.monotonic() - begin < seconds:
+
+
+def _print(simulator: str, runs: dict[str, list[_Cost]], ratios: dict[str, list[tuple[float, float]]]) -> None:
+    table = Table(
+        f"{simulator}: medians; in brackets where the true one is, to {_CERTAIN:.0%}",
+        *("", "CPU [ms] per simulated s", "times nobody", "speed [s/s]", "times nobody's", "viewer, CPU [%]"),
+        "frames/s of a page",
+    )
+    for name, costs in runs.items():
+        middle = [
+            statistics.median(getattr(cost, key) for cost in costs) for key in ("cpu", "speed", "viewer", "frames")
+        ]
+        cpu, speed = (_words(column) for column in zip(*ratios[name], strict=True)) if name in ratios else ("1", "1")
+        table.row(name, 1e3 * middle[0], cpu, middle[1], speed, *(middle[2:]))
+
+
+def interval(values: Sequence[float]) -> tuple[float, float] | None:
+    """Return where the true median lies, whatever the distribution is; None if there are too few to say.
+
+    By order statistics: each value is below the true median as likely as above.
+    """
+    n = len(values)
+    below = np.cumsum([math.comb(n, k) / 2**n for k in range(n)])  # chance that at most k values are
+    k = int(np.searchsorted(below, (1 - _CERTAIN) / 2, side="right"))
+    ordered = sorted(values)
+    return (ordered[k - 1], ordered[n - k]) if k else None
+
+
+def _words(values: Sequence[float]) -> str:
+    where = interval(values)
+    return f"{statistics.median(values):.3f}" + (f" ({where[0]:.2f}-{where[1]:.2f})" if where else "")
+
+
+def _measure(rig: Rig, phase: str, seconds: float) -> _Cost:
+    rig.look(_PAGES[phase])
+    with rig.stopped() if phase == _DEAD else contextlib.nullcontext():
+        count, start = rig.pages[0].counts["state"] if rig.pages else 0, time.monotonic()
+        simulated, wall, spent, viewer = rig.passed(seconds)
+        frames = rig.pages[0].counts["state"] - count if rig.pages else 0
+        rate = frames / (time.monotonic() - start)
+    return _Cost(spent / simulated, simulated / wall, 100 * viewer / wall, rate)
+
+
+def _soak(rig: Rig, seconds: float) -> None:
+    """Print memory over time with ten pages, one of which hangs, is cut off and comes again; and who missed what."""
+    table = Table(
+        "ten pages, one hangs", "[s]", "viewer [MB]", "simulator [MB]", "frames/s of a page", "cut off", "after [s]"
+    )
+    rig.look(_PAGES[_TEN])
+    begin = hung = time.monotonic()
+    cuts: list[float] = []
+    for _ in _parts(begin, seconds):
         seen, start = rig.pages[0].counts["state"], time.monotonic()
-        while time.monotonic() - start < part:
+        while time.monotonic() - start < max(seconds / 10, 1.0):
             time.sleep(0.1)
             if rig.pages[-1].cut_off:
-                cut += 1
+                cuts.append(time.monotonic() - hung)
                 rig.pages[-1].close()
                 rig.pages[-1] = Page(rig.address)
                 rig.pages[-1].stall()
+                hung = time.monotonic()
         rate = (rig.pages[0].counts["state"] - seen) / (time.monotonic() - start)
-        table.row(f"{time.monotonic() - begin:.0f}", memory(rig.viewer), memory(rig.simulator), rate, cut)
+        after = f"{cuts[-1]:.1f}" if cuts else "-"
+        table.row(
+            f"{time.monotonic() - begin:.0f}", memory(rig.viewer), memory(rig.simulator), rate, str(len(cuts)), after
+        )
+    print("\nwho looks, as the viewer says:", *rig.service("clients").split("; "), sep="\n  ", flush=True)
 
 
-def _parameters(environment: dict[str, str]) -> list[str]:
-    """Set the viewer's parameters; return what its command line adds."""
-    subprocess.run(
-        ["rosparam", "load", str(shipped("launch/viewer.yaml")), "/viewer_node"], env=environment, check=True
-    )
-    said = {
-        "port": 0,
-        "control": "false",
-        "simulator": "stageros",
-        "base": "none",
-        "drive/topic": "none",
-        "model": str(shipped("launch/md100.yaml")),
-    }
-    for name, value in said.items():
-        subprocess.run(["rosparam", "set", f"/viewer_node/{name}", str(value)], env=environment, check=True)
-    return ["__name:=viewer_node"]
-
-
-def _address(environment: dict[str, str]) -> str:
-    """Return where the page is, as soon as the viewer says so."""
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        try:
-            return _call(environment, "Trigger", "/viewer_node/new_token", "")
-        except Error:
-            time.sleep(0.2)
-    raise Error("viewer_node: does not answer")
-
-
-def _call(environment: dict[str, str], kind: str, name: str, said: str) -> str:
-    return _said(environment, _CALL.format(kind=kind, name=name, said=said))
-
-
-def _said(environment: dict[str, str], program: str) -> str:
-    """Return what a program in Python prints. Raise Error with its last words if it fails."""
-    answer = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
-    if answer.returncode:
-        raise Error(answer.stderr.splitlines()[-1] if answer.stderr else program)
-    return answer.stdout.strip()
+def _parts(begin: float, seconds: float) -> Iterator[None]:
+    while time.monotonic() - begin < seconds:
+        yield

@@ -95,6 +95,7 @@ class Page:
 
     def close(self) -> None:
         """End it."""
+        self._reads = True  # one that hangs would not hear that the other end agrees
         if self._thread.is_alive():
             asyncio.run_coroutine_threadsafe(self._socket.close(), self._loop)
             self._thread.join(_PATIENCE)

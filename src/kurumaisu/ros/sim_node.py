@@ -21,10 +21,11 @@ from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.services import Services
 from kurumaisu.ros.sim_effects import NAMESPACE, LiveEffects
+from kurumaisu.ros.sim_fans import ChairFan
 from kurumaisu.ros.sim_laser import LaserOutput, laser_output
 from kurumaisu.ros.sim_publish import SimTopics
 from kurumaisu.ros.sim_settings import SimSettings, read_settings
-from kurumaisu.ros.sim_view import ChairFan, ViewTopics
+from kurumaisu.ros.sim_view import ViewTopics
 from kurumaisu.sim.chair import ChairSimulator, Observation
 from kurumaisu.sim.holder import VoltageHolder
 from kurumaisu.types import FloatArray

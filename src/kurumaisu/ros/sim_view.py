@@ -6,55 +6,26 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import rospy
-from rospy.numpy_msg import numpy_msg
 from std_msgs.msg import String
 
-from kurumaisu.geometry import PLANAR, attached
+from kurumaisu.geometry import PLANAR
 from kurumaisu.msg import View
-from kurumaisu.params import Laser
-from kurumaisu.ros.messages import stamp_of
-from kurumaisu.sim.chair import Observation as ChairObservation
-from kurumaisu.sim.fans import spread
+from kurumaisu.ros.outlet import Outlet
+from kurumaisu.ros.sim_fans import Fans, Looks
+from kurumaisu.ros.view_wire import Shape, ViewWire
 from kurumaisu.sim.machinery import Machinery
-from kurumaisu.sim.scans import Scans
 from kurumaisu.sim.scenery import Piece, bounds, scenery
-from kurumaisu.sim.simulator import Simulator
-from kurumaisu.types import FloatArray
+from kurumaisu.types import IntArray
 
 _NS = 1_000_000_000
-_View = numpy_msg(View)  # a plain View would be packed number by number, on any topic
 _OF_LATE = 16  # views over which the real-time factor is taken
-
-
-@dataclass(frozen=True)
-class Looks:
-    """The newest scans of all fans: stamps (f,) [ns], poses (f, 3) of the sensors; rows of all beams, as in View."""
-
-    stamps: Sequence[int]
-    poses: FloatArray
-    ranges: FloatArray
-    truths: FloatArray | None
-    intensities: FloatArray
-
-
-class Fans(Protocol):
-    """The fans of a simulation."""
-
-    def places(self, machinery: Machinery) -> list[dict[str, Any]]:
-        """Return for each fan its body's row, bearings and gate."""
-
-    @property
-    def fresh(self) -> bool:
-        """Whether there may be no newer ones in the next step."""
-
-    def looks(self) -> Looks | None:
-        """Return the newest scans, None before the first."""
+_NEWEST = 1  # views kept for a viewer that does not take them
+_BREATH = 0.002  # [s] after which what a socket did not take is offered again
 
 
 class ViewTopics:
@@ -71,14 +42,16 @@ class ViewTopics:
         """Advertise; rate [Hz] at most; machinery: tells what runs now; drives: topics of commands by bodies' rows."""
         self._period, self._frame = 1 / rate, frame
         self._machinery, self._fans, self._drives = machinery, fans, drives
-        self._view = rospy.Publisher("~view", _View, queue_size=1, tcp_nodelay=True)
+        self._view = Outlet("~view", View, _NEWEST)
         self._world = rospy.Publisher("~world", String, queue_size=1, latch=True)
         self._known: Machinery | None = None
         self._number = 0
         self._run = 0
         self._due = 0.0  # [s] of wall time
+        self._offered = 0.0  # [s] likewise
         self._late: deque[tuple[float, int]] = deque(maxlen=_OF_LATE)
-        self._sent: Sequence[int] = ()  # stamps of the scans that were
+        self._sent: IntArray | None = None  # stamps of the scans that were
+        self._wires: dict[Shape, ViewWire] = {}
         self._looked = False  # somebody did, when last asked
         self._stalled = b""  # as of the last step
         self._contacts = np.zeros(0, dtype=np.uint32)
@@ -86,12 +59,17 @@ class ViewTopics:
     @property
     def due(self) -> bool:
         """Whether somebody looks and should see something new; asked in every step, so there is no more to it."""
-        if time.monotonic() < self._due:
+        wall = time.monotonic()
+        if self._view.behind and wall >= self._offered + _BREATH:
+            self._view.flush()
+            self._offered = wall
+        if wall < self._due:
             return False
-        if self._view.get_num_connections():
+        if self._view.wanted:
             return True
-        self._sent = ()  # who comes next wants the scans, too
+        self._sent = None  # who comes next wants the scans, too
         self._looked = False
+        self._due = wall + self._period
         return False
 
     def carried(self) -> None:
@@ -112,14 +90,16 @@ class ViewTopics:
             self._describe(machinery)
         self._due = wall + self._period
         self._looked = True
-        view = _View(world=self._number, run=self._run, paused=paused, speed=speed)
-        view.header.stamp, view.header.frame_id = stamp_of(now), self._frame
-        view.real_time_factor = 0.0 if paused else self._factor(wall, now)
-        view.poses = np.ascontiguousarray(machinery.frames[:-1, PLANAR]).reshape(-1)
-        view.hit = machinery.stalled.tobytes()
-        view.contacts = self._contacts.copy()  # another thread may be sending it
-        self._add_scans(view)
-        self._view.publish(view)
+        looks = self._new_looks()
+        wire = self._wire(machinery, looks)
+        wire.head(self._view.next_number(), divmod(now, _NS), self._number, self._run)
+        wire.pace(paused, speed, 0.0 if paused else self._factor(wall, now))
+        wire.poses[:] = machinery.frames[:-1, PLANAR]
+        wire.hit[:] = machinery.stalled
+        wire.contacts[:] = self._contacts
+        if looks is not None:
+            wire.fill(looks)
+        self._view.send(wire.data)
 
     def _count_contacts(self) -> None:
         """Note what has begun in a step; in most nothing has, and bytes compare fastest."""
@@ -137,25 +117,32 @@ class ViewTopics:
         (began, then), passed = self._late[0], wall - self._late[0][0]
         return (now - then) / _NS / passed if passed > 0 and began else 0.0
 
-    def _add_scans(self, view: Any) -> None:
+    def _new_looks(self) -> Looks | None:
+        """Return the newest scans if they have not been shown."""
         looks = self._fans.looks()
-        empty = np.empty(0, dtype=np.float32)
-        view.ranges = view.truths = view.intensities = empty
-        view.sensors = np.empty(0)
-        if looks is None or looks.stamps == self._sent:
-            return
+        if looks is None or (self._sent is not None and np.array_equal(looks.stamps, self._sent)):
+            return None
         self._sent = looks.stamps
-        view.stamps = [stamp_of(stamp) for stamp in looks.stamps]
-        view.sensors = np.ascontiguousarray(looks.poses, dtype=np.float64).reshape(-1)
-        view.ranges = looks.ranges.astype(np.float32)
-        view.truths = empty if looks.truths is None else looks.truths.astype(np.float32)
-        view.intensities = looks.intensities.astype(np.float32)
+        return looks
+
+    def _wire(self, machinery: Machinery, looks: Looks | None) -> ViewWire:
+        """Return what has room for this, made once: shapes change with the world only."""
+        bodies = len(machinery.stalled)
+        if looks is None:
+            shape = Shape(bodies, 0, 0, 0, 0)
+        else:
+            truths = 0 if looks.truths is None else len(looks.truths)
+            shape = Shape(bodies, len(looks.stamps), len(looks.ranges), truths, len(looks.intensities))
+        if shape not in self._wires:
+            self._wires[shape] = ViewWire(self._frame, shape)
+        return self._wires[shape]
 
     def _describe(self, machinery: Machinery) -> None:
         """Tell of other bodies."""
         self._known = machinery
         self._number += 1
-        self._sent = ()
+        self._sent = None
+        self._wires.clear()
         self._stalled = machinery.stalled.tobytes()
         self._contacts = np.zeros(len(machinery.stalled), dtype=np.uint32)
         pieces = scenery(machinery)
@@ -182,90 +169,3 @@ def _described(piece: Piece) -> dict[str, Any]:
         "polygons": [np.round(polygon, 4).tolist() for polygon in piece.polygons],
         "segments": np.round(piece.segments, 4).tolist(),
     }
-
-
-class ChairFan:
-    """The chair's laser."""
-
-    def __init__(self, laser: Laser, chair: Callable[[], int]) -> None:
-        """chair: tells its row among the bodies."""
-        self._laser, self._chair = laser, chair
-        mount = laser.mount
-        self._mount = np.array([mount.x, mount.y, mount.z, mount.yaw])
-        self._looks: Looks | None = None
-
-    def note(self, observation: ChairObservation, epoch: int) -> None:
-        """Hear of a step; epoch [ns]: what the clock said at the simulation's time 0."""
-        scan = observation.scan
-        if scan is None:
-            return
-        x, y, heading = scan.pose.tolist()
-        place = attached(np.array([x, y, 0.0, heading]), self._mount)[None, PLANAR]
-        stamp = epoch + round(scan.time * _NS)
-        self._looks = Looks((stamp,), place, scan.ranges, scan.truths, scan.returns)
-
-    def places(self, _machinery: Machinery) -> list[dict[str, Any]]:
-        """Return the one."""
-        laser = self._laser
-        return [
-            {
-                "row": self._chair(),
-                "beams": laser.beams,
-                "angle_min": laser.angle_min,
-                "angle_increment": laser.angle_increment,
-                "range_min": laser.range_min,
-                "range_max": laser.range_max,
-            }
-        ]
-
-    @property
-    def fresh(self) -> bool:
-        """A scan keeps the place where it was made."""
-        return True
-
-    def looks(self) -> Looks | None:
-        """Return its newest scan."""
-        return self._looks
-
-
-class FleetFans:
-    """All fans of the robots of a world file."""
-
-    def __init__(self, simulator: Simulator) -> None:
-        self._simulator = simulator
-        self.fresh = False
-        self._newest: tuple[int, Scans, FloatArray] | None = None  # [ns], and the bodies' frames then
-
-    def note(self, now: int) -> None:
-        """Hear of a step at the end of which a view is due; now [ns]. Only now is it known where the fans measured."""
-        scans, time = self._simulator.scans, self._simulator.time
-        self.fresh = not len(scans) or any(sweep.time == time for sweep in scans.sweeps)
-        if self.fresh and len(scans):
-            self._newest = now, scans, self._simulator.machinery.frames.copy()
-
-    def places(self, machinery: Machinery) -> list[dict[str, Any]]:
-        """Return those of the models that there are now."""
-        self._newest = None
-        return [
-            {
-                "row": fan.body,
-                "beams": fan.fan.samples,
-                "angle_min": spread(fan.fan)[0],
-                "angle_increment": spread(fan.fan)[1],
-                "range_min": fan.fan.range_min,
-                "range_max": fan.fan.range_max,
-            }
-            for fan in machinery.fans
-        ]
-
-    def looks(self) -> Looks | None:
-        """Return their newest scans."""
-        if self._newest is None:
-            return None
-        self.fresh = False
-        stamp, scans, frames = self._newest
-        machinery = self._simulator.machinery
-        bodies, mounts = [fan.body for fan in machinery.fans], np.array([fan.mount for fan in machinery.fans])
-        poses = attached(frames[bodies], mounts)[:, PLANAR]
-        returns = np.concatenate([scan.returns for scan in scans])
-        return Looks((stamp,) * len(bodies), poses, scans.ranges, machinery.rangers.truths, returns)

@@ -15,7 +15,8 @@ from geometry_msgs.msg import Pose, Twist
 
 from kurumaisu.errors import Error
 from kurumaisu.ros.rotation import pose_of
-from kurumaisu.ros.sim_view import FleetFans, ViewTopics
+from kurumaisu.ros.sim_fans import FleetFans
+from kurumaisu.ros.sim_view import ViewTopics
 from kurumaisu.ros.stageros_names import Names, names_of, names_of_another
 from kurumaisu.ros.stageros_newcomers import is_text, renumbered
 from kurumaisu.ros.stageros_plan import plan_world

@@ -51,6 +51,11 @@ class Maps:
         for topic in self._topics:
             topic.close()
 
+    @property
+    def there(self) -> bool:
+        """Whether anybody maps or localises: nobody else's transforms are of use here."""
+        return any(topic.there for topic in self._topics)
+
     def estimate(self, truth: FloatArray | None) -> Estimate | None:
         """Return where it believes to be in the world shown; show map and particles, if they are new.
 

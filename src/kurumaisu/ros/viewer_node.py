@@ -17,7 +17,8 @@ from kurumaisu.viewer.server import Server
 
 def main() -> None:
     """Run the node; exit with 1 and one line for bad configuration or a port that is taken."""
-    rospy.init_node("viewer_node")
+    # rostime stays off: it would hear every /clock of a simulator, though nobody looks
+    rospy.init_node("viewer_node", disable_rostime=True)
     try:
         settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
         hub = Hub()
@@ -32,7 +33,15 @@ def main() -> None:
         # Who reaches this service can publish commands, too: nothing is given away.
         return TriggerResponse(settings.control, server.new_address() if settings.control else server.address)
 
-    service = rospy.Service("~new_token", Trigger, new_token)
+    def clients(_request: TriggerRequest) -> TriggerResponse:
+        accounts, stalled = server.accounts()
+        lines = [
+            f"{one.address}: {one.seconds:.0f} s, {one.shown} frames, {one.missed} more were left out as it was slow"
+            for one in accounts
+        ]
+        return TriggerResponse(True, "\n".join([*lines, f"cut off so far, as they took nothing: {stalled}"]))
+
+    services = [rospy.Service("~new_token", Trigger, new_token), rospy.Service("~clients", Trigger, clients)]
     # to the terminal only, for the log and /rosout are read by others
     if settings.control:
         print(f"viewer, with control, good once: {server.new_address()}")
@@ -40,6 +49,7 @@ def main() -> None:
     try:
         source.run(settings.server.rate)
     finally:
-        service.shutdown()
+        for service in services:
+            service.shutdown()
         source.close()
         server.close()

@@ -7,12 +7,11 @@ from collections import deque
 from typing import Any
 
 import numpy as np
-import rospy
 from sensor_msgs.msg import LaserScan
 
 from kurumaisu.geometry import compose, interpolate
 from kurumaisu.params import Model
-from kurumaisu.ros.viewer_topics import Newest, Transforms
+from kurumaisu.ros.viewer_topics import Newest, Now, Transforms
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.protocol import Body, Fan, Ranger, World
@@ -31,6 +30,7 @@ class Robot:
         self._transforms = transforms
         self._map, self._odom, self._base = frames
         self._scan = Newest("scan", LaserScan)
+        self._now = Now()
         self._past: deque[tuple[float, FloatArray]] = deque(maxlen=_REMEMBERED)
         mount = model.laser.mount
         self._mount = np.array([mount.x, mount.y, mount.yaw])
@@ -42,10 +42,12 @@ class Robot:
         body = Body(_ID, _ID, "robot", _COLOR, movable=False, polygons=(self._footprint,), drivable=True)
         self._hub.world(World((body,), None))
         self._scan.open()
+        self._now.open()
 
     def close(self) -> None:
         """Listen no longer."""
         self._scan.close()
+        self._now.close()
         self._past.clear()
 
     def drives(self) -> dict[str, str | None]:
@@ -54,7 +56,7 @@ class Robot:
 
     def moment(self) -> tuple[dict[str, Any], dict[Ranger, Fan]] | None:
         """Return what goes into a State, and the scan if it is new."""
-        now = rospy.get_time()
+        now = self._now.time()
         pose = self._transforms.lookup(self._map, self._base)
         if pose is None:
             pose = self._transforms.lookup(self._odom, self._base)

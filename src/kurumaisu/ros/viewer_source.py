@@ -131,10 +131,11 @@ class RosSource:
 
     def _turn(self, on: bool) -> None:
         """Listen, or no longer."""
-        parts: list[Any] = [self._transforms, self._scene, self._maps, self._notes, self._chair, self._effects]
+        parts: list[Any] = [self._scene, self._maps, self._notes, self._chair, self._effects]
         for part in parts:
             if part is not None:
                 part.open() if on else part.close()
+        self._transforms.listen(on and isinstance(self._scene, Robot))
         self._open, self._run, self._shown = on, None, None
 
     def _show(self) -> None:
@@ -144,6 +145,8 @@ class RosSource:
         if moment is None:
             return
         parts, scans = moment
+        if isinstance(self._scene, Simulation):
+            self._transforms.listen(self._maps.there)  # flat out, a simulator sends thousands a second
         if parts is self._shown and self._chair is None:
             return  # nothing is new
         self._shown = parts
@@ -178,8 +181,10 @@ class RosSource:
 
     def _guess(self, x: float, y: float, yaw: float) -> Outcome:
         """Tell whoever localises where the robot is."""
+        if self._shown is None:
+            raise Error("initial_pose: nothing has been heard of a robot yet")
         message = PoseWithCovarianceStamped()
-        message.header.stamp, message.header.frame_id = rospy.Time.now(), self._map_frame
+        message.header.stamp, message.header.frame_id = rospy.Time.from_sec(self._shown["t"]), self._map_frame
         message.pose.pose.position.x, message.pose.pose.position.y = x, y
         message.pose.pose.orientation = quaternion_of(yaw)
         for place, variance in ((0, 0.25), (7, 0.25), (35, 0.07)):  # [m^2, rad^2] as rviz has them

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
 import rospy
+from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
 from kurumaisu.geometry import between, compose
@@ -34,6 +36,16 @@ class Newest:
             self._subscriber.unregister()
         self._subscriber = self._raw = self.last = None
 
+    @property
+    def listens(self) -> bool:
+        """Whether it is open."""
+        return self._subscriber is not None
+
+    @property
+    def there(self) -> bool:
+        """Whether it is listened to, and somebody publishes it."""
+        return self._subscriber is not None and self._subscriber.get_num_connections() > 0
+
     def take_raw(self) -> bytes | None:
         """Return the bytes of the newest message, None if there is none since the last take."""
         raw, self._raw = self._raw, None
@@ -52,6 +64,29 @@ class Newest:
         self._raw = message
 
 
+class Now:
+    """The time [s] by /clock where that is what counts, heard only while it is asked for, and else of this computer."""
+
+    def __init__(self) -> None:
+        self._clock = Newest("/clock", Clock)
+
+    def open(self) -> None:
+        """Listen, if need be."""
+        if rospy.get_param("/use_sim_time", False):
+            self._clock.open()
+
+    def close(self) -> None:
+        """Listen no longer."""
+        self._clock.close()
+
+    def time(self) -> float:
+        """Return it; 0 before the first of /clock."""
+        if not self._clock.listens:
+            return time.time()
+        self._clock.take()
+        return 0.0 if self._clock.last is None else float(self._clock.last.clock.to_sec())
+
+
 class Transforms:
     """What /tf says in the plane, from the newest message of each publisher; enough for a picture."""
 
@@ -59,6 +94,11 @@ class Transforms:
         self._raw: dict[str, bytes] = {}
         self._parents: dict[str, tuple[str, FloatArray]] = {}
         self._subscriber: Any = None
+
+    def listen(self, on: bool) -> None:
+        """Listen, or not."""
+        if on != (self._subscriber is not None):
+            self.open() if on else self.close()
 
     def open(self) -> None:
         """Listen."""

@@ -69,3 +69,10 @@ class Scans(Sequence[Scan]):
         if len(self.sweeps) == 1:
             return self.sweeps[0].ranges
         return np.concatenate([np.empty(0), *(scan.ranges for scan in self)])
+
+    @property
+    def returns(self) -> FloatArray:
+        """What all fans' beams hit, as ranges."""
+        if len(self.sweeps) == 1:
+            return self.sweeps[0].returns
+        return np.concatenate([np.empty(0), *(scan.returns for scan in self)])

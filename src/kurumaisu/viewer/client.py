@@ -9,6 +9,7 @@ import struct
 from collections import deque
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from typing import Any
 
 from aiohttp import WSCloseCode, WSMsgType, web
@@ -26,6 +27,16 @@ _MOST_WAITING = 32  # commands of one client
 _MOST_REPLIES = 256  # that one client has not taken
 _MOST_WRONG = 5  # credentials
 _SEND_BUFFER = 1 << 18  # [bytes] in the kernel, which would keep megabytes of old frames for a slow client
+
+
+@dataclass(frozen=True)
+class Account:
+    """What a client has had: address, seconds since it came, frames that it took, and frames that it missed."""
+
+    address: str
+    seconds: float
+    shown: int
+    missed: int
 
 
 class Client:
@@ -50,6 +61,9 @@ class Client:
         self._asked = asyncio.Event()
         self._waiting: deque[Command] = deque()
         self._replies: deque[str] = deque()
+        self._mailbox: Mailbox | None = None
+        self._address, self._came = "", 0.0  # [s] of the loop
+        self.stalled = False  # and was cut off
 
     async def serve(self, request: web.Request) -> web.WebSocketResponse:
         """Send and hear until the connection ends."""
@@ -64,7 +78,9 @@ class Client:
         def notify() -> None:
             loop.call_soon_threadsafe(self._news.set)
 
-        mailbox = self._hub.join(notify)
+        host, port = (request.transport.get_extra_info("peername") if request.transport else None) or ("", 0)
+        self._address, self._came = f"{host}:{port}", loop.time()
+        self._mailbox = mailbox = self._hub.join(notify)
         self._news.set()
         tasks = [asyncio.create_task(self._send(mailbox)), asyncio.create_task(self._obey())]
         try:
@@ -81,8 +97,16 @@ class Client:
         if self._transport is not None:
             self._transport.abort()
 
+    def account(self) -> Account | None:
+        """Return what it has had; None before its handshake is over."""
+        box = self._mailbox
+        if box is None:
+            return None
+        return Account(self._address, asyncio.get_running_loop().time() - self._came, box.shown, box.missed)
+
     def _cut_off(self) -> None:
         """End the connection, and have the kernel throw away what was to be sent: it would keep it for minutes."""
+        self.stalled = True
         if self._transport is not None and not self._transport.is_closing():
             link = self._transport.get_extra_info("socket")
             link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
@@ -90,7 +114,8 @@ class Client:
 
     async def _send(self, mailbox: Mailbox) -> None:
         """Send what is newest, as fast as the client takes it but not faster than the rate; end it if it stalls."""
-        pause = 1 / self._settings.rate
+        period, clock = 1 / self._settings.rate, asyncio.get_running_loop().time
+        due = clock()
         while True:
             await self._news.wait()
             self._news.clear()
@@ -102,7 +127,8 @@ class Client:
             except (TimeoutError, ConnectionError, RuntimeError):
                 self._cut_off()
                 return
-            await asyncio.sleep(pause)
+            due = max(due + period, clock())  # what is late is left out, not made up for
+            await asyncio.sleep(due - clock())
 
     async def _give(self, payload: Payload) -> None:
         if isinstance(payload, str):

@@ -16,6 +16,7 @@ Payload = str | bytes
 Slot = tuple[str, int | protocol.Ranger]  # kind of message, and which of them: whose scan, or 0
 
 _KEPT_MAPS = 2  # a page may still be fetching the last but one
+_FRAME: Slot = ("state", 0)  # which every frame has one of
 _OF_THE_WORLD = ("scan", "particles")  # slots that make no sense with other bodies
 
 
@@ -27,6 +28,8 @@ class Mailbox:
         self._lock = threading.Lock()
         self._waiting: dict[Slot, Payload] = dict(start)
         self.dropped = 0  # messages that a newer one replaced before they were sent
+        self.missed = 0  # frames among them
+        self.shown = 0  # frames that were taken
 
     def offer(self, news: Mapping[Slot, Payload], forget: tuple[str, ...]) -> None:
         """Put newer messages in the place of older ones; forget: kinds that no longer hold."""
@@ -34,6 +37,7 @@ class Mailbox:
             for slot in [slot for slot in self._waiting if slot[0] in forget]:
                 del self._waiting[slot]
             self.dropped += len(self._waiting.keys() & news.keys())
+            self.missed += _FRAME in self._waiting and _FRAME in news
             self._waiting.update(news)
         self._notify()
 
@@ -41,6 +45,7 @@ class Mailbox:
         """Return what is waiting, oldest slots first; they are empty then."""
         with self._lock:
             waiting, self._waiting = self._waiting, {}
+        self.shown += _FRAME in waiting
         return list(waiting.values())
 
 

@@ -13,21 +13,14 @@ from pathlib import Path
 from aiohttp import web
 
 from kurumaisu.errors import Error
-from kurumaisu.viewer import access, report
+from kurumaisu.viewer import access, files, report
 from kurumaisu.viewer.access import Keys
-from kurumaisu.viewer.client import URGENT, Client
+from kurumaisu.viewer.client import URGENT, Account, Client
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
 
 PAGE = Path(__file__).with_name("page")
-_TYPES = {
-    ".html": "text/html",
-    ".css": "text/css",
-    ".js": "text/javascript",
-    ".svg": "image/svg+xml",
-    ".png": "image/png",
-}
 _NAME = re.compile(r"[\w-]+(\.[\w-]+)*")
 _WORKERS = 8  # commands that are under way at a time, of all clients, beside the urgent ones
 _PATIENCE = 5.0  # [s] for the loop to begin, and to end
@@ -51,6 +44,7 @@ class Server:
         self._workers = {name: ThreadPoolExecutor(1, f"viewer_{name}") for name in URGENT}
         self._workers[""] = ThreadPoolExecutor(_WORKERS, "viewer_command")
         self._open: set[Client] = set()
+        self._stalled = 0
         self._runner: web.AppRunner | None = None
         self._port = 0
         self.reports: Mapping[str, Path] = {}  # files below /report/, by name
@@ -79,6 +73,14 @@ class Server:
         if not self._control:
             raise Error("this viewer only shows: it was not started with control")
         return f"{self.address}#token={self._keys.new_token()}"
+
+    def accounts(self) -> tuple[list[Account], int]:
+        """Return what each client has had, and how many others were cut off as they took nothing."""
+        return asyncio.run_coroutine_threadsafe(self._account(), self._loop).result(_PATIENCE)
+
+    async def _account(self) -> tuple[list[Account], int]:
+        known = [account for client in self._open if (account := client.account()) is not None]
+        return sorted(known, key=lambda account: -account.seconds), self._stalled
 
     async def _begin(self) -> None:
         app = web.Application(middlewares=[self._guard])
@@ -125,14 +127,14 @@ class Server:
                 response.headers.setdefault(name, value)
         return response
 
-    async def _index(self, _request: web.Request) -> web.StreamResponse:
-        return _served(PAGE / "index.html")
+    async def _index(self, request: web.Request) -> web.StreamResponse:
+        return files.served(request, PAGE / "index.html")
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["name"]
         if not _NAME.fullmatch(name):  # it may hold encoded slashes
             raise web.HTTPNotFound
-        return _served(PAGE / name)
+        return files.served(request, PAGE / name)
 
     async def _map(self, request: web.Request) -> web.StreamResponse:
         png = self._hub.maps.get(int(request.match_info["number"]))
@@ -159,15 +161,6 @@ class Server:
             return await client.serve(request)
         finally:
             self._open.discard(client)
+            self._stalled += client.stalled
             if not self._open:
                 self._source.watch(False)
-
-
-def _served(path: Path) -> web.Response:
-    """Return a small file, of a kind that pages are made of."""
-    kind = _TYPES.get(path.suffix)
-    if kind is None or not path.is_file():
-        raise web.HTTPNotFound
-    return web.Response(
-        body=path.read_bytes(), content_type=kind, charset="utf-8" if kind.startswith("text/") else None
-    )
