@@ -127,8 +127,8 @@ def test_the_plan_names_files_that_are_there(capsys):
     assert "0.2, 0.5, 1, 2, 4" in told
 
 
-def wall(tmp_path, **how):
-    rng = np.random.default_rng(4)
+def wall(tmp_path, seed=4, **how):
+    rng = np.random.default_rng(seed)
     write(tmp_path / "wall", recorded([scans(d, rng, gate=3.99, **how) for d in DISTANCES[:4]]))
     return ["laser", str(tmp_path / "wall"), "--distances", *map(str, DISTANCES[:4]), "--out", str(tmp_path / "out")]
 
@@ -139,6 +139,38 @@ def test_a_laser_that_is_not_its_model_is_better_known_afterwards(tmp_path, caps
     assert found["datum_offset"] == pytest.approx(0.0, abs=0.001)
     assert found["sigma"][0] == pytest.approx(2 * FOUR[2], rel=0.3)
     assert "the new law is better" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("seed", range(4, 9))
+def test_a_laser_that_is_its_model_is_kept(tmp_path, capsys, seed):
+    """Whatever the new law has by chance on scans of one wall is no gain."""
+    assert main(wall(tmp_path, seed)) == 1
+    told = capsys.readouterr().out
+    assert "NO better: keep the model that you have" in told
+    assert "nats a reading (90 %: " in told
+
+
+def test_a_laser_is_judged_by_a_wall_that_was_put_up_again(tmp_path, capsys):
+    """Taped 5 mm off: on the scans between those that were fitted the law is better, on another wall it is not."""
+    arguments = wall(tmp_path, shift=0.005)
+    assert main(arguments) == 0
+    rng = np.random.default_rng(9)
+    write(tmp_path / "again", recorded([scans(d, rng, gate=3.99) for d in DISTANCES[:4]]))
+    assert main([*arguments, "--test", str(tmp_path / "again")]) == 1
+    assert "NO better" in capsys.readouterr().out
+
+
+def test_errors_on_scans_are_those_of_the_law_by_hand(tmp_path, capsys):
+    wrong = tmp_path / "wrong.yaml"
+    text = MODEL.read_text().replace("datum_offset: 0.058826 ", "datum_offset: 0.055826 ")
+    wrong.write_text(text)
+    assert main([*wall(tmp_path), "--model", str(wrong)]) == 0
+    rows = {
+        line.split(",")[0]: line.split()[-2:] for line in capsys.readouterr().out.splitlines() if "rms [mm]" in line
+    }
+    before, after = map(float, rows["mean off the law"])
+    assert before == pytest.approx(3.0, abs=0.15)
+    assert after < 0.15
 
 
 def test_the_laser_needs_as_many_runs_as_distances(tmp_path, capsys):

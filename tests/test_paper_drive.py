@@ -240,6 +240,15 @@ def test_a_drive_of_bends_to_one_side_only_is_told_to_mix():
     assert any("go together" in words for words in found.warnings)
 
 
+def test_a_straight_law_without_any_noise_is_straight():
+    """Only rounding is left, which is far more than nothing."""
+    rng = np.random.default_rng(1)
+    run = bench.make(replace(bench.CASES[0], sd_v=1e-12, sd_w=1e-12, pose_sd=0.0), rng)
+    found = identify.identify(recording(run), OPTIONS, silent)
+    assert not found.refused
+    assert not any("no straight line" in words for words in found.warnings)
+
+
 def test_a_bent_law_is_told():
     run = driven(np.tile([0.1, -0.1, 0.4, -0.4, 0.7, -0.7], 6), np.tile([0.3, -0.6, 0.9, -0.3, 0.6, -0.9, 0.0], 6)[:36])
     bent = run.voltage.values.copy()

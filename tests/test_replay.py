@@ -4,14 +4,17 @@
 import contextlib
 import math
 import subprocess
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 import rosbag
 
 from kurumaisu.bench.processes import master, running
+from kurumaisu.critic.reading import read_recording
 
 PATIENCE = 60.0  # [s] of wall time for a process to end
 TICK = 0.02  # [s] of base_node
@@ -42,11 +45,8 @@ def recording(bag: Path, *topics: str, environment: dict[str, str]) -> Iterator[
 
 
 @contextlib.contextmanager
-def mapping(bag: Path | None, environment: dict[str, str]) -> Iterator[None]:
-    """Map meanwhile, and record the maps, where a bag is named."""
-    if bag is None:
-        yield
-        return
+def mapping(bag: Path, environment: dict[str, str]) -> Iterator[None]:
+    """Map meanwhile, and record the maps."""
     with (
         recording(bag, "/map", environment=environment),
         running(["roslaunch", "kurumaisu", "slam.launch"], environment=environment),
@@ -55,27 +55,57 @@ def mapping(bag: Path | None, environment: dict[str, str]) -> Iterator[None]:
         yield
 
 
-def record(bag: Path, *arguments: str, maps: Path | None = None) -> None:
-    """Record the simulator driven this way and that; arguments: of record.launch."""
-    names = [bag] if not arguments else [bag.with_name(f"{bag.stem}_0.bag")]
-    with master() as environment, running(["roslaunch", "kurumaisu", "sim.launch"], environment=environment):
+DRIVER = """
+import sys, rospy
+from geometry_msgs.msg import Twist
+rospy.init_node("driver")
+out = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+while not out.get_num_connections():
+    rospy.rostime.wallsleep(0.02)
+for pair in sys.argv[1:]:
+    twist = Twist()
+    twist.linear.x, twist.angular.z = map(float, pair.split(","))
+    end = rospy.get_time() + 4.0
+    while rospy.get_time() < end:
+        out.publish(twist)
+        rospy.sleep(0.05)
+    rospy.sleep(0.6)  # silence stops the chair, then the next
+"""  # times are the simulator's
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory) -> Path:
+    """A folder with a drive in parts, drive_0.bag, ..., the maps of it, live.bag, and one in a single bag, short.bag.
+
+    At twice the speed: voltages act by their stamps, whatever the clock on the wall says.
+    """
+    folder = tmp_path_factory.mktemp("drive")
+    with (
+        master() as environment,
+        running(["roslaunch", "kurumaisu", "sim.launch", "speed:=2"], environment=environment),
+    ):
         wait_for_message("/odom", environment)
-        command = ["roslaunch", "kurumaisu", "record.launch", f"bag:={bag}", *arguments]
-        with mapping(maps, environment), running(command, environment=environment):
-            wait_for_file(Path(f"{names[0]}.active"))
-            wait_for_message("/scan", environment)
-            for v, w in DRIVES:
-                twist = f"{{linear: {{x: {v}}}, angular: {{z: {w}}}}}"
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    subprocess.run(
-                        ["rostopic", "pub", "-r", "20", "/cmd_vel", "geometry_msgs/Twist", twist],
-                        env=environment,
-                        timeout=6.0,  # of which starting it may take some
-                        stdout=subprocess.DEVNULL,
-                        check=True,
-                    )
+        with (
+            mapping(folder / "live.bag", environment),  # first: what stands before the drive is replayed, too
+            recorded(folder, "drive", "drive_0", environment, "split:=4", "others:=map trajectory particlecloud"),
+        ):
+            pairs = [f"{v},{w}" for v, w in DRIVES]
+            subprocess.run([sys.executable, "-c", DRIVER, *pairs], env=environment, timeout=PATIENCE, check=True)
             wait_for_message("/scan", environment, 30)  # at rest: the last map comes up to 2 s after the last scan
-        wait_for_file(names[0])
+        with recorded(folder, "short", "short", environment):
+            wait_for_message("/scan", environment)
+    return folder
+
+
+@contextlib.contextmanager
+def recorded(folder: Path, name: str, first: str, environment: dict[str, str], *arguments: str) -> Iterator[None]:
+    """Run record.launch, with its bag named from the folder where it is called; first: the bag that it begins with."""
+    command = ["env", "-C", str(folder), "roslaunch", "kurumaisu", "record.launch", f"bag:={name}.bag", *arguments]
+    with running(command, environment={**environment, "PWD": str(folder)}):
+        wait_for_file(folder / f"{first}.bag.active")
+        wait_for_message("/scan", environment)
+        yield
+    wait_for_file(folder / f"{first}.bag")
 
 
 def replay(bags: Sequence[Path], out: Path, *arguments: str) -> None:
@@ -103,14 +133,27 @@ def reached(bag: rosbag.Bag, topic: str) -> np.ndarray:
     return np.concatenate([rows[1:, 0][np.diff(flags) != 0] for flags in beyond])
 
 
-def test_the_base_run_again_goes_where_it_went(tmp_path):
-    bag, out = tmp_path / "drive.bag", tmp_path / "again.bag"
-    record(bag)
-    with rosbag.Bag(bag) as recorded:
-        info = recorded.get_type_and_topic_info().topics
-        names = {topic.lstrip("/") for topic in info}
-        assert {"cmd_vel", "voltages", "odom", "scan", "ground_truth", "tf", "tf_static"} <= names
-    replay([bag], out)
+def parts_of(folder: Path) -> list[Path]:
+    return sorted(folder.glob("drive_*.bag"))
+
+
+def test_a_bag_has_what_critic_and_mapping_need_and_each_part_can_be_read_alone(drive):
+    parts = parts_of(drive)
+    assert len(parts) > 1
+    for part in [drive / "short.bag", *parts[:-1]]:  # the last may have just begun
+        with rosbag.Bag(part) as bag:
+            assert bag.get_compression_info().compression == "lz4"
+            names = {topic.lstrip("/") for topic in bag.get_type_and_topic_info().topics}
+        assert {"voltages", "odom", "scan", "ground_truth", "tf", "tf_static"} <= names, part
+    (run,) = read_recording(drive / "drive.bag").runs  # all parts, by the name that was asked for
+    assert np.ptp(run.odom.t) > 7.0
+    assert np.diff(run.odom.t).max() < 1.5 * TICK
+    assert {"cmd_vel"} <= {t.lstrip("/") for p in parts for t in rosbag.Bag(p).get_type_and_topic_info().topics}
+
+
+def test_the_base_run_again_goes_where_it_went(drive, tmp_path):
+    out = tmp_path / "again.bag"
+    replay(parts_of(drive), out)
     with rosbag.Bag(out) as both:
         then, now = poses(both, "/recorded/odom"), poses(both, "/odom")
         assert both.get_message_count("/scan") > 10
@@ -162,18 +205,10 @@ def alike(one: Path, other: Path) -> tuple[float, float]:
     return both.sum() / either.sum(), agree.mean()
 
 
-def test_odometry_again_is_the_same_to_the_last_bit_and_so_is_nearly_the_map(tmp_path):
+def test_odometry_again_is_the_same_to_the_last_bit_and_so_is_nearly_the_map(drive, tmp_path):
     """Through live topics and a recorded clock, from a bag that was split."""
-    live, out = tmp_path / "live.bag", tmp_path / "again.bag"
-    record(tmp_path / "drive.bag", "split:=4", "others:=map trajectory particlecloud", maps=live)
-    parts = sorted(tmp_path.glob("drive_*.bag"))
-    assert len(parts) > 1
-    with rosbag.Bag(parts[0]) as first:
-        assert first.get_compression_info().compression == "lz4"
-    for part in parts:  # each can be read alone: what is latched is in each
-        with rosbag.Bag(part) as bag:
-            assert "tf_static" in {name.lstrip("/") for name in bag.get_type_and_topic_info().topics}
-    replay(parts, out, "base:=reckoned", "slam:=true")
+    live, out = drive / "live.bag", tmp_path / "again.bag"
+    replay(parts_of(drive), out, "base:=reckoned", "slam:=true", "rate:=2")
     with rosbag.Bag(out) as both:
         then, now = bits(both, "/recorded/odom"), bits(both, "/odom")
         for topic in ("/map", "/trajectory", "/particlecloud"):  # what mapped then is out of the way of what maps now

@@ -83,6 +83,31 @@ def test_good_scans_are_not_wrong(seed):
     assert sanity.said_of("with scans", [seed]) == []
 
 
+def exact_drive():
+    """A drive with rests, by a reference without any noise, as a simulator's: (t, x, y, theta) and (t, v, w)."""
+    phases = [(2.0, 0.0, 0.0)]
+    for k in range(8):
+        phases += [(3.0, 0.4 if k % 2 else -0.3, 0.2 * (k % 3 - 1)), (2.0 + 0.3 * k, 0.0, 0.0)]
+    command = np.array([(sum(p[0] for p in phases[:n]), v, w) for n, (_, v, w) in enumerate(phases)])
+    t = np.arange(0.0, sum(p[0] for p in phases), 0.05)
+    v, w = command[np.searchsorted(command[:, 0], t + 1e-9, side="right") - 1, 1:].T
+    theta = np.r_[0.0, np.cumsum(0.05 * w)[:-1]]
+    x, y = (np.r_[0.0, np.cumsum(0.05 * v * of(theta + 0.025 * w))[:-1]] for of in (np.cos, np.sin))
+    return {"pose": np.column_stack([t, x, y, theta]), "command": command}
+
+
+def test_a_robot_that_rests_under_an_exact_reference_is_not_wrong():
+    assert sanity.said_of_tables(exact_drive(), ["command", "pose"], None) == []
+
+
+def test_poses_that_are_held_while_it_moves_are_said_beside_rests():
+    tables = exact_drive()
+    poses = tables["pose"]
+    again = np.flatnonzero(np.random.default_rng(2).random(len(poses) - 1) < 0.15) + 1
+    tables["pose"][again, 1:] = poses[again - 1, 1:]
+    assert any("duplicate rows" in line for line in sanity.said_of_tables(tables, ["command", "pose"], None))
+
+
 def test_the_lag_of_white_noise_behind_itself_is_found():
     rng = np.random.default_rng(1)
     a = rng.normal(size=2000)

@@ -33,6 +33,7 @@ NAMES = (
     "predict",
     "paper",
     "paper_scans",
+    "paper_wall",
     "viewer",
 )
 

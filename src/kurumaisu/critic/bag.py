@@ -16,6 +16,7 @@ from rosbags.rosbag1.reader import IndexData
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from kurumaisu.critic import messages
+from kurumaisu.critic.split_bag import parts_of
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 
@@ -47,12 +48,21 @@ class Topic:
 def read_topics(
     path: Path, parts: dict[str, str], instead: Mapping[str, Callable[[Any], Any]] = MappingProxyType({})
 ) -> dict[str, Topic]:
-    """Read the topics that are in the bag, by part of a run; parts: part by absolute topic.
+    """Read the topics that are in the bag, or in all parts of one that was split, by part of a run.
 
+    parts: part by absolute topic.
     instead: what to keep of a row in place of it, by part, where an hour of rows would fill the memory.
     Raise Error naming file, topic and type for what cannot be read.
     """
     found: dict[str, Topic] = {}
+    for bag in parts_of(path):
+        _read_into(found, bag, parts, instead)
+    return found
+
+
+def _read_into(
+    found: dict[str, Topic], path: Path, parts: dict[str, str], instead: Mapping[str, Callable[[Any], Any]]
+) -> None:
     try:
         with _Reader(path) as reader:
             chosen = [connection for connection in reader.connections if _absolute(connection.topic) in parts]
@@ -74,7 +84,6 @@ def read_topics(
     except Exception as error:  # whatever a parser trips over in a damaged file
         told = str(error) or type(error).__name__
         raise Error(f"{path}: is not a whole ROS 1 bag (rosbag reindex may help): {told}") from error
-    return found
 
 
 class _Reader(Reader):

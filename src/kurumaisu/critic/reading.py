@@ -15,17 +15,19 @@ from kurumaisu.critic.read_csv import QUERY, is_csv_run, read_csv_run, read_quer
 from kurumaisu.critic.read_rawlog import is_rawlog, rawlog_name, read_rawlog_run
 from kurumaisu.critic.recording import LaserMount, Recording, Run
 from kurumaisu.critic.selection import matching
+from kurumaisu.critic.split_bag import is_split
 from kurumaisu.errors import Error
 
 
 def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
     """Read a folder of runs, one folder of CSV tables, one bag or one rawlog.
 
+    NAME.bag may have been split into NAME_0.bag, NAME_1.bag, ...
     wanted: names of runs, or patterns like drive_*; only those are read and used; empty takes all.
     Raise Error naming file, line and column, topic or key for anything that cannot be read, and saying what
     is missing when nothing can be done with what was read.
     """
-    if not path.exists():
+    if not path.exists() and not is_split(path):
         raise Error(f"{path}: there is no such file or folder")
     meta_file = path / "meta.yaml"
     meta = read_meta(meta_file) if meta_file.is_file() else Meta()
@@ -40,7 +42,7 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
     require_use(path, runs, meta, faults)
     train, test = split(meta_file, meta, [run.name for run in runs], partly=bool(wanted))
     return Recording(
-        name=path.resolve().stem if path.is_file() else path.resolve().name,
+        name=path.resolve().name if path.is_dir() else path.resolve().stem,
         runs=tuple(runs),
         train=train,
         test=test,
@@ -55,7 +57,7 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
 
 def sources(path: Path) -> list[Path]:
     """Return what each run is read from: a bag, a rawlog, or a folder of tables."""
-    if path.is_file():
+    if not path.is_dir():
         if path.suffix != ".bag" and not is_rawlog(path):
             raise Error(f"{path}: is no recording: a folder, a .bag or a .rawlog")
         return [path]

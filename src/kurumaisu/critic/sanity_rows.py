@@ -13,6 +13,7 @@ _FROZEN = 2.0  # [s] of standing while far more than usual is asked for
 _BLOCK = 8  # rows that repeat earlier ones exactly, in their order
 _GRID = 0.02  # [m] a grid finer than this is no harm
 _DECIMALS = 9
+MOVING = 0.05  # [m/s, rad/s] above this a robot is on its way
 
 
 def frozen(pose: Series, asked: Rates, driven: Rates) -> str | None:
@@ -50,10 +51,17 @@ def _runs(flags: BoolArray) -> tuple[IntArray, IntArray]:
 
 
 def repeats(pose: Series, driven: Rates) -> float:
-    """Return how many times each pose was written under new times while the robot moved, on the mean."""
+    """Return how many times each pose was written under new times while the robot moved, on the mean.
+
+    A robot that rests under a reference without noise repeats its pose, too: whether it moves is asked in the middle of
+    such a stretch, for next to its ends the means of the rates are those of the motion before and behind.
+    """
     still = _still(pose)
     speed = np.nan_to_num(np.abs(driven.values)).max(axis=1)
-    moving = np.interp(pose.t[:-1], driven.t, speed) > 0.05
+    asked = pose.t[:-1].copy()
+    for a, b in zip(*_runs(still), strict=True):
+        asked[a:b] = 0.5 * (pose.t[a] + pose.t[b])
+    moving = np.interp(asked, driven.t, speed) > MOVING
     if moving.sum() < 20 or not _exact(pose):
         return 1.0
     return float(1 / (1 - min(still[moving].mean(), 0.99)))

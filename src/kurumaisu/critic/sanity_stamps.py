@@ -8,7 +8,8 @@ import numpy as np
 from kurumaisu.critic.recording import Series
 from kurumaisu.critic.sanity_jumps import fresh
 from kurumaisu.critic.sanity_pose import position_noise
-from kurumaisu.types import FloatArray
+from kurumaisu.critic.sanity_rows import MOVING
+from kurumaisu.types import BoolArray, FloatArray
 
 _AROUND = 1.5  # [s] to either side that tell the speed, but
 _HALF = 8  # intervals at least
@@ -27,7 +28,7 @@ def words(pose: Series) -> str | None:
     gain of the odometry and the noise of the poses; poses that wait in a queue give 0.
     """
     new = fresh(pose)
-    rows = _intervals(new)
+    rows = _intervals(new, _rests(pose, new))
     if rows is None:
         return None
     longer, further = rows
@@ -48,8 +49,21 @@ def words(pose: Series) -> str | None:
     )
 
 
-def _intervals(pose: Series) -> tuple[FloatArray, FloatArray] | None:
-    """Return how much longer than its neighbours each interval is, and how much further it went [s], both (n,)."""
+def _rests(pose: Series, new: Series) -> BoolArray:
+    """Tell of each interval between fresh poses whether the robot rested in it: it repeated a pose, and hardly moved.
+
+    A pose that waited in a queue repeats none.
+    """
+    repeated = np.diff(np.searchsorted(pose.t, new.t)) > 1
+    way = np.hypot(*np.diff(new.values[:, :2], axis=0).T)
+    return np.asarray(repeated & (way < MOVING * np.diff(new.t)))
+
+
+def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray] | None:
+    """Return how much longer than its neighbours each interval is, and how much further it went [s], both (n,).
+
+    rests (len(pose) - 1,): intervals that do not count, nor do those about them.
+    """
     if len(pose.t) < _LEAST:
         return None
     dt = np.diff(pose.t)
@@ -61,7 +75,7 @@ def _intervals(pose: Series) -> tuple[FloatArray, FloatArray] | None:
     time, gone = (np.convolve(each, around, mode="same") for each in (dt, way))
     speed = gone / time
     driving = speed * time / len(around) > _CLEAR * position_noise(pose)
-    driving &= np.convolve(dt > _PAUSE, around, mode="same") == 0
+    driving &= np.convolve((dt > _PAUSE) | rests, around, mode="same") == 0
     driving[:half] = driving[-half:] = False
     if driving.sum() < _LEAST:
         return None

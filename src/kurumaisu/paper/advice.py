@@ -47,6 +47,7 @@ def plan(options: Options) -> list[str]:
         "  not in order; a bag each, named so that they sort as their distances are given:",
         "  rosbag record -O a.bag --duration 6 scan",
         "Then: calibrate laser a.bag b.bag c.bag d.bag e.bag --distances 1 0.2 4 0.5 2 --out DIR",
+        "  Every other scan is held out; what the tape was off, only a wall put up again can show: --test f.bag ...",
         "Whether near walls are noisier by range or by incidence: the same bags in a folder with their poses and world",
         "  (docs/recording.md), beams from straight ahead to 70 degrees, so no nearer than 0.2 m to a board of 1 m:",
         "  paper conjecture DIR --distances 1 0.2 4 0.5 2 --out OUT",

@@ -15,8 +15,10 @@ from kurumaisu.experiments.script import Box
 from kurumaisu.paper import drawing
 from kurumaisu.paper.model_file import ModelFile
 from kurumaisu.paper.options import Wall
-from kurumaisu.params import load_model
+from kurumaisu.params import load_model, shipped
 from kurumaisu.riddles import lab
+from kurumaisu.types import FloatArray
+from kurumaisu.world import load_world
 
 # A chassis no larger than the laser: it stands 0.2 m before the board, and turns where the laser is.
 _WORLD = "board.world"
@@ -58,6 +60,11 @@ def write_script(options: Wall, out: Path) -> None:
         "places": rows,
     }
     drawing.write(out, yaml.safe_dump(text, sort_keys=False))
+
+
+def walls() -> FloatArray:
+    """Return the simulated board's outline (m, 4), x and y of both ends [m], seen from the middle of its face."""
+    return load_world(shipped(f"worlds/{_WORLD}")).segments - [lab.WALL, 0.0, lab.WALL, 0.0]
 
 
 def simulated(bench: Path, options: Wall, seed: int) -> Recording:

@@ -7,16 +7,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from kurumaisu.critic.recording import Recording, Series
 from kurumaisu.critic.reference import with_reference
 from kurumaisu.errors import Error
-from kurumaisu.paper import commands, commands_wall, drawing, held_out, laser_file
+from kurumaisu.paper import bench_wall, commands, commands_wall, drawing, held_out, held_out_laser, laser_file
 from kurumaisu.paper.options import load_options
 from kurumaisu.paper.samples import samples_of
-from kurumaisu.paper.wall import Ahead, ahead_of, places_of
-from kurumaisu.params import Model, load_model
+from kurumaisu.paper.wall import ahead_of, places_of
+from kurumaisu.params import load_model
+
+BETTER, NO_BETTER = "the new law is better", "the new law is NO better: keep the model that you have"
 
 
 def drive(
@@ -39,50 +39,47 @@ def drive(
     before, after = (held_out.errors(load_model(path), samples, runs) for path in (model, out / "chair.yaml"))
     lines = held_out.lines(before, after)
     better = after.better_than(before, options.drive.better)
-    lines.append("the new law is better" if better else "the new law is NO better: keep the model that you have")
+    lines.append(BETTER if better else NO_BETTER)
     print("\n".join(lines))
     drawing.write(out / "held_out.txt", "\n".join(lines) + "\n")
     return int(not better)
 
 
 def laser(
-    model: Path, recordings: Sequence[Path], distances: Sequence[float], out: Path, *, settings: Path | None
+    model: Path,
+    recordings: Sequence[Path],
+    distances: Sequence[float],
+    out: Path,
+    *,
+    test: Sequence[Path],
+    settings: Path | None,
 ) -> int:
-    """Write the laser's equation (4) from every other scan of a wall; show before and after on the scans between them.
+    """Write the laser's equation (4) from scans of a wall; show before and after on others.
 
-    Return 0, or 1 where the new law is no better. Raise Error for what is wrong with a file, or with the wall.
+    test: of the wall, put up again at the same distances; where there is none, every other scan is held out. Return 0,
+    or 1 where the new law is no better. Raise Error for what is wrong with a file, or with the wall.
     """
     options = load_options(settings)
-    whole = commands.read_all(recordings)
-    train, test = (_every_other(whole, first) for first in (0, 1))
-    halved = replace(options, wall=replace(options.wall, least_scans=max(2, options.wall.least_scans // 2)))
-    law, ahead = commands_wall.fit(train, distances, model, options.wall.tape_sd, halved, out)
+    fitted, held, wall = commands.read_all(recordings), commands.read_all(test) if test else None, options.wall
+    if held is None:
+        wall = replace(wall, least_scans=max(2, wall.least_scans // 2))
+        fitted, held = (_every_other(fitted, first) for first in (0, 1))
+    law, ahead = commands_wall.fit(fitted, distances, model, wall.tape_sd, replace(options, wall=wall), out)
     head = [
         f"Equation (4) was identified from {', '.join(path.name for path in recordings)}: {len(ahead)} distances.",
-        f"{100 * options.bootstrap.level:.0f} % intervals; distances taped to {1e3 * options.wall.tape_sd:g} mm:",
+        f"{100 * options.bootstrap.level:.0f} % intervals; distances taped to {1e3 * wall.tape_sd:g} mm:",
     ]
     laser_file.write_laser(model, law, head, out / "laser.yaml")
     print("\n".join(commands_wall.law_rows(law, laser_file.printed(model))))
-    held = [ahead_of(p, options.wall) for p in places_of(test, distances, load_model(model).laser, halved.wall)]
-    before, after = (_log_density(load_model(path), held) for path in (model, out / "laser.yaml"))
-    told = f"log density of a held-out reading: before {before:.3f}, after {after:.3f} nats"
-    better = after > before
-    lines = [told, "the new law is better" if better else "the new law is NO better: keep the model that you have"]
+    places = [ahead_of(place, wall) for place in places_of(held, distances, load_model(model).laser, wall)]
+    laws = load_model(model).laser.error, load_model(out / "laser.yaml").laser.error
+    judged = held_out_laser.judge(laws, places, bench_wall.resolution(model), options.bootstrap.level)
+    lines = held_out_laser.lines(judged, options.bootstrap.level)
+    lines.append(BETTER if judged.better else NO_BETTER)
     print("\n".join(lines))
     print(f"model with this law: {out / 'laser.yaml'}")
     drawing.write(out / "held_out_laser.txt", "\n".join(lines) + "\n")
-    return int(not better)
-
-
-def _log_density(model: Model, held: Sequence[Ahead]) -> float:
-    """Return the mean log density of readings [nats per reading, of metres]."""
-    error = model.laser.error
-    found = []
-    for place in held:
-        sd = error.deviation(place.true)
-        z = (place.readings - error.mean(place.true)) / sd
-        found.append(np.mean(-0.5 * z**2 - np.log(sd) - 0.5 * np.log(2 * np.pi)))
-    return float(np.mean(found))
+    return int(not judged.better)
 
 
 def _every_other(recording: Recording, first: int) -> Recording:

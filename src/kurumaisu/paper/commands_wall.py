@@ -104,13 +104,14 @@ def law_rows(law: LaserLaw, printed: Sequence[float]) -> list[str]:
 
 
 def figure_12(recordings: Sequence[Path], bench_model: Path, out: Path, settings: Path | None) -> int:
-    """Draw figure 12 of scans of the simulated wall and test their agreement with (4); return 1 where they do not."""
+    """Draw figures 11, 12 of scans of the simulated wall, test whether these agree with (4); return 1 if not."""
     options = load_options(settings)
     laser = load_model(bench_model).laser
     places = places_of(read_all(recordings), options.wall.distances, laser, options.wall)
     ahead = [ahead_of(place, options.wall) for place in places]
     told = judged(ahead, bench_model, options)
-    figures_wall.simulated(out / "figure_12.svg", ahead, told, laser.error)
+    figures_wall.setting(out / "figure_11.svg", places, bench_wall.walls())
+    figures_wall.simulated(out / "figure_12.svg", ahead, told, laser.error, options.wall.agree)
     figures_wall.data(out / "figure_12.csv", ahead, told)
     lines = rows(told, ahead)
     print("\n".join(lines))

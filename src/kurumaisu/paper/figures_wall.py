@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures 7, 8 and 9, and 12: scans of a wall, their mean and their standard deviation against distance."""
+"""Figures 7, 8, 9, 11 and 12: scans of a wall, their mean and their standard deviation against distance."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from kurumaisu._core import LaserError
 from kurumaisu.paper import drawing
 from kurumaisu.paper.laser_law import NAMES, Agreement, LaserLaw
 from kurumaisu.paper.wall import Ahead, Place
+from kurumaisu.types import FloatArray
 
 
 def scan(path: Path, place: Place) -> None:
@@ -55,8 +56,45 @@ def against_distance(path: Path, places: Sequence[Ahead], law: LaserLaw, paper: 
             axis.legend()
 
 
-def simulated(path: Path, places: Sequence[Ahead], told: Sequence[Agreement], paper: LaserError) -> None:
-    """Write figure 12: means of the simulated wall against distance over (4), and what is left, in standard errors."""
+def setting(path: Path, places: Sequence[Place], walls: FloatArray) -> None:
+    """Write figure 11: the simulated wall and the laser at each distance; beside it one scan from each, x stretched.
+
+    walls: (m, 4) [m], x, y of both ends, seen from the middle of the wall's face. The scans' data go beside the file.
+    """
+    rows: dict[str, list[float]] = {"distance": [], "x": [], "y": []}
+    with drawing.figure(path, 1, 2, (7.6, 3.2)) as axes:
+        whole, close = axes[0]
+        for n, (x0, y0, x1, y1) in enumerate(walls):
+            for axis in axes[0]:
+                label = None if n or axis is close else "wall"
+                axis.plot([x0, x1], [y0, y1], color=drawing.PAPER, linewidth=1.4, label=label)
+        for n, place in enumerate(places):
+            points = place.points[0]
+            met = points[np.isfinite(points).all(axis=1)] - [place.distance, 0.0]
+            for end in met[[0, -1]]:
+                whole.plot([-place.distance, end[0]], [0, end[1]], color=drawing.FAINT, linewidth=0.7, zorder=1)
+            whole.plot(-place.distance, 0, "^", color=drawing.LINE, label=None if n else "laser")
+            shade = 0.9 - 0.7 * n / max(len(places) - 1, 1)
+            close.plot(
+                *met.T, "o", color=drawing.MEASURED, alpha=shade, markersize=2.0, label=f"from {place.distance:g} m"
+            )
+            for column, values in zip(rows.values(), (np.full(len(met), place.distance), *met.T), strict=True):
+                column.extend(values.tolist())
+        whole.set(xlabel="x [m] from the wall", ylabel="y [m]", title="Figure 11: the simulated wall")
+        whole.set_aspect("equal", adjustable="datalim")
+        whole.legend(loc="upper left")
+        close.set(xlabel="x [m] from the wall", title="a scan from each place, x stretched")
+        left, right = close.get_xlim()
+        close.set_xlim(left, right + 0.35 * (right - left))  # room for the legend
+        close.legend(loc="center right")
+    drawing.table(path.with_suffix(".csv"), rows)
+
+
+def simulated(path: Path, places: Sequence[Ahead], told: Sequence[Agreement], paper: LaserError, agree: float) -> None:
+    """Write figure 12: means of the simulated wall against distance over (4), and what is left, in standard errors.
+
+    agree: within how many of them a mean must lie.
+    """
     r = np.array([place.distance for place in places])
     fine = np.linspace(0.0, 1.05 * r.max(), 200)
     with drawing.figure(path, 1, 2, (7.6, 3.2)) as axes:
@@ -65,9 +103,12 @@ def simulated(path: Path, places: Sequence[Ahead], told: Sequence[Agreement], pa
         mean.plot(r, [place.mean for place in places], "o", color=drawing.MEASURED, label="simulated wall")
         mean.set(xlabel="distance [m]", ylabel="mean reading [m]", title="Figure 12")
         mean.legend()
-        off.axhspan(-3, 3, color="#eef2f4")
+        off.axhspan(-agree, agree, color="#eef2f4", label="agrees")
         off.plot(r, [one.off for one in told], "o", color=drawing.MEASURED)
-        off.set(xlabel="distance [m]", ylabel="mean - (4) [standard errors]", title="what is left", ylim=(-5, 5))
+        off.legend(loc="upper right")
+        off.set(xlabel="distance [m]", ylabel="mean - (4) [standard errors]", title="what is left")
+        most = max(agree, *(abs(one.off) for one in told))
+        off.set_ylim(-1.5 * most, 1.5 * most)
 
 
 def data(path: Path, places: Sequence[Ahead], told: Sequence[Agreement]) -> None:

@@ -221,7 +221,7 @@ def _fit_branch(
         slope=slope,
         intercept=intercept,
         scatter=float(np.std((volts - line.at(rate)) / line.slope, ddof=2)),
-        curvature=_curvature(rate, volts, block),
+        curvature=_curvature(rate, volts, block, options.drive.voltage_sd),
         refused=_refusal(slope, intercept, rate, axis.unit, options),
     )
 
@@ -255,8 +255,11 @@ def _refusal(slope: Coefficient, intercept: Coefficient, rate: FloatArray, unit:
     return ""
 
 
-def _curvature(rate: FloatArray, volts: FloatArray, block: IntArray) -> float:
-    """Return the t value of a square term, by block means: noise within a block is one."""
+def _curvature(rate: FloatArray, volts: FloatArray, block: IntArray, voltage_sd: float) -> float:
+    """Return the t value of a square term, by block means: noise within a block is one.
+
+    Where a simulator has no noise, what the D/A is said to scatter by, voltage_sd [V], remains: rounding is no bend.
+    """
     names, index = np.unique(block, return_inverse=True)
     size = np.bincount(index)
     x, y = np.bincount(index, volts) / size, np.bincount(index, rate) / size
@@ -266,5 +269,6 @@ def _curvature(rate: FloatArray, volts: FloatArray, block: IntArray) -> float:
     root = np.sqrt(size)
     found, *_ = np.linalg.lstsq(columns * root[:, np.newaxis], y * root, rcond=None)
     left = (y - columns @ found) * root
-    covariance = np.linalg.inv((columns * size[:, np.newaxis]).T @ columns) * (left @ left) / (len(x) - 3)
-    return float(found[2] / np.sqrt(max(covariance[2, 2], 1e-300)))
+    variance = max(left @ left / (len(x) - 3), (found[1] * voltage_sd) ** 2)
+    covariance = np.linalg.inv((columns * size[:, np.newaxis]).T @ columns) * variance
+    return float(found[2] / np.sqrt(covariance[2, 2]))

@@ -43,7 +43,14 @@ def _drive(options: argparse.Namespace) -> int:
 
 
 def _laser(options: argparse.Namespace) -> int:
-    return calibrate.laser(options.model, options.recordings, options.distances, options.out, settings=options.settings)
+    return calibrate.laser(
+        options.model,
+        options.recordings,
+        options.distances,
+        options.out,
+        test=options.test,
+        settings=options.settings,
+    )
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -70,6 +77,13 @@ def _parser() -> argparse.ArgumentParser:
     laser.set_defaults(command=_laser)
     laser.add_argument("recordings", nargs="+", type=Path, help="scans of the wall")
     laser.add_argument("--distances", nargs="+", type=float, required=True, help="[m] of the runs, in the order given")
+    laser.add_argument(
+        "--test",
+        nargs="+",
+        type=Path,
+        default=[],
+        help="scans to judge by, at the same distances; none: every other one",
+    )
     for part in (drive, laser):
         part.add_argument("--out", type=Path, required=True, help="folder for the model file, figures and data")
         part.add_argument(

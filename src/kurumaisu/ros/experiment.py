@@ -49,6 +49,7 @@ def _run(script: Script, options: argparse.Namespace) -> str:
     stop = _Stop()
     try:
         ground = Ground(script, model.chassis, care, options.world)
+        print(f"experiment: {options.name}: {script.seconds:.0f} s; Ctrl-C stops it", file=sys.stderr, flush=True)
         if script.kind == "places":
             return run_places(script, care, ground, stop, options.bag)
         return run_drive(script, care, model, ground, stop, options.bag)

@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from kurumaisu.errors import Error, failed
 from kurumaisu.paper import commands, commands_wall
@@ -47,26 +48,15 @@ def _drive(options: argparse.Namespace) -> int:
 
 
 def _wall(options: argparse.Namespace) -> int:
-    return commands_wall.figures_wall_of(
-        options.model,
-        options.recordings,
-        options.out,
-        distances=options.distances,
-        seed=options.seed,
-        settings=options.settings,
-    )
+    return commands_wall.figures_wall_of(options.model, options.recordings, options.out, **_of_wall(options))
 
 
 def _conjecture(options: argparse.Namespace) -> int:
-    return commands_wall.asked(
-        options.model,
-        options.recordings,
-        options.out,
-        distances=options.distances,
-        seed=options.seed,
-        settings=options.settings,
-        say=commands.say,
-    )
+    return commands_wall.asked(options.model, options.recordings, options.out, say=commands.say, **_of_wall(options))
+
+
+def _of_wall(options: argparse.Namespace) -> dict[str, Any]:
+    return {"distances": options.distances, "seed": options.seed, "settings": options.settings}
 
 
 def _dac(options: argparse.Namespace) -> int:

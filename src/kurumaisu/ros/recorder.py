@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import glob
 import shutil
 import subprocess
 import time
@@ -16,6 +15,7 @@ import rosgraph
 import rospy
 
 from kurumaisu.children import interrupt
+from kurumaisu.critic.split_bag import numbered
 from kurumaisu.errors import Error
 from kurumaisu.ros.experiment_ground import publishers
 
@@ -77,10 +77,7 @@ class Recorder:
         if self._first == self._path:
             path = Path(f"{self._path}{ending}")
             return [path] if path.exists() else []
-        lead, trail = len(self._path.stem) + 1, len(self._path.suffix + ending)
-        found = self._path.parent.glob(f"{glob.escape(self._path.stem)}_*{self._path.suffix}{ending}")
-        numbered = [path for path in found if path.name[lead:-trail].isdigit()]
-        return sorted(numbered, key=lambda path: int(path.name[lead:-trail]))
+        return numbered(self._path, ending)
 
     def _check_space(self) -> None:
         """Raise Error where rosbag record would write nothing, of which it tells only its log."""

@@ -12,6 +12,7 @@ import rosbag
 import rospy
 from nav_msgs.msg import Odometry
 
+from kurumaisu.critic.split_bag import parts_of
 from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper import reckon
@@ -96,21 +97,22 @@ def _row(message: Odometry) -> Odom:
 
 
 def check(path: Path) -> int:
-    """Say how a bag's odometry compares with that which its voltages make; return 0 when all bits are the same.
+    """Say how odometry of a bag, or of a split one, compares with what its voltages make; return 0 when bits are equal.
 
     Raise Error when it cannot be read, or has not both.
     """
     put: list[Put] = []
     odom: list[Odom] = []
-    try:
-        with rosbag.Bag(str(path)) as bag:
-            for topic, message, _ in bag.read_messages(["voltages", "/voltages", "odom", "/odom"]):
-                if topic.endswith("odom"):
-                    odom.append(_row(message))
-                else:
-                    put.append((message.header.stamp.to_nsec(), message.v, message.w))
-    except (OSError, rosbag.ROSBagException) as error:
-        raise Error(f"{path}: {error}") from error
+    for part in parts_of(path):
+        try:
+            with rosbag.Bag(str(part)) as bag:
+                for topic, message, _ in bag.read_messages(["voltages", "/voltages", "odom", "/odom"]):
+                    if topic.endswith("odom"):
+                        odom.append(_row(message))
+                    else:
+                        put.append((message.header.stamp.to_nsec(), message.v, message.w))
+        except (OSError, rosbag.ROSBagException) as error:
+            raise Error(f"{part}: {error}") from error
     found = reckon.compare(put, odom)
     if found is None:
         raise Error(f"{path}: has no voltages and odom of the same stamps")
