@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 import unittest
 
 import numpy as np
@@ -154,10 +153,12 @@ class LocalizationNode(unittest.TestCase):
         wait_for(lambda: len(self.poses.messages) > begin, "amcl_pose at rest", DEADLINE)
 
     def test_6_scans_without_transforms_are_counted_and_said(self):
-        begin = time.monotonic()
-        while time.monotonic() - begin < 4.0 and not (self.status() and "NO_TRANSFORM" in self.status().message):
-            self.room.step((time.monotonic() - begin), with_tf=False)
-            time.sleep(0.05)
+        self.room.step_until(
+            lambda: self.status() and "NO_TRANSFORM" in self.status().message,
+            "no transform said",
+            DEADLINE,
+            with_tf=False,
+        )
         self.wait_for_status(2, "LOCALIZATION_NO_TRANSFORM")
         values = {item.key: item.value for item in self.status().values}
         assert int(values["dropped without transform"]) > 0
