@@ -82,6 +82,10 @@ class MappingNode(unittest.TestCase):
                     return status
         return None
 
+    def says(self, words):
+        status = self.status()
+        return status and words in status.message
+
     def wait_for_status(self, level, words):
         said = set()
 
@@ -255,21 +259,15 @@ class MappingNode(unittest.TestCase):
         np.testing.assert_allclose([x, y, wrap(theta)], np.zeros(3), atol=0.05)
 
     def test_3_scans_without_transforms_are_counted_and_said(self):
-        begin = time.monotonic()
-        while time.monotonic() - begin < DEADLINE and not (
-            self.status() and "scans come, but" in self.status().message
-        ):
-            self.room.step(time.monotonic() - begin, with_tf=False)
-            time.sleep(0.05)
+        self.room.step_until(lambda: self.says("scans come, but"), "scans without tf said", DEADLINE, with_tf=False)
         self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but no odometry: tf has no odom -> base_link")
         assert int(self.values()["dropped without transform"]) > 0
         self.wait_for_status(2, "MAPPING_NO_SCAN")
 
     def test_4_a_laser_that_nobody_has_placed_is_said(self):
-        begin = time.monotonic()
-        while time.monotonic() - begin < DEADLINE and not (self.status() and "nobody says" in self.status().message):
-            self.room.step(time.monotonic() - begin, frame="nowhere")
-            time.sleep(0.05)
+        self.room.step_until(
+            lambda: self.says("nobody says"), "a laser without a place said", DEADLINE, frame="nowhere"
+        )
         self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but nobody says where the laser is")
 
     def test_5_scans_without_transforms_do_not_stop_the_others(self):

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <ctime>
 #include <functional>
 #include <map>
@@ -204,6 +205,27 @@ TEST(Localizer, NoticesThatItWasCarriedAway) {
   ASSERT_NE(doubt, moments.end());
   EXPECT_LT(doubt->t - 20, 3);
   EXPECT_GT(doubt->sd, 0.7);
+  EXPECT_TRUE(sure(moments.back()));
+  EXPECT_LT(moments.back().off, 0.06);
+}
+
+/// Before it is sure of another place it is shown where it was believed to be, with an honest deviation.
+TEST(LocalizerFaults, ADoubtedPoseDoesNotLeapThroughTheMap) {
+  const auto moments = faulty([](double t, k::Scan& scan, k::Pose2D&, k::Pose2D&) {
+    if (t < 12 || t > 20) return;
+    for (std::size_t i = 0; i < scan.ranges.size(); ++i) {  // a spiral: of no place at all
+      scan.ranges[i] = 0.5F + 0.005F * static_cast<float>(i);
+    }
+  });
+  const auto unsure = std::count_if(moments.begin(), moments.end(), [](const Moment& m) { return !sure(m); });
+  EXPECT_GT(unsure, 60);
+  for (std::size_t i = 1; i < moments.size(); ++i) {
+    if (sure(moments[i])) continue;  // that is when it may leap
+    const k::Pose2D step =
+        k::between(moments[i - 1].estimate.map_from_base.mean, moments[i].estimate.map_from_base.mean);
+    EXPECT_LT(std::hypot(step.x, step.y), 0.6) << moments[i].t;
+  }
+  EXPECT_EQ(confidentlyWrong(moments), 0);
   EXPECT_TRUE(sure(moments.back()));
   EXPECT_LT(moments.back().off, 0.06);
 }

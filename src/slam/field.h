@@ -35,6 +35,8 @@ class Field {
     if (!(x >= 0 && y >= 0 && x < static_cast<float>(width_) && y < static_cast<float>(height_))) return kFar;
     return codes_[static_cast<std::size_t>(y) * width_ + static_cast<std::size_t>(x)];
   }
+  /// Codes of a row of cells.
+  const std::uint8_t* row(int y) const { return &codes_[static_cast<std::size_t>(y) * width_]; }
   /// Distance [m] that a code stands for.
   double distance(std::uint8_t code) const { return (code - kSurface) * quantum_; }
 

@@ -148,9 +148,12 @@ void Filter::localise(const Scan& scan, const Pose2D& motion, const Eigen::Matri
 }
 
 void Filter::insert(const Scan& scan) {
-  mrpt::obs::CSensoryFrame frame;
-  frame.insert(insertionObservation(scan, settings_.range));
-  particles_->pdf.insertObservation(frame);
+  // Not pdf.insertObservation(), which keeps every scan, and where all particles then were, beside their maps.
+  const auto observation = insertionObservation(scan, settings_.range);
+  for (auto& particle : particles_->pdf.m_particles) {
+    const mrpt::poses::CPose3D pose(particle.d->robotPath.back());
+    particle.d->mapTillNow.insertObservation(*observation, pose);
+  }
 }
 
 /// MRPT's generator belongs to the thread and keeps half a pair of normal draws over a new seed, so it is

@@ -2,12 +2,6 @@
 #include "slam/finder.h"
 
 namespace kurumaisu {
-namespace {
-
-constexpr double kHeadStart = 5;  // log-odds of the place where the chair was believed to be, when doubted
-
-}  // namespace
-
 std::optional<Places> Finder::step(const Beams& beams, const Odometry& now,
                                    const std::optional<Pose2D>& doubted) {
   if (!search_) {
@@ -19,8 +13,9 @@ std::optional<Places> Finder::step(const Beams& beams, const Odometry& now,
   }
   if (!search_->step()) return std::nullopt;
   Places found(*sensor_, settings_->recovery);
-  found.add(search_->poses(), beams_, 0);
-  if (doubted_) found.add({*doubted_}, beams_, kHeadStart);
+  found.add(search_->poses(), beams_);
+  // Where a map has no place at all, it does not speak for that one either.
+  if (doubted_ && !found.empty()) found.addDoubted(*doubted_, beams_);
   search_.reset();
   found.update(motionBetween(begun_, now, settings_->motion, process_), beams);
   return found;

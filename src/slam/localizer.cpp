@@ -146,7 +146,7 @@ class Localizer::Impl {
                                 mean.covariance};
       setBase(estimate.map_from_base);
     }
-    look(beams, estimate);
+    look(beams, estimate.map_from_base.mean);
     switch (doubt_.judge(health_, travelled_)) {
       case Doubt::Step::kNone:
         return;
@@ -159,8 +159,8 @@ class Localizer::Impl {
     }
   }
 
-  void look(const Beams& beams, const Estimate& estimate) {
-    const Fit fit = sensor_.look(beams, estimate.map_from_base.mean);
+  void look(const Beams& beams, const Pose2D& map_from_base) {
+    const Fit fit = sensor_.look(beams, map_from_base);
     if (fit.readings() >= static_cast<int>(kLeastReadings)) health_.take(fit.share(), settings_.recovery);
   }
 
@@ -186,13 +186,15 @@ class Localizer::Impl {
   }
 
   void follow(const Beams& beams, const Gaussian& motion, bool update, Estimate& estimate) {
+    Gaussian best = moved(places_.best(), motion);
     if (update || finder_.busy()) {
       places_.update(motion, beams);
       show(estimate);
+      best = places_.best();
     }
     if (finder_.busy() || travelled_ >= kSearchAgain * settings_.recovery.found_way) searchAgain(beams);
-    look(beams, estimate);
-    decide(estimate);
+    look(beams, best.mean);
+    decide(best, estimate);
     if (knowledge_ == Knowledge::kAmbiguous) {
       estimate.map_from_base.covariance += around(pose_.mean, places_.all());
     }
@@ -206,25 +208,26 @@ class Localizer::Impl {
     travelled_ = 0;
   }
 
+  /// Where it was believed to be: it does not leap through the map before it is sure.
   void show(Estimate& estimate) {
-    setBase(places_.best());
+    setBase(places_.shown());
     estimate.map_from_base = pose_;
     estimate.particles = static_cast<int>(places_.size());
   }
 
   /// One place is taken when it has held against all others over some way, those of a second search among them.
-  void decide(Estimate& estimate) {
+  void decide(const Gaussian& best, Estimate& estimate) {
     const auto& s = settings_.recovery;
     if (finder_.busy() || travelled_ < s.found_way) return;
     if (health_.doubtful(s)) {
-      known_ = false;
+      known_ = places_.hasDoubted();
       start(Knowledge::kLost);
       estimate.map_from_base.covariance = anywhere(field_);
     } else if (places_.odds() >= s.found_odds && places_.bestFit() >= s.found_fit) {
       if (!verified_) {
         travelled_ = kSearchAgain * s.found_way;  // now
       } else {
-        Gaussian wide = estimate.map_from_base;
+        Gaussian wide = best;
         wide.covariance.diagonal() += Eigen::Vector3d(0.01, 0.01, 0.0025);  // 0.1 m, 3 degrees
         setPose(wide);
         estimate.map_from_base = std::move(wide);

@@ -161,16 +161,23 @@ const Matcher::Line* Matcher::nearest(const Eigen::Vector2d& point, const Eigen:
   return nearestOf(far_, farReach(), point, eye, reach);
 }
 
-/// size: of the squares [m], at least reach.
+/// size: of the squares [m], at least reach. A square that begins beyond the best line so far is not looked into.
 const Matcher::Line* Matcher::nearestOf(const Cells& cells, double size, const Eigen::Vector2d& point,
                                         const Eigen::Vector2d& eye, double reach) {
   const Line* best = nullptr;
   double best_square = reach * reach;
-  const auto x = static_cast<std::int64_t>(std::floor(point.x() / size));
-  const auto y = static_cast<std::int64_t>(std::floor(point.y() / size));
-  for (int dx = -1; dx <= 1; ++dx) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      const auto cell = cells.find(keyOf(x + dx, y + dy));
+  const double x = std::floor(point.x() / size);
+  const double y = std::floor(point.y() / size);
+  const auto gap = [size](double at, double square, int step) {  // [m]
+    return step < 0 ? at - square * size : step * ((square + step) * size - at);
+  };
+  for (const int dx : {0, -1, 1}) {
+    const double across = gap(point.x(), x, dx);
+    for (const int dy : {0, -1, 1}) {
+      const double along = gap(point.y(), y, dy);
+      if (across * across + along * along >= best_square) continue;
+      const auto cell =
+          cells.find(keyOf(static_cast<std::int64_t>(x) + dx, static_cast<std::int64_t>(y) + dy));
       if (cell == cells.end()) continue;
       for (const Line& line : cell->second) {
         const double square = (line.point - point).squaredNorm();

@@ -14,6 +14,7 @@ namespace {
 constexpr double kHopeless = 20;    // nats behind the best
 constexpr double kSame = 0.3;       // [m] places nearer than this
 constexpr double kSameAngle = 0.2;  // [rad] and no more turned than this are one
+constexpr double kHeadStart = 5;    // log-odds of the place that was believed
 constexpr int kFirstRounds = 12;
 constexpr int kRounds = 4;
 constexpr double kFitGain = 0.3;  // share of a scan in the mean of a place's fit
@@ -25,18 +26,28 @@ void Places::align(Place& place, const Beams& beams, int rounds) const {
   place.pose = {found.pose, found.information.inverse()};
 }
 
-void Places::add(const std::vector<Pose2D>& poses, const Beams& beams, double head_start) {
+Places::Place Places::placeAt(const Pose2D& pose, const Beams& beams) const {
   Eigen::Matrix3d start = Eigen::Matrix3d::Zero();
   start.diagonal() << settings_->step * settings_->step, settings_->step * settings_->step,
       settings_->angle_step * settings_->angle_step;
-  for (const Pose2D& pose : poses) {
-    Place place{{pose, start}, head_start, 0};
-    align(place, beams, kFirstRounds);
-    const Fit fit = sensor_->look(beams, place.pose.mean);
-    place.fit = fit.share();
-    place.log_weight += settings_->power * fit.log_likelihood;
-    places_.push_back(place);
-  }
+  Place place{{pose, start}, 0, 0, false};
+  align(place, beams, kFirstRounds);
+  const Fit fit = sensor_->look(beams, place.pose.mean);
+  place.fit = fit.share();
+  place.log_weight = settings_->power * fit.log_likelihood;
+  return place;
+}
+
+void Places::add(const std::vector<Pose2D>& poses, const Beams& beams) {
+  for (const Pose2D& pose : poses) places_.push_back(placeAt(pose, beams));
+  tidy();
+}
+
+void Places::addDoubted(const Pose2D& pose, const Beams& beams) {
+  Place place = placeAt(pose, beams);
+  place.log_weight += kHeadStart;
+  place.doubted = true;
+  places_.push_back(place);
   tidy();
 }
 
@@ -61,13 +72,19 @@ void Places::tidy() {
                    [](const Place& a, const Place& b) { return a.log_weight > b.log_weight; });
   std::vector<Place> kept;
   for (const Place& place : places_) {
-    if (!kept.empty() && place.log_weight < kept.front().log_weight - kHopeless) break;
-    if (kept.size() >= static_cast<std::size_t>(settings_->places)) break;
+    const bool hopeless = !kept.empty() && place.log_weight < kept.front().log_weight - kHopeless;
+    const bool full = kept.size() >= static_cast<std::size_t>(settings_->places);
+    if ((hopeless || full) && !place.doubted) continue;
     const auto same = [&place](const Place& other) {
       const Pose2D off = between(place.pose.mean, other.pose.mean);
       return std::hypot(off.x, off.y) < kSame && std::abs(wrapAngle(off.theta)) < kSameAngle;
     };
-    if (std::none_of(kept.begin(), kept.end(), same)) kept.push_back(place);
+    const auto likelier = std::find_if(kept.begin(), kept.end(), same);
+    if (likelier == kept.end()) {
+      kept.push_back(place);
+    } else if (place.doubted) {
+      likelier->doubted = true;
+    }
   }
   places_ = std::move(kept);
   const double best = places_.empty() ? 0 : places_.front().log_weight;
@@ -75,6 +92,12 @@ void Places::tidy() {
 }
 
 Gaussian Places::best() const { return places_.front().pose; }
+
+std::vector<Places::Place>::const_iterator Places::doubted() const {
+  return std::find_if(places_.begin(), places_.end(), [](const Place& place) { return place.doubted; });
+}
+
+Gaussian Places::shown() const { return hasDoubted() ? doubted()->pose : best(); }
 
 double Places::bestFit() const { return places_.empty() ? 0 : places_.front().fit; }
 

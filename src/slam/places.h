@@ -14,10 +14,13 @@ class Places {
   /// Keeps references to the sensor and the settings.
   Places(const Sensor& sensor, const RecoverySettings& settings) : sensor_(&sensor), settings_(&settings) {}
 
-  /// Adds poses, each aligned to the readings first; head_start: log-odds that they get.
-  void add(const std::vector<Pose2D>& poses, const Beams& beams, double head_start);
+  /// Adds poses, each aligned to the readings first.
+  void add(const std::vector<Pose2D>& poses, const Beams& beams);
+  /// Adds the pose that was believed so far, with a head start.
+  void addDoubted(const Pose2D& pose, const Beams& beams);
 
-  /// Moves all places and weighs them by a scan; forgets those that are hopeless, or have met another.
+  /// Moves all places and weighs them by a scan; forgets those that are hopeless, or have met another, but not the
+  /// one that was believed.
   void update(const Gaussian& motion, const Beams& beams);
 
   /// Takes in places found later: they compete with those there are from now on, at par.
@@ -28,6 +31,9 @@ class Places {
   /// The likeliest place and its fit.
   Gaussian best() const;
   double bestFit() const;
+  /// The place that was believed; where none was, the likeliest.
+  Gaussian shown() const;
+  bool hasDoubted() const { return doubted() != places_.end(); }
   /// How much likelier it is than all others together.
   double odds() const;
   std::vector<Weighted> all() const;
@@ -36,9 +42,12 @@ class Places {
   struct Place {
     Gaussian pose;
     double log_weight;
-    double fit;  ///< mean share of readings explained
+    double fit;    ///< mean share of readings explained
+    bool doubted;  ///< it was believed before the search
   };
 
+  std::vector<Place>::const_iterator doubted() const;
+  Place placeAt(const Pose2D& pose, const Beams& beams) const;
   void align(Place& place, const Beams& beams, int rounds) const;
   void tidy();
 

@@ -2,9 +2,10 @@
 // Where in a map could this scan have been taken?
 #pragma once
 
-#include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
+#include "slam/combed.h"
 #include "slam/sensor.h"
 
 namespace kurumaisu {
@@ -13,7 +14,7 @@ namespace kurumaisu {
 class Search {
  public:
   /// Keeps references to the sensor and the settings.
-  Search(const Sensor& sensor, const RecoverySettings& settings, Beams beams);
+  Search(const Sensor& sensor, const RecoverySettings& settings, const Beams& beams);
 
   /// Goes on for a scan's time; true when done.
   bool step();
@@ -26,22 +27,32 @@ class Search {
  private:
   struct Candidate {
     int misfit;
-    int x, y, heading;  ///< steps
+    int x, y;     ///< [cells]
+    int heading;  ///< steps
   };
   struct Offset {
-    float x, y;  ///< of a reading from base [cells]
+    int x, y;  ///< of a reading's cell from base's
   };
 
-  void tryPosition(int x, int y);
+  int columnAt(int position) const { return left_ + position % columns_ * stride_; }
+  int rowAt(int position) const { return low_ + position / columns_ * stride_; }
+  /// Readings for every heading, some of them.
+  static std::vector<std::vector<Offset>> rotated(const Beams& beams, double step, double resolution);
+  static int farthest(const std::vector<std::vector<Offset>>& rotated);
+  /// Tries neighbouring positions of a row, all headings.
+  void tryRun(int position, int count);
   void keep(const Candidate& candidate);
   Pose2D poseOf(const Candidate& candidate) const;
 
   const Sensor* sensor_;
   const RecoverySettings* settings_;
-  std::vector<std::vector<Offset>> rotated_;  ///< readings for every heading
-  int stride_, columns_, rows_;
+  std::vector<std::vector<Offset>> rotated_;
+  int stride_, left_, low_, columns_, rows_;  ///< of the positions [cells]
+  int reach_;                                 ///< of the readings [cells]
+  Combed codes_;
   int next_ = 0;
-  std::vector<Candidate> kept_;  ///< a heap with the worst on top
+  std::vector<std::uint16_t> misfits_;  ///< of a run: for every heading a row
+  std::vector<Candidate> kept_;         ///< a heap with the worst on top
 };
 
 }  // namespace kurumaisu

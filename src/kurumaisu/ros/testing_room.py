@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -163,3 +164,14 @@ class Room:
             self.step(float(t), **options)
             time.sleep(0.02)
         return float(times[-1])
+
+    def step_until(self, condition: Callable[[], Any], what: str, patience: float, **options: Any) -> None:
+        """Step at the wall's pace until a condition holds. Raise AssertionError after so many seconds."""
+        begin, pause = time.monotonic(), 0.05
+
+        def stepped() -> Any:
+            self.step(time.monotonic() - begin, **options)
+            time.sleep(pause)
+            return condition()
+
+        wait_for(stepped, what, patience)
