@@ -67,10 +67,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _costs(rig: Rig, simulator: str, options: argparse.Namespace) -> bool:
     """Print what each phase costs; return whether one page costs too much."""
-    what = f"{options.robots} robots" if simulator == "stageros" else "the chair"
+    what = f"in one thread, {options.robots} robots" if simulator == "stageros" else "the chair"
     phases = _PHASES[simulator]
     progress = Table(
-        f"{simulator}, {what} of 682 beams, flat out in one thread, {os.cpu_count()} cores: CPU time, times nobody",
+        f"{simulator}, {what} of 682 beams, flat out, {os.cpu_count()} cores: CPU time, times nobody",
         *("turn of", *phases, "load average"),
     )
     runs: dict[str, list[_Cost]] = {name: [] for name in (_NOBODY, *phases)}
