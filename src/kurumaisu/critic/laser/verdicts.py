@@ -23,7 +23,7 @@ from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.supply import every_id, supplier
 from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
-from kurumaisu.critic.naming import NAMED
+from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Comparison
 from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, NextExperiment, Unknown
@@ -93,8 +93,7 @@ def criticise(
 def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model: Model) -> NextExperiment | None:
     """Return the experiment that tells apart what the scans cannot, or that supplies what they lack."""
     open_ids = sorted({name for group in finding.confounded for name in group})
-    lacks = not finding.causes and not finding.unknown and lacking(assembly)
-    if not open_ids and not lacks:
+    if not open_ids and not lacking(assembly):
         return None
     return supplier(model, open_ids or every_id(), recording.truth)
 
@@ -141,8 +140,8 @@ def _scatter(
     assembly: Assembly, normal: Normal, fit: Pinned, ids: frozenset[str] | None
 ) -> tuple[list[Scatter], tuple[Comparison, ...]]:
     """Return the effects on how readings scatter about the best fit of their mean, and what they mend."""
-    few = fit.assembly.thinned(_SCATTERED)
-    rows = np.unique(np.linspace(0, len(fit.left) - 1, _SCATTERED).astype(int))
+    rows = fit.assembly.smooth_rows(_SCATTERED)
+    few = fit.assembly.thinned(rows)
     statistics = Statistics(few, normal.scan_noise)
     means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
@@ -180,6 +179,7 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     if made.winner is not None and curve:
         scatter = [each for each in scatter if each.nats > rivals.LEFT * made.winner.belief.nats]
     causes, added = _with_scatter(causes, settings, scatter)
+    confounded += tuple(group for group in map(_set_of, scatter) if group)
     return LaserFinding(causes, confounded, unknown, added, details, small=small)
 
 
@@ -194,6 +194,14 @@ def _with_scatter(
             known[name] = _joined(known.get(name), each)
         out[name] = EffectSetting(name, {**each.setting.parameters, **(_off_null(mean) if mean else {})})
     return tuple(known.values()), tuple(out.values())
+
+
+def _set_of(scatter: Scatter) -> tuple[str, ...]:
+    """Return the effects of which one makes readings scatter so, where it is not certain which."""
+    every = {scatter.setting.id: scatter.p, **scatter.rivals}
+    group = tuple(sorted(name for name, p in every.items() if p >= RIVAL or name == scatter.setting.id))
+    certain = len(group) > 1 and sum(every[name] for name in group) >= NAMED
+    return group if certain and scatter.p < NAMED else ()
 
 
 def _confused(assembly: Assembly, normal: Normal, made: _Made, causes: Sequence[Cause]) -> Groups:
