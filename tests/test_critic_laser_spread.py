@@ -13,7 +13,7 @@ from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.laser.spread import ScatterSearch
-from kurumaisu.critic.laser.statistics import Statistics
+from kurumaisu.critic.laser.statistics import Statistics, _mixed
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -93,3 +93,17 @@ def test_scans_at_a_jump_of_the_rates_say_nothing_about_the_scatter(tmp_path):
     assert jumped not in left
     assert len(left) >= len(before) - 3, "its neighbours rest on some of its poses, and no others do"
     assert len(assembly.thinned(left).shots.stamps) == len(left)
+
+
+def test_readings_between_two_sides_are_told_from_sides_and_slopes():
+    sides = np.array([[2.0] * 8 + [1.0] * 8])
+    assert not _mixed(sides).any()
+    one = sides.copy()
+    one[0, 8] = 1.4
+    assert np.flatnonzero(_mixed(one)[0]).tolist() == [8 - 3]
+    both = one.copy()
+    both[0, 7] = 1.7
+    assert np.flatnonzero(_mixed(both)[0]).tolist() == [7 - 3, 8 - 3]
+    assert not _mixed(np.linspace(1.0, 3.0, 16)[np.newaxis]).any(), "a slope is no jump"
+    one[0, 6] = np.nan
+    assert not _mixed(one).any(), "nobody knows whether that side goes on"

@@ -103,10 +103,10 @@ class ScatterSearch:
         at = self._fit.statistics(beside, (1, 2))
         here = self._likeness.cost(at)
         without = {*gone, *(piece.effect for piece in chosen)}
-        starts = [
-            self._fit.rough([push for push in pushes if push.effect is effect], at)
-            for effect in self._fit.candidates(without)
-        ]
+        by_effect = {
+            effect: [push for push in pushes if push.effect is effect] for effect in self._fit.candidates(without)
+        }
+        starts = [self._fit.rough(own, at) for own in by_effect.values() if own]
         starts = sorted((start for start in starts if start.low < here), key=_low)
         tried: list[Piece] = []
         for start in starts[:_REFITS]:

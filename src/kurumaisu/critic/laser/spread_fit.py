@@ -93,14 +93,18 @@ class ScatterFit:
         return float(abs(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-9))
 
     def pushes(self) -> Iterator[Push]:
-        """Yield what each parameter alone does to the statistics, at some values."""
+        """Yield what each parameter alone does to the statistics, at some values, the largest last."""
         plain = self._simulate((), 1)
         for effect in self.candidates(set()):
             null = self._simulate.null(effect)
             for p in self._parameters(effect):
-                for value in _sizes(p):
+                found: list[Push] = []
+                for value in sorted(_sizes(p), key=lambda value: -abs(value - p.null)):
                     moved = self._simulate((EffectSetting(effect.id, {**null, p.name: value}),), 1)
-                    yield Push(effect, p.name, value, moved - plain)
+                    if np.array_equal(moved, plain):
+                        break  # it only shapes what others do, or does nothing when it is smaller
+                    found.append(Push(effect, p.name, value, moved - plain))
+                yield from reversed(found)
 
     def candidates(self, without: set[type[Mechanism]]) -> Iterator[type[Mechanism]]:
         """Yield the effects that may be looked for, without some."""

@@ -31,7 +31,7 @@ from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 MATERIAL = 3e-4  # [m] rms change of the readings below which an effect of the laser does not matter
-_SCATTERED = 45  # scans whose scatter is looked at: each simulation of them takes a hundredth of a second
+_SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
 Progress = Callable[[str], None]
 
 
