@@ -82,6 +82,7 @@ class ScatterFit:
         self._ids = ids
         nulls = np.array([simulate((), 1000 + i) for i in range(_NULLS)])
         self._simulate, self._means = simulate, set(means)
+        self._shapes: set[tuple[str, str]] = set()
         self.likeness = Likeness(nulls, measured, simulate.counts())
 
     def overlap(self, one: Piece, other: Piece) -> float:
@@ -104,6 +105,8 @@ class ScatterFit:
                     if np.array_equal(moved, plain):
                         break  # it only shapes what others do, or does nothing when it is smaller
                     found.append(Push(effect, p.name, value, moved - plain))
+                if not found:
+                    self._shapes.add((effect.id, p.name))
                 yield from reversed(found)
 
     def candidates(self, without: set[type[Mechanism]]) -> Iterator[type[Mechanism]]:
@@ -187,8 +190,13 @@ class ScatterFit:
         return at(x), low
 
     def errors(self, piece: Piece, every: Sequence[EffectSetting]) -> dict[str, float]:
-        """Return sds of the parameters that were fitted, from how the statistics follow each."""
-        setting, parameters = piece.setting, [p for p in piece.effect.parameters if p.name in piece.free]
+        """Return sds of the parameters that were fitted, from how the statistics follow each.
+
+        What only shapes the effect is in doubt, too, fitted or not: as far as is usual.
+        """
+        setting = piece.setting
+        shapes = {p.name for p in piece.effect.parameters if (setting.id, p.name) in self._shapes}
+        parameters = [p for p in piece.effect.parameters if p.name in shapes | set(piece.free)]
         beside = [other for other in every if other is not setting]
         slopes = []
         for p in parameters:
@@ -209,9 +217,10 @@ class ScatterFit:
             slopes.append(sure * change / (ends[1] - ends[0]))
         j = np.array(slopes).T
         scale = np.array([p.scale for p in parameters])
-        inverse = np.linalg.inv((j * scale).T @ (j * scale) + 1e-4 * np.eye(len(scale)))
+        prior = np.array([1.0 if p.name in shapes else 1e-4 for p in parameters])
+        inverse = np.linalg.inv((j * scale).T @ (j * scale) + np.diag(prior))
         sds = np.sqrt(np.diag(inverse)) * scale
-        return {p.name: float(sd) for p, sd in zip(parameters, sds, strict=True)}
+        return {p.name: float(sd) for p, sd in zip(parameters, sds, strict=True) if p.name in piece.free}
 
 
 def _sizes(p: Parameter) -> list[float]:
