@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kurumaisu import effects
+from kurumaisu.critic.laser.grids import directions, geometric, grid_of
 from kurumaisu.critic.laser.shots import Look, Shots, look, predict, shapes, thin
 from kurumaisu.effects import Mechanism, Parameter
 from kurumaisu.params import EffectSetting
@@ -25,7 +26,6 @@ _NOTHING = 1e-9  # [m] a change that is none
 _SAME = 0.98  # correlation from which two forms of an effect are one
 _PROBE = 12  # scans on which it is tried how a parameter acts
 _FINER = tuple(2.0 ** np.arange(-0.375, 0.4, 0.0625))  # about a value of the grid
-_HALF_TURN = 8  # directions in half a turn of two parameters that act by their squares
 _BETWEEN = np.pi / 16 * np.linspace(-1, 1, 9)  # [rad] about such a direction
 _AROUND = 127  # shapes that are tried to say a sum of two as one
 _RANK = 1e-3  # singular values below this share of the largest do not count
@@ -139,7 +139,7 @@ class Marks:
                 at = {first: float(np.cos(angle)), second: float(np.sin(angle))}
                 yield at, self._along(effect, at)[:, :, np.newaxis]
             return
-        grids = {p.name for p in effect.parameters if p.name in form.at and _geometric(p)}
+        grids = {p.name for p in effect.parameters if p.name in form.at and geometric(p)}
         for factors in product(*(_FINER for _ in grids)):
             at = {**form.at, **{name: form.at[name] * f for name, f in zip(sorted(grids), factors, strict=True)}}
             if grids and all(p.lower <= at.get(p.name, p.lower) <= p.upper for p in effect.parameters):
@@ -239,7 +239,7 @@ class Marks:
         self, effect: type[Mechanism], squares: Sequence[Parameter]
     ) -> Iterator[tuple[dict[str, float], list[Column], list[FloatArray]]]:
         """Yield a form per direction in which parameters that act by their square may go together."""
-        for signs in _directions(len(squares)):
+        for signs in directions(len(squares)):
             sizes = {p.name: sign for p, sign in zip(squares, signs, strict=True)}
             lead = next(p for p in squares if sizes[p.name])
             yield sizes, [Column(lead, squared=True, beside={})], [self._along(effect, sizes)]
@@ -256,13 +256,13 @@ class Marks:
         pairs: list[dict[str, float]] = [{}]
         grids: dict[str, list[float]] = {}
         for parameter in shaping:
-            grid = _grid(parameter, float(np.ptp(self._shots.stamps)) or 1.0)
+            grid = grid_of(parameter, float(np.ptp(self._shots.stamps)) or 1.0)
             units = np.array([_unit(self._slope(effect, acting[0], {parameter.name: value})) for value in grid])
             sizes = np.linalg.svd(units, compute_uv=False)
             rank = int(np.sum(sizes > _RANK * sizes[0]))
-            if rank == 2 and _geometric(parameter) and self._straight(effect, acting[0], parameter):
+            if rank == 2 and geometric(parameter) and self._straight(effect, acting[0], parameter):
                 pairs = [{**pair, parameter.name: end} for pair in pairs for end in (parameter.lower, parameter.upper)]
-            elif rank > 2 or (rank == 2 and _geometric(parameter)):  # within bounds, which a sum of two would ignore
+            elif rank > 2 or (rank == 2 and geometric(parameter)):  # within bounds, which a sum of two would ignore
                 grids[parameter.name] = grid
             elif rank == 2:
                 other = int(np.argmin(np.abs(units @ units[0])))
@@ -274,33 +274,6 @@ class Marks:
         values = (shaping.lower, 0.5 * (shaping.lower + shaping.upper), shaping.upper)
         low, middle, high = (np.nan_to_num(self._slope(effect, acting, {shaping.name: value})) for value in values)
         return _rms(middle - 0.5 * (low + high)) < _RANK * _rms(high - low)
-
-
-def _directions(count: int) -> list[tuple[float, ...]]:
-    """Return sizes of parameters that act by their squares; of two, directions over half a turn."""
-    if count == 2:
-        return [
-            (round(float(np.cos(a)), 12), round(float(np.sin(a)), 12))
-            for a in np.pi / _HALF_TURN * np.arange(_HALF_TURN)
-        ]
-    every = product((-1.0, 0.0, 1.0), repeat=count)
-    return [signs for signs in every if next((sign for sign in signs if sign), 0.0) > 0]
-
-
-def _grid(parameter: Parameter, span: float) -> list[float]:
-    """Return values of a parameter that only shapes an effect; span [s]: of the scans, for a parameter in seconds."""
-    if parameter.unit == "s":
-        values = span * 2.0 ** np.arange(-4, 2.1, 0.5)
-    elif parameter.lower > 0:
-        values = parameter.null * 2.0 ** np.arange(-3, 1.6, 0.25)
-    else:
-        values = parameter.null + parameter.scale * np.arange(0, 3.1, 0.5)
-    return [float(value) for value in values if parameter.lower <= value <= parameter.upper] or [parameter.null]
-
-
-def _geometric(parameter: Parameter) -> bool:
-    """Return whether a parameter's grid is of factors."""
-    return parameter.unit == "s" or parameter.lower > 0
 
 
 def _unit(column: FloatArray) -> FloatArray:

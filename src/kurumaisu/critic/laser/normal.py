@@ -14,12 +14,12 @@ from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, refined
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
-from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, thin
+from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, rows_of
 from kurumaisu.critic.laser.sought import moved, stands
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
 from kurumaisu.geometry import compose
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
 _SURE = 0.3  # share of the scans that must lie on a smooth path, or else none is preferred
@@ -76,10 +76,13 @@ class Assembly:
     def _trust(self) -> BeamNoise:
         one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
         sd = np.maximum(np.nan_to_num(one), _LEAST)  # a beam that meets nothing has none
+        smooth = self._on_smooth_path()[:, np.newaxis]
+        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & smooth)
+
+    def _on_smooth_path(self) -> BoolArray:
+        """Return which scans (k,) lie where the chair's path is smooth; all where that is seldom."""
         sure = np.array([not self.kinked[self.shots.run[k]][hat.rows].any() for k, hat in enumerate(self.hats)])
-        if sure.mean() < _SURE:
-            sure[:] = True
-        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & sure[:, np.newaxis])
+        return sure if sure.mean() >= _SURE else np.ones_like(sure)
 
     def _errors(self) -> list[FloatArray]:
         """Return the errors of the poses (q, 3) under each scan, by that scan alone, within what is plausible."""
@@ -118,14 +121,21 @@ class Assembly:
                 self.columns[:, :, form.span] = columns
                 self.forms[self.forms.index(form)] = replace(form, at=at)
 
-    def thinned(self, most: int) -> Assembly:
-        """Return at most so many of the scans, evenly taken, without columns."""
-        rows = np.unique(np.linspace(0, len(self.hats) - 1, most).astype(int))
+    def smooth_rows(self, most: int) -> IntArray:
+        """Return at most so many of the scans, evenly taken from those where the chair's path is smooth.
+
+        Where a rate jumps nobody knows just where the chair was, and readings seem to scatter far.
+        """
+        rows = np.flatnonzero(self._on_smooth_path())
+        return np.asarray(rows[np.unique(np.linspace(0, len(rows) - 1, most).astype(int))])
+
+    def thinned(self, rows: IntArray) -> Assembly:
+        """Return some of the scans, without columns."""
         out = copy(self)
-        out.shots, out.marks = thin(self.shots, most), self.marks.thinned(rows)
+        out.shots, out.marks = rows_of(self.shots, rows), self.marks.thinned(rows)
         out.columns = np.empty((*out.shots.measured.shape, 0), dtype=np.float32)
         out.hats = [self.hats[row] for row in rows]
-        out.layout = Layout(*(part[rows] for part in (self.layout.times, self.layout.run, self.layout.stand)))
+        out.layout = Layout(self.layout.times[rows], self.layout.run[rows], self.layout.stand[rows])
         out.residual, out.poses, out.geometry = self.residual[rows], self.poses[rows], self.geometry[rows]
         out.first = BeamNoise(self.first.sd[rows], self.first.rho, self.first.valid[rows])
         return out

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from kurumaisu.critic.laser.noise import ScanNoise
 from kurumaisu.critic.laser.normal import Assembly
@@ -13,13 +14,21 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
 _FAR = 6.0  # deviations of an outlier
+_ELSEWHERE = (
+    25.0  # deviations that hardly any noise reaches, however heavy its tails: it is a reading of something else
+)
 _COMMON = 0.005  # [m] plausible common mode of a scan, when it is read off one scan alone
 _CELL = 0.5  # [m] of the map in which errors are averaged
 _GRID = 1e-3  # [m] to which readings are rounded before their values are counted
 _OBLIQUE = np.radians(80.0)  # [rad] beyond which no reading counts
 _SQUARE = np.radians(60.0)  # [rad] within which a wall beside a jump hardly moves with an error of the heading
+_JUMP = 0.15  # [m] between the two sides of an edge, at least
+_FLAT = 0.2  # share of it by which either side may go on
+_BESIDE = 3  # beams by which errors of the pose move a narrow face that lies between two sides in truth
+_INSIDE = 0.15  # share of it from either side, beyond which a reading lies between them
 _LEVER = 0.5  # [m] from base_link to a laser, at most
 _ROUNDS = 3
+_SOME = 4  # every so-manieth reading says how wide all are
 
 
 @dataclass(frozen=True)
@@ -35,14 +44,13 @@ class Statistics:
 
     def __init__(self, assembly: Assembly, noise: ScanNoise) -> None:
         """Take the geometry; noise: of the reference, which each scan's poses are sought within."""
-        shots, seen = assembly.shots, assembly.marks.seen
+        seen = assembly.marks.seen
         self._base = assembly.marks.base
         self._sd = assembly.first.sd
         self._trust = assembly.geometry
-        met = np.asarray(np.isfinite(self._base) & (self._base < shots.laser.range_max - 0.1))
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
-        self._sides = _sides(seen.ranges, met & (seen.incidence < _SQUARE))
+        self._jumps = _jumps(seen.ranges, seen.incidence)
         self._stand = assembly.layout.stand
         self._basis, self._size = _basis(assembly, noise)
         axes = np.r_[0, 1 + np.arange(self._basis.shape[2] - 1) % 3]
@@ -52,7 +60,8 @@ class Statistics:
         inner = np.asarray(weighed.transpose(0, 2, 1) @ weighed, dtype=np.float64)
         inner = inner + np.eye(inner.shape[1]) * (self._size**-2)[:, np.newaxis, :]
         inverse = np.linalg.inv(inner)
-        self._solve = inverse @ weighed.transpose(0, 2, 1)
+        self._solve = (inverse @ weighed.transpose(0, 2, 1)).astype(np.float32)  # half the memory, twice as fast
+        self._fitted = (self._basis / self._sd[:, :, np.newaxis]).astype(np.float32)
         self._common_sd = _common_sd(inner, inverse, self._size)
 
     def pose_errors(self, rng: np.random.Generator) -> FloatArray:
@@ -75,14 +84,14 @@ class Statistics:
             both = inside[:, lag:] & inside[:, :-lag]
             out.append(float(np.mean(z[:, lag:][both] * z[:, :-lag][both])) / power)
         size = np.abs(left[inside])
-        out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR)]
+        out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > _ELSEWHERE)]
         far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
         out.append(_share((far[:, 1:] & far[:, :-1])[inside[:, 1:]]))
         out += [_log(float(np.mean(common**2))), float(common[1:] @ common[:-1]) / float(common @ common)]
         out += [_between(z, inside, np.broadcast_to(np.arange(z.shape[1]), z.shape)), _between(z, inside, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
-        out.append(self._mixed(readings))
+        out.append(_share(_mixed(readings) & self._jumps))
         return np.array([*out, *_values(readings[self._trust])])
 
     def names(self) -> list[str]:
@@ -101,7 +110,7 @@ class Statistics:
         return [
             *((f"spread, {name}", False) for name in groups),
             *((f"correlation of beams {lag} apart", False) for lag in (1, 2, 4)),
-            *((f"readings more than {far:g} sd off", True) for far in (3, 4.5, _FAR)),
+            *((f"readings more than {far:g} sd off", True) for far in (3, 4.5, _FAR, _ELSEWHERE)),
             (f"neighbours more than {_FAR:g} sd off", True),
             ("spread of whole scans", False),
             ("correlation of whole scans", False),
@@ -126,21 +135,12 @@ class Statistics:
         inside = known
         coefficients = np.zeros(self._size.shape)
         for _ in range(_ROUNDS):
-            filled = np.where(inside, np.nan_to_num(z), fitted)
+            filled = np.where(inside, np.nan_to_num(z), fitted).astype(np.float32)
             coefficients = (self._solve @ filled[:, :, np.newaxis])[:, :, 0]
-            fitted = (self._basis @ coefficients[:, :, np.newaxis])[:, :, 0] / self._sd
-            width = 1.4826 * float(np.median(np.abs((z - fitted)[inside])))
+            fitted = (self._fitted @ coefficients[:, :, np.newaxis])[:, :, 0]
+            width = 1.4826 * float(np.median(np.abs((z - fitted)[inside])[::_SOME]))
             inside = known & (np.abs(np.nan_to_num(z - fitted)) < 4.5 * max(width, 0.1))
         return np.where(known, z - fitted, np.nan), coefficients[:, 0]
-
-    def _mixed(self, readings: FloatArray) -> float:
-        """Return how many readings beside a jump lie well between its sides."""
-        near, far, at = self._sides
-        if not at.any():
-            return 0.0
-        with np.errstate(invalid="ignore"):
-            share = (readings[at] - near[at]) / (far[at] - near[at])
-        return _share((share > 0.15) & (share < 0.85))
 
 
 def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, returns: FloatArray) -> Groups:
@@ -167,15 +167,33 @@ def _cells(assembly: Assembly) -> IntArray:
     return np.asarray(index.reshape(ranges.shape))
 
 
-def _sides(ranges: FloatArray, expected: BoolArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return nearer and farther side (k, b) of the jump beside a beam, and where there is one."""
-    jump = np.diff(np.where(expected, ranges, np.nan), axis=1)
-    at = np.abs(np.nan_to_num(jump)) > 0.15
-    near, far = np.full(ranges.shape, np.nan), np.full(ranges.shape, np.nan)
-    low, high = np.minimum(ranges[:, 1:], ranges[:, :-1]), np.maximum(ranges[:, 1:], ranges[:, :-1])
-    for side in (slice(None, -1), slice(1, None)):
-        near[:, side][at], far[:, side][at] = low[at], high[at]
-    return near, far, np.isfinite(near)
+def _mixed(readings: FloatArray) -> BoolArray:
+    """Return which readings (k, b - 6) lie well between the two sides of a jump, which both go on as they are.
+
+    By the readings alone: where a jump is moves with every error of the pose.
+    """
+    before, left, here, right, after = (readings[:, i : i - 6 or None] for i in (0, 1, 3, 5, 6))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        jump = right - left
+        share = (here - left) / jump
+        flat = np.maximum(np.abs(left - before), np.abs(after - right)) < _FLAT * np.abs(jump)
+        return np.asarray((np.abs(jump) > _JUMP) & flat & (share > _INSIDE) & (share < 1 - _INSIDE))
+
+
+def _jumps(ranges: FloatArray, incidence: FloatArray) -> BoolArray:
+    """Return where (k, b - 6) a jump from one face to another is to be expected, and no narrow face lies between."""
+    narrow = _widened(_mixed(ranges))
+    with np.errstate(invalid="ignore"):
+        jump = np.abs(np.diff(np.where(incidence < _SQUARE, ranges, np.nan), axis=1)) > _JUMP
+    beside = np.zeros(ranges.shape, dtype=bool)
+    beside[:, 1:] |= jump
+    beside[:, :-1] |= jump
+    return np.asarray(_widened(beside)[:, 3:-3] & ~narrow)
+
+
+def _widened(mask: BoolArray) -> BoolArray:
+    """Return a mask (k, b) with some more beams on either side of each."""
+    return np.asarray(maximum_filter1d(mask, 2 * _BESIDE + 1, axis=1, mode="constant"))
 
 
 def _basis(assembly: Assembly, noise: ScanNoise) -> tuple[FloatArray, FloatArray]:
@@ -223,15 +241,20 @@ def _between(z: FloatArray, inside: BoolArray, group: IntArray) -> float:
 
 def _values(readings: FloatArray) -> list[float]:
     """Return how many different values there are, and how many readings have the least and the greatest of them."""
-    steps = np.rint(readings[np.isfinite(readings)] / _GRID)
+    steps = np.rint(readings[np.isfinite(readings)] / _GRID).astype(np.int64)
     if not len(steps):
         return [0.0, 0.0, 0.0]
-    return [_log(len(np.unique(steps))), _share(steps <= steps.min()), _share(steps >= steps.max())]
+    counts = np.bincount(steps - steps.min())
+    return [_log(np.count_nonzero(counts)), _root(int(counts[0])), _root(int(counts[-1]))]
 
 
 def _share(hits: BoolArray) -> float:
     """Return the square root of a count: its variance does not depend on how many are to be expected."""
-    return 2 * float(np.sqrt(np.sum(hits) + 0.375))
+    return _root(int(np.count_nonzero(hits)))
+
+
+def _root(count: int) -> float:
+    return 2 * float(np.sqrt(count + 0.375))
 
 
 def _log(value: float) -> float:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu import effects
 from kurumaisu.critic.laser import pictures, rivals, still
+from kurumaisu.critic.laser.estimates import estimates_of, of_block, settings_of, with_scatter
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.pictures import NO_PICTURES, Part, Pictures, misfits, noise_rows
@@ -23,16 +23,15 @@ from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.supply import every_id, supplier
 from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
-from kurumaisu.critic.naming import NAMED
+from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Comparison
-from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, NextExperiment, Unknown
-from kurumaisu.effects import Mechanism
+from kurumaisu.critic.verdict import Cause, NextExperiment, Unknown
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 MATERIAL = 3e-4  # [m] rms change of the readings below which an effect of the laser does not matter
-_SCATTERED = 45  # scans whose scatter is looked at: each simulation of them takes a hundredth of a second
+_SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
 Progress = Callable[[str], None]
 
 
@@ -81,7 +80,7 @@ def criticise(
     normal = assembly.full(normal)
     made = _made(assembly, normal, found)
     progress("laser: fitting what acts")
-    fit = pinned(assembly, normal, made.fit.forms, _settings(assembly, made.fit), made.winner, recording.truth)
+    fit = pinned(assembly, normal, made.fit.forms, settings_of(assembly, made.fit), made.winner, recording.truth)
     progress("laser: weighing effects on the scatter")
     scatter, comparison = _scatter(assembly, normal, fit, ids)
     finding = _finding(assembly, normal, made, fit, scatter)
@@ -93,8 +92,7 @@ def criticise(
 def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model: Model) -> NextExperiment | None:
     """Return the experiment that tells apart what the scans cannot, or that supplies what they lack."""
     open_ids = sorted({name for group in finding.confounded for name in group})
-    lacks = not finding.causes and not finding.unknown and lacking(assembly)
-    if not open_ids and not lacks:
+    if not open_ids and not lacking(assembly):
         return None
     return supplier(model, open_ids or every_id(), recording.truth)
 
@@ -141,8 +139,8 @@ def _scatter(
     assembly: Assembly, normal: Normal, fit: Pinned, ids: frozenset[str] | None
 ) -> tuple[list[Scatter], tuple[Comparison, ...]]:
     """Return the effects on how readings scatter about the best fit of their mean, and what they mend."""
-    few = fit.assembly.thinned(_SCATTERED)
-    rows = np.unique(np.linspace(0, len(fit.left) - 1, _SCATTERED).astype(int))
+    rows = fit.assembly.smooth_rows(_SCATTERED)
+    few = fit.assembly.thinned(rows)
     statistics = Statistics(few, normal.scan_noise)
     means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
@@ -157,12 +155,12 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     found = made.found
     sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
     settings = {setting.id: setting for setting, _ in fit.settings}
-    estimates = {setting.id: _estimates(setting, sds) for setting, sds in fit.settings}
+    estimates = {setting.id: estimates_of(setting, sds) for setting, sds in fit.settings}
     if made.winner is not None:
         free = made.winner.free
         valid = normal.beam_noise.valid
         sizes[free.id] = float(np.sqrt(np.mean((assembly.columns[valid][:, free.span] @ made.coefficients) ** 2)))
-        settings[free.id], estimates[free.id] = _of_block(made.winner, made.coefficients, normal)
+        settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
     causes = tuple(
@@ -179,38 +177,22 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     details = (_noise_told(assembly, normal), *lacking(assembly), *_told(sizes, small))
     if made.winner is not None and curve:
         scatter = [each for each in scatter if each.nats > rivals.LEFT * made.winner.belief.nats]
-    causes, added = _with_scatter(causes, settings, scatter)
+    causes, added = with_scatter(causes, settings, scatter)
+    confounded += tuple(group for group in map(_set_of, scatter) if group)
     return LaserFinding(causes, confounded, unknown, added, details, small=small)
 
 
-def _with_scatter(
-    causes: Sequence[Cause], settings: Mapping[str, EffectSetting], scatter: Sequence[Scatter]
-) -> tuple[tuple[Cause, ...], tuple[EffectSetting, ...]]:
-    """Return causes and settings, also of what acts on the scatter."""
-    known, out = {cause.id: cause for cause in causes}, dict(settings)
-    for each in scatter:
-        name, mean = each.setting.id, settings.get(each.setting.id)
-        if each.p >= NAMED:
-            known[name] = _joined(known.get(name), each)
-        out[name] = EffectSetting(name, {**each.setting.parameters, **(_off_null(mean) if mean else {})})
-    return tuple(known.values()), tuple(out.values())
+def _set_of(scatter: Scatter) -> tuple[str, ...]:
+    """Return the effects of which one makes readings scatter so, where it is not certain which."""
+    every = {scatter.setting.id: scatter.p, **scatter.rivals}
+    group = tuple(sorted(name for name, p in every.items() if p >= RIVAL or name == scatter.setting.id))
+    certain = len(group) > 1 and sum(every[name] for name in group) >= NAMED
+    return group if certain and scatter.p < NAMED else ()
 
 
 def _confused(assembly: Assembly, normal: Normal, made: _Made, causes: Sequence[Cause]) -> Groups:
     names = [cause.id for cause in causes]
     return joined(made.found.confounded, twins(made.found, made.winner, assembly.free, normal.gram, names))
-
-
-def _of_block(winner: Rival, coefficients: FloatArray, normal: Normal) -> tuple[EffectSetting, dict[str, Estimate]]:
-    """Return a block as a model file has it, and the estimate of its size."""
-    free = winner.free
-    if free.basis is not None:
-        return EffectSetting(free.id, free.basis.parameters(coefficients)), {}
-    p = free.parameter
-    assert p is not None
-    at, low, high = (float(np.clip(p.null + p.scale * x, p.lower, p.upper)) for x in rivals.size(winner, normal.gram))
-    nulls = {each.name: each.null for each in effects.by_id(free.id).parameters}
-    return EffectSetting(free.id, {**nulls, p.name: at}), {p.name: Estimate(at, low, high, p.unit)}
 
 
 def _noise_told(assembly: Assembly, normal: Normal) -> str:
@@ -231,21 +213,6 @@ def _told(sizes: Mapping[str, float], small: Sequence[str]) -> list[str]:
     ]
 
 
-def _off_null(setting: EffectSetting) -> dict[str, float]:
-    nulls = {p.name: p.null for p in effects.by_id(setting.id).parameters}
-    return {name: value for name, value in setting.parameters.items() if value != nulls[name]}
-
-
-def _joined(cause: Cause | None, scatter: Scatter) -> Cause:
-    parameters = {p.name: p for p in effects.by_id(scatter.setting.id).parameters}
-    estimates = dict(cause.parameters) if cause is not None else {}
-    for name, sd in scatter.sds.items():
-        p, value, half = parameters[name], scatter.setting.parameters[name], NORMAL90 * sd
-        estimates[name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
-    nats = scatter.nats + (cause.gain_nats if cause is not None else 0.0)
-    return Cause(scatter.setting.id, max(min(scatter.p, 1.0), cause.p if cause is not None else 0.0), estimates, nats)
-
-
 def _rms(assembly: Assembly, normal: Normal, fit: Fitted, name: str) -> float:
     valid = normal.beam_noise.valid
     change, start = np.zeros(int(valid.sum())), 0
@@ -255,50 +222,6 @@ def _rms(assembly: Assembly, normal: Normal, fit: Fitted, name: str) -> float:
             change = assembly.columns[valid][:, form.span] @ fit.coefficients[start:stop]
         start = stop
     return float(np.sqrt(np.mean(change**2)))
-
-
-def _settings(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
-    """Return the fitted effects as a model file has them."""
-    out, start = [], 0
-    for form in fit.forms:
-        at = fit.coefficients[start : start + len(form.columns)]
-        start += len(form.columns)
-        effect = effects.by_id(form.id)
-        if len(form.columns) > 1 and form.columns[0].beside:
-            nulls = {p.name: p.null for p in effect.parameters}
-            out.append(EffectSetting(form.id, {**nulls, **assembly.marks.joined(form, at)}))
-            continue
-        values = {p.name: p.null for p in effect.parameters}
-        for column, coefficient in zip(form.columns, at.tolist(), strict=True):
-            if column.squared:
-                values |= _squared(effect, form.at, coefficient)
-            else:
-                values[column.parameter.name] = column.parameter.null + column.parameter.scale * coefficient
-        shape = {} if form.columns[0].squared else form.at
-        values |= shape
-        # Two effects that nearly cancel are fitted as sums, which no bound stops.
-        within = {p.name: float(np.clip(values[p.name], p.lower, p.upper)) for p in effect.parameters}
-        out.append(EffectSetting(form.id, within))
-    return out
-
-
-def _squared(effect: type[Mechanism], signs: Mapping[str, float], coefficient: float) -> dict[str, float]:
-    """Return the parameters that act by their squares together, for their common square in units of their scales."""
-    size = float(np.sqrt(max(coefficient, 0.0)))
-    return {
-        p.name: float(np.clip(p.null + signs[p.name] * size * p.scale, p.lower, p.upper))
-        for p in effect.parameters
-        if p.name in signs
-    }
-
-
-def _estimates(setting: EffectSetting, sds: Mapping[str, float]) -> dict[str, Estimate]:
-    out = {}
-    for p in effects.by_id(setting.id).parameters:
-        if p.name in sds:
-            value, half = setting.parameters[p.name], NORMAL90 * sds[p.name]
-            out[p.name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
-    return out
 
 
 def _gain(made: _Made, name: str) -> float:

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects on the scatter: rivals weighed in the company that is found last, far outliers, scans that may speak."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from laser_scene import recording
+
+from kurumaisu import effects
+from kurumaisu.critic.laser.noise import ScanNoise
+from kurumaisu.critic.laser.normal import Assembly
+from kurumaisu.critic.laser.shots import gather
+from kurumaisu.critic.laser.simulated import Simulator
+from kurumaisu.critic.laser.spread import ScatterSearch
+from kurumaisu.critic.laser.statistics import Statistics, _mixed
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """Numbers that follow effects in proportion: marks by id.name, for a parameter at its scale."""
+
+    marks: dict[str, tuple[float, ...]]
+
+    def counts(self):
+        return np.zeros(5, dtype=bool)
+
+    def null(self, effect):
+        return {p.name: p.null for p in effect.parameters}
+
+    def __call__(self, settings, seed):
+        out = 0.02 * np.random.default_rng(seed).standard_normal(5)
+        for setting in settings:
+            for p in effects.by_id(setting.id).parameters:
+                mark = np.array(self.marks.get(f"{setting.id}.{p.name}", (0.0,) * 5))
+                out = out + mark * (setting.parameters[p.name] - p.null) / p.scale
+        return out
+
+
+def at(name, **values):
+    """A setting of an effect with these values, the others as of none."""
+    return EffectSetting(name, {**{p.name: p.null for p in effects.by_id(name).parameters}, **values})
+
+
+def test_what_is_likeliest_alone_is_weighed_again_in_company():
+    simulate = _Linear(
+        {
+            "laser.quantisation.step": (3.0, 3.0, 3.0, 3.0, 0.0),
+            "laser.beam_correlation.rho": (0.0, 0.0, 0.6, 0.6, 4.0),
+            "laser.incidence_noise.gain": (3.0, 3.0, 3.6, 3.6, 0.0),
+        }
+    )
+    truth = [at("laser.quantisation", step=0.01), at("laser.beam_correlation", rho=0.3)]
+    ids = frozenset({"laser.quantisation", "laser.beam_correlation", "laser.incidence_noise"})
+    found = ScatterSearch(simulate, simulate(truth, 5), (), ids).run()
+    assert {each.setting.id for each in found} == {setting.id for setting in truth}
+
+
+def test_it_is_not_certain_which_of_two_alike_acts():
+    simulate = _Linear({"laser.quantisation.step": (1.0,) * 5, "laser.incidence_noise.gain": (1.0,) * 5})
+    ids = frozenset({"laser.quantisation", "laser.incidence_noise"})
+    (found,) = ScatterSearch(simulate, simulate([at("laser.quantisation", step=0.01)], 5), (), ids).run()
+    assert found.p < 0.9
+    assert sum(found.rivals.values()) + found.p == pytest.approx(1.0, abs=1e-6)
+
+
+def _assembly(tmp_path):
+    return Assembly(gather(recording(tmp_path, None, 0.0, 1, scans=12), MODEL), frozenset())
+
+
+def test_noise_of_heavy_tails_hardly_goes_as_far_as_readings_of_something_else(tmp_path):
+    assembly = _assembly(tmp_path)
+    statistics = Statistics(assembly, ScanNoise(0.002, 0.001, 1e-4, 1.0))
+    simulate, names = Simulator(assembly, statistics), statistics.names()
+    far = next(i for i, name in enumerate(names) if name.startswith("readings more than 25"))
+    plain, tails, bursts = (
+        simulate(settings, 3)[far]
+        for settings in ((), [at("laser.heavy_tails", inverse_nu=0.3)], [at("laser.crosstalk", probability=0.1)])
+    )
+    assert tails - plain < 4.0
+    assert bursts - plain > 10.0
+
+
+def test_scans_at_a_jump_of_the_rates_say_nothing_about_the_scatter(tmp_path):
+    assembly = _assembly(tmp_path)
+    before = assembly.smooth_rows(len(assembly.hats))
+    jumped = before[len(before) // 2]
+    assembly.kinked[assembly.shots.run[jumped]][assembly.hats[jumped].rows] = True
+    left = assembly.smooth_rows(len(assembly.hats))
+    assert jumped not in left
+    assert len(left) >= len(before) - 3, "its neighbours rest on some of its poses, and no others do"
+    assert len(assembly.thinned(left).shots.stamps) == len(left)
+
+
+def test_readings_between_two_sides_are_told_from_sides_and_slopes():
+    sides = np.array([[2.0] * 8 + [1.0] * 8])
+    assert not _mixed(sides).any()
+    one = sides.copy()
+    one[0, 8] = 1.4
+    assert np.flatnonzero(_mixed(one)[0]).tolist() == [8 - 3]
+    both = one.copy()
+    both[0, 7] = 1.7
+    assert np.flatnonzero(_mixed(both)[0]).tolist() == [7 - 3, 8 - 3]
+    assert not _mixed(np.linspace(1.0, 3.0, 16)[np.newaxis]).any(), "a slope is no jump"
+    one[0, 6] = np.nan
+    assert not _mixed(one).any(), "nobody knows whether that side goes on"
