@@ -152,19 +152,12 @@ class LocalizationNode(unittest.TestCase):
         wait_for(lambda: len(self.poses.messages) > begin, "amcl_pose at rest", DEADLINE)
 
     def test_6_scans_without_transforms_are_counted_and_said(self):
-<<<<<<< HEAD
-        begin = time.monotonic()
-        while time.monotonic() - begin < DEADLINE and not (self.status() and "NO_TRANSFORM" in self.status().message):
-            self.room.step((time.monotonic() - begin), with_tf=False)
-            time.sleep(0.05)
-=======
         self.room.step_until(
             lambda: self.status() and "NO_TRANSFORM" in self.status().message,
             "no transform said",
             DEADLINE,
             with_tf=False,
         )
->>>>>>> slam
         self.wait_for_status(2, "LOCALIZATION_NO_TRANSFORM")
         values = {item.key: item.value for item in self.status().values}
         assert int(values["dropped without transform"]) > 0
