@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from kurumaisu.critic import decide, naming
+from kurumaisu.critic.catalogue import Term
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.noise import START, Growth
 from kurumaisu.critic.smooth_judge import Beyond
 from kurumaisu.critic.smooth_search import Rivalry
+from kurumaisu.effects import Parameter
 
 
 def fit_of(names):
@@ -72,4 +74,17 @@ def test_two_sets_that_lead_to_each_other_come_to_an_end(judged):
     asked, answers = judged
     answers |= {"wrong": decision(found_of("other")), "other": decision(found_of("wrong"))}
     assert decided().found.best.ids in ({"wrong"}, {"other"})
-    assert len(asked) == 3
+    assert len(asked) == 2
+
+
+@pytest.mark.parametrize(
+    ("start", "better"),
+    [({("a", "offset"): 0.0}, False), ({("a", "offset"): 0.9}, True), ({("b", "offset"): 1.0}, False)],
+)
+def test_a_fit_that_first_values_beat_is_stuck(start, better):
+    """The best value is 1; the fit stuck at 0.5, as on a wrong tooth of a comb."""
+    parameter = Parameter("offset", "V", null=0.0, scale=1.0, lower=-2.0, upper=2.0)
+    problem = SimpleNamespace(residual=lambda _, values: 4.0 * (values - 1.0))
+    fit = SimpleNamespace(terms=(Term("a", parameter, 0.0),), log_likelihood=-2.0)
+    assert naming.begins_better(problem, fit, start) is better
+    assert not naming.begins_better(problem, SimpleNamespace(terms=()), start)

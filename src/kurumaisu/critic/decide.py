@@ -20,7 +20,7 @@ from kurumaisu.types import FloatArray
 # Sizes of a cause, as shares of the one fitted, whose marks together stand for those of its other forms.
 _FORMS = (0.25, 0.5, 1.5, 2.0, 3.0)
 _REST = 1e-3  # [m/s], [rad/s] below which a chair rests: one that lags never quite does
-_ANEW = 2  # times at most that all is judged anew, because other effects act than those about which the noise was taken
+_ANEW = 1  # times at most that all is judged anew, because other effects act than those about which the noise was taken
 Progress = Callable[[str], None]
 Truth = tuple[float, float] | None
 
