@@ -242,20 +242,20 @@ def slope(p, drive):
 @_rates("base.caster_reversal")
 def caster_reversal(p, drive):
     """Somebody who watches: which way did it last drive, which way last turn, how far is the last reversal ago."""
-    last_way = last_side = kicked_to = 0.0
+    last_way = kicked_to = 0.0
+    sides = [0.0] * max(round(0.03 / drive.dt), 1)  # of the last turn, the oldest first: casters take that long
     since, out = 0.0, []
     for v, w in zip(drive.v, drive.w, strict=True):
         way = (v > 0) - (v < 0)
         if way != 0:
             if last_way not in (0, way):
-                kicked_to, since = last_side, 0.0
+                kicked_to, since = sides[0], 0.0
             last_way = way
         travelled = abs(v) * drive.dt
         kick = p["kick"] * math.exp(-(since + travelled / 2) / p["length"]) if abs(v) > 1e-3 else 0.0
         out.append(w + kicked_to * kick)
         since += travelled
-        if w != 0:
-            last_side = math.copysign(1.0, w)
+        sides = [*sides[1:], math.copysign(1.0, w) if w != 0 else sides[-1]]
     return drive.v, _still(len(out)), out
 
 

@@ -178,6 +178,15 @@ def test_casters_kick_to_the_side_of_the_last_turn_and_die_away():
     assert not apply("base.caster_reversal", values, v, 0 * w).w.any()  # casters straight
 
 
+def test_casters_stand_as_before_a_step_in_which_everything_changes():
+    """From left forward to right backward late within a step, whose means still drive forward but turn right."""
+    v = np.concatenate([np.full(50, 0.5), [0.3], np.full(50, -0.5)])
+    w = np.concatenate([np.full(50, 0.1), [-0.05], np.full(50, -0.5)])
+    out = apply("base.caster_reversal", {"kick": 0.1, "length": 0.25}, v, w).w - w
+    assert not out[:51].any()
+    assert (out[51:] > 0).all()
+
+
 def test_dac_zero_and_steps():
     it = effects.Volts(np.array([0.1, 0.0]), np.array([-0.1234, 0.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]))
     zero = effects.by_id("base.dac_zero_f")({"offset": 0.02}, CONTEXT).apply(it)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is said of an effect that is found but not certain: sets, curves that draw it, other forms of it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -70,6 +71,16 @@ def test_rest_tells_nothing_about_noise_that_grows_with_the_rates():
     assert pace[10] == pytest.approx(pace[pace != pace[10]].mean(), rel=0.05)
     one_speed = drive([0.4, 0.0, 0.4, 0.0], np.zeros(4)).pace
     np.testing.assert_allclose(one_speed, 0.5)
+
+
+def test_where_a_law_swallows_commands_nothing_shakes_and_nothing_tells_of_growth():
+    """Told to turn slowly a chair rests: as still as one told to rest, and no slow turn of little noise."""
+    asked = drive(np.zeros(6), [0.8, 0.0, 0.0, 0.0, 0.1, 0.1])
+    swallowed = replace(asked, still=np.repeat([False, False, False, False, True, True], 50))
+    rests = drive(np.zeros(6), [0.8, 0.0, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(swallowed.activity, rests.activity)
+    np.testing.assert_allclose(swallowed.pace, rests.pace)
+    assert asked.activity[-1] > 5 * swallowed.activity[-1]
 
 
 def noise_of_a_drive(growth, seed):

@@ -8,16 +8,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic import gain, naming, noise, predict_doubt, smooth_fit, smooth_judge
+from kurumaisu.critic import gain, naming, noise, predict_doubt, replay, smooth_fit, smooth_judge
 from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.prior import odds
 from kurumaisu.critic.smooth_fit import Extension
+from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 # Sizes of a cause, as shares of the one fitted, whose marks together stand for those of its other forms.
 _FORMS = (0.25, 0.5, 1.5, 2.0, 3.0)
+_REST = 1e-3  # [m/s], [rad/s] below which a chair rests: one that lags never quite does
+_ANEW = 1  # times at most that all is judged anew, because other effects act than those about which the noise was taken
 Progress = Callable[[str], None]
 Truth = tuple[float, float] | None
 
@@ -62,7 +65,13 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
         made = _judged(first, found, hint, truth, progress)
         if made.beyond.extension is not None and made.beyond.rivalry.winner is not None:
             return made
-    return _judged(first, found, None, truth, progress)
+    for _ in range(_ANEW + 1):
+        made, before = _judged(first, found, None, truth, progress), found.best.ids
+        better = made.beyond.better
+        found = made.found if better is None else replace(made.found, fits=(better, *made.found.fits))
+        if found.best.ids == before:
+            break
+    return made
 
 
 def _judged(
@@ -80,7 +89,16 @@ def _judged(
     problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
     again = naming.search(problem, progress, found.best)
     beyond = smooth_judge.judge(problem, again, progress)
-    return Decision(problem, replace(again, p=beyond.rivalry.p_effects), growth, beyond)
+    return Decision(problem, weighed_anew(again, beyond.rivalry.p_effects), growth, beyond)
+
+
+def weighed_anew(found: naming.Naming, p: dict[str, float]) -> naming.Naming:
+    """Return what was found with the probabilities beside curves.
+
+    What a curve draws speaks for its effect, which may decide what the effects alone left open: then it is no set.
+    """
+    still_open = (group for group in found.confounded if all(p[name] < naming.NAMED for name in group))
+    return replace(found, p=p, confounded=tuple(still_open))
 
 
 def scatter(
@@ -94,7 +112,8 @@ def scatter(
 ) -> noise.Scatter:
     """Return what is left about a fit, or an extension, with all that may act projected out or nothing.
 
-    forms: with what the causes of the fit would do in other forms projected out, too.
+    forms: with what the causes of the fit would do in other forms projected out, too, and the chair at rest where they
+    have it rest: a law that swallows small commands must not pass for noise that grows with them.
     """
     settings = fit.settings if beside is None else beside.settings
     residuals = [drive.measured - problem.simulated(drive, settings) for drive in problem.drives]
@@ -108,7 +127,14 @@ def scatter(
         return smooth_fit.simulated_columns(problem, drive, beside)
 
     projected = [columns(drive, left.size) for drive, left in zip(problem.drives, residuals, strict=True)]
-    return noise.Scatter(problem.drives, residuals, projected, truth)
+    drives = [_resting(drive, problem.model, settings) for drive in problem.drives] if forms else problem.drives
+    return noise.Scatter(drives, residuals, projected, truth)
+
+
+def _resting(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> Drive:
+    """Return a drive that knows where the simulated chair rests although it is asked to move."""
+    motion = replay.motion(drive, model, settings)
+    return replace(drive, still=(np.abs(motion.v) < _REST) & (np.abs(motion.w) < _REST))
 
 
 def _other_forms(problem: Problem, drive: Drive, fit: Fit) -> FloatArray:

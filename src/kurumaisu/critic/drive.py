@@ -16,7 +16,7 @@ from kurumaisu.critic.recording import Run, Series
 from kurumaisu.effects import LATE
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
-from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
 _CLOCK = 0.02  # share by which the reference's clock may be off, and more
@@ -37,7 +37,8 @@ class Drive:
 
     source: the channel that drives the replay; start [s] of the grid; v, w (n,) rates asked for on the grid;
     times (m + 1,) and poses (m + 1, 3) of the reference; known: what unknown effects may follow, (n,) each on the
-    grid, by the names that effects.Motion has; heading [rad] at the start of the grid, None: that of the first pose.
+    grid, by the names that effects.Motion has; heading [rad] at the start of the grid, None: that of the first pose;
+    still (n,): where the chair rests although it is asked to move, None: nowhere.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Drive:
     poses: FloatArray
     known: Mapping[str, FloatArray] = field(default_factory=dict)
     heading: float | None = None
+    still: BoolArray | None = None
 
     @property
     def measured(self) -> FloatArray:
@@ -70,7 +72,7 @@ class Drive:
         A chair that rolls on keeps its pace, and one at rest has the mean one: else noise that rests with the chair
         would pass for noise that grows.
         """
-        rates = np.abs(self.v) / _USUAL_V + np.abs(self.w) / _USUAL_W
+        rates = (np.abs(self.v) / _USUAL_V + np.abs(self.w) / _USUAL_W) * self._moving
         own, rolling = (
             self._means(rates, before) / np.maximum(self._means(self._moving, before), 1e-9) for before in (0.0, _ROLLS)
         )
@@ -80,7 +82,8 @@ class Drive:
 
     @property
     def _moving(self) -> FloatArray:
-        return np.asarray((self.v != 0) | (self.w != 0), dtype=np.float64)
+        asked = (self.v != 0) | (self.w != 0)
+        return np.asarray(asked if self.still is None else asked & ~self.still, dtype=np.float64)
 
     def seen_at(self, times: FloatArray, poses: FloatArray) -> Drive:
         """Return the drive with other poses (m + 1, 3) at other times (m + 1,)."""

@@ -20,6 +20,7 @@ NAMED, RIVAL = stand_ins.NAMED, stand_ins.RIVAL
 _REFITS = 10  # sets refitted after each scan
 _CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
 _ROUNDS = 8  # scans at most
+_STUCK = 0.5  # [nat] by which a fit must be beaten by mere first values to be made again
 NULLS = 2000  # draws of the null calibration
 
 
@@ -72,9 +73,13 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
 
     def try_sets(guesses: Iterable[tuple[Chosen, Mapping[Key, float]]]) -> Fit:
         for chosen, start in guesses:
-            if chosen not in fits:
-                progress(f"fitting {', '.join(sorted(candidate.id for candidate in chosen))}")
-                fits[chosen] = problem.fit_candidates(chosen, start)
+            old = fits.get(chosen)
+            if old is not None and not begins_better(problem, old, start):
+                continue
+            progress(f"fitting {', '.join(sorted(candidate.id for candidate in chosen))}")
+            fit = problem.fit_candidates(chosen, start)
+            if old is None or fit.score > old.score:
+                fits[chosen] = fit
         return max(fits.values(), key=worth)
 
     nothing = screen = Screen(problem, empty)
@@ -102,6 +107,18 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
     posterior = Posterior(ranked, weights)
     p = {name: posterior.p.get(name, 0.0) for name in sorted({candidate.id for candidate in problem.candidates})}
     return Naming(tuple(ranked), p, confounded(posterior), _false_alarm(nothing), nothing.enough)
+
+
+def begins_better(problem: Problem, fit: Fit, start: Mapping[Key, float]) -> bool:
+    """Tell whether other first values of a set explain more than its fit, which stuck half way.
+
+    Else what is needless seems to act: beside it a comb of likely values is searched anew, and found out better.
+    """
+    if not fit.terms or any(term.key not in start for term in fit.terms if not term.fixed):
+        return False
+    values = np.array([term.parameter.lower if term.fixed else start[term.key] for term in fit.terms])
+    left = problem.residual(fit.terms, values)
+    return -0.5 * float(left @ left) > fit.log_likelihood + _STUCK
 
 
 def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:

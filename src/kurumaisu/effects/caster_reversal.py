@@ -9,6 +9,9 @@ from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Sta
 from kurumaisu.types import BoolArray, FloatArray
 
 _DRIVING = 1.0e-3  # [m/s] from which a chair drives: a lag never quite comes to rest
+# [s] A turn shorter than this before a reversal swings no caster. In a step within which the commands change, the mean
+# has part of the next turn already; which side it has must not depend on where in the step that was.
+_SWING = 0.03
 
 
 class CasterReversal(Effect):
@@ -30,29 +33,32 @@ class CasterReversal(Effect):
     follows = Follows.V_CHANGE
 
     _direction = 0.0  # last direction driven, 0: none yet
-    _turn = 0.0  # side of the last turn
+    _turns: FloatArray | None = None  # sides of the last turn, (k,) steps
     _side = 0.0  # of the kick under way
     _travel = 0.0  # [m] since the last reversal
 
     def apply(self, motion: Motion) -> Motion:
         """Kick w after reversals; a step counts with the distance at its middle."""
         direction = _held(np.sign(motion.v), self._direction)
-        turn = _held(np.sign(motion.w), self._turn)
+        if self._turns is None:
+            self._turns = np.zeros(max(round(_SWING / motion.dt), 1))
+        past = self._turns
+        turns = np.concatenate([past, _held(np.sign(motion.w), float(past[-1]))])
         earlier = np.concatenate([[self._direction], direction[:-1]])
         reversed_here = (direction != earlier) & (earlier != 0)
-        sides = np.concatenate([[self._turn], turn[:-1]])  # before each step
-        side = _last(reversed_here, sides, self._side)
+        side = _last(reversed_here, turns[: len(motion.w)], self._side)
         way = np.abs(motion.v) * motion.dt
         gone = np.concatenate([[0.0], np.cumsum(way)])
         since = gone[:-1] - _last(reversed_here, gone[:-1], -self._travel)
         kick = self.values["kick"] * np.exp(-(since + way / 2) / self.values["length"])
-        self._direction, self._turn, self._side = float(direction[-1]), float(turn[-1]), float(side[-1])
+        self._direction, self._turns, self._side = float(direction[-1]), turns[-len(past) :], float(side[-1])
         self._travel = float(since[-1] + way[-1])
         return replace(motion, w=motion.w + side * kick * (np.abs(motion.v) > _DRIVING))
 
     def settle(self, motion: Motion) -> None:
         """Have the casters trail."""
-        self._direction, self._turn = float(np.sign(motion.v[-1])), float(np.sign(motion.w[-1]))
+        self._direction = float(np.sign(motion.v[-1]))
+        self._turns = np.full(max(round(_SWING / motion.dt), 1), np.sign(motion.w[-1]))
 
 
 def _held(signs: FloatArray, before: float) -> FloatArray:

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is decided after the search: which sets stay open, and when all is judged anew."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kurumaisu.critic import decide, naming
+from kurumaisu.critic.catalogue import Term
+from kurumaisu.critic.decide import Decision
+from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.noise import START, Growth
+from kurumaisu.critic.smooth_judge import Beyond
+from kurumaisu.critic.smooth_search import Rivalry
+from kurumaisu.effects import Parameter
+
+
+def fit_of(names):
+    return SimpleNamespace(ids=frozenset(names.split()), candidates=frozenset(names.split()), score=0.0)
+
+
+def found_of(*sets, confounded=()):
+    return Naming((*map(fit_of, sets), fit_of("")), {}, confounded, 0.0)
+
+
+def decision(found, better=None):
+    beyond = Beyond(Rivalry((), -np.inf, {}, {}, 0.0), None, 1.0, better)
+    return Decision(SimpleNamespace(), found, Growth(0.0, 0.0, START), beyond)
+
+
+def test_what_is_named_is_in_no_set():
+    """A curve that draws b speaks for it: it is named then, and not one of two that cannot be told apart."""
+    found = found_of("a b", confounded=(("b", "c"), ("d", "e")))
+    p = {"a": 1.0, "b": 0.95, "c": 0.05, "d": 0.6, "e": 0.4}
+    again = decide.weighed_anew(found, p)
+    assert again.confounded == (("d", "e"),)
+    assert again.named == ("a", "b")
+
+
+@pytest.fixture
+def judged(monkeypatch):
+    """Return the sets about which all was judged, and what each of them led to, to be filled."""
+    asked, answers = [], {}
+
+    def judge(_first, found, *_):
+        asked.append(" ".join(sorted(found.best.ids)))
+        return answers[asked[-1]]
+
+    monkeypatch.setattr(naming, "search", lambda *_: found_of("wrong"))
+    monkeypatch.setattr(decide.smooth_judge, "hinted", lambda *_: None)
+    monkeypatch.setattr(decide, "_judged", judge)
+    return asked, answers
+
+
+def decided():
+    return decide.decide(SimpleNamespace(), None, lambda _: None)
+
+
+def test_noise_taken_about_a_set_that_is_not_the_best_is_taken_again(judged):
+    asked, answers = judged
+    answers |= {"wrong": decision(found_of("right")), "right": decision(found_of("right"))}
+    assert decided() is answers["right"]
+    assert asked == ["wrong", "right"]
+
+
+def test_a_better_set_that_a_curve_led_to_is_where_the_search_goes_on(judged):
+    _asked, answers = judged
+    answers |= {"wrong": decision(found_of("wrong"), fit_of("better")), "better": decision(found_of("better"))}
+    assert decided() is answers["better"]
+
+
+def test_two_sets_that_lead_to_each_other_come_to_an_end(judged):
+    asked, answers = judged
+    answers |= {"wrong": decision(found_of("other")), "other": decision(found_of("wrong"))}
+    assert decided().found.best.ids in ({"wrong"}, {"other"})
+    assert len(asked) == 2
+
+
+@pytest.mark.parametrize(
+    ("start", "better"),
+    [({("a", "offset"): 0.0}, False), ({("a", "offset"): 0.9}, True), ({("b", "offset"): 1.0}, False)],
+)
+def test_a_fit_that_first_values_beat_is_stuck(start, better):
+    """The best value is 1; the fit stuck at 0.5, as on a wrong tooth of a comb."""
+    parameter = Parameter("offset", "V", null=0.0, scale=1.0, lower=-2.0, upper=2.0)
+    problem = SimpleNamespace(residual=lambda _, values: 4.0 * (values - 1.0))
+    fit = SimpleNamespace(terms=(Term("a", parameter, 0.0),), log_likelihood=-2.0)
+    assert naming.begins_better(problem, fit, start) is better
+    assert not naming.begins_better(problem, SimpleNamespace(terms=()), start)
