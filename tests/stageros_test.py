@@ -304,6 +304,7 @@ class OneRobot(Case):
             assert (twist.linear.x, twist.linear.y, twist.linear.z, twist.angular.z) == (0, 0, 0, 0)
 
     def test_every_message_of_a_step_has_its_time(self):
+        self.step()  # the clock that was last heard may be of an earlier step
         before = self.now()
         self.step(3)
         assert self.now() == pytest.approx(before + 3 * STEP)
@@ -581,6 +582,7 @@ class Switches(Case):
 
     def test_a_sensor_has_a_rate_of_its_own(self):
         one, two = (self.topics[f"/ann/base_sonar_{i}"].messages for i in range(2))
+        self.step(4)  # the clock that was last heard may be of an earlier step
         start = self.now()
         self.step(8)
         wait_for(lambda: len(since(one, start)) == 8, "eight readings of the first")
