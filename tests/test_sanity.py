@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kurumaisu.bench import drives, sanity, wrong_data, wrong_scans
-from kurumaisu.critic import sanity_fit, sanity_rates, sanity_rows, sanity_stamps
+from kurumaisu.critic import sanity_fit, sanity_input, sanity_rates, sanity_rows, sanity_stamps
 from kurumaisu.critic.reading import read_recording
 from kurumaisu.critic.recording import Series
 from kurumaisu.critic.sanity import examine
@@ -38,6 +38,18 @@ def test_a_large_effect_is_not_wrong_data(effect):
 def test_nothing_is_wrong_with_a_good_drive_of_any_style(style):
     tables = drives.make(case(None, 0.0, style), np.random.default_rng(4))
     assert sanity.said_of_tables(tables, ["command", "voltage", "pose"], None) == []
+
+
+@pytest.mark.parametrize(("turns", "crossed", "swapped"), [(0.0, False, False), (0.5, False, False), (0.5, True, True)])
+def test_channels_are_swapped_only_if_neither_follows_its_own(turns, crossed, swapped):
+    """Of a chair that veers much the yaw rate follows the forward channel, but so does the speed."""
+    rng = np.random.default_rng(6)
+    t = np.arange(0.0, 120.0, sanity_rates.STEP)
+    v, w = 0.5 * (t % 10 < 5), turns * (t % 14 < 7)
+    driven = np.column_stack([v + rng.normal(0, 0.25, len(t)), w + 0.4 * v + rng.normal(0, 0.06, len(t))])
+    asked = np.column_stack([w, v] if crossed else [v, w])
+    match = sanity_input.compare(sanity_rates.Rates(t, asked), sanity_rates.Rates(t, driven), "command")
+    assert match.swapped == swapped
 
 
 def test_poses_that_are_missing_are_not_late():

@@ -69,7 +69,7 @@ def compare(asked: Rates, driven: Rates, name: str) -> Match:
     possible = (lags >= -STEP / 2) & (lags <= _LATE)
     base = float(straight[possible].max(initial=0.0))
     words = []
-    swapped = float(crossed[possible].max(initial=0.0)) > base + _WIN and _alike(pairs, crossed, possible, swapped=True)
+    swapped = float(crossed[possible].max(initial=0.0)) > base + _WIN and _is_swap(pairs, crossed, possible)
     total = crossed if swapped else straight
     at = int(np.argmax(np.where(possible, total, -1.0)))
     best = int(np.argmax(total))
@@ -109,8 +109,11 @@ def _strongest(pairs: list[list[Likeness]], at: int, swapped: bool) -> float:
     return float(max(abs(pairs[i][1 - i if swapped else i].correlation[at]) for i in range(2)))
 
 
-def _alike(pairs: list[list[Likeness]], total: FloatArray, possible: BoolArray, *, swapped: bool) -> bool:
-    return _strongest(pairs, int(np.argmax(np.where(possible, total, -1.0))), swapped) > _ALIKE
+def _is_swap(pairs: list[list[Likeness]], crossed: FloatArray, possible: BoolArray) -> bool:
+    """Whether the other channel explains one well, and its own neither: a chair that veers follows both."""
+    at = int(np.argmax(np.where(possible, crossed, -1.0)))
+    follows = [pairs[i][i].nats[possible].max(initial=0.0) > pairs[i][1 - i].nats[at] + _WIN for i in range(2)]
+    return _strongest(pairs, at, swapped=True) > _ALIKE and not any(follows)
 
 
 def _shift_words(name: str, lag: float, alike: float, plain: float) -> str:
