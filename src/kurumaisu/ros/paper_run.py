@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -45,16 +46,32 @@ def launch(arguments: Sequence[str], log: Path, deadline: float) -> None:
         command = ["roslaunch", "-p", str(port), "kurumaisu", *arguments]
         process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, env=environment)
         try:
-            process.wait(deadline)
-            why = f"ended with code {process.returncode}" if process.returncode else ""
-        except subprocess.TimeoutExpired:
-            why = f"was not done after {deadline:.0f} s"
+            why = _awaited(process, arguments[0], deadline)
         finally:
             interrupt(process, _PATIENCE)
     text = log.read_text(encoding="utf-8", errors="replace")
     if why or ("experiment: " in text and ": done, " not in text):
         tail = "\n".join(text.splitlines()[-_TAIL:])
         raise Error(f"roslaunch kurumaisu {arguments[0]} {why or 'was stopped'}; the end of {log}:\n{tail}")
+
+
+def _awaited(process: subprocess.Popen[bytes], name: str, deadline: float) -> str:
+    """Wait for a process to end, [s] at most; on a terminal say for how long. Return what went wrong, or nothing."""
+    begin = time.monotonic()
+    shown = sys.stderr.isatty()
+    try:
+        while (passed := time.monotonic() - begin) < deadline:
+            if shown:
+                print(f"\r{name}: {passed:.0f} s", end="", file=sys.stderr, flush=True)
+            try:
+                code = process.wait(min(1.0, deadline - passed))
+            except subprocess.TimeoutExpired:
+                continue
+            return f"ended with code {code}" if code else ""
+        return f"was not done after {deadline:.0f} s"
+    finally:
+        if shown:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)
 
 
 def drive(model: Path, file: str, bag: Path, *, seed: int, speed: float) -> None:
