@@ -156,8 +156,9 @@ def _run(check: Check, word: str, stop: Event) -> Counts:
     counts, note = _judge(check, word, problem)
     _line("FAILED" if counts.failed else "ok", check.name, time.monotonic() - start, note)
     if counts.failed:
-        lines = [f"    {line}" for line in log.read_text(errors="replace").splitlines()[-TAIL:]]
-        lines += [f"    {line}" for line in results.failures(check.written())]
+        said = [line for line in log.read_text(errors="replace").splitlines() if not line.endswith("[passed]")]
+        # what failed comes first: who reads this may see the beginning only
+        lines = [f"    {line}" for line in [*results.failures(check.written()), *said[-TAIL:]]]
         print("\n".join(lines), f"\n    (whole output: {log})", flush=True)
     elif check.reads:
         stamp.write_text(state)
