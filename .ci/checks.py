@@ -94,7 +94,7 @@ def _checks() -> list[Check]:
     return [
         Check("ruff check", ["ruff", "check", *python]),
         Check("ruff format", ["ruff", "format", "--check", *python]),
-        Check("mypy", ["mypy"]),
+        Check("mypy", ["mypy"], beside=True),
         Check("mypy .ci", ["mypy", "--config-file=", "--strict", *(str(p) for p in (ROOT / ".ci").glob("*.py"))]),
         Check("clang-format", ["clang-format", "--dry-run", "-Werror", *cpp]),
         Check("catkin_lint", ["catkin_lint", "--offline", "--strict", "-W2", str(ROOT / ".ws/src")]),

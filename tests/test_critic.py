@@ -3,13 +3,13 @@
 
 from dataclasses import replace
 
+import hidden_effect
 import numpy as np
 import pytest
+from hidden_effect import recording, recording_of
 from scipy.integrate import trapezoid
 
 from kurumaisu import geometry
-from kurumaisu.bench import hidden_effect
-from kurumaisu.bench.critic import recording, recording_of
 from kurumaisu.critic import drive, pipeline, prior, replay
 from kurumaisu.critic.recording import Series
 from kurumaisu.critic.verdict import read_verdict

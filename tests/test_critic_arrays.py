@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hidden_effect import recording
 
-from kurumaisu.bench.critic import recording
 from kurumaisu.critic.arrays import criticise_arrays, recording_of
 from kurumaisu.critic.clean import Faults
 from kurumaisu.critic.meta import Meta

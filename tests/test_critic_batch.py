@@ -11,8 +11,8 @@ import time
 from pathlib import Path
 
 import pytest
+from hidden_effect import recording
 
-from kurumaisu.bench.critic import recording
 from kurumaisu.critic import batch
 from kurumaisu.critic.cli import main
 from kurumaisu.critic.display import Display, Plain, Terminal

@@ -3,12 +3,12 @@
 
 from dataclasses import replace
 
+import hidden_effect
 import numpy as np
 import pytest
+from hidden_effect import recording, recording_of
 from scipy import optimize
 
-from kurumaisu.bench import hidden_effect
-from kurumaisu.bench.critic import recording, recording_of
 from kurumaisu.critic import pipeline, solve
 from kurumaisu.critic.catalogue import Term
 from kurumaisu.critic.drive import prepare

@@ -6,9 +6,9 @@ import shutil
 from pathlib import Path
 
 import pytest
+from hidden_effect import recording
 
 from kurumaisu import effects
-from kurumaisu.bench.critic import recording
 from kurumaisu.critic import cli, find
 from kurumaisu.critic.cli import main
 from kurumaisu.critic.job import Job, Outcome

@@ -4,11 +4,11 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import hidden_effect
 import numpy as np
 import pytest
+from hidden_effect import recording_of
 
-from kurumaisu.bench import hidden_effect
-from kurumaisu.bench.critic import recording_of
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic import naming, replay, sanity
 from kurumaisu.critic.catalogue import Candidate, Term

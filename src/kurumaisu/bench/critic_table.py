@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The critic and simple baselines on hidden faults of all kinds, as one table."""
+"""The critic and simple baselines on hidden faults of one kind, effect by effect."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ import numpy as np
 from kurumaisu.bench.hidden import Ask, make, names_of
 from kurumaisu.bench.hidden.baselines import BASELINES
 from kurumaisu.bench.hidden.oracle import gain_share
-from kurumaisu.bench.hidden.score import Score, calibration_error, score, scored_names
+from kurumaisu.bench.hidden.score import SURE, Score, calibration_error, score, scored_names
+from kurumaisu.bench.processes import cpu_time
 from kurumaisu.bench.table import Table, share
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.recording import Recording
@@ -52,6 +53,8 @@ RIGHT = {
     "confounded": "a set with the truth, of ids that all explain it",
 }
 
+Answers = dict[str, Score]  # to one recording, by who answers: "critic", and the baselines
+
 
 @dataclass(frozen=True)
 class Job:
@@ -64,7 +67,7 @@ class Job:
 
 def options_of(parser: argparse.ArgumentParser) -> None:
     """Add the options of this table."""
-    parser.add_argument("--kind", choices=sorted(KINDS), help="what is hidden; without it the short table of old")
+    parser.add_argument("--kind", choices=sorted(KINDS), help="what is hidden; without it all kinds, with the floors")
     parser.add_argument("--effects", nargs="+", default=(), help="ids, or names of unknown or wrong things; all")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--form", choices=("plain", "other"), default="other", help="equations that hide an id")
@@ -80,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
     asks = [Ask(kind, (name,) if name else (), options.z, options.form, family=family) for name in rows]
     baselines = options.baselines and family == "base"
     jobs = [Job(ask, options.seed + i, baselines) for i, ask in enumerate(np.repeat(np.array(asks), options.draws))]
-    answers = _all_answers(jobs, options.jobs, options.log)
+    answers = all_answers(jobs, options.jobs, options.log)
     headings = ("right           ", "misnamed        ", "confounded      ", "unknown         ", "nothing         ")
     title = f"{options.kind}, seeds from {options.seed}; right: {RIGHT[kind]}; shares with 90 % intervals"
     table = Table(title, "hidden", "number", *headings, "interval covers ", "median z", "CPU [s]")
@@ -100,9 +103,9 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _all_answers(jobs: Sequence[Job], processes: int, log: Path | None) -> list[dict[str, Score]]:
+def all_answers(jobs: Sequence[Job], processes: int, log: Path | None) -> list[Answers]:
     """Return the scores of all draws, in order; say on a terminal how far it is."""
-    out: list[dict[str, Score]] = []
+    out: list[Answers] = []
     with TemporaryDirectory() as folder, ProcessPoolExecutor(processes) as pool:
         for job, answer in zip(jobs, pool.map(_answers, jobs, repeat(folder)), strict=True):
             out.append(answer)
@@ -112,12 +115,12 @@ def _all_answers(jobs: Sequence[Job], processes: int, log: Path | None) -> list[
     return out
 
 
-def _answers(job: Job, folder: str) -> dict[str, Score]:
+def _answers(job: Job, folder: str) -> Answers:
     """Return the scores of the critic and, if asked, of the baselines."""
     case = make(job.ask, job.seed, Path(folder))
-    start = time.process_time()
+    start = cpu_time()
     verdict = _criticised(case.recording)
-    cpu = time.process_time() - start
+    cpu = cpu_time() - start
     out = {"critic": replace(score(case.truth, verdict, cpu), gain_share=gain_share(case, verdict.gain))}
     for name, baseline in BASELINES.items() if job.baselines else ():
         start = time.process_time()
@@ -149,9 +152,9 @@ def _row(table: Table, label: str, scores: Sequence[Score]) -> None:
 
 def _summary(scores: Sequence[Score]) -> None:
     stated = [pair for one in scores for pair in one.stated]
-    sure = [right for p, right in stated if p >= 0.95]
+    sure = [right for p, right in stated if p >= SURE]
     print(f"\nof {len(stated)} causes named: calibration error {calibration_error(stated):.3f}; ", end="")
-    print(f"right when p >= 0.95: {share(sum(sure), len(sure))}, {len(sure)} of them")
+    print(f"right when p >= {SURE}: {share(sum(sure), len(sure))}, {len(sure)} of them")
     gained = [one.gain_share for one in scores if one.gain_share is not None and one.truth.z >= 10]
     if gained:
         low, middle = np.quantile(gained, [0.1, 0.5])
@@ -159,7 +162,7 @@ def _summary(scores: Sequence[Score]) -> None:
         print(f"10 % quantile {low:.3f}, of {len(gained)}")
 
 
-def _log(path: Path | None, jobs: Sequence[Job], answers: Sequence[dict[str, Score]]) -> None:
+def _log(path: Path | None, jobs: Sequence[Job], answers: Sequence[Answers]) -> None:
     if path is None:
         return
     with path.open("a", encoding="utf-8") as stream:
@@ -167,7 +170,7 @@ def _log(path: Path | None, jobs: Sequence[Job], answers: Sequence[dict[str, Sco
             stream.write(line + "\n")
 
 
-def _lines(jobs: Sequence[Job], answers: Sequence[dict[str, Score]]) -> Iterator[str]:
+def _lines(jobs: Sequence[Job], answers: Sequence[Answers]) -> Iterator[str]:
     for job, answer in zip(jobs, answers, strict=True):
         one = answer["critic"]
         truth = {key: value for key, value in asdict(one.truth).items() if value}

@@ -19,6 +19,7 @@ from kurumaisu.bench.hidden.base_case import RUNS, draw_drives
 from kurumaisu.bench.hidden.base_case import recording as base_recording
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.bench.processes import cpu_time
 from kurumaisu.bench.table import Table
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.recording import Recording, Run
@@ -57,17 +58,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _measured(recording: Recording) -> tuple[float, float, str]:
-    wall, cpu = time.perf_counter(), _cpu()
+    wall, cpu = time.perf_counter(), cpu_time()
     found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None).verdict
-    return time.perf_counter() - wall, _cpu() - cpu, found.verdict
-
-
-def _cpu() -> float:
-    """Return the CPU time of this process and of those that it waited for [s]."""
-    return sum(
-        usage.ru_utime + usage.ru_stime
-        for usage in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    )
+    return time.perf_counter() - wall, cpu_time() - cpu, found.verdict
 
 
 def _recording(seed: int, folder: Path) -> Recording:

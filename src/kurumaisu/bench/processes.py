@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import resource
 import signal
 import socket
 import subprocess
@@ -30,6 +31,14 @@ def cpu(pid: int) -> float:
     """Return the CPU time [s] that a process has used, in and for itself."""
     # the kernel's name of the clock that counts a whole process' time, to the nanosecond: clock_getcpuclockid(3)
     return time.clock_gettime((~pid << 3) | 2)
+
+
+def cpu_time() -> float:
+    """Return the CPU time [s] of this process and of those that it waited for."""
+    return sum(
+        usage.ru_utime + usage.ru_stime
+        for usage in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    )
 
 
 def memory(pid: int) -> float:

@@ -12,6 +12,7 @@ from kurumaisu.bench.hidden.case import Truth
 from kurumaisu.bench.hidden.wrong import WRONG
 from kurumaisu.critic.verdict import Verdict
 
+SURE = 0.95  # probability from which an answer is taken for sure
 _SEEN = 3.0  # whitened norm below which nobody can tell two effects apart for sure
 _TOLD_APART = 6.0  # whitened norm from which a rival is to be told from the truth
 _TWINS = 0.1  # and below which they do the same
@@ -22,7 +23,8 @@ class Score:
     """One answer: right for its kind, and what else it was; covered: of intervals whose parameter has a truth.
 
     stated: probability and truth of each cause named; cpu [s]; z, z_rival of the case; words: of the answer, short;
-    gain_share: of the oracle's gain on data held out, None where there is no oracle.
+    gain_share: of the oracle's gain on data held out, None where there is no oracle; followed: one of the first three
+    curves of what is not in the catalogue is by a covariate that is right.
     """
 
     right: bool
@@ -36,6 +38,7 @@ class Score:
     truth: Truth
     words: str
     gain_share: float | None = None
+    followed: bool = False
 
 
 def score(truth: Truth, verdict: Verdict, cpu: float) -> Score:
@@ -54,6 +57,7 @@ def score(truth: Truth, verdict: Verdict, cpu: float) -> Score:
         cpu=cpu,
         truth=truth,
         words=_words(verdict),
+        followed=_is_followed(truth, verdict),
     )
 
 
@@ -70,7 +74,7 @@ def _right(truth: Truth, verdict: Verdict, named: set[str]) -> bool:
         also = set(WRONG[truth.problem].also)
         return verdict.verdict == "invalid_data" or (bool(named) and named <= also)
     if truth.kind == "unknown":
-        return not named and any(_follows(truth, u.channel, u.covariate) for u in verdict.unknown[:3])
+        return not named and _is_followed(truth, verdict)
     if truth.kind == "confounded":
         allowed = {name for ids in truth.accepted for name in ids}
         return any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
@@ -87,6 +91,10 @@ def _right(truth: Truth, verdict: Verdict, named: set[str]) -> bool:
         sets = {name for group in verdict.confounded for name in group}
         return named <= set(truth.ids) <= named | sets
     return exact
+
+
+def _is_followed(truth: Truth, verdict: Verdict) -> bool:
+    return any(_follows(truth, unknown.channel, unknown.covariate) for unknown in verdict.unknown[:3])
 
 
 def _follows(truth: Truth, channel: str, covariate: str) -> bool:

@@ -8,10 +8,12 @@ differential equation, a delay is a queue, a dead zone is in volts beyond the th
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.sim.joystick import joystick
 from kurumaisu.types import FloatArray
 
@@ -42,12 +44,7 @@ class Disturbance:
 
 
 USUAL = Disturbance(sd_v=0.01, sd_w=0.02, tau=0.3, pose_sd=0.005)
-DISTURBANCES = {
-    "usual": USUAL,
-    "slow": Disturbance(sd_v=0.02, sd_w=0.03, tau=2.0, pose_sd=0.005),
-    "rough": Disturbance(sd_v=0.05, sd_w=0.10, tau=0.05, pose_sd=0.02),
-    "poor reference": Disturbance(sd_v=0.01, sd_w=0.02, tau=0.3, pose_sd=0.02),
-}
+RUNS = 3
 
 _Line = tuple[float, float]  # slope, intercept
 _FORWARD: tuple[_Line, _Line] = ((1.32402, 0.127906), (2.07369, -0.108783))
@@ -58,6 +55,27 @@ def draw_size(effect: str, rng: np.random.Generator) -> float:
     """Return a size of the effect in its own unit."""
     low, high, signed = EFFECTS[effect]
     return float(rng.uniform(low, high) * (rng.choice([-1, 1]) if signed else 1))
+
+
+def recording(effect: str | None, size: float, seed: int, seconds: float) -> Recording:
+    """Return a recording of several runs with a hidden effect, or none."""
+    return recording_of(
+        f"hidden {seed}", [make_run(effect, size, seed * RUNS + i, seconds, USUAL) for i in range(RUNS)]
+    )
+
+
+def recording_of(name: str, drives: Sequence[dict[str, FloatArray]]) -> Recording:
+    """Return a recording of the tables of some drives."""
+    runs = tuple(
+        Run(
+            f"run_{i}",
+            command=Series.of_table(tables["command"], "v", "w"),
+            voltage=Series.of_table(tables["voltage"], "v_f", "v_s"),
+            pose=Series.of_table(tables["pose"], "x", "y", "theta"),
+        )
+        for i, tables in enumerate(drives, start=1)
+    )
+    return Recording(name, runs, train=tuple(run.name for run in runs))
 
 
 def make_run(

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The critic's table of floors counts each figure over the right recordings."""
+
+import argparse
+from dataclasses import replace
+
+import pytest
+from scipy.stats import binomtest
+
+from kurumaisu.bench import critic_floors
+from kurumaisu.bench.hidden.baselines import BASELINES
+from kurumaisu.bench.hidden.case import Truth
+from kurumaisu.bench.hidden.score import score, scored_names
+from kurumaisu.critic.verdict import Verdict
+
+OPTIONS = argparse.Namespace(draws=2, seed=0, jobs=1, log=None)
+
+
+def rows(capsys, monkeypatch, truth_of, named_by_critic):
+    """Return the table's rows by label, where the critic names what a function of the number of the draw says."""
+
+    def answers(jobs, processes, log):
+        out = []
+        for i, job in enumerate(jobs):
+            truth = truth_of(job.ask)
+            critic = replace(scored_names(truth, named_by_critic(i, truth), 1.0), gain_share=None)
+            others = {who: scored_names(truth, frozenset(), 1.0) for who in BASELINES}
+            out.append({"critic": critic, **others})
+        return out
+
+    monkeypatch.setattr(critic_floors, "all_answers", answers)
+    assert critic_floors.run(OPTIONS) == 0
+    lines = capsys.readouterr().out.splitlines()
+    return {line[:31].strip(): line[31:] for line in lines if line[:1] not in ("", "-")}
+
+
+def truth_of(ask):
+    return Truth(ask.kind, ask.ids, z=20.0 if ask.ids != ("base.delay",) else 7.0)
+
+
+def test_the_first_of_each_kind_is_missed(capsys, monkeypatch):
+    found = rows(capsys, monkeypatch, truth_of, lambda i, truth: frozenset(truth.ids) if i else frozenset(["base.x"]))
+    low, high = binomtest(1, 20).proportion_ci(0.9)
+    assert f"0.05 ({low:.2f}-{high:.2f}) of 20" in found["false alarms, base"]
+    assert "0.00 (0.00-0.14) of 20" in found["false alarms, base"]  # those who never name anything
+    assert "0.98 (0.93-1.00) of 64" in found["another form, base, any z"]
+    assert "of 62" in found["another form, base, strong"]  # the two delays are weak
+    assert "of 62" in found["one cause exact, base, strong"]
+
+
+def test_names_said_for_sure_count_against_it_where_nothing_is_hidden_that_has_a_name():
+    truth = Truth("unknown", ("threshold_slip",), channel="v", covariates=("v",))
+    misnamed = replace(scored_names(truth, frozenset(["base.gain_v"]), 1.0), stated=((0.97, False),))
+    doubted = replace(misnamed, stated=((0.6, False),))
+    figure = next(f for f in critic_floors.FIGURES if f.label == "unknown: misnamed, p >= .9, base")
+    assert figure.count([misnamed, doubted]).startswith("0.50")
+
+
+def test_a_curve_that_is_not_among_the_first_three_is_not_found():
+    truth = Truth("unknown", ("threshold_slip",), channel="v", covariates=("v",))
+    assert not score(truth, Verdict("none"), 0.0).followed
+
+
+@pytest.mark.parametrize("figure", critic_floors.FIGURES, ids=lambda figure: figure.label)
+def test_a_figure_of_nothing_is_a_dash(figure):
+    assert figure.count([]).startswith(("-", "nan"))
