@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kurumaisu.critic.job import Job, criticise
 from kurumaisu.critic.laser.still import repeatability
 from kurumaisu.critic.reading import read_recording
 from kurumaisu.errors import Error
@@ -62,6 +63,13 @@ def test_sena_drives_a_loop_of_76_metres():
     drive = read_recording(needs(sena.FOLDER / sena.LOG)).runs[0]
     assert drive.scan.values.shape == (225, 361)
     assert np.hypot(*np.diff(drive.odom.values[:, :2], axis=0).T).sum() == pytest.approx(76.4, abs=0.5)
+
+
+def test_sena_is_too_short_to_name_anything(tmp_path):
+    found = criticise(Job(needs(sena.FOLDER / sena.LOG), tmp_path), lambda _: None)
+    assert (found.verdict.verdict, found.verdict.causes) == ("none", ())
+    assert "27 intervals between poses are too few" in found.story.headline
+    assert "dac_quantisation" not in str(found.story)  # the steps of a converter are in the odometry, if there are any
 
 
 def test_a_recording_that_is_not_there_is_an_error_that_names_it(tmp_path, capsys):

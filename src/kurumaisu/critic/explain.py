@@ -85,7 +85,7 @@ def criticism(
     problem, found, growth = made.problem, made.found, made.growth
     best = found.best
     shares = {name: moved_share(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
-    gains = confirmed(worth, best.score - found.empty.score)
+    gains = confirmed(worth, found.nats(best))
     felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     kind = _kind(found, matters)

@@ -50,6 +50,10 @@ class Naming:
         """Return the fit of nothing."""
         return next(fit for fit in self.fits if not fit.candidates)
 
+    def nats(self, fit: Fit) -> float:
+        """Return the evidence [nat] of a set over nothing, none where data are too few to believe in it."""
+        return fit.score - self.empty.score if self.enough else 0.0
+
     @property
     def named(self) -> tuple[str, ...]:
         """Return the effects of the best set that are certain enough to be named."""

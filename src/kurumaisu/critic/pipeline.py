@@ -21,6 +21,7 @@ from kurumaisu.critic.pruned import pruned
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.replay import model_of
 from kurumaisu.critic.report import write_report
+from kurumaisu.critic.selection import beside_odometry
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.verdict import Gain, write_verdict
 from kurumaisu.errors import Error
@@ -101,6 +102,8 @@ def _criticise_base(
     test = [drives[name] for name in recording.test if name in drives]
 
     progress("estimating the noise")
+    if all(drive.source == "odom" for drive in train):
+        ids = beside_odometry(ids)
     rough = Problem(train, model, noise.START, ids=ids)
     empty = rough.fit((), {})
     first = rough.changed(noise=scatter(rough, empty, recording.truth, project=True).estimate().noise)

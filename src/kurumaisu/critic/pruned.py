@@ -19,13 +19,13 @@ def pruned(made: Decision, worth: Gain | None, measure: Callable[[Decision], Gai
     found = made.found
     if worth is None or made.beyond.extension is not None:
         return made, worth
-    if confirmed(worth, found.best.score - found.empty.score):
+    if confirmed(worth, found.nats(found.best)):
         return made, worth
     smaller = [fit for fit in found.fits if fit.ids and set(found.named) <= fit.ids < found.best.ids]
     for fit in smaller[:_TRIED]:
         other = _with(made, fit)
         gained = measure(other)
-        if confirmed(gained, fit.score - found.empty.score):
+        if confirmed(gained, found.nats(fit)):
             return other, gained
     return made, worth
 

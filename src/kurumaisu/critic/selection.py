@@ -33,6 +33,12 @@ def effect_ids(only: Sequence[str], without: Sequence[str]) -> frozenset[str] | 
     return frozenset(wanted)
 
 
+def beside_odometry(ids: frozenset[str] | None) -> frozenset[str]:
+    """Return those of these effects, None for all, that may act between what odometry says and how a robot moves."""
+    known = {effect.id for effect in effects.BASE if effect.in_odometry}
+    return (ids if ids is not None else frozenset((*(effect.id for effect in effects.ALL), effects.SMOOTH))) - known
+
+
 def matching(option: str, pattern: str, names: Sequence[str], what: str) -> list[str]:
     """Return the names that a pattern matches. Raise Error, with near names, when there is none."""
     found = [name for name in names if fnmatchcase(name, pattern)]

@@ -90,8 +90,10 @@ def details(
     ]
     fitted: dict[str, list[str]] = {}
     for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True):
+        if term.fixed and value == term.parameter.null:
+            continue  # the usual form of an effect that has several
         e = estimate(problem.model, term, value, sd)
-        size = with_interval(e.estimate, e.lo90, e.hi90, e.unit)
+        size = quantities([e.estimate], e.unit)[0] if term.fixed else with_interval(e.estimate, e.lo90, e.hi90, e.unit)
         fitted.setdefault(term.id, []).append(f"{term.parameter.name} {size}")
     for name, sizes in fitted.items():
         moved = f"within {HORIZON:g} s it moves the chair by {100 * shares[name]:.1f} % of its way or turn"

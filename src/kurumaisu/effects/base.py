@@ -99,9 +99,13 @@ class Context:
 
 
 class BaseEffect(Mechanism):
-    """An effect somewhere in the drive chain. shows_in, follows: where a residual drawn over it shows its shape."""
+    """An effect somewhere in the drive chain. shows_in, follows: where a residual drawn over it shows its shape.
+
+    in_odometry: whatever it does, odometry has it, whether of the wheels or of what was put out.
+    """
 
     stage: ClassVar[Stage]
+    in_odometry: ClassVar[bool] = False
     shows_in: ClassVar[Rate]
     follows: ClassVar[Follows]
 

@@ -21,6 +21,7 @@ class DacQuantisation(VoltageEffect):
 
     id = "base.dac_quantisation"
     stage = Stage.CONVERTER
+    in_odometry = True
     parameters = (
         Parameter("step", "V", null=0.0, scale=0.005, lower=0.0, upper=1.0),
         Parameter("phase", "1", null=0.0, scale=0.5, lower=-0.5, upper=0.5),
