@@ -260,7 +260,8 @@ class MappingNode(unittest.TestCase):
 
     def test_3_scans_without_transforms_are_counted_and_said(self):
         self.room.step_until(lambda: self.says("scans come, but"), "scans without tf said", DEADLINE, with_tf=False)
-        self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but no odometry: tf has no odom -> base_link")
+        # "tf has no odom -> base_link", unless a transform of the time before came late
+        self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but no odometry")
         assert int(self.values()["dropped without transform"]) > 0
         self.wait_for_status(2, "MAPPING_NO_SCAN")
 

@@ -119,18 +119,19 @@ def cross_v_to_w(p, v, w):
     return v, 0.0, w + p["share"] * volts("translation", v) / slope
 
 
-def _swallowed(axis, rate, width):
-    """The voltage is moved by the width towards the branch's threshold, which it does not pass."""
+def _swallowed(axis, rate, p):
+    """The voltage is moved by the width towards the branch's threshold, which it does not pass; or jumps there."""
     if rate == 0:
         return 0.0
     slope, intercept = branch(axis, rate)
+    width = p["width"] * (abs(slope / branch(axis, 1.0)[0]) if p["even"] >= 0.5 else 1.0)
     above = volts(axis, rate) - intercept
     left = abs(above) - width
-    return math.copysign(left, above) / slope if left > 0 else 0.0
+    return math.copysign(abs(above) if p["whole"] >= 0.5 else left, above) / slope if left > 0 else 0.0
 
 
-RATES["base.dead_zone_v"] = _each(lambda p, v, w: (_swallowed("translation", v, p["width"]), 0.0, w))
-RATES["base.dead_zone_w"] = _each(lambda p, v, w: (v, 0.0, _swallowed("steering", w, p["width"])))
+RATES["base.dead_zone_v"] = _each(lambda p, v, w: (_swallowed("translation", v, p), 0.0, w))
+RATES["base.dead_zone_w"] = _each(lambda p, v, w: (v, 0.0, _swallowed("steering", w, p)))
 
 
 @_rates("base.backlash")

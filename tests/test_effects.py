@@ -56,7 +56,7 @@ def test_chunks_give_the_same_motion_as_the_whole(effect, cuts, seed):
 
 @pytest.mark.parametrize("effect", RATES, ids=lambda effect: effect.id)
 def test_every_effect_changes_the_motion_and_its_null_does_not(effect):
-    motion = drive(400, 3)
+    motion = drive(400, 1)
     changed = effect(TYPICAL[effect.id], context()).apply(motion)
     assert not np.allclose(rates(changed), rates(motion), atol=1e-4)
     null = {parameter.name: parameter.null for parameter in effect.parameters}
@@ -128,8 +128,17 @@ def test_delay_moves_the_integral_in_time(delay):
 
 def test_dead_zone_swallows_volts_of_each_branch():
     motion = effects.Motion(DT, np.array([0.5, -0.5, 0.02, 0.0]), np.zeros(4))
-    out = effects.by_id("base.dead_zone_v")({"width": 0.06}, context()).apply(motion).v
+    out = effects.by_id("base.dead_zone_v")({"width": 0.06, "even": 0.0, "whole": 0.0}, context()).apply(motion).v
     np.testing.assert_allclose(out, [0.5 - 0.06 / 1.32402, -0.5 + 0.06 / 2.07369, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("whole", "forward"), [(0.0, 0.5 - 0.06 / 1.32402), (1.0, 0.5)])
+def test_a_dead_zone_of_rates_is_as_wide_on_either_side(whole, forward):
+    motion = effects.Motion(DT, np.array([0.5, -0.5, 0.045, -0.045, -0.046]), np.zeros(5))
+    values = {"width": 0.06, "even": 1.0, "whole": whole}
+    out = effects.by_id("base.dead_zone_v")(values, context()).apply(motion).v
+    beyond = -0.046 if whole else -0.046 + 0.06 / 1.32402
+    np.testing.assert_allclose(out, [forward, -forward, 0.0, 0.0, beyond], atol=1e-12)
 
 
 def test_process_noise_has_the_stated_size_and_colour():

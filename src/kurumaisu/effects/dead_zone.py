@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """base.dead_zone_v and base.dead_zone_w: the joystick input swallows more volts than the law says."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,13 +10,30 @@ from kurumaisu._core import AxisLaw
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 from kurumaisu.types import FloatArray
 
-_WIDTH = (Parameter("width", "V", null=0.0, scale=0.03, lower=-0.3, upper=0.5),)
+_PARAMETERS = (
+    Parameter("width", "V", null=0.0, scale=0.03, lower=-0.3, upper=0.5),
+    Parameter("even", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
+    Parameter("whole", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
+)
+_FORMS = (
+    {"even": 0.0, "whole": 0.0},
+    {"even": 1.0, "whole": 0.0},
+    {"even": 0.0, "whole": 1.0},
+    {"even": 1.0, "whole": 1.0},
+)
 
 
-def _swallow(rate: FloatArray, width: float, law: AxisLaw) -> FloatArray:
-    """Return rates without what the width [V] stands for on their branch; a negative width adds it."""
-    lost = width * np.abs(law.gain(rate))
-    return np.asarray(np.sign(rate) * np.maximum(np.abs(rate) - lost, 0.0))
+def _swallow(rate: FloatArray, values: Mapping[str, float], law: AxisLaw) -> FloatArray:
+    """Return rates without what the zone swallows; a negative width adds it.
+
+    width [V]: of the branch of each rate, or with even = 1 of the positive one for both, so that as much of the rate
+    is lost on either side. whole: 1 where a rate beyond the zone is left as it is, else all rates are less by the zone.
+    """
+    branch = np.ones_like(rate) if values["even"] >= 0.5 else rate
+    zone = values["width"] * np.abs(law.gain(branch))
+    if values["whole"] >= 0.5:
+        return np.where(np.abs(rate) > zone, rate, 0.0)
+    return np.asarray(np.sign(rate) * np.maximum(np.abs(rate) - zone, 0.0))
 
 
 class DeadZoneV(Effect):
@@ -23,16 +41,17 @@ class DeadZoneV(Effect):
 
     id = "base.dead_zone_v"
     stage = Stage.THRESHOLD
-    parameters = _WIDTH
+    parameters = _PARAMETERS
+    forms = _FORMS
     sentence = "small translation voltages are swallowed: the dead zone of V_f is wider than modelled"
-    formula = "sign(v) · max(0, |v| − width · |gain of V_f|)"
+    formula = "sign(v) · max(0, |v| − width · |gain of V_f|), or with whole = 1: 0 up to there, beyond it v"
     source = "assumed: joystick inputs have a neutral zone; 5-50 mV"
     shows_in = Rate.V
     follows = Follows.V
 
     def apply(self, motion: Motion) -> Motion:
         """Shrink v towards 0."""
-        return replace(motion, v=_swallow(motion.v, self.values["width"], self.context.translation))
+        return replace(motion, v=_swallow(motion.v, self.values, self.context.translation))
 
 
 class DeadZoneW(Effect):
@@ -40,13 +59,14 @@ class DeadZoneW(Effect):
 
     id = "base.dead_zone_w"
     stage = Stage.THRESHOLD
-    parameters = _WIDTH
+    parameters = _PARAMETERS
+    forms = _FORMS
     sentence = "small steering voltages are swallowed: the dead zone of V_s is wider than modelled"
-    formula = "sign(w) · max(0, |w| − width · |gain of V_s|)"
+    formula = "sign(w) · max(0, |w| − width · |gain of V_s|), or with whole = 1: 0 up to there, beyond it w"
     source = "assumed: joystick inputs have a neutral zone; 5-50 mV"
     shows_in = Rate.W
     follows = Follows.W
 
     def apply(self, motion: Motion) -> Motion:
         """Shrink w towards 0."""
-        return replace(motion, w=_swallow(motion.w, self.values["width"], self.context.steering))
+        return replace(motion, w=_swallow(motion.w, self.values, self.context.steering))
