@@ -35,12 +35,16 @@ _POSE_EVERY = 100  # steps
 
 @dataclass(frozen=True)
 class Disturbance:
-    """Ornstein-Uhlenbeck noise of the rates: sd_v [m/s], sd_w [rad/s], tau [s]; pose_sd [m, rad] of the reference."""
+    """Ornstein-Uhlenbeck noise of the rates: sd_v [m/s], sd_w [rad/s], tau [s]; pose_sd [m, rad] of the reference.
+
+    at_rest: the noise acts on a chair that is asked to rest, too.
+    """
 
     sd_v: float
     sd_w: float
     tau: float
     pose_sd: float
+    at_rest: bool = False
 
 
 USUAL = Disturbance(sd_v=0.01, sd_w=0.02, tau=0.3, pose_sd=0.005)
@@ -57,11 +61,12 @@ def draw_size(effect: str, rng: np.random.Generator) -> float:
     return float(rng.uniform(low, high) * (rng.choice([-1, 1]) if signed else 1))
 
 
-def recording(effect: str | None, size: float, seed: int, seconds: float) -> Recording:
+def recording(
+    effect: str | None, size: float, seed: int, seconds: float, disturbance: Disturbance = USUAL
+) -> Recording:
     """Return a recording of several runs with a hidden effect, or none."""
-    return recording_of(
-        f"hidden {seed}", [make_run(effect, size, seed * RUNS + i, seconds, USUAL) for i in range(RUNS)]
-    )
+    seeds = range(seed * RUNS, (seed + 1) * RUNS)
+    return recording_of(f"hidden {seed}", [make_run(effect, size, each, seconds, disturbance) for each in seeds])
 
 
 def recording_of(name: str, drives: Sequence[dict[str, FloatArray]]) -> Recording:
@@ -94,7 +99,7 @@ def drive(
     steps = round((command[-1, 0] + 1.0) / _STEP)
     asked = command[np.searchsorted(command[:, 0], np.arange(steps) * _STEP, side="right") - 1, 1:]
     noise = _ornstein_uhlenbeck(steps, rng, disturbance)
-    chair = _Chair(effect, size)
+    chair = _Chair(effect, size, disturbance.at_rest)
     poses = []
     for k in range(steps):
         if k % _POSE_EVERY == 0:
@@ -122,17 +127,17 @@ def _volts(rate: float, lines: tuple[_Line, _Line]) -> float:
 class _Chair:
     """A chair with one peculiarity."""
 
-    def __init__(self, effect: str | None, size: float) -> None:
+    def __init__(self, effect: str | None, size: float, restless: bool) -> None:
         self.x = self.y = self.theta = 0.0
-        self._effect, self._size = effect, size
+        self._effect, self._size, self._restless = effect, size, restless
         self._v = self._w = 0.0
         self._queue = deque([(0.0, 0.0)] * (round(size / _STEP) if effect == "base.delay" else 0))
 
     def step(self, v: float, w: float, noise_v: float, noise_w: float) -> None:
-        """Drive one step towards the rates asked for; noise acts on a chair that is asked to move."""
+        """Drive one step towards the rates asked for; noise acts on a chair that moves, or always."""
         self._queue.append((v, w))
         v, w = self._steady(*self._queue.popleft())
-        moving = v != 0 or w != 0
+        moving = v != 0 or w != 0 or self._restless
         share = _STEP / self._size if self._effect in ("base.lag_v", "base.lag_w") else 0.0
         self._v = self._v + share * (v - self._v) if self._effect == "base.lag_v" else v
         self._w = self._w + share * (w - self._w) if self._effect == "base.lag_w" else w

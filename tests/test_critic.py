@@ -37,6 +37,12 @@ def test_a_hidden_effect_is_named_and_measured(effect):
     assert verdict.gain.log_density_per_sample.lo90 > 0
 
 
+def test_a_chair_that_fluctuates_at_rest_too_has_nothing_else():
+    restless = replace(hidden_effect.USUAL, at_rest=True)
+    verdict = criticise(recording("base.lag_v", 0.15, 70, 40.0, restless)).verdict
+    assert ([cause.id for cause in verdict.causes], verdict.unknown) == (["base.lag_v"], ())
+
+
 @pytest.mark.parametrize("seed", [81, 82, 83])
 def test_without_an_effect_nothing_is_named(seed):
     criticism = criticise(recording(None, 0.0, seed, 40.0))

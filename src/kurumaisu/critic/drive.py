@@ -25,7 +25,6 @@ LONGEST = 100_000.0  # [s] a day: what is longer has its times in another unit, 
 # over short intervals its noise, in the input and in the residual alike, would pass for a gain below 1 (errors in
 # variables), while over long ones it averages out.
 _ROLLS = 0.2  # [s] for which a chair may move on after it was asked to rest
-_STILL = 0.1  # share of the noise of a moving chair that one at rest may have
 _ROUNDING = 1e-9  # [m/s], [rad/s]
 _USUAL_V, _USUAL_W = 0.8, 0.8  # [m/s], [rad/s]
 POSE_INTERVAL = {"voltage": 0.1, "command": 0.1, "odom": 2.0}
@@ -61,9 +60,9 @@ class Drive:
     def activity(self) -> FloatArray:
         """Share of each increment's noise that acts, (m,): floor and casters shake a chair that moves.
 
-        A chair asked to rest may roll on for a while, and is never quite still.
+        A chair asked to rest may roll on for a while.
         """
-        return np.asarray(np.maximum(np.sqrt(self._means(self._moving, _ROLLS)), _STILL))
+        return np.sqrt(self._means(self._moving, _ROLLS))
 
     @cached_property
     def pace(self) -> FloatArray:

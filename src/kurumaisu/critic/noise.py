@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 from scipy.linalg import qr
@@ -26,7 +27,8 @@ class Noise:
 
     position_sd [m], heading_sd [rad]: white; sd_v [m/s], sd_lateral [m/s], sd_w [rad/s]: stationary sd of
     Ornstein-Uhlenbeck processes of time constant tau [s]; slow_...: the same of a second, slower one, 0: none;
-    growth: by how much they grow with the rates, as a share per Drive.pace.
+    growth: by how much they grow with the rates, as a share per Drive.pace; rest: share of a moving chair's noise that
+    one at rest has.
     """
 
     position_sd: float
@@ -40,20 +42,22 @@ class Noise:
     slow_w: float = 0.0
     slow_tau: float = 3.0
     growth: float = 0.0
+    rest: float = 0.1
 
 
 # Where the search for the noise starts, and how far from there a value remains plausible (natural log, 1 sd).
 START = Noise(position_sd=0.01, heading_sd=0.005, sd_v=0.02, sd_lateral=0.005, sd_w=0.03, tau=0.3)
 _SLOW = replace(START, slow_v=0.005, slow_lateral=0.001, slow_w=0.01, growth=0.3)
-_SPREAD = dict.fromkeys(vars(START), 2.0) | {"tau": 1.0, "slow_tau": 0.7, "growth": 1.0}
-_FLOOR = dict.fromkeys(vars(START), 1e-5) | {"tau": 0.02, "slow_tau": 0.5, "growth": 1e-4}
-_CEILING = dict.fromkeys(vars(START), 3.0) | {"sd_w": 10.0, "tau": 20.0, "slow_tau": 20.0, "growth": 30.0}
+_SPREAD = dict.fromkeys(vars(START), 2.0) | {"tau": 1.0, "slow_tau": 0.7, "growth": 1.0, "rest": 1.0}
+_FLOOR = dict.fromkeys(vars(START), 1e-5) | {"tau": 0.02, "slow_tau": 0.5, "growth": 1e-4, "rest": START.rest}
+_CEILING = dict.fromkeys(vars(START), 3.0) | {"sd_w": 10.0, "tau": 20.0, "slow_tau": 20.0, "growth": 30.0, "rest": 1.0}
 ONE_COLOUR = ("position_sd", "heading_sd", "sd_v", "sd_lateral", "sd_w", "tau")
 _SECOND = ("slow_v", "slow_lateral", "slow_w", "slow_tau")
 _GROWN = (0.3, 1.0, 3.0)  # from which growth is searched for: from a single one the search sticks half way
 _GROWING = ("sd_v", "sd_lateral", "sd_w", "slow_v", "slow_lateral", "slow_w")
+_RESTLESS = (0.3, 1.0)  # shares of its noise that a chair at rest may have, which are tried
 _HINTS = (0.1, 0.5, 1.0, 3.0)  # of a second colour's usual size
-_WORTH = 4.0  # [nat] from which a second colour is believed: it has four parameters
+_WORTH = 4.0  # [nat] from which a second colour is believed: it has four parameters; noise at rest, too
 _SAME = 0.03  # share of a column beyond those before it that makes it one of its own
 
 
@@ -62,7 +66,7 @@ def whitener(drive: Drive, noise: Noise) -> Whitener:
     return Whitener(
         drive.poses,
         drive.times,
-        drive.activity * (1 + noise.growth * drive.pace),
+        np.maximum(drive.activity, noise.rest) * (1 + noise.growth * drive.pace),
         position_sd=noise.position_sd,
         heading_sd=noise.heading_sd,
         process_sd=[
@@ -116,14 +120,26 @@ class Scatter:
         self._truth = truth
 
     def estimate(self, start: Noise = START) -> Estimate:
-        """Return the noise of one colour, or of two where they explain more."""
-        one = self._best(replace(start, slow_v=0.0, slow_lateral=0.0, slow_w=0.0), ONE_COLOUR)
+        """Return the noise of one colour, or of two where they explain more; of a chair at rest as much as it has."""
+        one = self._restless(self._best(replace(start, slow_v=0.0, slow_lateral=0.0, slow_w=0.0), _free(start)))
         second = start if start.slow_v else _SLOW
         slow = {name: getattr(second, name) for name in _SECOND}
         if not self._hints_at(one.noise, slow):
             return one
-        two = self._best(replace(one.noise, **slow), (*ONE_COLOUR, *_SECOND))
+        two = self._best(replace(one.noise, **slow), (*_free(one.noise), *_SECOND))
         return two if two.cost < one.cost - _WORTH else one
+
+    def _restless(self, still: Estimate) -> Estimate:
+        """Return the noise of a chair that fluctuates at rest, too, if that explains more."""
+        tried = (
+            replace(still.noise, rest=rest, sd_v=k * still.noise.sd_v, sd_w=k * still.noise.sd_w)
+            for rest in _RESTLESS
+            for k in (1.0, 0.7)
+        )
+        cost, start = min(((self._cost(noise), noise) for noise in tried), key=itemgetter(0))
+        if still.noise.rest > START.rest or cost > self._cost(still.noise) - _WORTH:
+            return still
+        return self._best(start, _free(start))
 
     def _hints_at(self, one: Noise, slow: dict[str, float]) -> bool:
         """Tell whether some of a second colour explains more than none: a tenth of the price of a search."""
@@ -143,7 +159,7 @@ class Scatter:
 
     def growth(self, about: Estimate, prior_odds: float) -> Growth:
         """Return how likely it is that the noise grows with the rates, about the estimate of noise that does not."""
-        names = (*ONE_COLOUR, *(_SECOND if about.noise.slow_v else ()))
+        names = (*_free(about.noise), *(_SECOND if about.noise.slow_v else ()))
         growing = min((self._best(_grown(about.noise, size), (*names, "growth")) for size in _GROWN), key=_cost_of)
         better = max(about.cost - growing.cost, 0.0)
         nats = better - float(occam(np.sqrt(2 * better), sides=1))
@@ -180,6 +196,11 @@ class Scatter:
         square, b, inner = gram[0, 0], gram[1:, 0], gram[1:, 1:] + 1e-6 * np.eye(len(gram) - 1)
         rest = square - b @ np.linalg.solve(inner, b)
         return 0.5 * float(log_determinant + rest + np.linalg.slogdet(inner)[1])
+
+
+def _free(noise: Noise) -> tuple[str, ...]:
+    """Return what is searched for in noise of one colour."""
+    return (*ONE_COLOUR, "rest") if noise.rest > START.rest else ONE_COLOUR
 
 
 def _grown(noise: Noise, growth: float) -> Noise:
