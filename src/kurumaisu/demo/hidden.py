@@ -42,10 +42,12 @@ def run(folder: Path, seed: int) -> None:
 
 
 def draw(rng: np.random.Generator) -> EffectSetting:
-    """Return one of the effects shown, of a size that matters."""
+    """Return one of the effects shown, of a size that matters, in any of its forms."""
     effect = effects.by_id(SHOWN[rng.integers(len(SHOWN))])
-    values = {}
+    values = dict(effect.forms[rng.integers(len(effect.forms))]) if effect.forms else {}
     for parameter in effect.parameters:
+        if parameter.name in values:
+            continue
         sign = rng.choice([-1, 1]) if parameter.lower < parameter.null else 1
         values[parameter.name] = float(parameter.null + sign * parameter.scale * rng.uniform(1.0, 2.5))
     return EffectSetting(effect.id, values)
