@@ -89,7 +89,7 @@ def _judged(
     problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
     again = naming.search(problem, progress, found.best)
     beyond = smooth_judge.judge(problem, again, progress)
-    p, still_open = coarse.believed(problem, again, beyond.rivalry.p_effects)
+    p, still_open = coarse.believed(again, beyond.rivalry.p_effects)
     return Decision(problem, weighed_anew(replace(again, confounded=still_open), p), growth, beyond)
 
 
