@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic import gain, naming, noise, predict_doubt, replay, smooth_fit, smooth_judge
+from kurumaisu.critic import coarse, gain, naming, noise, predict_doubt, replay, smooth_fit, smooth_judge
 from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
@@ -89,7 +89,8 @@ def _judged(
     problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
     again = naming.search(problem, progress, found.best)
     beyond = smooth_judge.judge(problem, again, progress)
-    return Decision(problem, weighed_anew(again, beyond.rivalry.p_effects), growth, beyond)
+    p, still_open = coarse.believed(again, beyond.rivalry.p_effects)
+    return Decision(problem, weighed_anew(replace(again, confounded=still_open), p), growth, beyond)
 
 
 def weighed_anew(found: naming.Naming, p: dict[str, float]) -> naming.Naming:

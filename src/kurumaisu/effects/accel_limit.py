@@ -11,6 +11,7 @@ from kurumaisu.effects.base import LATE, Context, Effect, Follows, Motion, Param
 from kurumaisu.types import FloatArray
 
 _LATEST = 0.98  # of a step: what is left then tells little of the new target
+_REACHED = 1e-9  # [m/s], [rad/s] from a target at which a ramp has reached it
 
 
 class AccelLimit(Effect):
@@ -36,8 +37,8 @@ class AccelLimit(Effect):
     def apply(self, motion: Motion) -> Motion:
         """Ramp v and w; a sample is the step's mean rate."""
         slow_v, slow_w = self.values["slowness_v"], self.values["slowness_w"]
-        v, self._v = _core.ramp(_begun(motion, motion.v, slow_v, self._v), slow_v, motion.dt, self._v)
-        w, self._w = _core.ramp(_begun(motion, motion.w, slow_w, self._w), slow_w, motion.dt, self._w)
+        v, self._v = _ramped(motion, motion.v, slow_v, self._v)
+        w, self._w = _ramped(motion, motion.w, slow_w, self._w)
         return replace(motion, v=v, w=w)
 
     def settle(self, motion: Motion) -> None:
@@ -45,16 +46,21 @@ class AccelLimit(Effect):
         self._v, self._w = float(motion.v[-1]), float(motion.w[-1])
 
 
-def _begun(motion: Motion, target: FloatArray, slowness: float, level: float) -> FloatArray:
-    """Return targets (n,) with, where one changed within a step, how far a ramp can come in what is left of it.
+def _ramped(motion: Motion, target: FloatArray, slowness: float, level: float) -> tuple[FloatArray, float]:
+    """Return the mean rates (n,) of the steps, and the last step's at its end.
 
-    The mean of the step would have it begin with the step, which is half a step too early on average.
+    Where a target changed within a step, a ramp goes as far as it can in what is left of it, and begins no sooner:
+    one from the step's beginning would be early, and a delay seem to act.
     """
     late = motion.known.get(LATE)
     if late is None or slowness == 0:
-        return target
+        return _core.ramp(target, slowness, motion.dt, level)
+    late = np.minimum(late, _LATEST)
     before = np.concatenate([[level], target[:-1]])
-    left = 1 - np.minimum(late, _LATEST)
-    change = (target - before) / left
-    reach = left * motion.dt / slowness
-    return np.asarray(np.where(late > 0, before + np.clip(change, -reach, reach), target))
+    change = (target - before) / (1 - late)
+    reach = (1 - late) * motion.dt / slowness
+    begun = np.where(late > 0, before + np.clip(change, -reach, reach), target)
+    rates, end = _core.ramp(begun, slowness, motion.dt, level)
+    # One that was still on its way goes on meanwhile.
+    waiting = np.isclose(np.concatenate([[level], rates[:-1]]), before, rtol=0.0, atol=_REACHED)
+    return np.asarray(rates - np.where(waiting, late * (begun - before), 0.0)), end
