@@ -42,7 +42,7 @@ class Noise:
     slow_w: float = 0.0
     slow_tau: float = 3.0
     growth: float = 0.0
-    rest: float = 0.1
+    rest: float = 0.02
 
 
 # Where the search for the noise starts, and how far from there a value remains plausible (natural log, 1 sd).
@@ -55,7 +55,7 @@ ONE_COLOUR = ("position_sd", "heading_sd", "sd_v", "sd_lateral", "sd_w", "tau")
 _SECOND = ("slow_v", "slow_lateral", "slow_w", "slow_tau")
 _GROWN = (0.3, 1.0, 3.0)  # from which growth is searched for: from a single one the search sticks half way
 _GROWING = ("sd_v", "sd_lateral", "sd_w", "slow_v", "slow_lateral", "slow_w")
-_RESTLESS = (0.3, 1.0)  # shares of its noise that a chair at rest may have, which are tried
+_RESTLESS = (0.1, 0.3, 1.0)  # shares of its noise that a chair at rest may have, which are tried
 _HINTS = (0.1, 0.5, 1.0, 3.0)  # of a second colour's usual size
 _WORTH = 4.0  # [nat] from which a second colour is believed: it has four parameters; noise at rest, too
 _SAME = 0.03  # share of a column beyond those before it that makes it one of its own
