@@ -9,12 +9,17 @@ import pytest
 from kurumaisu.critic.laser.columns import Column, Form
 from kurumaisu.critic.laser.free import Free
 from kurumaisu.critic.laser.grids import grid_of
+from kurumaisu.critic.laser.reframed import from_base_link
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.trust import trusted_place
 from kurumaisu.critic.laser.twins import twins
-from kurumaisu.critic.laser.verdicts import size_where_it_acts
+from kurumaisu.critic.laser.verdicts import LaserFinding, size_where_it_acts
+from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.verdict import Cause, Estimate
 from kurumaisu.effects import Parameter
+from kurumaisu.params import EffectSetting, load_model, shipped
 
+MODEL = load_model(shipped("launch/md100.yaml"))
 SIZE = Parameter("size", "m", null=0.0, scale=0.01, lower=-1.0, upper=1.0)
 TAU = Parameter("tau", "s", null=900.0, scale=600.0, lower=1.0, upper=2.0e4)
 
@@ -62,3 +67,44 @@ def test_what_acts_in_a_sector_is_not_made_small_by_the_others():
     assert size_where_it_acts(change) == pytest.approx(8e-4)
     assert size_where_it_acts(np.full(1000, 5e-4)) == pytest.approx(5e-4)
     assert size_where_it_acts(np.zeros(10)) == 0
+
+
+def cause(name, parameter, size, half):
+    return Cause(name, 1.0, {parameter: Estimate(size, size - half, size + half, "m")}, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("mount", "named"),
+    [(-0.050, False), (0.050, True), (-0.020, True)],
+    ids=["the reference's point, seen by the scans", "the same way", "less than that"],
+)
+def test_a_point_off_base_link_does_not_move_the_laser_too(mount, named):
+    """The scans are then looked at from base_link, where they may show something else."""
+    first = cause("laser.mount_x", "x", mount, 0.0004)
+    shift = EffectSetting("laser.mount_x", {"x": mount})
+    finding = LaserFinding(causes=(first,), settings=(shift,))
+    drives = (cause("base.marker_x", "x", 0.0506, 0.0015), cause("base.gain_v", "gain", 0.05, 0.01))
+    pose = Series(np.arange(2.0), np.array([[1.0, 2.0, 0.0], [1.0, 2.0, np.pi / 2]]), ("x", "y", "theta"))
+    looked = []
+
+    def look(moved):
+        looked.append(moved)
+        return LaserFinding(causes=(cause("laser.scale", "scale", 0.001, 0.0001),))
+
+    recording = Recording("drives", (Run("one", pose=pose), Run("two")), ("one", "two"))
+    seen, settings = from_base_link(drives, finding, recording, MODEL, look)
+    if named:
+        assert (seen, settings, looked) == (finding, finding.settings, [])
+        return
+    assert [one.id for one in seen.causes] == ["laser.scale"]
+    assert settings == (shift,), "to the reference, the laser sits there"
+    assert any("laser.mount_x" in line and "base.marker_x" in line for line in seen.details)
+    assert looked[0].runs[0].pose.values[:, :2] == pytest.approx(np.array([[0.95, 2.0], [1.0, 1.95]]))
+
+
+def test_what_shifts_no_point_is_left_alone():
+    """A reference's clock and a laser that is tilted move nothing to another place."""
+    late = Cause("laser.latency", 1.0, {"delay": Estimate(0.05, 0.04, 0.06, "s")}, 50.0)
+    clock = Cause("base.clock_scale", 1.0, {"scale": Estimate(0.05, 0.04, 0.06, "1")}, 50.0)
+    finding = LaserFinding(causes=(late,))
+    assert from_base_link((clock,), finding, Recording("none", (), ()), MODEL, None) == (finding, ())
