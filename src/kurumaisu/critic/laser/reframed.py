@@ -44,7 +44,10 @@ def from_base_link(
         return finding, finding.settings
     by = np.sum([shift.by for name, shift in seen if name in told], axis=0)
     again = look(replace(recording, runs=tuple(_moved(run, by) for run in recording.runs)))
-    words = [f"laser: {name} is what {other} does to scans seen from the reference." for name, other in told.items()]
+    words = [
+        f"laser: from the reference it seems to sit elsewhere ({name}); that is {other}, no fault of the mounting."
+        for name, other in told.items()
+    ]
     there = tuple(setting for setting in finding.settings if setting.id in told)
     return replace(again, details=(*again.details, *words)), (*again.settings, *there)
 
