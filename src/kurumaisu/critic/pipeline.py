@@ -14,6 +14,8 @@ from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import write_extended
 from kurumaisu.critic.laser.aside import aside
 from kurumaisu.critic.laser.merge import with_laser
+from kurumaisu.critic.laser.reframed import from_base_link
+from kurumaisu.critic.laser.verdicts import criticise as look
 from kurumaisu.critic.portion import bounded
 from kurumaisu.critic.predict_extended import forecast_of
 from kurumaisu.critic.predict_motion import Settings
@@ -58,12 +60,17 @@ def criticise(
     with aside(recording, model, model_file, ids) as scans_say:
         base, extension = _criticise_base(recording, model, progress, ids) if moved else (None, _UNDRIVEN)
         scans = scans_say(progress)
-    found = with_laser(base or explain.undriven(recording, model), scans)
-    found = _with_worth(found, recording, replace(extension, scans=scans.settings), progress, slam=slam)
+    found = base or explain.undriven(recording, model)
+    scans, settings = from_base_link(
+        found.verdict.causes, scans, recording, model, lambda moved: look(moved, model, progress, ids)
+    )
+    found = with_laser(found, scans)
+    found = _with_worth(found, recording, replace(extension, scans=settings), progress, slam=slam)
     if not predict.asked(recording):
         return found
     progress("predicting what was asked for")
-    return replace(found, predictions=tuple(predict.predictions(recording, model, extension.forecast, found.settings)))
+    every = (*found.settings, *(each for each in settings if each not in found.settings))
+    return replace(found, predictions=tuple(predict.predictions(recording, model, extension.forecast, every)))
 
 
 def _with_worth(

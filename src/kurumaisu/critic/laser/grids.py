@@ -9,6 +9,7 @@ import numpy as np
 
 from kurumaisu.effects import Parameter
 
+_LONG = 2.0**1.5  # times the usual value, the longest time that is tried: in a short recording it looks like for ever
 _HALF_TURN = 8  # directions in half a turn of two parameters that act by their squares
 
 
@@ -24,9 +25,13 @@ def directions(count: int) -> list[tuple[float, ...]]:
 
 
 def grid_of(parameter: Parameter, span: float) -> list[float]:
-    """Return values of a parameter that only shapes an effect; span [s]: of the scans, for a parameter in seconds."""
+    """Return values of a parameter that only shapes an effect; span [s]: of the scans, for a parameter in seconds.
+
+    The longest time comes first: of shapes that are alike the first is kept, and that one is most like a constant.
+    """
     if parameter.unit == "s":
-        values = span * 2.0 ** np.arange(-4, 2.1, 0.5)
+        longest = max(4 * span, _LONG * parameter.null)
+        values = longest * 2.0 ** -np.arange(0, np.log2(16 * longest / span) + 0.1, 0.5)
     elif parameter.lower > 0:
         values = parameter.null * 2.0 ** np.arange(-3, 1.6, 0.25)
     else:

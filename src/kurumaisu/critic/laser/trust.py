@@ -12,7 +12,9 @@ from kurumaisu.types import BoolArray, FloatArray
 
 _KINK = 1e-4  # departure from a straight wall, where 1/r(i+1) + 1/r(i-1) = 2 cos(increment) / r(i), relative to 1/r
 _BESIDE = 4  # beams on each side of a corner or jump: an error of the pose or the mounting moves it so far
-_STEEPEST = np.radians(80.0)  # [rad] oblique beyond this, a beam slides along the wall with every error of the pose
+# [rad] oblique beyond this, a beam slides along the wall with every error of the pose, which then acts by its square,
+# too; and what becomes of a footprint four times as long as wide is another equation for everybody.
+_STEEPEST = np.radians(75.0)
 _GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
 _PILED = 20  # readings of one value, the least or the greatest, that are a pile if hardly more lie beside them
 _GRID = 1e-3  # [m] within which values are one

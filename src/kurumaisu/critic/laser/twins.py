@@ -13,9 +13,14 @@ import numpy as np
 from kurumaisu.critic.laser.free import Free
 from kurumaisu.critic.laser.rivals import Rival, beside
 from kurumaisu.critic.laser.search import Fitted, Found
+from kurumaisu.critic.prior import odds
+from kurumaisu.critic.smooth import belief
 from kurumaisu.types import FloatArray
 
 _LOSS = 3.0  # [nat] of log likelihood that a twin may explain less, a half for each parameter more
+# [nat] of evidence that a block may lack: one wall that is off imitates a mounting, but it would be a rare chance that
+# moved all walls of a room just as a quadratic error of the range does.
+_CHANCE = 7.0
 _RANK = 1e-6  # share of the largest eigenvalue below which a direction of a block does not show
 
 Groups = tuple[tuple[str, ...], ...]
@@ -69,8 +74,14 @@ def _others(
             yield next(iter(fit.ids - rest)), _worth(fit)
     base = max((fit for fit in found.fits if fit.ids == rest), key=_worth, default=None)
     for block in blocks:
-        if base is not None and block.id not in rest:
+        if base is not None and block.id not in rest and not _by_chance(found, base, block, gram):
             yield block.id, _with_block(base, block, gram)
+
+
+def _by_chance(found: Found, base: Fitted, block: Free, gram: FloatArray) -> bool:
+    """Return whether a block's coefficients, drawn before the data, would hardly ever do what the best set does."""
+    evidence = base.score + belief(*beside(base, block, gram), block.priors).nats + float(np.log(odds(len(found.p))))
+    return found.best.score - evidence > _CHANCE
 
 
 def _worth(fit: Fitted) -> float:

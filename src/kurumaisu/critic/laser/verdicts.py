@@ -30,7 +30,7 @@ from kurumaisu.critic.verdict import Cause, NextExperiment, Unknown
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-MATERIAL = 3e-4  # [m] rms change of the readings below which an effect of the laser does not matter
+MATERIAL = 3e-4  # [m] change of the readings, where it acts, below which an effect of the laser does not matter
 _SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
 Progress = Callable[[str], None]
 
@@ -159,7 +159,7 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     if made.winner is not None:
         free = made.winner.free
         valid = normal.beam_noise.valid
-        sizes[free.id] = float(np.sqrt(np.mean((assembly.columns[valid][:, free.span] @ made.coefficients) ** 2)))
+        sizes[free.id] = size_where_it_acts(assembly.columns[valid][:, free.span] @ made.coefficients)
         settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
@@ -191,7 +191,9 @@ def _set_of(scatter: Scatter) -> tuple[str, ...]:
 
 
 def _confused(assembly: Assembly, normal: Normal, made: _Made, causes: Sequence[Cause]) -> Groups:
-    names = [cause.id for cause in causes]
+    # Of a set, too: what explains the readings as well as its likeliest member belongs to it.
+    open_ids = {name for group in made.found.confounded for name in group}
+    names = [*(cause.id for cause in causes), *sorted(open_ids & made.fit.ids)]
     return joined(made.found.confounded, twins(made.found, made.winner, assembly.free, normal.gram, names))
 
 
@@ -207,7 +209,7 @@ def _noise_told(assembly: Assembly, normal: Normal) -> str:
 
 def _told(sizes: Mapping[str, float], small: Sequence[str]) -> list[str]:
     return [
-        f"{name}: changes the readings by {1e3 * size:.2g} mm (rms)"
+        f"{name}: changes the readings by {1e3 * size:.2g} mm (rms where it acts)"
         f"{': detectable, but it does not matter' if name in small else ''}."
         for name, size in sorted(sizes.items())
     ]
@@ -221,7 +223,16 @@ def _rms(assembly: Assembly, normal: Normal, fit: Fitted, name: str) -> float:
         if form.id == name:
             change = assembly.columns[valid][:, form.span] @ fit.coefficients[start:stop]
         start = stop
-    return float(np.sqrt(np.mean(change**2)))
+    return size_where_it_acts(change)
+
+
+def size_where_it_acts(change: FloatArray) -> float:
+    """Return the root mean square of changes [m], each counted by its square.
+
+    Of the same change everywhere that is the change; one that acts in a sector is no smaller for all beams elsewhere.
+    """
+    square = float(np.sum(change**2))
+    return float(np.sqrt(np.sum(change**4) / square)) if square > 0 else 0.0
 
 
 def _gain(made: _Made, name: str) -> float:

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What belongs to a set of effects of the laser that cannot be told apart, which beams may speak, and what matters."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kurumaisu.critic.laser.columns import Column, Form
+from kurumaisu.critic.laser.free import Free
+from kurumaisu.critic.laser.grids import grid_of
+from kurumaisu.critic.laser.reframed import from_base_link
+from kurumaisu.critic.laser.search import Search
+from kurumaisu.critic.laser.trust import trusted_place
+from kurumaisu.critic.laser.twins import twins
+from kurumaisu.critic.laser.verdicts import LaserFinding, size_where_it_acts
+from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.verdict import Cause, Estimate
+from kurumaisu.effects import Parameter
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+SIZE = Parameter("size", "m", null=0.0, scale=0.01, lower=-1.0, upper=1.0)
+TAU = Parameter("tau", "s", null=900.0, scale=600.0, lower=1.0, upper=2.0e4)
+
+
+@pytest.mark.parametrize(("walls", "a_set"), [(1, True), (12, False)])
+def test_many_walls_do_not_imitate_an_effect_by_chance(walls, a_set):
+    """Walls at any places explain as much as the effect of which each sees a part; but who would put them there?"""
+    readings = 240
+    rng = np.random.default_rng(2)
+    effect = np.ones(readings)
+    block = np.kron(np.eye(walls), np.ones((readings // walls, 1)))
+    y = 2.0 * effect + rng.standard_normal(readings)
+    rows = np.column_stack([effect, block, y])
+    form = Form("an.effect", {}, (Column(SIZE, squared=False, beside={}),), 0)
+    free = Free("a.map", SIZE, None, (np.eye(walls),), slice(1, 1 + walls))
+    gram = rows.T @ rows
+    found = Search([form], gram).run()
+    assert found.best.ids == {"an.effect"}
+    groups = twins(found, None, [free], gram, ["an.effect"])
+    assert groups == ((("a.map", "an.effect"),) if a_set else ())
+
+
+def test_a_time_that_a_short_drive_does_not_see_is_tried():
+    """In a minute, what dies away in a quarter of an hour and more is an offset."""
+    times = grid_of(TAU, 60.0)
+    assert times[0] == max(times) > 2400
+    assert min(times) < 10
+    assert max(grid_of(TAU, 3600.0)) == 4 * 3600
+
+
+def test_beams_along_a_wall_do_not_speak():
+    angles = np.radians([0.0, 40.0, 74.0, 76.0, 79.0])
+    beams = 40
+    incidence = np.repeat(angles[:, np.newaxis], beams, axis=1)
+    level = 1 / np.cos(np.linspace(-0.1, 0.1, beams))  # of a straight wall
+    seen = SimpleNamespace(incidence=incidence, level=np.repeat(level[np.newaxis], 5, axis=0))
+    laser = SimpleNamespace(range_min=0.06, range_max=4.0, angle_increment=0.2 / (beams - 1))
+    place = trusted_place(SimpleNamespace(laser=laser), seen, np.full_like(incidence, 2.0))
+    assert place[:, beams // 2].tolist() == [True, True, True, False, False]
+
+
+def test_what_acts_in_a_sector_is_not_made_small_by_the_others():
+    change = np.zeros(1000)
+    change[:100] = -8e-4
+    assert size_where_it_acts(change) == pytest.approx(8e-4)
+    assert size_where_it_acts(np.full(1000, 5e-4)) == pytest.approx(5e-4)
+    assert size_where_it_acts(np.zeros(10)) == 0
+
+
+def cause(name, parameter, size, half):
+    return Cause(name, 1.0, {parameter: Estimate(size, size - half, size + half, "m")}, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("mount", "named"),
+    [(-0.050, False), (0.050, True), (-0.020, True)],
+    ids=["the reference's point, seen by the scans", "the same way", "less than that"],
+)
+def test_a_point_off_base_link_does_not_move_the_laser_too(mount, named):
+    """The scans are then looked at from base_link, where they may show something else."""
+    first = cause("laser.mount_x", "x", mount, 0.0004)
+    shift = EffectSetting("laser.mount_x", {"x": mount})
+    finding = LaserFinding(causes=(first,), settings=(shift,))
+    drives = (cause("base.marker_x", "x", 0.0506, 0.0015), cause("base.gain_v", "gain", 0.05, 0.01))
+    pose = Series(np.arange(2.0), np.array([[1.0, 2.0, 0.0], [1.0, 2.0, np.pi / 2]]), ("x", "y", "theta"))
+    looked = []
+
+    def look(moved):
+        looked.append(moved)
+        return LaserFinding(causes=(cause("laser.scale", "scale", 0.001, 0.0001),))
+
+    recording = Recording("drives", (Run("one", pose=pose), Run("two")), ("one", "two"))
+    seen, settings = from_base_link(drives, finding, recording, MODEL, look)
+    if named:
+        assert (seen, settings, looked) == (finding, finding.settings, [])
+        return
+    assert [one.id for one in seen.causes] == ["laser.scale"]
+    assert settings == (shift,), "to the reference, the laser sits there"
+    assert any("laser.mount_x" in line and "base.marker_x" in line for line in seen.details)
+    assert looked[0].runs[0].pose.values[:, :2] == pytest.approx(np.array([[0.95, 2.0], [1.0, 1.95]]))
+
+
+def test_what_shifts_no_point_is_left_alone():
+    """A reference's clock and a laser that is tilted move nothing to another place."""
+    late = Cause("laser.latency", 1.0, {"delay": Estimate(0.05, 0.04, 0.06, "s")}, 50.0)
+    clock = Cause("base.clock_scale", 1.0, {"scale": Estimate(0.05, 0.04, 0.06, "1")}, 50.0)
+    finding = LaserFinding(causes=(late,))
+    assert from_base_link((clock,), finding, Recording("none", (), ()), MODEL, None) == (finding, ())
