@@ -11,6 +11,7 @@ from kurumaisu.effects.base import LATE, Context, Effect, Follows, Motion, Param
 from kurumaisu.types import FloatArray
 
 _LATEST = 0.98  # of a step: what is left then tells little of the new target
+_SETTLED = 1e-9  # [m/s], [rad/s] rounding of a rate
 
 
 class AccelLimit(Effect):
@@ -36,8 +37,8 @@ class AccelLimit(Effect):
     def apply(self, motion: Motion) -> Motion:
         """Ramp v and w; a sample is the step's mean rate."""
         slow_v, slow_w = self.values["slowness_v"], self.values["slowness_w"]
-        v, self._v = _core.ramp(_begun(motion, motion.v, slow_v, self._v), slow_v, motion.dt, self._v)
-        w, self._w = _core.ramp(_begun(motion, motion.w, slow_w, self._w), slow_w, motion.dt, self._w)
+        v, self._v = _ramped(motion, motion.v, slow_v, self._v)
+        w, self._w = _ramped(motion, motion.w, slow_w, self._w)
         return replace(motion, v=v, w=w)
 
     def settle(self, motion: Motion) -> None:
@@ -45,16 +46,26 @@ class AccelLimit(Effect):
         self._v, self._w = float(motion.v[-1]), float(motion.w[-1])
 
 
-def _begun(motion: Motion, target: FloatArray, slowness: float, level: float) -> FloatArray:
+def _ramped(motion: Motion, target: FloatArray, slowness: float, level: float) -> tuple[FloatArray, float]:
+    """Return the steps' mean rates (n,) on the way to targets (n,), and the rate at the end."""
+    late = motion.known.get(LATE)
+    if late is None or slowness == 0:
+        return _core.ramp(target, slowness, motion.dt, level)
+    before = np.concatenate([[level], target[:-1]])
+    left = np.where(late > 0, 1 - np.minimum(late, _LATEST), 1.0)
+    begun = _begun(target, before, left, motion.dt / slowness)
+    means, end = _core.ramp(begun, slowness, motion.dt, level)
+    # Until its target changed, a chair that had reached the one before kept to that.
+    way = begun - before
+    settled = np.abs(before + way - way * np.abs(way) * slowness / (2 * motion.dt) - means) < _SETTLED
+    return np.where(settled, means - (1 - left) * way, means), end
+
+
+def _begun(target: FloatArray, before: FloatArray, left: FloatArray, reach: float) -> FloatArray:
     """Return targets (n,) with, where one changed within a step, how far a ramp can come in what is left of it.
 
     The mean of the step would have it begin with the step, which is half a step too early on average.
+    reach: of a whole step.
     """
-    late = motion.known.get(LATE)
-    if late is None or slowness == 0:
-        return target
-    before = np.concatenate([[level], target[:-1]])
-    left = 1 - np.minimum(late, _LATEST)
     change = (target - before) / left
-    reach = left * motion.dt / slowness
-    return np.asarray(np.where(late > 0, before + np.clip(change, -reach, reach), target))
+    return np.where(left < 1, before + np.clip(change, -left * reach, left * reach), target)
