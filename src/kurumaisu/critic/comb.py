@@ -134,5 +134,9 @@ def _means(values: FloatArray) -> FloatArray:
 
 
 def _alike(one: FloatArray, other: FloatArray) -> float:
-    norms = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float(one @ other) / norms if norms else 1.0
+    """Return how alike two changes are, 1 where they are the same; a faint one is not like a loud one.
+
+    Else the first sizes beyond a threshold, which are all that fits a fault that is seldom met, lie between two steps.
+    """
+    loud = max(float(one @ one), float(other @ other))
+    return float(one @ other) / loud if loud else 1.0
