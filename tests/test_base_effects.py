@@ -92,6 +92,9 @@ def test_slope_depends_on_the_heading_in_the_map():
     north = apply("base.slope", {"climb_x": 0.02, "climb_y": 0.03}, [0.3, -0.3], [0.0, 0.0], heading=np.pi / 2)
     np.testing.assert_allclose(north.v, [0.27, -0.33])
     assert not apply("base.slope", climb, np.zeros(3), np.zeros(3)).v.any()  # brakes
+    # A floor that shakes the chair turns it where no sum of the turns asked for tells: where it heads was measured.
+    seen = apply("base.slope", climb, [0.3, 0.3], [0.0, 0.0], heading=0.0, known={"heading": np.array([0.0, np.pi])})
+    np.testing.assert_allclose(seen.v, [0.28, 0.32])
 
 
 @given(cut=st.integers(1, 49), heading=st.floats(-7, 7), seed=st.integers(0, 99))

@@ -24,6 +24,7 @@ class DeadZoneV(Effect):
     id = "base.dead_zone_v"
     stage = Stage.THRESHOLD
     parameters = _WIDTH
+    empirical = True
     sentence = "small translation voltages are swallowed: the dead zone of V_f is wider than modelled"
     formula = "sign(v) · max(0, |v| − width · |gain of V_f|)"
     source = "assumed: joystick inputs have a neutral zone; 5-50 mV"
@@ -41,6 +42,7 @@ class DeadZoneW(Effect):
     id = "base.dead_zone_w"
     stage = Stage.THRESHOLD
     parameters = _WIDTH
+    empirical = True
     sentence = "small steering voltages are swallowed: the dead zone of V_s is wider than modelled"
     formula = "sign(w) · max(0, |w| − width · |gain of V_s|)"
     source = "assumed: joystick inputs have a neutral zone; 5-50 mV"
