@@ -193,7 +193,7 @@ def test_casters_stand_as_before_a_step_in_which_everything_changes():
 def test_dac_zero_and_steps():
     it = effects.Volts(np.array([0.1, 0.0]), np.array([-0.1234, 0.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]))
     zero = effects.by_id("base.dac_zero_f")({"offset": 0.02}, CONTEXT).apply(it)
-    np.testing.assert_allclose([*zero.v_f, *zero.v_s], [0.12, 0.02, -0.1234, 0.0])
+    np.testing.assert_allclose([*zero.v_f, *zero.v_s], [0.12, 0.0, -0.1234, 0.0])  # brakes hold what is asked to rest
     zero = effects.by_id("base.dac_zero_s")({"offset": 0.02, "rests": 0.0}, CONTEXT).apply(it)
     np.testing.assert_allclose([*zero.v_f, *zero.v_s], [0.1, 0.0, -0.1034, 0.02])
 
