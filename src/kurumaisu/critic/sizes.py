@@ -70,8 +70,8 @@ def _doubt(problem: Problem, fit: Fit, columns: FloatArray) -> FloatArray:
 def _next_order(problem: Problem, fit: Fit, name: str) -> float:
     """Return the share of a size by which the next order of the equation may shift it, 1 sd; 0 of what has none.
 
-    Where the first order moves the chair by a share of its way or turn, the next one does by that share of the first,
-    times a factor within -1 and 1.
+    Where the first order moves the chair by a share of the way or turn that is left, the next one does by that share
+    of the first, times a factor within -1 and 1.
     """
     if not effects.by_id(name).empirical:
         return 0.0
@@ -81,7 +81,8 @@ def _next_order(problem: Problem, fit: Fit, name: str) -> float:
         starts, stops = spans(drive, HORIZON)
         paths = [replay.path(drive, problem.model, some) for some in (fit.settings, without)]
         one, other = (geometry.between(path[starts], path[stops]) for path in paths)
-        d, m = (np.abs(np.column_stack([x[:, 0] + 1j * x[:, 1], x[:, 2]])) for x in (one - other, other))
+        d, *ways = (np.abs(np.column_stack([x[:, 0] + 1j * x[:, 1], x[:, 2]])) for x in (one - other, one, other))
+        m = np.minimum(*ways)
         changed, along, made = changed + (d**2).sum(axis=0), along + (d * m).sum(axis=0), made + (m**2).sum(axis=0)
     where = int(np.argmax(changed / np.maximum(made, 1e-12)))
     return float(min(changed[where] / max(along[where], 1e-12), 1.0) / np.sqrt(3))
