@@ -262,7 +262,8 @@ def caster_reversal(p, drive):
 
 @_volts("base.dac_zero_f")
 def dac_zero_f(p, v_f, v_s, _signs):
-    return [v + p["offset"] for v in v_f], v_s
+    """Nobody drives a chair that creeps at rest: its brakes hold it."""
+    return [v + p["offset"] if v else v for v in v_f], v_s
 
 
 @_volts("base.dac_zero_s")

@@ -92,6 +92,9 @@ def test_slope_depends_on_the_heading_in_the_map():
     north = apply("base.slope", {"climb_x": 0.02, "climb_y": 0.03}, [0.3, -0.3], [0.0, 0.0], heading=np.pi / 2)
     np.testing.assert_allclose(north.v, [0.27, -0.33])
     assert not apply("base.slope", climb, np.zeros(3), np.zeros(3)).v.any()  # brakes
+    # A floor that shakes the chair turns it where no sum of the turns asked for tells: where it heads was measured.
+    seen = apply("base.slope", climb, [0.3, 0.3], [0.0, 0.0], heading=0.0, known={"heading": np.array([0.0, np.pi])})
+    np.testing.assert_allclose(seen.v, [0.28, 0.32])
 
 
 @given(cut=st.integers(1, 49), heading=st.floats(-7, 7), seed=st.integers(0, 99))
@@ -190,7 +193,7 @@ def test_casters_stand_as_before_a_step_in_which_everything_changes():
 def test_dac_zero_and_steps():
     it = effects.Volts(np.array([0.1, 0.0]), np.array([-0.1234, 0.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]))
     zero = effects.by_id("base.dac_zero_f")({"offset": 0.02}, CONTEXT).apply(it)
-    np.testing.assert_allclose([*zero.v_f, *zero.v_s], [0.12, 0.02, -0.1234, 0.0])
+    np.testing.assert_allclose([*zero.v_f, *zero.v_s], [0.12, 0.0, -0.1234, 0.0])  # brakes hold what is asked to rest
     zero = effects.by_id("base.dac_zero_s")({"offset": 0.02, "rests": 0.0}, CONTEXT).apply(it)
     np.testing.assert_allclose([*zero.v_f, *zero.v_s], [0.1, 0.0, -0.1034, 0.02])
 

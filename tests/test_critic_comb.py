@@ -65,6 +65,26 @@ def test_a_ramp_begins_when_its_command_does(start, slowness):
     assert replayed(start, ramp) == pytest.approx(0.6 * (3.0 - start) - 0.18 * slowness, abs=1e-6)
 
 
+@pytest.mark.parametrize("start", [0.5, 0.5031, 0.5062, 0.5089])
+def test_a_ramp_shorter_than_a_step_begins_when_its_command_does(start):
+    """0.6 m/s at 200 m/s^2 is reached 3 ms late: 0.9 mm less."""
+    ramp = (EffectSetting("base.accel_limit", {"slowness_v": 0.005, "slowness_w": 0.0}),)
+    assert replayed(start, ramp) == pytest.approx(0.6 * (3.0 - start) - 0.0009, abs=1e-5)
+
+
+def test_a_top_speed_that_only_the_fastest_drives_meet_is_found():
+    """Half of the sizes of a comb with even steps would have no such drive, the others half of all drives."""
+    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(4), seconds=40.0, rate=10.0)
+    top = 0.97 * max(float(np.abs(setting.command[:, 1]).max()) for setting in drives.settings)
+    fault = BASE["base.saturation"].fault({"size": 1 - top, "axis": 0.0, "top_v": 1.0, "top_w": 1.0}, "plain")
+    data = base_case.recording("top", drives, [fault])
+    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset({"base.saturation"}))
+    ahead = next(c for c in problem.candidates if [term.key[1] for term in c.terms] == ["inverse_v"])
+    fit = problem.fit_candidates([ahead], {})
+    assert fit.values[0] == pytest.approx(1 / top, rel=0.02)
+    assert fit.score > problem.fit_candidates((), {}).score
+
+
 def test_what_changes_within_a_step_is_known_and_rests_are_rests():
     t = np.round(np.arange(200) * 0.0333, 6)
     rates = np.column_stack([0.3 * (np.arange(200) % 3 == 0), 0.2 * (np.arange(200) % 4 == 0)])

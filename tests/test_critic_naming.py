@@ -10,6 +10,11 @@ import pytest
 from hidden_effect import recording_of
 
 from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.bench.hidden.base_case import run_of
+from kurumaisu.bench.hidden.base_catalogue import BASE
+from kurumaisu.bench.hidden.motion import STEP, Setting
+from kurumaisu.bench.hidden.motion import drive as hidden_drive
+from kurumaisu.bench.hidden.noise import USUAL, draw_rates, draw_reference
 from kurumaisu.critic import naming, replay, sanity
 from kurumaisu.critic.catalogue import Candidate, Term
 from kurumaisu.critic.decide import Decision
@@ -184,4 +189,24 @@ def test_another_form_is_tried_without_what_stood_in_for_it():
     problem = SimpleNamespace(candidates=(zero, other, needless))
     screen = SimpleNamespace(fixed=(), related=lambda *_: True, mends=lambda *_: True)
     fit = SimpleNamespace(candidates=frozenset({zero, needless}), ids=frozenset({"zero", "needless"}), start={})
-    assert frozenset({other}) in {chosen for chosen, _ in naming._neighbours(problem, screen, fit)}
+    assert frozenset({other}) in {chosen for chosen, _ in naming._neighbours(problem, screen, screen, fit)}
+
+
+def test_what_clips_does_not_hide_what_else_it_may_be():
+    """At one speed a top speed, a gain and a dead zone do the same; beside a top speed the others show no columns."""
+    rng = np.random.default_rng(1)
+    command = np.array([[2.0 * i, 0.4 * (i % 2), 0.0] for i in range(15)])
+    stamps = np.arange(0.0, 30.0, 0.1)
+    noise = draw_rates(USUAL, round((stamps[-1] + 3.0) / STEP), rng)
+    setting = Setting(command, np.zeros(3), stamps, noise)
+    poses, _ = hidden_drive(setting, [BASE["base.dead_zone_v"].fault({"size": 0.05}, "plain")])
+    run = run_of("one speed", setting, poses + draw_reference(USUAL, len(stamps), rng))
+    ids = frozenset({"base.saturation", "base.dead_zone_v", "base.gain_v"})
+    problem = Problem([prepare(run, MODEL)], MODEL, NOISE, ids=ids)
+    top = problem.fit(["base.saturation"], {})
+    found = naming.search(problem, lambda _: None, top)
+    best = {next(iter(fit.ids)): fit for fit in reversed(found.fits) if len(fit.ids) == 1}
+    assert {"base.dead_zone_v", "base.gain_v"} <= set(found.confounded[0])
+    # That the top speed lies just below the one that was driven would be chance.
+    assert abs(best["base.saturation"].log_likelihood - best["base.gain_v"].log_likelihood) < 0.5
+    assert best["base.saturation"].score < best["base.gain_v"].score - 1.0

@@ -21,6 +21,7 @@ _NEAR = 0.4  # of the log of the norm
 _TRIALS = 12
 _FARTHEST = 2.0**7  # scales
 _USUAL = 0.7  # that an effect which has several forms acts in the usual one, before the data
+_SUDDEN = 0.1  # share of what a step does, below which half a step does nothing
 _STRAIGHT = 0.9  # correlation of the changes by a step and by two from which a derivative says what a parameter does
 
 
@@ -30,7 +31,7 @@ class Term:
 
     null: its value in the model criticised; step: from there to where it shows typically, in units of its scale;
     shape: it changes how another parameter of the effect shows, and nothing by itself; rough: twice the step does not
-    do twice the same, so that a derivative says little.
+    do twice the same, so that a derivative says little; sudden: half the step does nothing, as below a threshold.
     """
 
     id: str
@@ -39,6 +40,7 @@ class Term:
     step: float = 0.2
     shape: bool = False
     rough: bool = False
+    sudden: bool = False
 
     @property
     def key(self) -> Key:
@@ -132,16 +134,17 @@ def _showing(own: Sequence[Term], norm: Norm) -> Iterator[Term]:
 
 
 def roughened(terms: Iterable[Term], moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> tuple[Term, ...]:
-    """Return the terms, marked where twice the step does not do twice the same; moved: the change by settings."""
-    return tuple(replace(term, rough=not term.shape and _is_rough(term, moved)) for term in terms)
+    """Return the terms, marked where another step does not do its share of the same; moved: the change by settings."""
+    return tuple(term if term.shape else _marked(term, moved) for term in terms)
 
 
-def _is_rough(term: Term, moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> bool:
+def _marked(term: Term, moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> Term:
     p = term.parameter
-    steps = np.clip(term.null + np.array([1.0, 2.0]) * term.step * p.scale, p.lower, p.upper)
-    one, two = (moved(settings_of([term], np.array([value]))) for value in steps)
+    steps = np.clip(term.null + np.array([0.5, 1.0, 2.0]) * term.step * p.scale, p.lower, p.upper)
+    half, one, two = (moved(settings_of([term], np.array([value]))) for value in steps)
     norms = float(np.linalg.norm(one) * np.linalg.norm(two))
-    return norms > 0 and float(one @ two) < _STRAIGHT * norms
+    rough = norms > 0 and float(one @ two) < _STRAIGHT * norms
+    return replace(term, rough=rough, sudden=float(np.linalg.norm(half)) < _SUDDEN * float(np.linalg.norm(one)))
 
 
 def _typical_step(term: Term, norm: Callable[[float], float]) -> float | None:

@@ -26,6 +26,7 @@ _TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a 
 _ALIKE = (0.4, 0.8)  # correlation of neighbouring sizes: below, there is one between them; above, they may be farther
 _GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
 _SIZES = 500  # at most
+_FAINT = 0.2  # of the norm of its neighbour
 _BEST = 6  # that are tried
 
 
@@ -134,5 +135,11 @@ def _means(values: FloatArray) -> FloatArray:
 
 
 def _alike(one: FloatArray, other: FloatArray) -> float:
-    norms = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float(one @ other) / norms if norms else 1.0
+    """Return the correlation of two changes, 0 of a faint one with a loud one and 1 of two that are nothing.
+
+    Between nothing and much lies what a threshold that is seldom met does.
+    """
+    norms = sorted(float(np.linalg.norm(change)) for change in (one, other))
+    if norms[1] == 0:
+        return 1.0
+    return float(one @ other) / (norms[0] * norms[1]) if norms[0] > _FAINT * norms[1] else 0.0

@@ -226,7 +226,8 @@ class Problem:
             free += loud
             cost += sum(_shape_cost(terms[i], solution, i) for i in own if terms[i].shape)
             size = self._amplitudes(terms, solution, loud)
-            cost += max(_ROUGH_WAYS + size, _teeth(terms, solution, loud)) if candidate.rough else size
+            ways = _ROUGH_WAYS if candidate.rough else 0.0
+            cost += max(ways + size, _teeth(terms, solution, loud))
         if len(free) > 1:
             unit = solution.slopes[:, free] / np.maximum(np.linalg.norm(solution.slopes[:, free], axis=0), 1e-9)
             cost += 0.5 * float(np.linalg.slogdet(unit.T @ unit + np.eye(len(free)) / Z_USUAL**2)[1])
@@ -297,9 +298,15 @@ def covariance(gram: FloatArray) -> FloatArray:
 
 
 def _teeth(terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> float:
-    """Return the cost of sizes that the data know so closely: by chance, one out of many would fit as well."""
-    sizes = [abs(solution.values[i] - terms[i].null) for i in loud if terms[i].rough]
-    sds = [solution.sds[i] for i in loud if terms[i].rough]
+    """Return the cost of sizes that the data know so closely: by chance, one out of many would fit as well.
+
+    A threshold that is met by little, too: it could be anywhere, and is where the drives just reach it.
+    """
+    many = [i for i in loud if terms[i].rough or terms[i].sudden]
+    if not many:
+        return -np.inf
+    sizes = [abs(solution.values[i] - terms[i].null) for i in many]
+    sds = [solution.sds[i] for i in many]
     width = np.sqrt(2 * np.pi) * np.array(sds) / np.maximum(sizes, 1e-12)
     return float(np.sum(_ROUGH_RANGE - np.log(np.clip(width, 1e-6, 1.0))))
 

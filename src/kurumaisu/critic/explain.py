@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from kurumaisu.critic import misfit, naming, replay, words
+from kurumaisu.critic import misfit, naming, replay, sizes, words
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
@@ -135,11 +135,7 @@ def _kind(found: Naming, matters: set[str]) -> Kind:
 def _cause(problem: Problem, found: Naming, name: str) -> Cause:
     rest = {candidate for candidate in found.best.candidates if candidate.id != name}
     without = problem.fit_candidates(rest, found.best.start)
-    parameters = {
-        term.parameter.name: words.estimate(problem.model, term, value, sd)
-        for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True)
-        if term.id == name
-    }
+    parameters = sizes.estimates(problem, found.best, name)
     return Cause(name, min(found.p[name], 1.0), parameters, found.best.score - without.score)
 
 

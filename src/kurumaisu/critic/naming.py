@@ -99,7 +99,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
             alone: list[tuple[Chosen, Mapping[Key, float]]] = [
                 (frozenset({other}), {}) for other in screen.fixed if nothing.mends(other)
             ]
-            best = try_sets([*alone, *_neighbours(problem, screen, best)])
+            best = try_sets([*alone, *_neighbours(problem, screen, nothing, best)])
         if best is centre:
             break
         centre = best
@@ -125,14 +125,18 @@ def begins_better(problem: Problem, fit: Fit, start: Mapping[Key, float]) -> boo
     return -0.5 * float(left @ left) > fit.log_likelihood + _STUCK
 
 
-def _neighbours(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
+def _neighbours(
+    problem: Problem, screen: Screen, nothing: Screen, fit: Fit
+) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
     """Yield the set without each of its effects, with what can only act or not, and with each rival instead."""
     kept = fit.start
     for one in sorted(fit.candidates, key=lambda candidate: candidate.id):
         yield fit.candidates - {one}, kept
         for other in problem.candidates:
             new = other.id not in fit.ids - {one.id} and other not in fit.candidates
-            if new and (screen.mends(other, one) if other.fixed else screen.related(one, other)):
+            # What clips or swallows hides its rivals: beside it their columns are empty, without it they are not.
+            alike = screen.related(one, other) or nothing.related(one, other)
+            if new and (screen.mends(other, one) if other.fixed else alike):
                 # What fits one form of a comb is nowhere near what fits another.
                 begin = {key: value for key, value in kept.items() if not other.rough or key[0] != other.id}
                 yield fit.candidates - {one} | {other}, begin

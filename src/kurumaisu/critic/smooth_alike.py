@@ -10,7 +10,7 @@ from kurumaisu.critic.smooth import Belief, Curve, Design, taken_up
 from kurumaisu.types import FloatArray
 
 _ALIKE = 0.9  # correlation of signals from which a curve draws an effect; noise alone bends a curve by as much
-_FORM = 0.15  # share of its signal by which a chair's fault may differ from the catalogue's equation for it
+FORM = 0.15  # share of its signal by which a chair's fault may differ from the catalogue's equation for it
 
 
 class Likeness:
@@ -18,7 +18,7 @@ class Likeness:
 
     def __init__(self, problem: Problem, best: Fit, design: Design) -> None:
         self._problem, self._best, self._design = problem, best, design
-        self._signals = {name: _signal(problem, best, name) for name in sorted(best.ids)}
+        self._signals = {name: signal_of(problem, best, name) for name in sorted(best.ids)}
 
     def drawn(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
         """Return what this curve draws of the best fit's effects, beside another fit that lacks them.
@@ -37,13 +37,13 @@ class Likeness:
         drawn = columns @ np.linalg.solve(spread, belief.prior @ (columns.T @ y))
         signals = {name: self._signals[name] - own @ (own.T @ self._signals[name]) for name in sorted(missing)}
         return {
-            name: 0.5 * float(_FORM**2 * signal @ signal)
+            name: 0.5 * float(FORM**2 * signal @ signal)
             for name, signal in signals.items()
             if _correlation(drawn, signal) > _ALIKE
         }
 
 
-def _signal(problem: Problem, fit: Fit, name: str) -> FloatArray:
+def signal_of(problem: Problem, fit: Fit, name: str) -> FloatArray:
     """Return what an effect of a fit does, whitened."""
     null = np.array(
         [

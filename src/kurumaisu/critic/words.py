@@ -8,16 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic import naming
-from kurumaisu.critic.catalogue import Term
+from kurumaisu.critic import naming, sizes
 from kurumaisu.critic.digits import quantities, with_interval
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import HORIZON, MATERIAL
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.story import Rival
-from kurumaisu.critic.verdict import NORMAL90, Cause, Estimate, Verdict
-from kurumaisu.params import Model
+from kurumaisu.critic.verdict import Cause, Verdict
 
 _MINUTE = 60.0  # [s]
 _CAUSES_TOLD = 4  # in a headline
@@ -89,15 +87,17 @@ def details(
         f"{len(drives)} drive{'s' * (len(drives) > 1)}, {seconds:.0f} s, replayed from the {drives[0].source} channel.",
     ]
     fitted: dict[str, list[str]] = {}
-    for term, value, sd in zip(found.best.terms, found.best.values, found.best.sds, strict=True):
-        if term.fixed and value == term.parameter.null:
-            continue  # the usual form of an effect that has several
-        e = estimate(problem.model, term, value, sd)
-        size = quantities([e.estimate], e.unit)[0] if term.fixed else with_interval(e.estimate, e.lo90, e.hi90, e.unit)
-        fitted.setdefault(term.id, []).append(f"{term.parameter.name} {size}")
-    for name, sizes in fitted.items():
+    forms = {term.key: term.parameter for term in found.best.terms if term.fixed}
+    for name in sorted(found.best.ids):
+        for parameter, e in sizes.estimates(problem, found.best, name).items():
+            form = forms.get((name, parameter))
+            if form is None:
+                fitted.setdefault(name, []).append(f"{parameter} {with_interval(e.estimate, e.lo90, e.hi90, e.unit)}")
+            elif e.estimate != form.null:  # of the usual form nothing need be said
+                fitted.setdefault(name, []).append(f"{parameter} {quantities([e.estimate], e.unit)[0]}")
+    for name, told in fitted.items():
         moved = f"within {HORIZON:g} s it moves the chair by {100 * shares[name]:.1f} % of its way or turn"
-        said.append(f"{name}: {', '.join(sizes)}; {moved}{_weight(name, found, shares, matters)}.")
+        said.append(f"{name}: {', '.join(told)}; {moved}{_weight(name, found, shares, matters)}.")
     n = problem.noise
     wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
     said.append(
@@ -150,12 +150,3 @@ def _rival(fit: Fit, best: Fit) -> Rival:
     else:
         why = f"fits better by {likelihood:.1f} nats, but needs more effects"
     return Rival(" + ".join(sorted(fit.ids)) or "no effect", fit.score - best.score, why)
-
-
-def estimate(model: Model, term: Term, value: float, sd: float) -> Estimate:
-    """Return a fitted parameter with its 90 % interval, which its bounds cut."""
-    unit = term.parameter.unit
-    if unit == "V" and model.law_name == "identity":
-        unit = "V (1 V stands for 1 m/s or 1 rad/s)"
-    low, high = value - NORMAL90 * sd, value + NORMAL90 * sd
-    return Estimate(float(value), max(low, term.parameter.lower), min(high, term.parameter.upper), unit)

@@ -24,6 +24,7 @@ class AccelLimit(Effect):
         Parameter("slowness_w", "s^2/rad", null=0.0, scale=0.5, lower=0.0, upper=20.0),
     )
     separable = True
+    empirical = True
     sentence = "the rates are ramped: large changes take longer than small ones"
     formula = "|dv'/dt| ≤ 1 / slowness_v, |dw'/dt| ≤ 1 / slowness_w, towards v, w"
     source = "assumed: motor controllers ramp; 0.3-1.5 m/s²"

@@ -14,6 +14,7 @@ class BatterySag(Effect):
     id = "base.battery_sag"
     stage = Stage.GAIN
     parameters = (Parameter("sag", "1/s", null=0.0, scale=1.0e-3, lower=-0.01, upper=0.1),)
+    empirical = True
     sentence = "the chair gets slower in the course of a drive, as from a battery that runs down"
     formula = "v, w · max(0, 1 − sag · t)"
     source = "assumed: battery voltage; 5-15 % in a recording"

@@ -20,6 +20,7 @@ class CurvatureV(Effect):
     id = "base.curvature_v"
     stage = Stage.GAIN
     parameters = (Parameter("curvature", "s/m", null=0.0, scale=0.05, lower=-1.0, upper=1.0),)
+    empirical = True
     sentence = "the law of the forward speed is bent: fast driving gains less than slow driving"
     formula = "v · max(0, 1 − curvature · |v|)"
     source = "assumed: expo of joystick inputs; ±0.1 s/m"
@@ -37,6 +38,7 @@ class CurvatureW(Effect):
     id = "base.curvature_w"
     stage = Stage.GAIN
     parameters = (Parameter("curvature", "s/rad", null=0.0, scale=0.05, lower=-1.0, upper=1.0),)
+    empirical = True
     sentence = "the law of the yaw rate is bent: fast turns gain less than slow turns"
     formula = "w · max(0, 1 − curvature · |w|)"
     source = "assumed: expo of joystick inputs; ±0.1 s/rad"

@@ -11,20 +11,20 @@ _OFFSET = (Parameter("offset", "V", null=0.0, scale=0.01, lower=-0.5, upper=0.5)
 
 
 class DacZeroF(VoltageEffect):
-    """V_f plus a constant."""
+    """V_f plus a constant; a chair asked to rest is held by its brakes, however far V_f is off then."""
 
     id = "base.dac_zero_f"
     stage = Stage.CONVERTER
     parameters = _OFFSET
     sentence = "the translation voltage is off by a constant"
-    formula = "V_f + offset"
+    formula = "V_f + offset, 0 at rest"
     source = "offset error of any D/A converter; 2-20 mV"
     shows_in = Rate.V
     follows = Follows.V
 
     def apply(self, volts: Volts) -> Volts:
         """Shift V_f."""
-        return replace(volts, v_f=volts.v_f + self.values["offset"])
+        return replace(volts, v_f=np.where(volts.v_f == 0, 0.0, volts.v_f + self.values["offset"]))
 
 
 class DacZeroS(VoltageEffect):

@@ -24,6 +24,7 @@ class LagV(_Lag):
     id = "base.lag_v"
     stage = Stage.RESPONSE
     parameters = _TAU
+    empirical = True
     sentence = "the forward speed follows its command with a first-order lag"
     formula = "tau · dv'/dt = v − v'"
     source = "Wang 2009: settling times of a wheelchair on four floors; 50-500 ms"
@@ -45,6 +46,7 @@ class LagW(_Lag):
     id = "base.lag_w"
     stage = Stage.RESPONSE
     parameters = _TAU
+    empirical = True
     sentence = "the yaw rate follows its command with a first-order lag"
     formula = "tau · dw'/dt = w − w'"
     source = "Wang 2009: settling times of a wheelchair on four floors; 50-500 ms"

@@ -34,6 +34,7 @@ class Mechanism:
 
     sentence: for the report; formula: what apply does, in the symbols of docs/effects.md; source: where the form is
     known from. separable: each parameter is a peculiarity by itself (one per axis), so one may act without the other.
+    empirical: the formula is the simplest of a family of curves, of which a chair may follow another.
     choices: where not empty, the only parameters that a critic considers: the effect acts so, or not at all.
     forms: where not empty, the values of some parameters that a critic considers, the usual ones first; it fits the
     other parameters.
@@ -45,6 +46,7 @@ class Mechanism:
     formula: ClassVar[str]
     source: ClassVar[str]
     separable: ClassVar[bool] = False
+    empirical: ClassVar[bool] = False
     choices: ClassVar[tuple[Mapping[str, float], ...]] = ()
     forms: ClassVar[tuple[Mapping[str, float], ...]] = ()
     random: ClassVar[bool] = False  # it draws noise, so its mean effect is none, or not the whole of it

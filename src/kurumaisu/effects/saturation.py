@@ -23,6 +23,7 @@ class Saturation(Effect):
         Parameter("inverse_w", "s/rad", null=0.0, scale=2.0, lower=0.0, upper=20.0),
     )
     separable = True
+    empirical = True
     sentence = "the chair is slower than commanded above a certain rate"
     formula = "|v| ≤ 1 / inverse_v, |w| ≤ 1 / inverse_w"
     source = "paper: the MD-100's speed knob; 0.5-1.5 m/s"

@@ -30,7 +30,8 @@ class Slope(Effect):
         before = self._heading if motion.heading is None else motion.heading
         after = before + np.cumsum(motion.w) * motion.dt
         self._heading = float(after[-1])
-        heading = after - motion.w * motion.dt / 2
+        # A sum of turns drifts away from where a chair on a real floor heads: better what was measured.
+        heading = motion.known.get("heading", after - motion.w * motion.dt / 2)
         loss = self.values["climb_x"] * np.cos(heading) + self.values["climb_y"] * np.sin(heading)
         moving = (motion.v != 0) | (motion.w != 0)
         return replace(motion, v=motion.v - moving * loss)

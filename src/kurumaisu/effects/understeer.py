@@ -13,7 +13,8 @@ class Understeer(Effect):
 
     id = "base.understeer"
     stage = Stage.FLOOR
-    parameters = (Parameter("k", "s^2/m^2", null=0.0, scale=0.1, lower=-1.0, upper=2.0),)
+    parameters = (Parameter("k", "s^2/m^2", null=0.0, scale=0.1, lower=-2.0, upper=2.0),)
+    empirical = True
     sentence = "the chair turns less when it drives fast (understeer)"
     formula = "w · max(0, 1 − k · v²)"
     source = "assumed: slip of the drive wheels; 0.05-0.2 s²/m²"
