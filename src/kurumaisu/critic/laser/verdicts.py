@@ -30,7 +30,7 @@ from kurumaisu.critic.verdict import Cause, NextExperiment, Unknown
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-MATERIAL = 3e-4  # [m] rms change of the readings below which an effect of the laser does not matter
+MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
 _SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
 Progress = Callable[[str], None]
 
@@ -159,7 +159,7 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     if made.winner is not None:
         free = made.winner.free
         valid = normal.beam_noise.valid
-        sizes[free.id] = float(np.sqrt(np.mean((assembly.columns[valid][:, free.span] @ made.coefficients) ** 2)))
+        sizes[free.id] = _size(assembly.columns[valid][:, free.span] @ made.coefficients)
         settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
@@ -207,7 +207,7 @@ def _noise_told(assembly: Assembly, normal: Normal) -> str:
 
 def _told(sizes: Mapping[str, float], small: Sequence[str]) -> list[str]:
     return [
-        f"{name}: changes the readings by {1e3 * size:.2g} mm (rms)"
+        f"{name}: changes the readings where it acts by {1e3 * size:.2g} mm"
         f"{': detectable, but it does not matter' if name in small else ''}."
         for name, size in sorted(sizes.items())
     ]
@@ -221,7 +221,13 @@ def _rms(assembly: Assembly, normal: Normal, fit: Fitted, name: str) -> float:
         if form.id == name:
             change = assembly.columns[valid][:, form.span] @ fit.coefficients[start:stop]
         start = stop
-    return float(np.sqrt(np.mean(change**2)))
+    return _size(change)
+
+
+def _size(change: FloatArray) -> float:
+    """Return how far [m] an effect moves the readings that it moves: of dark walls, say, not divided by all."""
+    power = change.astype(float) ** 2
+    return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))
 
 
 def _gain(made: _Made, name: str) -> float:
