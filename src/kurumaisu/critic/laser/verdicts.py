@@ -163,7 +163,7 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     if made.winner is not None:
         free = made.winner.free
         valid = normal.beam_noise.valid
-        sizes[free.id] = _size(assembly.columns[valid][:, free.span] @ made.coefficients)
+        sizes[free.id] = size_of(assembly.columns[valid][:, free.span] @ made.coefficients)
         settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
@@ -225,10 +225,10 @@ def _rms(assembly: Assembly, normal: Normal, fit: Fitted, name: str) -> float:
         if form.id == name:
             change = assembly.columns[valid][:, form.span] @ fit.coefficients[start:stop]
         start = stop
-    return _size(change)
+    return size_of(change)
 
 
-def _size(change: FloatArray) -> float:
+def size_of(change: FloatArray) -> float:
     """Return how far [m] an effect moves the readings that it moves: of dark walls, say, not divided by all."""
     power = change.astype(float) ** 2
     return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))

@@ -10,7 +10,7 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.laser.noise import CommonMode, ScanNoise
 from kurumaisu.critic.laser.spread import Scatter
-from kurumaisu.critic.naming import NAMED
+from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.recording import Recording
 from kurumaisu.params import EffectSetting
@@ -29,7 +29,7 @@ def with_whole_scans(
     nats = seen.nats + log_prior(1, count) - log_prior(0, count)
     known = next((each for each in scatter if each.setting.id == WHOLE), None)
     p = 1.0 / (1.0 + float(np.exp(-nats)))
-    if p < NAMED or (known is None and any(WHOLE in each.rivals for each in scatter)):
+    if p < NAMED or (known is None and any(each.rivals.get(WHOLE, 0.0) >= RIVAL for each in scatter)):
         return list(scatter)  # what stands in its place was weighed against it already
     rho = float(np.exp(-_period(recording) / noise.common_tau))
     p_sd, p_rho = (p for p in effects.by_id(WHOLE).parameters if p.name in ("sd", "rho"))
