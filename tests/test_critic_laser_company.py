@@ -129,11 +129,11 @@ def _recording():
 
 def test_a_common_mode_that_all_scans_show_is_named_unless_something_may_stand_in_for_it():
     noise, sure = ScanNoise(0.005, 0.005, 4e-4, 0.45), CommonMode(20.0, 0.1, 0.2)
-    (found,) = with_whole_scans([], sure, noise, _recording())
+    (found,) = with_whole_scans([], sure, noise, _recording(), None)
     assert found.setting.id == "laser.common_mode"
     assert found.p > 0.99
     assert found.setting.parameters["sd"] == pytest.approx(4e-4)
     assert found.setting.parameters["rho"] == pytest.approx(np.exp(-0.1 / 0.45))
-    assert with_whole_scans([], CommonMode(3.0, 0.5, 0.9), noise, _recording()) == []
+    assert with_whole_scans([], CommonMode(3.0, 0.5, 0.9), noise, _recording(), None) == []
     taken = Scatter(_at("laser.heavy_tails", inverse_nu=0.2), 0.6, 9.0, {}, {"laser.common_mode": 0.4})
-    assert with_whole_scans([taken], sure, noise, _recording()) == [taken]
+    assert with_whole_scans([taken], sure, noise, _recording(), None) == [taken]

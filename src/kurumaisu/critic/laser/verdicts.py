@@ -23,7 +23,7 @@ from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.supply import every_id, supplier
 from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
-from kurumaisu.critic.laser.whole_scans import WHOLE, with_whole_scans
+from kurumaisu.critic.laser.whole_scans import with_whole_scans
 from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Comparison
@@ -84,9 +84,8 @@ def criticise(
     fit = pinned(assembly, normal, made.fit.forms, settings_of(assembly, made.fit), made.winner, recording.truth)
     progress("laser: weighing effects on the scatter")
     scatter, comparison = _scatter(assembly, normal, fit, ids)
-    if ids is None or WHOLE in ids:
-        seen = assembly.common_mode(normal, recording.truth, made.fit.forms)
-        scatter = with_whole_scans(scatter, seen, normal.scan_noise, recording)
+    seen = assembly.common_mode(normal, recording.truth, made.fit.forms)
+    scatter = with_whole_scans(scatter, seen, normal.scan_noise, recording, ids)
     finding = _finding(assembly, normal, made, fit, scatter)
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
