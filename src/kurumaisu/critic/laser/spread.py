@@ -129,10 +129,10 @@ class ScatterSearch:
                 break
             piece, misfit = self._fit.alone(start, beside)
             tried.append(_valued(piece, here - misfit))
-        if self._off(at):
-            tried = [*tried, *self._halved(chosen, without, here)]
-            tried = [max(same, key=_nats) for same in _by_effect(tried)]
         best = _weighed(tried) if tried else None
+        if (best is None or best.nats < self._least(chosen, best)) and self._off(at):
+            tried = [*tried, *self._halved(chosen, without, here)]
+            best = _weighed([max(same, key=_nats) for same in _by_effect(tried)]) if tried else None
         return None if best is None or best.nats < 0 else best
 
     def _halved(self, chosen: Sequence[Piece], without: set[type[Mechanism]], here: float) -> Iterator[Piece]:
