@@ -13,7 +13,7 @@ from kurumaisu.critic.laser.reframed import from_base_link
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.trust import trusted_place
 from kurumaisu.critic.laser.twins import twins
-from kurumaisu.critic.laser.verdicts import LaserFinding, size_where_it_acts
+from kurumaisu.critic.laser.verdicts import LaserFinding
 from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.critic.verdict import Cause, Estimate
 from kurumaisu.effects import Parameter
@@ -59,14 +59,6 @@ def test_beams_along_a_wall_do_not_speak():
     laser = SimpleNamespace(range_min=0.06, range_max=4.0, angle_increment=0.2 / (beams - 1))
     place = trusted_place(SimpleNamespace(laser=laser), seen, np.full_like(incidence, 2.0))
     assert place[:, beams // 2].tolist() == [True, True, True, False, False]
-
-
-def test_what_acts_in_a_sector_is_not_made_small_by_the_others():
-    change = np.zeros(1000)
-    change[:100] = -8e-4
-    assert size_where_it_acts(change) == pytest.approx(8e-4)
-    assert size_where_it_acts(np.full(1000, 5e-4)) == pytest.approx(5e-4)
-    assert size_where_it_acts(np.zeros(10)) == 0
 
 
 def cause(name, parameter, size, half):

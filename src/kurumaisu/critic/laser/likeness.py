@@ -11,6 +11,8 @@ from kurumaisu.types import BoolArray, FloatArray
 _SIMULATED = 0.5  # variance of the numbers of simulations, of which two are averaged, in theirs
 _COUNT = 1.0  # sd of twice the root of a count, also of one that is always 0 in simulations
 _MATTERS = 0.02  # of any other number, a log of a square or a correlation, by which it may differ and matter to nobody
+_FAR = 5.0  # sds from which a number pulls no harder: what nothing explains yet must not bend what explains the others
+_DAMPED = 0.02  # share by which the curvature is raised: other draws make the slopes uncertain
 _FORM = 0.1  # share of what an effect does to a number, by which a real effect of that name may do more or less
 
 
@@ -39,7 +41,18 @@ class Likeness:
         """Return the negative log likelihood of the measured numbers for simulated ones, 0 for a perfect model."""
         lower = self._root(numbers)
         white = solve_triangular(lower, (numbers - self.measured) / self.sd, lower=True)
-        return 0.5 * (float(white @ white) - self._log_det) + float(np.log(np.diag(lower)).sum())
+        near = np.minimum(np.abs(white), _FAR)
+        misfit = float(np.sum(near * (np.abs(white) - 0.5 * near)))
+        return misfit - 0.5 * self._log_det + float(np.log(np.diag(lower)).sum())
+
+    def step(self, numbers: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Return the shares (n,) of some changes of the numbers (n, m) that bring them closest to the measured ones."""
+        white = np.array([self.whitened(change, numbers) for change in slopes])
+        left = self.whitened(numbers - self.measured, numbers)
+        weighed = white * np.minimum(1.0, _FAR / np.maximum(np.abs(left), 1e-9))
+        inner = weighed @ white.T
+        damped = inner + _DAMPED * np.diag(np.diag(inner)) + 1e-6 * np.eye(len(slopes))
+        return np.asarray(-np.linalg.solve(damped, weighed @ left))
 
     def whitened(self, change: FloatArray, numbers: FloatArray) -> FloatArray:
         """Return a change of the numbers (m,) about simulated ones in independent units."""

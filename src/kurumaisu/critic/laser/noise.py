@@ -8,7 +8,7 @@ so many independent ones makes a critic certain of effects that are not there.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -17,6 +17,11 @@ from scipy.optimize import minimize
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _FLOOR = 1e-6  # [m, rad] below which no sd counts
+# Of position [m], heading [rad], common mode [m] and its time constant [s]: what is usual, the sd of its log, bounds.
+_USUAL = np.array([0.005, 0.005, 2e-4, 1.0])
+_SPREAD = np.array([2.0, 2.0, 1.0, 1.0])
+_LOW, _HIGH = np.array([1e-5, 1e-5, 1e-6, 0.01]), np.array([0.3, 0.3, 0.1, 10.0])
+_APART = 0.2  # in logs, to see how surely each is known
 
 
 @dataclass(frozen=True)
@@ -138,35 +143,83 @@ def precision(layout: Layout, noise: ScanNoise, stands: FloatArray) -> tuple[Flo
     return out, log_det
 
 
-def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] | None, project: IntArray) -> ScanNoise:
-    """Return the scans' noise by restricted maximum likelihood; project: common columns to project out.
+@dataclass(frozen=True)
+class CommonMode:
+    """What says that whole scans are off together: log evidence [nat], and sds of the logs of its sd and its tau."""
 
-    The last common column is the residual. truth: known sd of the reference, else it is estimated too.
-    """
-    start = np.log([0.005, 0.005, 2e-4, 1.0])
-    low, high = np.log([1e-5, 1e-5, 1e-6, 0.01]), np.log([0.3, 0.3, 0.1, 10.0])
-    if truth is not None:
-        start[:2] = np.log(np.maximum(truth, 1e-5))
-    free = np.arange(0 if truth is None else 2, 4)
-    spread = np.array([2.0, 2.0, 1.0, 1.0])
+    nats: float
+    log_sd: float
+    log_tau: float
 
-    def noise_at(values: FloatArray) -> ScanNoise:
-        every = start.copy()
-        every[free] = np.clip(values, low[free], high[free])
-        return ScanNoise(*(float(value) for value in np.exp(every)))
 
-    small = [_only(gram, project) for gram in grams]
+class _Likelihood:
+    """The negative log restricted likelihood of a noise, and how far it is from what is usual."""
 
-    def cost(values: FloatArray) -> float:
-        s, log_det = marginal(small, layout, noise_at(values))
+    def __init__(self, grams: Sequence[Gram], layout: Layout, project: IntArray) -> None:
+        """Take common columns to project out; the last common column is the residual."""
+        self._grams, self._layout = [_only(gram, project) for gram in grams], layout
+
+    def __call__(self, noise: ScanNoise) -> float:
+        s, log_det = marginal(self._grams, self._layout, noise)
         x, b, yy = s[:-1, :-1], s[:-1, -1], float(s[-1, -1])
         norms = np.sqrt(np.maximum(np.diag(x), 1e-300))
         x = x / np.outer(norms, norms) + 1e-9 * np.eye(len(x))
         b = b / norms
         fitted = float(b @ np.linalg.solve(x, b)) if len(b) else 0.0
-        distance = (values - start[free]) / spread[free]
         kept = float(np.linalg.slogdet(x)[1]) + 2 * float(np.log(norms).sum())
-        return 0.5 * (log_det + yy - fitted + kept) + 0.5 * float(distance @ distance)
+        return 0.5 * (log_det + yy - fitted + kept)
+
+
+def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] | None, project: IntArray) -> ScanNoise:
+    """Return the scans' noise by restricted maximum likelihood; project: common columns to project out.
+
+    The last common column is the residual. truth: known sd of the reference, else it is estimated too.
+    """
+    start = np.log(_USUAL)
+    if truth is not None:
+        start[:2] = np.log(np.maximum(truth, 1e-5))
+    return _likeliest(_Likelihood(grams, layout, project), start, np.arange(0 if truth is None else 2, 4))
+
+
+def common_mode(
+    grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] | None, project: IntArray, noise: ScanNoise
+) -> CommonMode:
+    """Return what says that scans have a common mode, by all of them; noise: the likeliest one, other arguments alike.
+
+    By Laplace's approximation of the integral over its sd and its time constant.
+    """
+    likelihood = _Likelihood(grams, layout, project)
+
+    def cost(x: FloatArray) -> float:
+        sd, tau = (np.array([noise.common_sd, noise.common_tau]) * np.exp(x)).tolist()
+        far = (np.log([sd, tau]) - np.log(_USUAL[2:])) / _SPREAD[2:]
+        return likelihood(replace(noise, common_sd=sd, common_tau=tau)) + 0.5 * float(far @ far)
+
+    one, other = _APART * np.eye(2)
+    here = cost(np.zeros(2))
+    bent = [cost(x) + cost(-x) - 2 * here for x in (one, other)]
+    mixed = 0.25 * (cost(one + other) + cost(-one - other) - cost(one - other) - cost(other - one))
+    values, vectors = np.linalg.eigh(np.array([[bent[0], mixed], [mixed, bent[1]]]) / _APART**2)
+    values = np.maximum(values, 1 / np.max(_SPREAD[2:]) ** 2)  # no less is known than before the data
+    sds = np.sqrt(np.diag(vectors @ np.diag(1 / values) @ vectors.T))
+    none = replace(noise, common_sd=_FLOOR)
+    if truth is None:  # errors of the reference may then stand in for it
+        start = np.log([none.position_sd, none.heading_sd, none.common_sd, none.common_tau])
+        none = _likeliest(likelihood, start, np.arange(2))
+    return CommonMode(likelihood(none) - here - 0.5 * float(np.log(values).sum()), float(sds[0]), float(sds[1]))
+
+
+def _likeliest(likelihood: _Likelihood, start: FloatArray, free: IntArray) -> ScanNoise:
+    """Return the noise with some of its logs fitted, the others as they are."""
+
+    def noise_at(values: FloatArray) -> ScanNoise:
+        every = start.copy()
+        every[free] = np.clip(values, np.log(_LOW)[free], np.log(_HIGH)[free])
+        return ScanNoise(*(float(value) for value in np.exp(every)))
+
+    def cost(values: FloatArray) -> float:
+        distance = (values - start[free]) / _SPREAD[free]
+        return likelihood(noise_at(values)) + 0.5 * float(distance @ distance)
 
     at = start[free]
     for step in (1.0, 0.3):  # a second start from the end of the first: it may stop early on a ridge

@@ -13,7 +13,7 @@ from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, refined
 from kurumaisu.critic.laser.free import blocks
-from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, estimate, marginal, whitened
+from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, rows_of
 from kurumaisu.critic.laser.sought import moved, stands
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
@@ -145,17 +145,29 @@ class Assembly:
 
         Without the blocks of many columns, but for those that change whole scans.
         """
-        whole = [free.span for free in self.free if free.whole]
-        spans = [form.span for form in self._plain(fitted)] + whole
-        project = np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
+        project = self._projected(fitted)
         beam = self.first
         for _ in range(_ROUNDS):
             beam = refined(self.first, beam, lambda last: self.leftover(last, project), self.marks.seen, self.layout)
-        narrow = max((span.stop for span in whole), default=self._fixed)
+        narrow = max((free.span.stop for free in self.free if free.whole), default=self._fixed)
         grams, cross = self._crossed(beam, narrow)
         scan = estimate(grams, self.layout, truth, project)
         gram = without_beams(grams, cross, self.layout, scan, beam.own_sd)
         return Normal(gram, scan, beam, int(beam.valid.sum()))
+
+    def _projected(self, fitted: Sequence[Form]) -> IntArray:
+        """Return the columns of every effect, and of the blocks that change whole scans."""
+        spans = [form.span for form in self._plain(fitted)] + [free.span for free in self.free if free.whole]
+        return np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
+
+    def common_mode(self, normal: Normal, truth: tuple[float, float] | None, fitted: Sequence[Form]) -> CommonMode:
+        """Return what says that whole scans are off together, whatever effects on the mean there are.
+
+        fitted: forms that act, with their shapes.
+        """
+        project = self._projected(fitted)
+        grams = self.grams(normal.beam_noise, project)
+        return common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise)
 
     def full(self, normal: Normal) -> Normal:
         """Return the normal equations of all columns, in the noise that is known."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 
 from kurumaisu.critic.laser.columns import Form
 from kurumaisu.critic.naming import NAMED, RIVAL
-from kurumaisu.critic.prior import log_prior, occam
+from kurumaisu.critic.prior import Z_LOW, log_prior, occam
 from kurumaisu.types import FloatArray
 
 _LARGEST = 5  # effects in a set
@@ -20,6 +20,7 @@ _WEAK = 1e-4  # prior precision of a coefficient, in units of its parameter's sc
 # Share of what a set explains that one more effect in it must bring: a real effect hardly has the catalogue's very
 # form, and what its form leaves is not another one.
 FORM = 0.02
+_CONTAINED = 1e-4  # share of a column's power that a form may leave, and contain it
 _INSTEAD = 2.0  # times as likely without an effect as beside it is what stands in for it
 
 
@@ -68,6 +69,7 @@ class Search:
         self._count = {name: sum(form.id == name for form in forms) for name in self._ids}
         self._gram = gram
         self._known: dict[frozenset[int], Fitted | None] = {}
+        self._contains = {i: _contained(form, self._forms, gram) for i, form in self._forms.items()}
 
     def run(self) -> Found:
         """Extend, swap and prune the best sets until none is better."""
@@ -104,7 +106,23 @@ class Search:
 
     def _weigh(self, chosen: frozenset[int]) -> None:
         if chosen not in self._known:
-            self._known[chosen] = self._fit(tuple(self._forms[i] for i in sorted(chosen)))
+            fit = self._fit(tuple(self._forms[i] for i in sorted(chosen)))
+            self._known[chosen] = None if fit is None or self._plainer(chosen, fit) else fit
+
+    def _plainer(self, chosen: frozenset[int], fit: Fitted) -> bool:
+        """Return whether a form of fewer columns, which one of the set contains, explains as much in its place.
+
+        What shows of a temperature that hardly varies, about a reference that is anywhere, is an offset.
+        """
+        for i in chosen:
+            for j in self._contains[i]:
+                fewer = chosen - {i} | {j}
+                if self._forms[j].id not in fit.ids:
+                    self._weigh(fewer)
+                    other = self._known[fewer]
+                    if other is not None and 2 * (fit.log_likelihood - other.log_likelihood) < Z_LOW**2:
+                        return True
+        return False
 
     def _fit(self, forms: tuple[Form, ...]) -> Fitted | None:
         """Return forms fitted together; None where a parameter leaves its bounds."""
@@ -161,6 +179,18 @@ def confusion(
     group = tuple(uncertain + sorted(name for name in p if name not in best and instead(name)))
     one = uncertain and len(group) > 1 and p_any(group) >= NAMED
     return p, (group,) if one else ()
+
+
+def _contained(form: Form, forms: Mapping[int, Form], gram: FloatArray) -> list[int]:
+    """Return which forms of one column and another effect a form of several columns contains."""
+    out = []
+    for j, other in forms.items() if len(form.columns) > 1 else ():
+        if len(other.columns) == 1 and other.id != form.id:
+            inner, outer = gram[form.span, form.span], gram[form.span, other.start]
+            left = gram[other.start, other.start] - outer @ np.linalg.lstsq(inner, outer, rcond=1e-9)[0]
+            if left < _CONTAINED * gram[other.start, other.start]:
+                out.append(j)
+    return out
 
 
 def _within(form: Form, coefficients: FloatArray) -> bool:

@@ -7,7 +7,7 @@ goes. What seemed to act when its company was not yet known is weighed against i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,8 +24,8 @@ from kurumaisu.types import FloatArray
 
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
 _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
-_LEFT = 1e-3  # share of an effect's evidence that its own form may leave to any other one
-_LEFT_LIKE = 0.02  # and to one that changes the same numbers
+_LEFT = 0.02  # share of an effect's evidence that its own form may leave to one that changes the same numbers
+_MOST_LEFT = 15.0  # nats at most: ten numbers off by twice what the likelihood allows for another form
 _WEAK = 0.05  # share of the strongest effect's evidence, from which another one is beyond doubt
 _LARGEST = 6  # effects in a set
 _REFITS = 4  # effects that are refitted
@@ -52,6 +52,16 @@ def _low(rough: Rough) -> float:
     return rough.low
 
 
+def _nats(piece: Piece) -> float:
+    return piece.nats
+
+
+def _by_effect(pieces: Sequence[Piece]) -> list[list[Piece]]:
+    """Return the pieces of each effect."""
+    effects_there = dict.fromkeys(piece.effect for piece in pieces)
+    return [[piece for piece in pieces if piece.effect is effect] for effect in effects_there]
+
+
 class ScatterSearch:
     """Finds the effects that the statistics call for."""
 
@@ -67,7 +77,7 @@ class ScatterSearch:
 
     def run(self) -> list[Scatter]:
         """Return the effects, added while the evidence grows."""
-        if np.abs(self._likeness.units(self._likeness.measured)).max() < _QUIET:
+        if not self._off(self._likeness.offset):
             return []
         pushes = list(self._fit.pushes())
         chosen: list[Piece] = []
@@ -97,6 +107,11 @@ class ScatterSearch:
         known = self._likeness
         return Comparison(blamed, tuple(names), known.measured, known.offset, extended, known.sd)
 
+    def _off(self, numbers: FloatArray) -> bool:
+        """Return whether the measured statistics are off simulated ones by more than chance."""
+        units = self._likeness.units
+        return bool(np.abs(units(self._likeness.measured) - units(numbers)).max() >= _QUIET)
+
     def _step(self, pushes: Sequence[Push], chosen: Sequence[Piece], gone: set[type[Mechanism]]) -> Piece | None:
         """Return the effect to add; None where there is too little."""
         beside = [piece.setting for piece in chosen]
@@ -115,7 +130,22 @@ class ScatterSearch:
             piece, misfit = self._fit.alone(start, beside)
             tried.append(_valued(piece, here - misfit))
         best = _weighed(tried) if tried else None
+        if (best is None or best.nats < self._least(chosen, best)) and self._off(at):
+            tried = [*tried, *self._halved(chosen, without, here)]
+            best = _weighed([max(same, key=_nats) for same in _by_effect(tried)]) if tried else None
         return None if best is None or best.nats < 0 else best
+
+    def _halved(self, chosen: Sequence[Piece], without: set[type[Mechanism]], here: float) -> Iterator[Piece]:
+        """Yield rivals of the chosen effects, each fitted together with the one that was taken for it.
+
+        Of two that act, each alone explains nearly all, and the other one added to that much of it then nothing.
+        """
+        for piece in chosen:
+            beside = [other.setting for other in chosen if other is not piece]
+            for rival in piece.rivals:
+                if rival.effect not in without and self._fit.overlap(piece, rival) > _OVERLAP:
+                    new, misfit = self._fit.halves(piece, rival, beside)
+                    yield _valued(new, here - misfit)
 
     def _reweighed(self, chosen: Sequence[Piece]) -> list[Piece]:
         """Return the pieces, each weighed against its rivals beside all others, which were not known when it came."""
@@ -135,8 +165,8 @@ class ScatterSearch:
 
     def _least(self, chosen: Sequence[Piece], new: Piece) -> float:
         """Return the evidence from which an effect is taken beside others [nat]: they may act in another form."""
-        like = [piece.nats for piece in chosen if self._fit.overlap(piece, new) > _OVERLAP]
-        return max([_ENOUGH, *(_LEFT * piece.nats for piece in chosen), *(_LEFT_LIKE * nats for nats in like)])
+        left = (_LEFT * piece.nats * self._fit.overlap(piece, new) ** 2 for piece in chosen)
+        return max(_ENOUGH, *(min(_MOST_LEFT, nats) for nats in left)) if chosen else _ENOUGH
 
     def _settled(self, chosen: Sequence[Piece], new: Piece, gone: set[type[Mechanism]]) -> list[Piece]:
         """Return the pieces with a new one, fitted together with those like it; what it makes superfluous is gone."""

@@ -24,7 +24,6 @@ _ROUNDS = 4  # Gauss-Newton steps of a refit
 _SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
 _FARTHEST = 3.0  # such a step, in units of the first difference
 _FINER = 0.5  # of one step's difference is the next one's
-_DAMPED = 0.02  # share by which the curvature is raised: other draws make the slopes uncertain
 _SETTLED = 0.3  # nats that another step must bring
 _FREE = 2.0  # nats that a further parameter must bring
 _POOR = 15.0  # nats of misfit from which shapes of an effect are tried, too
@@ -138,6 +137,23 @@ class ScatterFit:
                     low, best = misfit, {**{k: v for k, v in best.items() if k != name}, name: push.value}
         return Rough(low, pushes[0].effect, best)
 
+    def halves(self, piece: Piece, rival: Piece, beside: Sequence[EffectSetting]) -> tuple[Piece, float]:
+        """Return the second of two effects that were fitted in each other's place, fitted together, and the misfit.
+
+        Each begins with half of its power.
+        """
+        pair = []
+        for one in (piece, rival):
+            sizes = {
+                p.name: p.null + np.sqrt(0.5) * (one.setting.parameters[p.name] - p.null)
+                for p in one.effect.parameters
+                if p.name in one.free
+            }
+            values = {**one.setting.parameters, **sizes}
+            pair.append(replace(one, setting=EffectSetting(one.setting.id, values)))
+        (_, new), misfit = self.together(pair, beside)
+        return new, misfit
+
     def alone(self, start: Rough, beside: Sequence[EffectSetting]) -> tuple[Piece, float]:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
         null = self._simulate.null(start.effect)
@@ -175,10 +191,7 @@ class ScatterFit:
         low = self.likeness.cost(here)
         for _ in range(_ROUNDS):
             moved = [numbers(x + reach * one) - here for one in np.eye(len(x))]
-            slopes = np.array([self.likeness.whitened(change, here) / reach for change in moved])
-            left = self.likeness.whitened(here - self.likeness.measured, here)
-            inner = slopes @ slopes.T
-            move = -np.linalg.solve(inner + _DAMPED * np.diag(np.diag(inner)) + 1e-6 * np.eye(len(x)), slopes @ left)
+            move = self.likeness.step(here, np.array(moved) / reach)
             before, move, reach = low, np.clip(move, -_FARTHEST, _FARTHEST), _FINER * reach
             for share in _SHARES:
                 tried = numbers(x + share * move)

@@ -23,6 +23,7 @@ from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.supply import every_id, supplier
 from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
+from kurumaisu.critic.laser.whole_scans import with_whole_scans
 from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Comparison
@@ -30,7 +31,7 @@ from kurumaisu.critic.verdict import Cause, NextExperiment, Unknown
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-MATERIAL = 3e-4  # [m] change of the readings, where it acts, below which an effect of the laser does not matter
+MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
 _SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
 Progress = Callable[[str], None]
 
@@ -83,6 +84,8 @@ def criticise(
     fit = pinned(assembly, normal, made.fit.forms, settings_of(assembly, made.fit), made.winner, recording.truth)
     progress("laser: weighing effects on the scatter")
     scatter, comparison = _scatter(assembly, normal, fit, ids)
+    seen = assembly.common_mode(normal, recording.truth, made.fit.forms)
+    scatter = with_whole_scans(scatter, seen, normal.scan_noise, recording, ids)
     finding = _finding(assembly, normal, made, fit, scatter)
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
@@ -159,7 +162,7 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     if made.winner is not None:
         free = made.winner.free
         valid = normal.beam_noise.valid
-        sizes[free.id] = size_where_it_acts(assembly.columns[valid][:, free.span] @ made.coefficients)
+        sizes[free.id] = size_of(assembly.columns[valid][:, free.span] @ made.coefficients)
         settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
@@ -209,7 +212,7 @@ def _noise_told(assembly: Assembly, normal: Normal) -> str:
 
 def _told(sizes: Mapping[str, float], small: Sequence[str]) -> list[str]:
     return [
-        f"{name}: changes the readings by {1e3 * size:.2g} mm (rms where it acts)"
+        f"{name}: changes the readings where it acts by {1e3 * size:.2g} mm"
         f"{': detectable, but it does not matter' if name in small else ''}."
         for name, size in sorted(sizes.items())
     ]
@@ -223,16 +226,13 @@ def _rms(assembly: Assembly, normal: Normal, fit: Fitted, name: str) -> float:
         if form.id == name:
             change = assembly.columns[valid][:, form.span] @ fit.coefficients[start:stop]
         start = stop
-    return size_where_it_acts(change)
+    return size_of(change)
 
 
-def size_where_it_acts(change: FloatArray) -> float:
-    """Return the root mean square of changes [m], each counted by its square.
-
-    Of the same change everywhere that is the change; one that acts in a sector is no smaller for all beams elsewhere.
-    """
-    square = float(np.sum(change**2))
-    return float(np.sqrt(np.sum(change**4) / square)) if square > 0 else 0.0
+def size_of(change: FloatArray) -> float:
+    """Return how far [m] an effect moves the readings that it moves: of dark walls, say, not divided by all."""
+    power = change.astype(float) ** 2
+    return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))
 
 
 def _gain(made: _Made, name: str) -> float:

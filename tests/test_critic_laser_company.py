@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects of the laser beside one another: two that look alike, one that contains another, what moves few readings."""
+
+import numpy as np
+import pytest
+
+from kurumaisu import effects
+from kurumaisu.critic.laser.columns import Column, Form
+from kurumaisu.critic.laser.likeness import Likeness
+from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate
+from kurumaisu.critic.laser.search import Search
+from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
+from kurumaisu.critic.laser.verdicts import size_of
+from kurumaisu.critic.laser.whole_scans import with_whole_scans
+from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.params import EffectSetting
+
+
+class _Powers:
+    """Logs of powers: of readings near to far, and of the beams' means, which offsets of the beams raise most."""
+
+    sd = np.linspace(1.0, 1.5, 10)
+
+    def counts(self):
+        return np.zeros(11, dtype=bool)
+
+    def null(self, effect):
+        return {p.name: p.null for p in effect.parameters}
+
+    def __call__(self, settings, seed):
+        wider, own = 1.0, 0.0
+        for setting in settings:
+            if setting.id == "laser.range_noise":
+                wider = 1 + setting.parameters["share"]
+            if setting.id == "laser.beam_bias":
+                own = setting.parameters["sd"] / 0.003
+        powers = np.append((self.sd * wider) ** 2 + own**2, wider**2 + 100 * own**2)
+        return np.log(powers) + 0.03 * np.random.default_rng(seed).standard_normal(11)
+
+
+def _at(name, **values):
+    return EffectSetting(name, {**{p.name: p.null for p in effects.by_id(name).parameters}, **values})
+
+
+def test_two_effects_act_together_though_each_explains_nearly_all_alone():
+    truth = [_at("laser.range_noise", share=0.6), _at("laser.beam_bias", sd=0.002)]
+    ids = frozenset({"laser.range_noise", "laser.beam_bias"})
+    simulate = _Powers()
+    means = ["laser.beam_bias.amplitude", "laser.beam_bias.phase", "laser.range_noise.slope"]
+    found = {each.setting.id: each for each in ScatterSearch(simulate, simulate(truth, 5), means, ids).run()}
+    assert set(found) == ids
+    assert found["laser.range_noise"].setting.parameters["share"] == pytest.approx(0.6, abs=0.1)
+
+
+def test_numbers_that_nothing_explains_yet_do_not_bend_what_explains_others():
+    nulls = np.random.default_rng(1).standard_normal((50, 3))
+    likeness = Likeness(nulls, np.array([80.0, 5.0, 5.0]), np.zeros(3, dtype=bool))
+    right, bent = np.array([0.0, 5.0, 5.0]), np.array([2.0, 17.0, 17.0])
+    assert likeness.cost(right) < likeness.cost(bent)
+    step = likeness.step(right, np.array([[2.0, 12.0, 12.0]]))
+    assert abs(step[0]) < 0.4, "the number that is far off would have it all the way"
+
+
+def _forms():
+    offset = effects.by_id("laser.offset").parameters[0]
+    warmth = effects.by_id("laser.temperature").parameters[0]
+    one = Form("laser.offset", {}, (Column(offset, squared=False, beside={}),), 0)
+    sides = tuple(Column(warmth, squared=False, beside={"reference": at}) for at in (10.0, 40.0))
+    return [one, Form("laser.temperature", {"reference": 10.0}, sides, 1, between=False)]
+
+
+@pytest.mark.parametrize(("slope", "named"), [(0.0, "laser.offset"), (8.0, "laser.temperature")])
+def test_what_hardly_varies_with_the_temperature_is_an_offset(slope, named):
+    temperature = np.linspace(20.0, 21.0, 400)
+    x = np.stack([np.ones(400), temperature - 10.0, temperature - 40.0], axis=1)
+    y = 0.2 + slope * (temperature - 20.5) + 0.5 * np.random.default_rng(2).standard_normal(400)
+    rows = np.column_stack([x, y]) / 0.5
+    found = Search(_forms(), rows.T @ rows).run()
+    assert found.best.ids == {named}
+    assert found.p[named] > 0.95
+    assert found.confounded == ()
+
+
+def test_what_an_effect_does_to_few_readings_is_not_divided_by_all():
+    dark = np.zeros(1000)
+    dark[:50] = 1e-3
+    assert size_of(dark) == pytest.approx(1e-3)
+    assert size_of(np.full(1000, -2e-4)) == pytest.approx(2e-4)
+    assert size_of(np.zeros(1000)) == 0.0
+
+
+def _scans(common, seed, scans=250, readings=400, sd=0.004):
+    """Grams of scans whose only columns are the common mode and the residual, and their layout."""
+    rng = np.random.default_rng(seed)
+    mode = np.zeros(scans)
+    for k in range(scans):
+        mode[k] = 0.8 * mode[k - 1] + 0.6 * rng.standard_normal() if k else rng.standard_normal()
+    grams = []
+    for k in range(scans):
+        rows = np.column_stack([np.ones(readings), common * mode[k] + sd * rng.standard_normal(readings)]) / sd
+        grams.append(Gram(rows.T @ rows, 0, 1))
+    nowhere = np.full(scans, -1)
+    return grams, Layout(0.1 * np.arange(scans), np.zeros(scans, dtype=int), nowhere)
+
+
+def _weighed(common, seed):
+    grams, layout = _scans(common, seed)
+    none = np.arange(0)
+    noise = estimate(grams, layout, (0.005, 0.005), none)
+    return common_mode(grams, layout, (0.005, 0.005), none, noise), noise
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_all_scans_tell_whether_they_have_a_common_mode(seed):
+    seen, noise = _weighed(3e-4, seed)
+    assert seen.nats > 10
+    assert abs(np.log(noise.common_sd / 3e-4)) < 3 * seen.log_sd
+    assert _weighed(0.0, seed)[0].nats < 2
+
+
+def _recording():
+    stamps = 0.1 * np.arange(50)
+    scan = Series(stamps, np.ones((50, 2)), ("r0", "r1"))
+    return Recording("scans", (Run("a", scan=scan),), train=("a",))
+
+
+def test_a_common_mode_that_all_scans_show_is_named_unless_something_may_stand_in_for_it():
+    noise, sure = ScanNoise(0.005, 0.005, 4e-4, 0.45), CommonMode(20.0, 0.1, 0.2)
+    (found,) = with_whole_scans([], sure, noise, _recording(), None)
+    assert found.setting.id == "laser.common_mode"
+    assert found.p > 0.99
+    assert found.setting.parameters["sd"] == pytest.approx(4e-4)
+    assert found.setting.parameters["rho"] == pytest.approx(np.exp(-0.1 / 0.45))
+    assert with_whole_scans([], CommonMode(3.0, 0.5, 0.9), noise, _recording(), None) == []
+    taken = Scatter(_at("laser.heavy_tails", inverse_nu=0.2), 0.6, 9.0, {}, {"laser.common_mode": 0.4})
+    assert with_whole_scans([taken], sure, noise, _recording(), None) == [taken]
