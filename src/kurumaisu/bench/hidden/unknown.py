@@ -6,6 +6,7 @@ An answer is right when it names the channel and any of the covariates: what a t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -35,23 +36,32 @@ class Strange:
         return Fault(self.form, sizes)
 
 
-def _place(r: Rates) -> tuple[FloatArray, FloatArray]:
-    """Return where the chair is in the middle of each cell, by rates alone."""
-    heading = r.headings()
-    x = r.start[0] + STEP * np.cumsum(r.v * np.cos(heading))
-    y = r.start[1] + STEP * np.cumsum(r.v * np.sin(heading))
-    return x, y
-
-
 def carpet(r: Rates, s: Sizes) -> Rates:
-    """V less by a share `size` on half of the floor, beyond a line through where the drive began."""
-    x, _ = _place(r)
-    return replace(r, v=r.v * (1 - s["size"] * (x > r.start[0] + s["edge"])))
+    """V less by a share `size` on half of the floor, beyond a line through where the drive began.
+
+    Where the chair is depends on how much it was held up, and on its noise: another path than the one asked for.
+    """
+    heading = r.headings()
+    cos, sin = np.cos(heading), np.sin(heading)
+    ahead = (cos * r.v * STEP).tolist()
+    shaken = (r.moving * (cos * r.noise[:, 0] - sin * r.noise[:, 1]) * STEP).tolist()
+    x, line = float(r.start[0]), float(r.start[0] + s["edge"])
+    held = np.empty(len(ahead))
+    for k, (step, shake) in enumerate(zip(ahead, shaken, strict=True)):
+        held[k] = s["size"] * (x > line)
+        x += step * (1 - held[k]) + shake
+    return replace(r, v=r.v * (1 - held))
 
 
 def heading_veer(r: Rates, s: Sizes) -> Rates:
-    """A turn of `size` [rad/s] by the sine of the heading, as of wind on a sail."""
-    return replace(r, w=r.w + s["size"] * r.moving * np.sin(r.headings() - s["bearing"]))
+    """A turn of `size` [rad/s] by the sine of the heading that the chair has come to, as of wind on a sail."""
+    turns = (STEP * (r.w + r.moving * r.noise[:, 2])).tolist()
+    heading = float(r.start[2] - s["bearing"])
+    pull = np.empty(len(turns))
+    for k, (turn, moving) in enumerate(zip(turns, r.moving.tolist(), strict=True)):
+        pull[k] = s["size"] * moving * math.sin(heading + turn / 2)
+        heading += turn + STEP * pull[k]
+    return replace(r, w=r.w + pull)
 
 
 def eccentric(r: Rates, s: Sizes) -> Rates:
