@@ -121,6 +121,21 @@ def test_what_the_catalogue_explains_is_left_to_it():
     assert false_alarm(problem, blind) == 0.0
 
 
+def test_a_curve_beside_nothing_is_one_over_rates_that_nothing_has_bent():
+    """A slip beyond a threshold, as a narrower dead zone with a smaller gain draws it: neither of them acts."""
+    slip = hidden.Kind(2, "w", lambda s, a, b: s.w * (abs(s.w) > 0.4))
+    case = hidden.make(slip, 80.0, 1002, seconds=40.0, runs=2)
+    problem = Problem(drives_of(case.recording), hidden.MODEL, hidden.USUAL)
+    names = ("base.dead_zone_w", "base.gain_w")
+    bent, empty = problem.fit(names, {}), problem.fit_candidates((), {})
+    assert np.all(bent.values < -0.2)
+    rivalry = compare(problem, Naming((bent, empty), dict.fromkeys(names, 1.0), (), 0.0))
+    alone = compare(problem, Naming((empty,), dict.fromkeys(names, 0.0), (), 0.0))
+    assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.w.w", frozenset())
+    assert rivalry.winner.belief.nats == pytest.approx(alone.winner.belief.nats, abs=1e-6)
+    assert max(rivalry.p_effects.values()) < 0.01
+
+
 def test_a_curve_and_an_effect_of_the_catalogue_are_fitted_together():
     case = hidden.make(hidden.KINDS["corrugated floor"], 30.0, 1003, seconds=40.0, runs=2, gain_w=0.06)
     problem = Problem(drives_of(case.recording), hidden.MODEL, hidden.USUAL)

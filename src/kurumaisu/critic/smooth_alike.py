@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu.critic.evidence import Fit, Problem
-from kurumaisu.critic.smooth import Belief, Curve, Design, taken_up
+from kurumaisu.critic.smooth import Belief, Curve, taken_up
+from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.types import FloatArray
 
 _ALIKE = 0.9  # correlation of signals from which a curve draws an effect; noise alone bends a curve by as much
@@ -16,8 +17,8 @@ _FORM = 0.15  # share of its signal by which a chair's fault may differ from the
 class Likeness:
     """How alike curves are to the effects of a fit, as both explain the drives."""
 
-    def __init__(self, problem: Problem, best: Fit, design: Design) -> None:
-        self._problem, self._best, self._design = problem, best, design
+    def __init__(self, problem: Problem, best: Fit, designs: Designs) -> None:
+        self._problem, self._best, self._designs = problem, best, designs
         self._signals = {name: _signal(problem, best, name) for name in sorted(best.ids)}
 
     def drawn(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
@@ -31,7 +32,7 @@ class Likeness:
         if len(missing) != 1 or fit.ids - self._best.ids:
             return {}
         y, own = taken_up(self._problem, fit)
-        columns = self._design.columns[:, curve.columns]
+        columns = self._designs.about(fit).columns[:, curve.columns]
         columns = columns - own @ (own.T @ columns)
         spread = np.eye(columns.shape[1]) + belief.prior @ (columns.T @ columns)
         drawn = columns @ np.linalg.solve(spread, belief.prior @ (columns.T @ y))
