@@ -185,6 +185,7 @@ def test_what_is_in_no_catalogue_is_left_by_all_of_it(name):
     ("name", "sizes", "law"),
     [
         ("heading_veer", {"size": 0.2, "bearing": 0.5}, lambda path: (0, 0.2 * np.sin(path[2] - 0.5))),
+        ("draught", {"size": 0.2, "door": 0.3}, lambda path: (0, 0.2 * np.exp(-2 * (path[1] - 0.3) ** 2))),
         ("carpet", {"size": 0.3, "edge": 0.2}, lambda path: (-0.3 * (path[0] > 0.2), 0)),
     ],
 )
@@ -198,7 +199,7 @@ def test_what_follows_the_pose_follows_the_one_that_the_chair_has(name, sizes, l
     middle = 0.5 * (path[:-1] + path[1:])
     assert np.abs(path - integrate(nominal)).max() > 0.5
     in_v, in_w = law(middle.T)
-    np.testing.assert_allclose(rates.w - nominal.w, in_w * rates.moving, atol=2e-4)
+    np.testing.assert_allclose(rates.w - nominal.w, in_w * rates.moving, atol=1e-3)
     assert np.mean(np.abs(rates.v - nominal.v * (1 + in_v)) > 1e-9) < 0.01  # but for the cells in which an edge lies
 
 

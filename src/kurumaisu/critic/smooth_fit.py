@@ -17,6 +17,7 @@ from kurumaisu.critic.smooth_basis import Basis
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
+_FINER = 4  # knots for one of a curve's, where what it leaves is taken for noise
 _ROUNDS = 3  # from columns linearised anew; the curve itself is linear in all but the path it leads to
 
 
@@ -68,10 +69,14 @@ def again(extension: Extension, drives: Sequence[Drive], problem: Problem) -> Ex
 
 
 def simulated_columns(problem: Problem, drive: Drive, extension: Extension) -> FloatArray:
-    """Return the derivative of a drive's increments by all effects of the catalogue and by the curve, (3 m, k)."""
+    """Return the derivative of a drive's increments by all effects of the catalogue and by the curve, (3 m, k).
+
+    The curve has more knots: what few of them leave of a step is no noise, and grows with the rates.
+    """
     own = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
     known = own.simulated_columns(drive, extension.fit)
-    return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [extension.curve])])
+    finer = replace(extension.curve, basis=extension.basis.finer(_FINER))
+    return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [finer])])
 
 
 def doubt(problem: Problem, drive: Drive, extension: Extension) -> FloatArray:

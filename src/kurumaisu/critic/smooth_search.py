@@ -80,7 +80,9 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
         share = float(np.exp(rival.worth - total))
         draws = likeness.drawn(rival.fit, rival.curve, rival.belief) if share > _SHARE else {}
         drawn = {name for name, nats in draws.items() if rival.worth - ceiling < BEYOND + nats}
-        for name in rival.fit.ids | drawn:
+        wins = not drawn and rival.worth - ceiling > BEYOND and share > _SHARE
+        part = likeness.part_of(rival.fit, rival.curve) if wins else set()
+        for name in (rival.fit.ids - part) | drawn:
             p[name] += share
         beyond += [] if drawn else [rival]
     curves: dict[str, float] = {}

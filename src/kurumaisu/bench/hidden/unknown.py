@@ -95,6 +95,32 @@ def threshold_slip(r: Rates, s: Sizes) -> Rates:
     return replace(r, w=np.where(np.abs(r.w) > 0.4, r.w * (1 - s["size"]), r.w))
 
 
+def flat_spot(r: Rates, s: Sizes) -> Rates:
+    """V less by a share `size` for a tenth of a turn of a wheel: where it was stood on for a winter."""
+    turn = np.cumsum(np.abs(r.v)) * STEP / s["girth"] - s["spot"]
+    return replace(r, v=r.v * (1 - s["size"] * np.exp(-((turn - np.round(turn)) ** 2) / (2 * 0.05**2))))
+
+
+def derating(r: Rates, s: Sizes) -> Rates:
+    """V less from a moment on, within 8 s by a share `size`: the controller is hot and saves itself."""
+    return replace(r, v=r.v * (1 - s["size"] * np.clip((r.t - s["moment"]) / 8.0, 0.0, 1.0)))
+
+
+def draught(r: Rates, s: Sizes) -> Rates:
+    """A turn of `size` [rad/s] beside an open door: within half a metre of y = `door` from where the drive began."""
+    turns = (STEP * (r.w + r.moving * r.noise[:, 2])).tolist()
+    ahead = (STEP * (r.v + r.moving * r.noise[:, 0])).tolist()
+    aside = (STEP * r.moving * r.noise[:, 1]).tolist()
+    heading, y = float(r.start[2]), -s["door"]
+    push = np.empty(len(turns))
+    for k, (turn, moving) in enumerate(zip(turns, r.moving.tolist(), strict=True)):
+        push[k] = s["size"] * moving * math.exp(-(y**2) / (2 * 0.5**2))
+        turn += STEP * push[k]
+        y += ahead[k] * math.sin(heading + turn / 2) + aside[k] * math.cos(heading + turn / 2)
+        heading += turn
+    return replace(r, w=r.w + push)
+
+
 def sector_bias(c: Scans, s: Sizes) -> Scans:
     """Readings `size` [m] longer in a sector of the fan 0.7 rad wide, as behind a scratched window."""
     return _longer(c, s["size"] * (np.abs(c.bearings - s["bearing"]) < 0.35))
@@ -138,6 +164,15 @@ STRANGE_BASE: dict[str, Strange] = {
     "bump": Strange(Form("floor", bump), 0.02, "base.v", ("v", "|v|")),
     "swing": Strange(Form("floor", swing), 0.02, "base.w", ("t", "time"), _uniform("phase", -np.pi, np.pi)),
     "threshold_slip": Strange(Form("floor", threshold_slip), 0.1, "base.w", ("w", "|w|")),
+    "flat_spot": Strange(
+        Form("floor", flat_spot),
+        0.1,
+        "base.v",
+        ("distance",),
+        lambda rng: {"girth": float(rng.uniform(0.8, 1.3)), "spot": float(rng.random())},
+    ),
+    "derating": Strange(Form("floor", derating), 0.1, "base.v", ("t", "time"), _uniform("moment", 15.0, 40.0)),
+    "draught": Strange(Form("floor", draught), 0.05, "base.w", ("y", "position"), _uniform("door", -0.5, 0.5)),
 }
 STRANGE_LASER: dict[str, Strange] = {
     "sector_bias": Strange(
