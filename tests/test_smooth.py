@@ -161,7 +161,7 @@ def test_an_effect_is_part_of_a_curve_over_what_it_follows(problem, name, curve,
     assert Likeness(problem, fit, designs).part_of(fit, own) == ({name} if part else set())
 
 
-def test_noise_is_estimated_about_a_curve_that_may_have_steps(problem):
+def test_a_finer_curve_leaves_little_of_a_step(problem):
     """Eight knots leave a half of a step between them; four times as many, which can do the same and more, do not."""
     design, fit = smooth.Design(problem, ()), problem.fit_candidates((), {})
     (curve,) = (c for c in design.curves if c.id == "smooth.v_gain.time")
@@ -174,7 +174,7 @@ def test_noise_is_estimated_about_a_curve_that_may_have_steps(problem):
         return np.linalg.norm(step - columns @ np.linalg.lstsq(columns, step, rcond=None)[0])
 
     few = smooth.raw_columns(drive, problem.model, (), [curve])
-    many = smooth_fit.simulated_columns(problem, drive, extension)[:, len(problem.terms) :]
+    many = smooth_fit.simulated_columns(problem, drive, extension, finer=True)[:, len(problem.terms) :]
     assert left(many) < 0.6 * left(few)
     np.testing.assert_allclose(many @ np.linalg.lstsq(many, few, rcond=None)[0], few, atol=1e-9)
 
