@@ -9,6 +9,8 @@ import unknown_effects as hidden
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
+from kurumaisu.bench.hidden import Ask
+from kurumaisu.bench.hidden import make as hidden_make
 from kurumaisu.critic import pipeline, replay, smooth, smooth_fit, smooth_shapes, smooth_words
 from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import prepare
@@ -177,6 +179,14 @@ def test_a_finer_curve_leaves_little_of_a_step(problem):
     many = smooth_fit.simulated_columns(problem, drive, extension, finer=True)[:, len(problem.terms) :]
     assert left(many) < 0.6 * left(few)
     np.testing.assert_allclose(many @ np.linalg.lstsq(many, few, rcond=None)[0], few, atol=1e-9)
+
+
+def test_what_a_curve_leaves_of_a_step_is_no_noise_that_grows():
+    brake = hidden_make(Ask("unknown", ("step_in_time",)), 12403)
+    ids = frozenset({"smooth", "base.process_noise", "base.gain_v"})
+    verdict = pipeline.criticise(brake.recording, shipped("launch/md100.yaml"), lambda _: None, ids=ids).verdict
+    assert (verdict.verdict, verdict.causes) == ("unknown", ())
+    assert (verdict.unknown[0].channel, verdict.unknown[0].covariate) == ("base.v", "time")
 
 
 def test_a_curve_beside_nothing_is_one_over_rates_that_nothing_has_bent(slipping):
