@@ -23,8 +23,9 @@ from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.noise import Growth, Noise, Scatter, whitener
 from kurumaisu.critic.pruned import pruned
-from kurumaisu.critic.smooth import Belief, Design
+from kurumaisu.critic.smooth import Belief
 from kurumaisu.critic.smooth_alike import Likeness
+from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.critic.smooth_judge import Beyond, undecided
 from kurumaisu.critic.smooth_search import Rivalry
 from kurumaisu.critic.stand_ins import Posterior, confounded
@@ -123,14 +124,14 @@ def understeering():
 @pytest.mark.parametrize(("channel", "covariate", "drawn"), [("w_gain", "abs_v", True), ("v_gain", "time", False)])
 def test_a_curve_speaks_for_the_effect_that_it_draws(understeering, channel, covariate, drawn):
     problem, best, nothing = understeering
-    design = Design(problem, ())
-    (curve,) = (c for c in design.curves if (c.channel, c.basis.covariate) == (channel, covariate))
+    designs = Designs(problem, nothing)
+    (curve,) = (c for c in designs.about(nothing).curves if (c.channel, c.basis.covariate) == (channel, covariate))
     belief = Belief(0.0, 0.04 * np.eye(curve.basis.size))
-    found = Likeness(problem, best, design).drawn(nothing, curve, belief)
+    found = Likeness(problem, best, designs).drawn(nothing, curve, belief)
     assert set(found) == ({"base.understeer"} if drawn else set())
     if drawn:  # the larger the effect, the more its equation may be off
         assert 3.0 < found["base.understeer"] < 0.05 * best.log_likelihood - 0.05 * nothing.log_likelihood
-        assert Likeness(problem, best, design).drawn(best, curve, belief) == {}
+        assert Likeness(problem, best, designs).drawn(best, curve, belief) == {}
 
 
 def fit_of(names, score):

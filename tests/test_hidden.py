@@ -9,9 +9,11 @@ import pytest
 from kurumaisu.bench.hidden import Ask, make, names_of
 from kurumaisu.bench.hidden.base_case import Scale, draw_drives, gates
 from kurumaisu.bench.hidden.base_catalogue import BASE
+from kurumaisu.bench.hidden.drives import rich
 from kurumaisu.bench.hidden.motion import STEP, Setting, drive, integrate
 from kurumaisu.bench.hidden.noise import REGIMES, Colour, Regime, draw_rates
 from kurumaisu.bench.hidden.sizing import left_beside, size_for
+from kurumaisu.bench.hidden.unknown import STRANGE_BASE
 from kurumaisu.bench.hidden.whitening import Path, Whitener, deviation
 from kurumaisu.errors import Error
 
@@ -177,6 +179,28 @@ def test_what_is_in_no_catalogue_is_left_by_all_of_it(name):
     assert truth.ids == ()
     assert truth.z == pytest.approx(8.0, rel=0.1)
     assert truth.z_rival >= truth.z * 0.99
+
+
+@pytest.mark.parametrize(
+    ("name", "sizes", "law"),
+    [
+        ("heading_veer", {"size": 0.2, "bearing": 0.5}, lambda path: (0, 0.2 * np.sin(path[2] - 0.5))),
+        ("draught", {"size": 0.2, "door": 0.3}, lambda path: (0, 0.2 * np.exp(-2 * (path[1] - 0.3) ** 2))),
+        ("carpet", {"size": 0.3, "edge": 0.2}, lambda path: (-0.3 * (path[0] > 0.2), 0)),
+    ],
+)
+def test_what_follows_the_pose_follows_the_one_that_the_chair_has(name, sizes, law):
+    """By noise, and by what it does itself, the chair is soon elsewhere than it was asked to be."""
+    noise = draw_rates(REGIMES["usual"], round(63.0 / STEP), np.random.default_rng(3))
+    command = rich(60.0, np.random.default_rng(4))
+    setting = Setting(command, np.zeros(3), np.arange(0.0, 61.0, 0.1), noise)
+    nominal, rates = drive(setting, ())[1], drive(setting, [STRANGE_BASE[name].fault(sizes, "plain")])[1]
+    path = integrate(rates)
+    middle = 0.5 * (path[:-1] + path[1:])
+    assert np.abs(path - integrate(nominal)).max() > 0.5
+    in_v, in_w = law(middle.T)
+    np.testing.assert_allclose(rates.w - nominal.w, in_w * rates.moving, atol=1e-3)
+    assert np.mean(np.abs(rates.v - nominal.v * (1 + in_v)) > 1e-9) < 0.01  # but for the cells in which an edge lies
 
 
 @pytest.mark.parametrize("name", names_of("wrong", "base"))

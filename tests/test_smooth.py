@@ -9,12 +9,17 @@ import unknown_effects as hidden
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from kurumaisu.critic import pipeline, replay, smooth, smooth_shapes, smooth_words
+from kurumaisu.bench.hidden import Ask
+from kurumaisu.bench.hidden import make as hidden_make
+from kurumaisu.critic import pipeline, replay, smooth, smooth_fit, smooth_shapes, smooth_words
+from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.prior import Z_HIGH, Z_LOW, Z_USUAL
+from kurumaisu.critic.smooth_alike import Likeness
 from kurumaisu.critic.smooth_basis import Basis
+from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.critic.smooth_fit import Extension, extend
 from kurumaisu.critic.smooth_judge import false_alarm
 from kurumaisu.critic.smooth_known import informed
@@ -119,6 +124,81 @@ def test_what_the_catalogue_explains_is_left_to_it():
     blind = compare(problem, Naming((empty,), {}, (), 1.0))
     assert blind.winner.curve.channel in ("w", "w_gain")
     assert false_alarm(problem, blind) == 0.0
+
+
+@pytest.fixture(scope="module")
+def slipping():
+    """Return a problem of a chair that slips beyond a threshold, and the two effects that draw it, fitted."""
+    slip = hidden.Kind(2, "w", lambda s, a, b: s.w * (abs(s.w) > 0.4))
+    case = hidden.make(slip, 80.0, 1002, seconds=40.0, runs=2)
+    problem = Problem(drives_of(case.recording), hidden.MODEL, hidden.USUAL)
+    return problem, problem.fit(("base.dead_zone_w", "base.gain_w"), {})
+
+
+def test_effects_beside_a_curve_over_the_same_are_not_named(slipping):
+    """What the curve's knots lack for a step, effects supply that do not act."""
+    problem, bent = slipping
+    rivalry = compare(problem, Naming((bent, problem.fit_candidates((), {})), dict.fromkeys(bent.ids, 1.0), (), 0.0))
+    only = compare(problem, Naming((bent,), dict.fromkeys(bent.ids, 1.0), (), 0.0))
+    assert (only.winner.curve.id, only.winner.fit.ids) == ("smooth.w.w", bent.ids)
+    assert only.winner.worth < rivalry.winner.worth
+    assert max(only.p_effects.values()) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("name", "curve", "part"),
+    [
+        ("base.gain_w", "smooth.w.w", True),
+        ("base.slope", "smooth.v.heading", True),
+        ("base.gain_w", "smooth.v.w", False),
+        ("base.gain_w", "smooth.w.abs_v", False),
+        ("base.gain_w", "smooth.w_gain.time", False),  # a curve of factors about another gain is one thing more
+    ],
+)
+def test_an_effect_is_part_of_a_curve_over_what_it_follows(problem, name, curve, part):
+    fit = problem.fit([name], {})
+    fit = replace(fit, values=np.full(len(fit.terms), 0.1), settings=settings_of(fit.terms, [0.1] * len(fit.terms)))
+    designs = Designs(problem, fit)
+    (own,) = (c for c in designs.about(fit).curves if c.id == curve)
+    assert Likeness(problem, fit, designs).part_of(fit, own) == ({name} if part else set())
+
+
+def test_a_finer_curve_leaves_little_of_a_step(problem):
+    """Eight knots leave a half of a step between them; four times as many, which can do the same and more, do not."""
+    design, fit = smooth.Design(problem, ()), problem.fit_candidates((), {})
+    (curve,) = (c for c in design.curves if c.id == "smooth.v_gain.time")
+    extension = Extension(fit, curve, curve.basis.priors[0], np.zeros(curve.basis.size), np.eye(curve.basis.size))
+    drive = problem.drives[0]
+    edged = replace(curve, basis=replace(curve.basis, knots=np.array([16.4, 16.41])))
+    step = smooth.raw_columns(drive, problem.model, (), [edged])[:, 1]
+
+    def left(columns):
+        return np.linalg.norm(step - columns @ np.linalg.lstsq(columns, step, rcond=None)[0])
+
+    few = smooth.raw_columns(drive, problem.model, (), [curve])
+    many = smooth_fit.simulated_columns(problem, drive, extension, finer=True)[:, len(problem.terms) :]
+    assert left(many) < 0.6 * left(few)
+    np.testing.assert_allclose(many @ np.linalg.lstsq(many, few, rcond=None)[0], few, atol=1e-9)
+
+
+def test_what_a_curve_leaves_of_a_step_is_no_noise_that_grows():
+    brake = hidden_make(Ask("unknown", ("step_in_time",)), 12403)
+    ids = frozenset({"smooth", "base.process_noise", "base.gain_v"})
+    verdict = pipeline.criticise(brake.recording, shipped("launch/md100.yaml"), lambda _: None, ids=ids).verdict
+    assert (verdict.verdict, verdict.causes) == ("unknown", ())
+    assert (verdict.unknown[0].channel, verdict.unknown[0].covariate) == ("base.v", "time")
+
+
+def test_a_curve_beside_nothing_is_one_over_rates_that_nothing_has_bent(slipping):
+    """A slip beyond a threshold, as a narrower dead zone with a smaller gain draws it: neither of them acts."""
+    problem, bent = slipping
+    names, empty = bent.ids, problem.fit_candidates((), {})
+    assert np.all(bent.values < -0.2)
+    rivalry = compare(problem, Naming((bent, empty), dict.fromkeys(names, 1.0), (), 0.0))
+    alone = compare(problem, Naming((empty,), dict.fromkeys(names, 0.0), (), 0.0))
+    assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.w.w", frozenset())
+    assert rivalry.winner.belief.nats == pytest.approx(alone.winner.belief.nats, abs=1e-6)
+    assert max(rivalry.p_effects.values()) < 0.01
 
 
 def test_a_curve_and_an_effect_of_the_catalogue_are_fitted_together():

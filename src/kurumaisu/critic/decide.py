@@ -86,6 +86,10 @@ def _judged(
         strict = scatter(first, found.best, truth, project=True, forms=True)
         final = strict.estimate(final.noise)
         growth = strict.growth(final, odds(len(found.p)))
+    elif growth.p > 1 / 2 and beside is not None:
+        # The noise stays that about the curve as it is: what its knots leave is no effect of the catalogue either.
+        strict = scatter(first, found.best, truth, project=True, beside=beside, forms=True)
+        growth = strict.growth(strict.estimate(final.noise), odds(len(found.p)))
     problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
     again = naming.search(problem, progress, found.best)
     beyond = smooth_judge.judge(problem, again, progress)
@@ -114,7 +118,8 @@ def scatter(
     """Return what is left about a fit, or an extension, with all that may act projected out or nothing.
 
     forms: with what the causes of the fit would do in other forms projected out, too, and the chair at rest where they
-    have it rest: a law that swallows small commands must not pass for noise that grows with them.
+    have it rest: a law that swallows small commands must not pass for noise that grows with them. Likewise with what
+    the curve would do if it had more knots.
     """
     settings = fit.settings if beside is None else beside.settings
     residuals = [drive.measured - problem.simulated(drive, settings) for drive in problem.drives]
@@ -125,7 +130,7 @@ def scatter(
         if beside is None:
             own = problem.simulated_columns(drive, fit)
             return np.column_stack([own, _other_forms(problem, drive, fit)]) if forms else own
-        return smooth_fit.simulated_columns(problem, drive, beside)
+        return smooth_fit.simulated_columns(problem, drive, beside, finer=forms)
 
     projected = [columns(drive, left.size) for drive, left in zip(problem.drives, residuals, strict=True)]
     drives = [_resting(drive, problem.model, settings) for drive in problem.drives] if forms else problem.drives

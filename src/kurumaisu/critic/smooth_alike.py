@@ -3,21 +3,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kurumaisu.critic.evidence import Fit, Problem
-from kurumaisu.critic.smooth import Belief, Curve, Design, taken_up
+from kurumaisu.critic.smooth import Belief, Curve, columns, taken_up
+from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.types import FloatArray
 
 _ALIKE = 0.9  # correlation of signals from which a curve draws an effect; noise alone bends a curve by as much
+_FINER = 4  # knots for one of a curve's
 FORM = 0.15  # share of its signal by which a chair's fault may differ from the catalogue's equation for it
 
 
 class Likeness:
     """How alike curves are to the effects of a fit, as both explain the drives."""
 
-    def __init__(self, problem: Problem, best: Fit, design: Design) -> None:
-        self._problem, self._best, self._design = problem, best, design
+    def __init__(self, problem: Problem, best: Fit, designs: Designs) -> None:
+        self._problem, self._best, self._designs = problem, best, designs
         self._signals = {name: signal_of(problem, best, name) for name in sorted(best.ids)}
 
     def drawn(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
@@ -31,16 +35,35 @@ class Likeness:
         if len(missing) != 1 or fit.ids - self._best.ids:
             return {}
         y, own = taken_up(self._problem, fit)
-        columns = self._design.columns[:, curve.columns]
-        columns = columns - own @ (own.T @ columns)
-        spread = np.eye(columns.shape[1]) + belief.prior @ (columns.T @ columns)
-        drawn = columns @ np.linalg.solve(spread, belief.prior @ (columns.T @ y))
+        free = self._designs.about(fit).columns[:, curve.columns]
+        free = free - own @ (own.T @ free)
+        spread = np.eye(free.shape[1]) + belief.prior @ (free.T @ free)
+        drawn = free @ np.linalg.solve(spread, belief.prior @ (free.T @ y))
         signals = {name: self._signals[name] - own @ (own.T @ self._signals[name]) for name in sorted(missing)}
         return {
             name: 0.5 * float(FORM**2 * signal @ signal)
             for name, signal in signals.items()
             if _correlation(drawn, signal) > _ALIKE
         }
+
+    def part_of(self, fit: Fit, curve: Curve) -> set[str]:
+        """Return the effects of a fit that are themselves curves over what a curve beside them follows.
+
+        How many knots it has is our choice: what they lack for a step, a gain and a dead zone supply, though neither
+        acts.
+        """
+        if not fit.ids:
+            return set()
+        finer = replace(curve, basis=curve.basis.finer(_FINER))
+        free = columns(self._problem, fit.settings, [finer])
+        if curve.channel.endswith("_gain"):  # a curve of factors may be one about another gain than 1
+            level = free[:, :1] if not len(curve.basis.knots) else free.sum(axis=1, keepdims=True)
+            level = level / np.linalg.norm(level)
+            free = free - level @ (level.T @ free)
+        left, sizes, _ = np.linalg.svd(free, full_matrices=False)
+        own = left[:, sizes > 1e-6 * max(sizes[0], 1e-12)]
+        signals = {name: signal_of(self._problem, fit, name) for name in sorted(fit.ids)}
+        return {name for name, signal in signals.items() if _norm(own.T @ signal) > _ALIKE * _norm(signal)}
 
 
 def signal_of(problem: Problem, fit: Fit, name: str) -> FloatArray:
@@ -55,5 +78,9 @@ def signal_of(problem: Problem, fit: Fit, name: str) -> FloatArray:
 
 
 def _correlation(one: FloatArray, other: FloatArray) -> float:
-    norms = float(np.linalg.norm(one) * np.linalg.norm(other))
+    norms = _norm(one) * _norm(other)
     return float(one @ other) / norms if norms else 0.0
+
+
+def _norm(values: FloatArray) -> float:
+    return float(np.linalg.norm(values))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,6 +53,15 @@ class Basis:
     def matrix(self, at: FloatArray) -> FloatArray:
         """Return the basis at values of the covariate (n,), (n, k)."""
         return _matrix(self.knots, self.constants.get("period", 0.0), at)
+
+    def finer(self, times: int) -> Basis:
+        """Return the curves over the same with that many knots for one, which hold these; waves are what they are."""
+        count = len(self.knots)
+        if not count:
+            return self
+        at = np.linspace(0, count - 1, times * (count - 1) + 1)
+        knots = np.interp(at, np.arange(count), self.knots)
+        return replace(self, knots=knots, priors=())
 
     def parameters(self, coefficients: FloatArray) -> dict[str, float]:
         """Return the parameters of the curve as a model file has them."""

@@ -17,6 +17,7 @@ from kurumaisu.critic.smooth_basis import Basis
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
+_FINER = 4  # knots for one of a curve's
 _ROUNDS = 3  # from columns linearised anew; the curve itself is linear in all but the path it leads to
 
 
@@ -67,11 +68,17 @@ def again(extension: Extension, drives: Sequence[Drive], problem: Problem) -> Ex
     return extend(other, fit, extension.curve, extension.prior)
 
 
-def simulated_columns(problem: Problem, drive: Drive, extension: Extension) -> FloatArray:
-    """Return the derivative of a drive's increments by all effects of the catalogue and by the curve, (3 m, k)."""
+def simulated_columns(problem: Problem, drive: Drive, extension: Extension, *, finer: bool) -> FloatArray:
+    """Return the derivative of a drive's increments by all effects of the catalogue and by the curve, (3 m, k).
+
+    finer: with more knots. What few of them leave of a step grows with the rates, and is no noise that does.
+    """
     own = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
     known = own.simulated_columns(drive, extension.fit)
-    return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [extension.curve])])
+    curve = extension.curve
+    if finer:
+        curve = replace(curve, basis=extension.basis.finer(_FINER))
+    return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [curve])])
 
 
 def doubt(problem: Problem, drive: Drive, extension: Extension) -> FloatArray:

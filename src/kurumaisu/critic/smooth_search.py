@@ -15,6 +15,7 @@ from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.smooth import Belief, Curve, Design, belief, taken_up
 from kurumaisu.critic.smooth_alike import Likeness
+from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.types import FloatArray
 
 BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
@@ -62,9 +63,9 @@ def no_rivals(found: Naming) -> Rivalry:
 def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozenset()) -> Rivalry:
     """Try every curve beside the best sets of the catalogue, beside none, and beside one more."""
     count = len({candidate.id for candidate in problem.candidates})
-    design = Design(problem, found.best.settings)
+    designs = Designs(problem, found.best)
     bare = [(fit, fit.score + log_prior(len(fit.candidates), count)) for fit in found.fits]
-    rivals = sorted(_rivals(problem, design, _tried(bare, also)), key=lambda rival: -rival.worth)
+    rivals = sorted(_rivals(problem, designs, _tried(bare, also)), key=lambda rival: -rival.worth)
     if not rivals:
         return no_rivals(found)
     plain = np.array([worth + np.log1p(-_ODDS) for _, worth in bare])
@@ -73,13 +74,15 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
         name: float(sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if name in fit.ids))
         for name in found.p
     }
-    likeness, ceiling = Likeness(problem, found.best, design), float(plain.max())
+    likeness, ceiling = Likeness(problem, found.best, designs), float(plain.max())
     beyond: list[Rival] = []
     for rival in rivals:
         share = float(np.exp(rival.worth - total))
         draws = likeness.drawn(rival.fit, rival.curve, rival.belief) if share > _SHARE else {}
         drawn = {name for name, nats in draws.items() if rival.worth - ceiling < BEYOND + nats}
-        for name in rival.fit.ids | drawn:
+        wins = not drawn and rival.worth - ceiling > BEYOND and share > _SHARE
+        part = likeness.part_of(rival.fit, rival.curve) if wins else set()
+        for name in (rival.fit.ids - part) | drawn:
             p[name] += share
         beyond += [] if drawn else [rival]
     curves: dict[str, float] = {}
@@ -97,15 +100,18 @@ def _tried(bare: Sequence[tuple[Fit, float]], also: frozenset[Candidate]) -> lis
     return ranked[:_FITS] + [pair for pair in ranked[_FITS:] if pair[0].candidates in wanted]
 
 
-def _rivals(problem: Problem, design: Design, fits: Sequence[tuple[Fit, float]]) -> Iterator[Rival]:
-    share = float(np.log(_ODDS / max(len(design.curves), 1)))
-    grams = [_gram(design.columns[:, curve.columns]) for curve in design.curves]
+def _rivals(problem: Problem, designs: Designs, fits: Sequence[tuple[Fit, float]]) -> Iterator[Rival]:
+    grams: dict[Design, list[FloatArray]] = {}
     for fit, worth in fits:
+        design = designs.about(fit)
+        if design not in grams:
+            grams[design] = [_gram(design.columns[:, curve.columns]) for curve in design.curves]
+        share = float(np.log(_ODDS / max(len(design.curves), 1)))
         y, own = taken_up(problem, fit)
         # Of columns without what the fit can take up: normal equations, of which only a little changes with the fit.
         products = np.column_stack([own, y]).T @ design.columns
         cross, b = products[:-1], products[-1]
-        for curve, gram in zip(design.curves, grams, strict=True):
+        for curve, gram in zip(design.curves, grams[design], strict=True):
             part = cross[:, curve.columns]
             found = belief(gram - part.T @ part, b[curve.columns], curve.basis.priors)
             # All curves of a kind that the data chose from share what one has.

@@ -6,6 +6,7 @@ An answer is right when it names the channel and any of the covariates: what a t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -35,23 +36,32 @@ class Strange:
         return Fault(self.form, sizes)
 
 
-def _place(r: Rates) -> tuple[FloatArray, FloatArray]:
-    """Return where the chair is in the middle of each cell, by rates alone."""
-    heading = r.headings()
-    x = r.start[0] + STEP * np.cumsum(r.v * np.cos(heading))
-    y = r.start[1] + STEP * np.cumsum(r.v * np.sin(heading))
-    return x, y
-
-
 def carpet(r: Rates, s: Sizes) -> Rates:
-    """V less by a share `size` on half of the floor, beyond a line through where the drive began."""
-    x, _ = _place(r)
-    return replace(r, v=r.v * (1 - s["size"] * (x > r.start[0] + s["edge"])))
+    """V less by a share `size` on half of the floor, beyond a line through where the drive began.
+
+    Where the chair is depends on how much it was held up, and on its noise: another path than the one asked for.
+    """
+    heading = r.headings()
+    cos, sin = np.cos(heading), np.sin(heading)
+    ahead = (cos * r.v * STEP).tolist()
+    shaken = (r.moving * (cos * r.noise[:, 0] - sin * r.noise[:, 1]) * STEP).tolist()
+    x, line = float(r.start[0]), float(r.start[0] + s["edge"])
+    held = np.empty(len(ahead))
+    for k, (step, shake) in enumerate(zip(ahead, shaken, strict=True)):
+        held[k] = s["size"] * (x > line)
+        x += step * (1 - held[k]) + shake
+    return replace(r, v=r.v * (1 - held))
 
 
 def heading_veer(r: Rates, s: Sizes) -> Rates:
-    """A turn of `size` [rad/s] by the sine of the heading, as of wind on a sail."""
-    return replace(r, w=r.w + s["size"] * r.moving * np.sin(r.headings() - s["bearing"]))
+    """A turn of `size` [rad/s] by the sine of the heading that the chair has come to, as of wind on a sail."""
+    turns = (STEP * (r.w + r.moving * r.noise[:, 2])).tolist()
+    heading = float(r.start[2] - s["bearing"])
+    pull = np.empty(len(turns))
+    for k, (turn, moving) in enumerate(zip(turns, r.moving.tolist(), strict=True)):
+        pull[k] = s["size"] * moving * math.sin(heading + turn / 2)
+        heading += turn + STEP * pull[k]
+    return replace(r, w=r.w + pull)
 
 
 def eccentric(r: Rates, s: Sizes) -> Rates:
@@ -83,6 +93,32 @@ def swing(r: Rates, s: Sizes) -> Rates:
 def threshold_slip(r: Rates, s: Sizes) -> Rates:
     """W less by a share `size` as soon as it turns faster than 0.4 rad/s."""
     return replace(r, w=np.where(np.abs(r.w) > 0.4, r.w * (1 - s["size"]), r.w))
+
+
+def flat_spot(r: Rates, s: Sizes) -> Rates:
+    """V less by a share `size` for a tenth of a turn of a wheel: where it was stood on for a winter."""
+    turn = np.cumsum(np.abs(r.v)) * STEP / s["girth"] - s["spot"]
+    return replace(r, v=r.v * (1 - s["size"] * np.exp(-((turn - np.round(turn)) ** 2) / (2 * 0.05**2))))
+
+
+def derating(r: Rates, s: Sizes) -> Rates:
+    """V less from a moment on, within 8 s by a share `size`: the controller is hot and saves itself."""
+    return replace(r, v=r.v * (1 - s["size"] * np.clip((r.t - s["moment"]) / 8.0, 0.0, 1.0)))
+
+
+def draught(r: Rates, s: Sizes) -> Rates:
+    """A turn of `size` [rad/s] beside an open door: within half a metre of y = `door` from where the drive began."""
+    turns = (STEP * (r.w + r.moving * r.noise[:, 2])).tolist()
+    ahead = (STEP * (r.v + r.moving * r.noise[:, 0])).tolist()
+    aside = (STEP * r.moving * r.noise[:, 1]).tolist()
+    heading, y = float(r.start[2]), -s["door"]
+    push = np.empty(len(turns))
+    for k, (turn, moving) in enumerate(zip(turns, r.moving.tolist(), strict=True)):
+        push[k] = s["size"] * moving * math.exp(-(y**2) / (2 * 0.5**2))
+        turn += STEP * push[k]
+        y += ahead[k] * math.sin(heading + turn / 2) + aside[k] * math.cos(heading + turn / 2)
+        heading += turn
+    return replace(r, w=r.w + push)
 
 
 def sector_bias(c: Scans, s: Sizes) -> Scans:
@@ -128,6 +164,15 @@ STRANGE_BASE: dict[str, Strange] = {
     "bump": Strange(Form("floor", bump), 0.02, "base.v", ("v", "|v|")),
     "swing": Strange(Form("floor", swing), 0.02, "base.w", ("t", "time"), _uniform("phase", -np.pi, np.pi)),
     "threshold_slip": Strange(Form("floor", threshold_slip), 0.1, "base.w", ("w", "|w|")),
+    "flat_spot": Strange(
+        Form("floor", flat_spot),
+        0.1,
+        "base.v",
+        ("distance",),
+        lambda rng: {"girth": float(rng.uniform(0.8, 1.3)), "spot": float(rng.random())},
+    ),
+    "derating": Strange(Form("floor", derating), 0.1, "base.v", ("t", "time"), _uniform("moment", 15.0, 40.0)),
+    "draught": Strange(Form("floor", draught), 0.05, "base.w", ("y", "position"), _uniform("door", -0.5, 0.5)),
 }
 STRANGE_LASER: dict[str, Strange] = {
     "sector_bias": Strange(

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Curves about the fit that they are tried beside: what follows a rate is another curve where the rate is another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kurumaisu.critic import replay
+from kurumaisu.critic.evidence import Fit, Problem
+from kurumaisu.critic.smooth import Design
+from kurumaisu.types import FloatArray
+
+# Share of the rates by which another fit may differ. Effects that make up for each other, such as a gain of -0.6 and a
+# dead zone, leave rates over which no step of the true ones is a step.
+_NEAR = 0.1
+
+
+class Designs:
+    """The curves of a problem, about the best set, and about others that make much of the rates."""
+
+    def __init__(self, problem: Problem, best: Fit) -> None:
+        self._problem = problem
+        self._made = [(self._rates(best), Design(problem, best.settings))]
+        self._of = {best.candidates: self._made[0][1]}
+
+    def about(self, fit: Fit) -> Design:
+        """Return the design about a fit, or about another one that has nearly the same rates."""
+        if fit.candidates not in self._of:
+            rates = self._rates(fit)
+            near = [design for other, design in self._made if _near(rates, other)]
+            if not near:
+                near = [Design(self._problem, fit.settings)]
+                self._made.append((rates, near[0]))
+            self._of[fit.candidates] = near[0]
+        return self._of[fit.candidates]
+
+    def _rates(self, fit: Fit) -> FloatArray:
+        """Return v and w of all drives, (2, n)."""
+        motions = [replay.motion(drive, self._problem.model, fit.settings) for drive in self._problem.drives]
+        return np.concatenate([np.stack([motion.v, motion.w]) for motion in motions], axis=1)
+
+
+def _near(one: FloatArray, other: FloatArray) -> bool:
+    apart, size = (np.sqrt(np.mean(rates**2, axis=1)) for rates in (one - other, other))
+    return bool(np.all(apart <= _NEAR * size))
