@@ -11,7 +11,7 @@ from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, co
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
 from kurumaisu.critic.laser.verdicts import size_of
-from kurumaisu.critic.laser.whole_scans import with_whole_scans
+from kurumaisu.critic.laser.whole_scans import beyond, with_whole_scans
 from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.params import EffectSetting
 
@@ -134,3 +134,12 @@ def test_a_common_mode_that_all_scans_show_is_named_unless_something_may_stand_i
     assert with_whole_scans([], CommonMode(3.0, 0.5, 0.9), noise, _recording(), None) == []
     taken = Scatter(_at("laser.heavy_tails", inverse_nu=0.2), 0.6, 9.0, {}, {"laser.common_mode": 0.4})
     assert with_whole_scans([taken], sure, noise, _recording(), None) == [taken]
+
+
+def test_a_common_mode_as_small_as_what_equations_miss_is_none():
+    seen = [
+        Scatter(_at("laser.common_mode", sd=4e-4, rho=0.5), 1.0, 20.0, {}, {}),
+        Scatter(_at("laser.dropout"), 1.0, 20.0, {}, {}),
+    ]
+    assert beyond(seen, 3e-4) == seen
+    assert beyond(seen, 5e-4) == seen[1:]

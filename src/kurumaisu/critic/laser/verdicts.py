@@ -23,7 +23,7 @@ from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.supply import every_id, supplier
 from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
-from kurumaisu.critic.laser.whole_scans import with_whole_scans
+from kurumaisu.critic.laser.whole_scans import beyond, with_whole_scans
 from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.story import Comparison
@@ -32,6 +32,7 @@ from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
+_MISSED = 0.15  # of what varies by effects on the mean: their equations may miss as much, and whole scans are off by it
 _SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
 Progress = Callable[[str], None]
 
@@ -86,6 +87,7 @@ def criticise(
     scatter, comparison = _scatter(assembly, normal, fit, ids)
     seen = assembly.common_mode(normal, recording.truth, made.fit.forms)
     scatter = with_whole_scans(scatter, seen, normal.scan_noise, recording, ids)
+    scatter = beyond(scatter, _MISSED * _spread_of(assembly, normal, made))
     finding = _finding(assembly, normal, made, fit, scatter)
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
@@ -233,6 +235,13 @@ def size_of(change: FloatArray) -> float:
     """Return how far [m] an effect moves the readings that it moves: of dark walls, say, not divided by all."""
     power = change.astype(float) ** 2
     return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))
+
+
+def _spread_of(assembly: Assembly, normal: Normal, made: _Made) -> float:
+    """Return by how much [m] what acts on the mean moves some readings more than others."""
+    valid = normal.beam_noise.valid
+    moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in made.parts()]
+    return float(np.std(sum(moved))) if moved else 0.0
 
 
 def _gain(made: _Made, name: str) -> float:

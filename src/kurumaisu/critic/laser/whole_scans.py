@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.special import expit
 
 from kurumaisu import effects
 from kurumaisu.critic.laser.noise import CommonMode, ScanNoise
@@ -47,7 +48,7 @@ def with_whole_scans(
     """
     count, out = len(effects.LASER), list(scatter)
     nats = seen.nats + log_prior(1, count) - log_prior(0, count)
-    p = 1.0 / (1.0 + float(np.exp(-nats)))
+    p = float(expit(nats))
     for whole in together() if p >= NAMED else ():
         known = next((each for each in out if each.setting.id == whole.id), None)
         if known is None and any(each.rivals.get(whole.id, 0.0) >= RIVAL for each in out):
@@ -63,6 +64,16 @@ def with_whole_scans(
         rest = [each for each in out if each is not known]
         out = [*rest, Scatter(EffectSetting(whole.id, values), p, max(nats, known.nats if known else nats), sds, {})]
     return out
+
+
+def beyond(scatter: Sequence[Scatter], least: float) -> list[Scatter]:
+    """Return effects on the scatter without those that have whole scans off together by less than `least` [m]."""
+    sizes = {whole.id: whole.size.name for whole in together()}
+    return [
+        each
+        for each in scatter
+        if each.setting.id not in sizes or each.setting.parameters[sizes[each.setting.id]] >= least
+    ]
 
 
 def _tried() -> Iterator[Together]:
