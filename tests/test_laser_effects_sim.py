@@ -139,7 +139,8 @@ def plain(tmp_path_factory) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("effect", effects.ALL, ids=lambda effect: effect.id)
 def test_every_effect_can_be_switched_on_in_a_file(tmp_path, plain, effect):
-    typical = {p.name: p.null + p.scale for p in effect.parameters}
+    usual = effect.forms[0] if effect.forms else {}
+    typical = {p.name: p.null + p.scale for p in effect.parameters} | dict(usual)
     on, off = run(tmp_path, {effect.id: typical}), run(tmp_path, {effect.id: NULLS[effect.id]})
     assert any(a.shape != b.shape or not np.array_equal(a, b, equal_nan=True) for a, b in zip(on, plain, strict=False))
     for a, b in zip(off, plain, strict=True):
