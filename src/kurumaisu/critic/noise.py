@@ -6,7 +6,7 @@ Taking it from a table, or treating increments as independent, makes a critic na
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 
@@ -54,6 +54,12 @@ _CEILING = dict.fromkeys(vars(START), 3.0) | {"sd_w": 10.0, "tau": 20.0, "slow_t
 ONE_COLOUR = ("position_sd", "heading_sd", "sd_v", "sd_lateral", "sd_w", "tau")
 _SECOND = ("slow_v", "slow_lateral", "slow_w", "slow_tau")
 _GROWN = (0.3, 1.0, 3.0)  # from which growth is searched for: from a single one the search sticks half way
+_HINTED_GROWTH = (
+    0.1,
+    0.3,
+    1.0,
+)  # one of which explains more if the noise grows: a hundredth of the price of the searches
+_HINTED = 0.5  # [nat] more, at least
 _GROWING = ("sd_v", "sd_lateral", "sd_w", "slow_v", "slow_lateral", "slow_w")
 _RESTLESS = (0.1, 0.3, 1.0)  # shares of its noise that a chair at rest may have, which are tried
 _HINTS = (0.1, 0.5, 1.0, 3.0)  # of a second colour's usual size
@@ -159,11 +165,19 @@ class Scatter:
 
     def growth(self, about: Estimate, prior_odds: float) -> Growth:
         """Return how likely it is that the noise grows with the rates, about the estimate of noise that does not."""
-        names = (*_free(about.noise), *(_SECOND if about.noise.slow_v else ()))
-        growing = min((self._best(_grown(about.noise, size), (*names, "growth")) for size in _GROWN), key=_cost_of)
+        growing = min(
+            (self._best(start, names) for start, names in self._growing(about.noise)), key=_cost_of, default=about
+        )
         better = max(about.cost - growing.cost, 0.0)
         nats = better - float(occam(np.sqrt(2 * better), sides=1))
         return Growth(float(expit(nats + np.log(prior_odds))), nats, growing.noise)
+
+    def _growing(self, about: Noise) -> Iterator[tuple[Noise, tuple[str, ...]]]:
+        """Yield what to begin with, and what is searched for; nothing where some growth explains no more than none."""
+        alone = self._cost(about)
+        if min(self._cost(_grown(about, size)) for size in _HINTED_GROWTH) < alone - _HINTED:
+            names = (*_free(about), *(_SECOND if about.slow_v else ()), "growth")
+            yield from ((_grown(about, size), names) for size in _GROWN)
 
     def _best(self, start: Noise, names: Sequence[str]) -> Estimate:
         if self._truth is not None:

@@ -18,7 +18,6 @@ _PARAMETERS = (
 _FORMS = (
     {"even": 0.0, "whole": 0.0},
     {"even": 1.0, "whole": 0.0},
-    {"even": 0.0, "whole": 1.0},
     {"even": 1.0, "whole": 1.0},
 )
 
