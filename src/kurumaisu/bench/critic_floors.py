@@ -27,12 +27,12 @@ class Part:
     family: str
     form: str = "other"
 
-    def jobs(self, draws: int, seed: int) -> Iterator[Job]:
-        """Return the draws of each name there is, or as many times `_NAMELESS` where there is none."""
+    def jobs(self, draws: int, seed: int, *, baselines: bool) -> Iterator[Job]:
+        """Yield the draws of each name there is, or as many times `_NAMELESS` where there is none."""
         named = self.kind in ("single", "unknown", "wrong", "confounded")
         asked = [(name,) for name in names_of(self.kind, self.family)] if named else [()] * _NAMELESS
         for i, ids in enumerate(ids for ids in asked for _ in range(draws)):
-            yield Job(Ask(self.kind, ids, form=self.form, family=self.family), seed + i, self.family == "base")
+            yield Job(Ask(self.kind, ids, form=self.form, family=self.family), seed + i, baselines)
 
 
 BASE, LASER = Part("single", "base"), Part("single", "laser")
@@ -139,7 +139,8 @@ def run(options: argparse.Namespace) -> int:
     parts = dict.fromkeys(part for figure in FIGURES for part in figure.parts)
     for part in parts:
         print(f"{part.kind}, {part.family}, {part.form} form ...", flush=True)
-        jobs = list(part.jobs(options.draws, options.seed))
+        compared = any(figure.compared and part in figure.parts for figure in FIGURES)
+        jobs = list(part.jobs(options.draws, options.seed, baselines=compared))
         answers[part] = all_answers(jobs, options.jobs, options.log)
     title = f"{options.draws} draws, seeds from {options.seed}; shares with 90 % intervals, and of how many"
     table = Table(title, "figure", "floor    ", *(f"{who:<24}" for who in ("critic", *BASELINES)))

@@ -54,11 +54,8 @@ _CEILING = dict.fromkeys(vars(START), 3.0) | {"sd_w": 10.0, "tau": 20.0, "slow_t
 ONE_COLOUR = ("position_sd", "heading_sd", "sd_v", "sd_lateral", "sd_w", "tau")
 _SECOND = ("slow_v", "slow_lateral", "slow_w", "slow_tau")
 _GROWN = (0.3, 1.0, 3.0)  # from which growth is searched for: from a single one the search sticks half way
-_HINTED_GROWTH = (
-    0.1,
-    0.3,
-    1.0,
-)  # one of which explains more if the noise grows: a hundredth of the price of the searches
+# One of these explains more where the noise grows, which costs a hundredth of the searches.
+_HINTED_GROWTH = (0.1, 0.3, 1.0)
 _HINTED = 0.5  # [nat] more, at least
 _GROWING = ("sd_v", "sd_lateral", "sd_w", "slow_v", "slow_lateral", "slow_w")
 _RESTLESS = (0.1, 0.3, 1.0)  # shares of its noise that a chair at rest may have, which are tried
@@ -137,15 +134,15 @@ class Scatter:
 
     def _restless(self, still: Estimate) -> Estimate:
         """Return the noise of a chair that fluctuates at rest, too, if that explains more."""
+        if still.noise.rest > START.rest:
+            return still
         tried = (
             replace(still.noise, rest=rest, sd_v=k * still.noise.sd_v, sd_w=k * still.noise.sd_w)
             for rest in _RESTLESS
             for k in (1.0, 0.7)
         )
         cost, start = min(((self._cost(noise), noise) for noise in tried), key=itemgetter(0))
-        if still.noise.rest > START.rest or cost > self._cost(still.noise) - _WORTH:
-            return still
-        return self._best(start, _free(start))
+        return self._best(start, _free(start)) if cost <= self._cost(still.noise) - _WORTH else still
 
     def _hints_at(self, one: Noise, slow: dict[str, float]) -> bool:
         """Tell whether some of a second colour explains more than none: a tenth of the price of a search."""
