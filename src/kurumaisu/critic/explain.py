@@ -24,7 +24,7 @@ from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.restarted import PICTURE, RESTART, restarted
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.story import Misfit, Noise, Overlay, Story
-from kurumaisu.critic.verdict import Cause, Gain, Kind, Verdict
+from kurumaisu.critic.verdict import Cause, Estimate, Gain, Kind, Verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -89,7 +89,8 @@ def criticism(
     felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     kind = _kind(found, matters)
-    causes = tuple(_cause(problem, found, name) for name in found.named if name in matters)
+    fitted = {name: sizes.estimates(problem, best, name) for name in sorted(best.ids)}
+    causes = tuple(_cause(problem, found, name, fitted[name]) for name in found.named if name in matters)
     # Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
     asked = problem.ids is None or process_noise(problem).id in problem.ids
     least = _GROWTH_BESIDE if made.something else _GROWTH_ALONE
@@ -109,7 +110,7 @@ def criticism(
         recording=recording.name,
         model=problem.model.name,
         headline=words.headline(verdict, found, matters, shares),
-        details=words.details(problem, found, drives, shares, matters),
+        details=words.details(problem, found, drives, fitted, shares, matters),
         pose_source=_pose_source(recording),
         provenance=_provenance(recording),
         overlays=overlays(recording, problem.model, settings or None),
@@ -132,10 +133,9 @@ def _kind(found: Naming, matters: set[str]) -> Kind:
     return "named" if matters & set(found.named) else "confounded" if found.confounded else "none"
 
 
-def _cause(problem: Problem, found: Naming, name: str) -> Cause:
+def _cause(problem: Problem, found: Naming, name: str, parameters: dict[str, Estimate]) -> Cause:
     rest = {candidate for candidate in found.best.candidates if candidate.id != name}
     without = problem.fit_candidates(rest, found.best.start)
-    parameters = sizes.estimates(problem, found.best, name)
     return Cause(name, min(found.p[name], 1.0), parameters, found.best.score - without.score)
 
 

@@ -13,7 +13,6 @@ from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.types import FloatArray
 
 _ALIKE = 0.9  # correlation of signals from which a curve draws an effect; noise alone bends a curve by as much
-_FINER = 4  # knots for one of a curve's
 FORM = 0.15  # share of its signal by which a chair's fault may differ from the catalogue's equation for it
 
 
@@ -54,7 +53,7 @@ class Likeness:
         """
         if not fit.ids:
             return set()
-        finer = replace(curve, basis=curve.basis.finer(_FINER))
+        finer = replace(curve, basis=curve.basis.finer())
         free = columns(self._problem, fit.settings, [finer])
         if curve.channel.endswith("_gain"):  # a curve of factors may be one about another gain than 1
             level = free[:, :1] if not len(curve.basis.knots) else free.sum(axis=1, keepdims=True)

@@ -21,6 +21,7 @@ _TURN = 2 * np.pi
 _ROUNDING = 1e-6  # of a quantity's size: less spread is none
 # Before the data, neighbouring knots differ at random (1), or so do neighbouring slopes (2): rough or smooth.
 _ORDERS = (1, 2)
+_FINER = 4  # knots for one
 
 
 @dataclass(frozen=True)
@@ -54,12 +55,12 @@ class Basis:
         """Return the basis at values of the covariate (n,), (n, k)."""
         return _matrix(self.knots, self.constants.get("period", 0.0), at)
 
-    def finer(self, times: int) -> Basis:
-        """Return the curves over the same with that many knots for one, which hold these; waves are what they are."""
+    def finer(self) -> Basis:
+        """Return the curves over the same with `_FINER` knots for one, which hold these; waves are what they are."""
         count = len(self.knots)
         if not count:
             return self
-        at = np.linspace(0, count - 1, times * (count - 1) + 1)
+        at = np.linspace(0, count - 1, _FINER * (count - 1) + 1)
         knots = np.interp(at, np.arange(count), self.knots)
         return replace(self, knots=knots, priors=())
 

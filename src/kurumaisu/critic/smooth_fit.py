@@ -17,7 +17,6 @@ from kurumaisu.critic.smooth_basis import Basis
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
-_FINER = 4  # knots for one of a curve's
 _ROUNDS = 3  # from columns linearised anew; the curve itself is linear in all but the path it leads to
 
 
@@ -77,7 +76,7 @@ def simulated_columns(problem: Problem, drive: Drive, extension: Extension, *, f
     known = own.simulated_columns(drive, extension.fit)
     curve = extension.curve
     if finer:
-        curve = replace(curve, basis=extension.basis.finer(_FINER))
+        curve = replace(curve, basis=extension.basis.finer())
     return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [curve])])
 
 

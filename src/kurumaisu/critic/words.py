@@ -3,19 +3,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic import naming, sizes
+from kurumaisu.critic import naming
 from kurumaisu.critic.digits import quantities, with_interval
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import HORIZON, MATERIAL
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.story import Rival
-from kurumaisu.critic.verdict import Cause, Verdict
+from kurumaisu.critic.verdict import Cause, Estimate, Verdict
 
 _MINUTE = 60.0  # [s]
 _CAUSES_TOLD = 4  # in a headline
@@ -79,17 +79,22 @@ def _sizes(cause: Cause) -> str:
 
 
 def details(
-    problem: Problem, found: Naming, drives: Sequence[Drive], shares: dict[str, float], matters: set[str]
+    problem: Problem,
+    found: Naming,
+    drives: Sequence[Drive],
+    sizes: Mapping[str, Mapping[str, Estimate]],
+    shares: dict[str, float],
+    matters: set[str],
 ) -> tuple[str, ...]:
-    """Return what a reader should know next; shares: how far each effect of the best set moves the chair."""
+    """Return what a reader should know next; sizes, shares: of each effect, and by which it moves the chair."""
     seconds = sum(float(drive.times[-1] - drive.times[0]) for drive in drives)
     said = [
         f"{len(drives)} drive{'s' * (len(drives) > 1)}, {seconds:.0f} s, replayed from the {drives[0].source} channel.",
     ]
     fitted: dict[str, list[str]] = {}
     forms = {term.key: term.parameter for term in found.best.terms if term.fixed}
-    for name in sorted(found.best.ids):
-        for parameter, e in sizes.estimates(problem, found.best, name).items():
+    for name, own in sizes.items():
+        for parameter, e in own.items():
             form = forms.get((name, parameter))
             if form is None:
                 fitted.setdefault(name, []).append(f"{parameter} {with_interval(e.estimate, e.lo90, e.hi90, e.unit)}")
