@@ -93,8 +93,8 @@ void Tcp::reset() {
 }
 
 void Tcp::unplug() {
+  listener_.close();  // first: whom the reset wakes must find nobody
   reset();
-  listener_.close();
 }
 
 void Tcp::ignore() {
