@@ -218,6 +218,10 @@ def test_wrong_shapes_are_refused():
 
 
 def test_ten_at_once_lose_nothing():
+    in_its_turn(check_ten_at_once)
+
+
+def check_ten_at_once():
     urgs = [VirtualUrg(USB, Tcp()) for _ in range(10)]
     clients = [Client(urg.port) for urg in urgs]
     spent = time.process_time()
