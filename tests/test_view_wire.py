@@ -24,11 +24,18 @@ def packed(view):
 @pytest.mark.parametrize("frame", ["map", "", "Grundriß"])
 @pytest.mark.parametrize(
     "shape",
-    [Shape(3, 2, 9, 9, 9), Shape(3, 2, 9, 0, 9), Shape(3, 0, 0, 0, 0), Shape(0, 1, 4, 4, 4), Shape(0, 0, 0, 0, 0)],
+    [
+        Shape(3, 2, 2, 9, 9, 9),
+        Shape(3, 1, 2, 9, 0, 9),
+        Shape(3, 3, 0, 0, 0, 0),
+        Shape(0, 0, 1, 4, 4, 4),
+        Shape(0, 0, 0, 0, 0, 0),
+    ],
 )
 def test_as_genpy_has_it(frame, shape):
     rng = np.random.default_rng(1)
     poses = rng.normal(size=(shape.bodies, 3))
+    odometry = rng.normal(size=(shape.robots, 3))
     looks = Looks(
         stamps=np.arange(shape.fans) * NS + 4_000_000_005,
         poses=rng.normal(size=(shape.fans, 3)),
@@ -43,12 +50,14 @@ def test_as_genpy_has_it(frame, shape):
         wire.poses[:] = poses
         wire.hit[:] = 1
         wire.contacts[:] = np.arange(shape.bodies) + 1000
+        wire.odometry[:] = odometry
         wire.fill(looks)
 
     view = View(world=5, run=6, paused=True, speed=2.5, real_time_factor=1.25)
     view.header.seq, view.header.stamp, view.header.frame_id = 8, rospy.Time(12, 34), frame
     view.poses, view.hit = poses.ravel().tolist(), bytes([1] * shape.bodies)
     view.contacts = [1000 + i for i in range(shape.bodies)]
+    view.odometry = odometry.ravel().tolist()
     view.stamps = [rospy.Time(i + 4, 5) for i in range(shape.fans)]
     view.sensors = looks.poses.ravel().tolist()
     view.ranges, view.intensities = looks.ranges.tolist(), looks.intensities.tolist()

@@ -72,6 +72,13 @@ class ViewerFleetTest(unittest.TestCase):
         assert abs(abs(headings[1] - headings[0]) - np.pi) < 1e-3
         assert abs(np.frombuffer(front, "<f4", offset=8)[7 + 45] - 3.8) < 0.01  # the wall before it
 
+    def test_odometry_is_beside_the_truth(self):
+        scout = self.bodies["scout"]["id"]
+        state = self.drive("scout", 0.5, lambda state: state["poses"][scout][0] > 1.0)
+        truth = state["truth"][0]
+        assert abs(state["odom"][0] / truth - 1.1) < 0.01, state  # the world file has it a tenth too far
+        assert abs(state["odom"][1]) < 1e-6
+
     def test_walls_are_where_the_world_has_them(self):
         for name, box in (("east", [[3.9, -4.0], [4.1, 4.0]]), ("north", [[-4.0, 4.9], [4.0, 5.1]])):
             wall = self.bodies[name]

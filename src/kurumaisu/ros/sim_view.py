@@ -97,6 +97,7 @@ class ViewTopics:
         wire.poses[:] = machinery.frames[:-1, PLANAR]
         wire.hit[:] = machinery.stalled
         wire.contacts[:] = self._contacts
+        wire.odometry[:] = machinery.localization.believed()
         if looks is not None:
             wire.fill(looks)
         self._view.send(wire.data)
@@ -127,12 +128,12 @@ class ViewTopics:
 
     def _wire(self, machinery: Machinery, looks: Looks | None) -> ViewWire:
         """Return what has room for this, made once: shapes change with the world only."""
-        bodies = len(machinery.stalled)
+        bodies, robots = len(machinery.stalled), len(machinery.robots)
         if looks is None:
-            shape = Shape(bodies, 0, 0, 0, 0)
+            shape = Shape(bodies, robots, 0, 0, 0, 0)
         else:
             truths = 0 if looks.truths is None else len(looks.truths)
-            shape = Shape(bodies, len(looks.stamps), len(looks.ranges), truths, len(looks.intensities))
+            shape = Shape(bodies, robots, len(looks.stamps), len(looks.ranges), truths, len(looks.intensities))
         if shape not in self._wires:
             self._wires[shape] = ViewWire(self._frame, shape)
         return self._wires[shape]
@@ -151,6 +152,7 @@ class ViewTopics:
             "world": self._number,
             "bounds": bounds(pieces),
             "bodies": [{**_described(piece), "drive": drives.get(piece.row)} for piece in pieces],
+            "robots": machinery.robot_rows.tolist(),  # rows of those whose odometry a View has
             "fans": self._fans.places(machinery),
         }
         self._world.publish(json.dumps(content))

@@ -20,6 +20,7 @@ class Shape:
     """How long the parts are; truths and intensities: beams, or 0 if there are none."""
 
     bodies: int
+    robots: int
     fans: int
     beams: int
     truths: int
@@ -39,6 +40,7 @@ class ViewWire:
             "poses": ("<f8", 3, shape.bodies),
             "hit": ("u1", 1, shape.bodies),
             "contacts": ("<u4", 1, shape.bodies),
+            "odometry": ("<f8", 3, shape.robots),
             "stamps": ("<u4", 2, shape.fans),
             "sensors": ("<f8", 3, shape.fans),
             "ranges": ("<f4", 1, shape.beams),
@@ -62,6 +64,7 @@ class ViewWire:
         for field, number in counts.items():
             self._set(f"{field}_length", number)
         self.poses, self.hit, self.contacts = map(self._row, ("poses", "hit", "contacts"))
+        self.odometry = self._row("odometry")
         self.stamps, self.sensors = self._row("stamps"), self._row("sensors")
         self.ranges, self.truths, self.intensities = map(self._row, ("ranges", "truths", "intensities"))
 

@@ -36,6 +36,7 @@ class Robot:
         self._mount = np.array([mount.x, mount.y, mount.yaw])
         self._footprint = _footprint(model)
         self.run = 0
+        self.odometry = None  # none but a base controller's
 
     def open(self) -> None:
         """Listen."""

@@ -38,6 +38,7 @@ class Simulation:
         self._described = Newest(f"{node}/world", String)
         self._world: dict[str, Any] = {}
         self.run = -1  # goes up when a robot was put elsewhere
+        self.odometry: FloatArray | None = None  # (3,) of the first robot, in its own frame; None: it is told its pose
         self._known: dict[str, Any] = {}  # of the last view
 
     def open(self) -> None:
@@ -59,6 +60,7 @@ class Simulation:
         if view is None or view.world != self._world.get("world"):  # its description is yet to come
             return (self._known, {}) if self._known else None
         self.run = view.run
+        self.odometry = self._believed(view)
         moving = np.asarray(view.poses).reshape(-1, 3)
         still = (body for body in self._world["bodies"] if body["row"] < 0 and body["kind"] != "wall")
         poses = {body["id"]: tuple(body["pose"]) for body in still}
@@ -116,6 +118,13 @@ class Simulation:
         world["first"] = robots[0]["id"] if robots else None
         bodies = tuple(_body(body, self._is_drivable(body)) for body in world["bodies"])
         self._hub.world(World(bodies, world["bounds"], world["first"]))
+
+    def _believed(self, view: Any) -> FloatArray | None:
+        every: FloatArray = np.asarray(view.odometry).reshape(-1, 3)
+        for row, pose in zip(self._world["robots"], every, strict=True):
+            if self._rows.get(row) == self._world["first"] and not np.isnan(pose).any():
+                return pose
+        return None
 
     def drives(self) -> dict[str, str | None]:
         """Return the topics of the robots that can be driven; None: the chair, which has a controller of its own."""

@@ -166,9 +166,7 @@ class RosSource:
 
     def _odom(self, truth: FloatArray | None) -> FloatArray | None:
         """Return where odometry has the robot, laid on the truth, or on the map, where it began."""
-        if self._chair is None:
-            return None
-        pose = self._chair.pose()
+        pose = self._scene.odometry if self._chair is None else self._chair.pose()
         if pose is None:
             return None
         if self._run != self._scene.run:

@@ -57,6 +57,10 @@ class Localization:
         chosen = ~self._given if whose is None else ~self._given & whose
         np.copyto(self.shares, drawn, where=chosen[:, np.newaxis])
 
+    def believed(self) -> FloatArray:
+        """Return the estimates (n, 3), NaN of those that are told where they are."""
+        return np.where(self._odom[:, np.newaxis], self.estimates, np.nan)
+
     def update(self, due: Rows, poses: FloatArray, velocities: FloatArray, rng: np.random.Generator) -> None:
         """Update those due; poses (n, 4) are true; velocities (n, 3) wanted [m/s, rad/s].
 
