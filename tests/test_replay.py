@@ -16,7 +16,7 @@ import rosbag
 from kurumaisu.bench.processes import master, running
 from kurumaisu.critic.reading import read_recording
 
-PATIENCE = 60.0  # [s] of wall time for a process to end
+PATIENCE = 180.0  # [s] of wall time for a process to end
 TICK = 0.02  # [s] of base_node
 CLOCK = 0.005  # [s] between messages of replay.launch's clock
 DRIVES = (("0.5", "0.4"), ("-0.2", "0.5"))  # v [m/s], w [rad/s]

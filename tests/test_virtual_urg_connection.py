@@ -203,6 +203,10 @@ def test_without_strictness_any_rate_will_do(tmp_path):
 
 
 def test_bytes_take_their_time_on_a_serial_line(tmp_path):
+    in_its_turn(lambda: check_serial_line(tmp_path))
+
+
+def check_serial_line(tmp_path):
     with VirtualUrg(SERIAL, Pty(tmp_path / "urg"), line_rate=True) as urg, Client(urg.address) as client:
         client.ask(b"SCIP2.0")
         took = []

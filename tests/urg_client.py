@@ -124,6 +124,6 @@ def in_its_turn(check, tries=5):
     for _ in range(tries - 1):
         try:
             return check()
-        except AssertionError:
+        except (AssertionError, EOFError, OSError):
             continue
     return check()
