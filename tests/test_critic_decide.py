@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is decided after the search: which sets stay open, and when all is judged anew."""
 
+from collections import defaultdict
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,7 +22,7 @@ def fit_of(names):
 
 
 def found_of(*sets, confounded=()):
-    return Naming((*map(fit_of, sets), fit_of("")), {}, confounded, 0.0)
+    return Naming((*map(fit_of, sets), fit_of("")), defaultdict(lambda: 1.0), confounded, 0.0)
 
 
 def decision(found, better=None):

@@ -16,6 +16,7 @@ from kurumaisu.critic.evidence import Fit
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.stand_ins import Posterior, confounded
+from kurumaisu.types import FloatArray
 
 # What an equation misses, as a share of the signal's norm: soft corners and second orders do.
 _MISSED = 0.1
@@ -25,11 +26,19 @@ _DIRECTIONS = 45
 
 def believed(found: Naming, p: Mapping[str, float]) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
     """Return probabilities p of effects as far as the evidence is believed, and the sets that cannot be told apart."""
-    square = 2 * (found.best.log_likelihood - found.empty.log_likelihood)  # z^2 of all that acts
-    variance = 1 + _MISSED**2 * max(square, 0.0) / _DIRECTIONS
-    posterior = Posterior(found.fits, softmax(np.array([_worth(found, fit) for fit in found.fits]) / variance))
+    variance = _variance(found)
     shares = {name: float(expit(logit(np.clip(share, 0.0, 1.0)) / variance)) for name, share in p.items()}
-    return shares, confounded(posterior)
+    return shares, confounded(Posterior(found.fits, weights(found)))
+
+
+def weights(found: Naming) -> FloatArray:
+    """Return how likely each set is, as far as the evidence is believed."""
+    return np.asarray(softmax(np.array([_worth(found, fit) for fit in found.fits]) / _variance(found)))
+
+
+def _variance(found: Naming) -> float:
+    square = 2 * (found.best.log_likelihood - found.empty.log_likelihood)  # z^2 of all that acts
+    return 1 + _MISSED**2 * max(square, 0.0) / _DIRECTIONS
 
 
 def _worth(found: Naming, fit: Fit) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic import coarse, gain, naming, noise, predict_doubt, replay, smooth_fit, smooth_judge
+from kurumaisu.critic import coarse, doubtful, gain, naming, noise, predict_doubt, replay, smooth_fit, smooth_judge
 from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
@@ -71,7 +71,8 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
         found = made.found if better is None else replace(made.found, fits=(better, *made.found.fits))
         if found.best.ids == before:
             break
-    return made
+    settled = made.found if made.beyond.extension is not None else doubtful.left_out(made.found)
+    return made if settled is made.found else replace(made, found=settled)
 
 
 def _judged(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from kurumaisu.critic import misfit, naming, replay, sizes, words
+from kurumaisu.critic import doubtful, misfit, naming, replay, sizes, words
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
@@ -89,7 +89,7 @@ def criticism(
     felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     kind = _kind(found, matters)
-    fitted = {name: sizes.estimates(problem, best, name) for name in sorted(best.ids)}
+    fitted = {name: doubtful.widened(found, name, sizes.estimates(problem, best, name)) for name in sorted(best.ids)}
     causes = tuple(_cause(problem, found, name, fitted[name]) for name in found.named if name in matters)
     # Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
     asked = problem.ids is None or process_noise(problem).id in problem.ids

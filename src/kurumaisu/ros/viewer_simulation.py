@@ -123,7 +123,7 @@ class Simulation:
         every: FloatArray = np.asarray(view.odometry).reshape(-1, 3)
         for row, pose in zip(self._world["robots"], every, strict=True):
             if self._rows.get(row) == self._world["first"] and not np.isnan(pose).any():
-                return pose
+                return np.asarray(pose)
         return None
 
     def drives(self) -> dict[str, str | None]:
