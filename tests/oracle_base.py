@@ -149,7 +149,10 @@ def backlash(p, drive):
 
 @_rates("base.battery_sag")
 def battery_sag(p, drive):
-    """The mean over a step of 1 - sag t, which is 0 once it has come there: by the parts of a thousand."""
+    """The mean over a step of 1 - sag t, which is 0 once it has come there: by the parts of a thousand.
+
+    A drive by itself is its own recording: through changes nothing.
+    """
     v, w, parts = [], [], 1000
     for k in range(len(drive.v)):
         times = [drive.dt * (k + (j + 0.5) / parts) for j in range(parts)] if k % 50 == 0 else [drive.dt * (k + 0.5)]

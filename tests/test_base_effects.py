@@ -58,7 +58,7 @@ STATIC = [
     ),
     (
         "base.battery_sag",
-        {"sag": 0.1},
+        {"sag": 0.1, "through": 1.0},
         V * (1 - 0.1 * DT * (0.5 + np.arange(6))),
         W * (1 - 0.1 * DT * (0.5 + np.arange(6))),
     ),

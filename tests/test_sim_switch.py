@@ -185,7 +185,12 @@ def test_changed_effects_are_saved_and_others_are_refused(world):
 def test_time_begins_when_an_effect_is_switched_on(world):
     it = start(world)
     drive(it, AHEAD, 200)
-    it.switch((EffectSetting("base.battery_sag", {"sag": 0.1}), EffectSetting("base.clock_scale", {"scale": 0.1})))
+    it.switch(
+        (
+            EffectSetting("base.battery_sag", {"sag": 0.1, "through": 0.0}),
+            EffectSetting("base.clock_scale", {"scale": 0.1}),
+        )
+    )
     rows = drive(it, AHEAD, 100)[0]
     times = 0.01 * np.arange(100)
     np.testing.assert_allclose(rows[:, 3], 0.4 * (1 - 0.1 * (times + 0.005)), rtol=1e-9)

@@ -24,6 +24,7 @@ from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.replay import model_of
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.selection import beside_odometry
+from kurumaisu.critic.sequence import timed
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.verdict import Gain, write_verdict
 from kurumaisu.errors import Error
@@ -58,19 +59,20 @@ def criticise(
     if not moved and all(run.scan is None for run in recording.runs):
         raise Error(f"{recording.runs[0].name}: has neither voltages nor commands nor odometry, and no scans either")
     with aside(recording, model, model_file, ids) as scans_say:
-        base, extension = _criticise_base(recording, model, progress, ids) if moved else (None, _UNDRIVEN)
+        whole = timed(recording)
+        base, extension = _criticise_base(whole, model, progress, ids) if moved else (None, _UNDRIVEN)
         scans = scans_say(progress)
     found = base or explain.undriven(recording, model)
     scans, settings = from_base_link(
         found.verdict.causes, scans, recording, model, lambda moved: look(moved, model, progress, ids)
     )
     found = with_laser(found, scans)
-    found = _with_worth(found, recording, replace(extension, scans=settings), progress, slam=slam)
+    found = _with_worth(found, whole, replace(extension, scans=settings), progress, slam=slam)
     if not predict.asked(recording):
         return found
     progress("predicting what was asked for")
     every = (*found.settings, *(each for each in settings if each not in found.settings))
-    return replace(found, predictions=tuple(predict.predictions(recording, model, extension.forecast, every)))
+    return replace(found, predictions=tuple(predict.predictions(whole, model, extension.forecast, every)))
 
 
 def _with_worth(

@@ -28,6 +28,7 @@ COVARIATES = {
     "wheel_left": ("wheel_left", "speed of the left wheel", "m/s"),
     "wheel_right": ("wheel_right", "speed of the right wheel", "m/s"),
     "time": ("time", "time since the start", "s"),
+    effects.RECORDING_TIME: (effects.RECORDING_TIME, "time since the first run began", "s"),
     "since_command": ("time_since_command", "time since the command changed", "s"),
     "since_reversal": ("distance_since_reversal", "distance since the last reversal", "m"),
     "heading": ("heading", "heading", "rad"),

@@ -53,7 +53,7 @@ from kurumaisu.effects.saturation import Saturation
 from kurumaisu.effects.sign import Sign
 from kurumaisu.effects.slope import Slope
 from kurumaisu.effects.smooth import CHANNELS, SMOOTH, constant_of, curve, smooth_id, smooth_of
-from kurumaisu.effects.smooth_covariates import CONSTANTS, COVARIATES, MEANINGS, PERIODIC, Follower
+from kurumaisu.effects.smooth_covariates import CONSTANTS, COVARIATES, MEANINGS, PERIODIC, RECORDING_TIME, Follower
 from kurumaisu.effects.smooth_laser import RANGE_COVARIATES, smooth_range_id, smooth_range_of
 from kurumaisu.effects.steering_law import SteeringLaw
 from kurumaisu.effects.understeer import Understeer
@@ -222,6 +222,7 @@ __all__ = [
     "MEANINGS",
     "PERIODIC",
     "RANGE_COVARIATES",
+    "RECORDING_TIME",
     "SMOOTH",
     "WORLD",
     "BaseEffect",

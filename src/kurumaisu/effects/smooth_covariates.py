@@ -20,6 +20,7 @@ CONSTANTS: Mapping[str, tuple[str, str]] = {
     "wheel_right": ("track", "m"),
     **{name: ("period", _PERIODS.get(name, "V")) for name in PERIODIC},
 }
+RECORDING_TIME = "recording_time"  # [s] since the first run began; known of recordings only
 MEANINGS: Mapping[str, str] = {
     "v": "forward speed that the effects before have left [m/s]",
     "abs_v": "its size [m/s]",
