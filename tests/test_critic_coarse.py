@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.special import logit
 
 from kurumaisu.critic import coarse
 from kurumaisu.critic.naming import Naming
@@ -35,7 +36,9 @@ def believed(strong, lead):
     weights = np.exp([0.0, -lead, -lead - 2.5])
     weights /= weights.sum()
     p = EFFECTS | {"strong": 1.0, "small": weights[0], "rival": weights[1]}
-    return coarse.believed(Naming(tuple(fits), p, (), 0.0), p)
+    with np.errstate(divide="ignore"):
+        odds = {name: float(logit(share)) for name, share in p.items()}
+    return coarse.believed(Naming(tuple(fits), p, (), 0.0), odds)
 
 
 def test_the_same_evidence_is_worth_less_beside_a_strong_cause():
@@ -58,4 +61,14 @@ def test_much_evidence_stays_certain_beside_a_strong_cause():
 def test_where_nothing_acts_probabilities_stay_as_they_are():
     fits = (fit_of({}, 0.0), fit_of({"small": 3.0}, -1.0))
     p = EFFECTS | {"small": 0.27}
-    assert coarse.believed(Naming(fits, p, (), 0.0), p)[0] == pytest.approx(p)
+    odds = {name: float(logit(share)) for name, share in p.items()}
+    assert coarse.believed(Naming(fits, p, (), 0.0), odds)[0] == pytest.approx(p)
+
+
+def test_a_cause_that_drowns_all_else_is_certain():
+    """At z = 250 log odds are 31 000: as a probability they would be 1 - 1e-16, that is 36, and be no more than 2.4."""
+    fits = (fit_of({"strong": 250.0}, 31000.0), fit_of({"strong": 250.0, "small": 1.0}, 30995.0), fit_of({}, 0.0))
+    p, sets = coarse.believed(Naming(fits, EFFECTS, (), 0.0), {"strong": 31000.0, "small": -5.0})
+    assert p["strong"] > 0.999
+    assert p["small"] == pytest.approx(np.exp(-5.0), rel=0.01)  # the doubt about the strong one makes it no likelier
+    assert sets == ()

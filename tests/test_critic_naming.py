@@ -8,6 +8,7 @@ import hidden_effect
 import numpy as np
 import pytest
 from hidden_effect import recording_of
+from scipy.special import logit
 
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.bench.hidden.base_case import run_of
@@ -148,7 +149,7 @@ def found_of(p, *fits):
 )
 def test_an_effect_or_a_curve_for_sure_is_not_nothing(p_effect, p_curve, p_nothing, said):
     found = found_of({"a": p_effect}, fit_of("a", 40.0))
-    rivalry = Rivalry((SimpleNamespace(),), 0.0, {"smooth.w.v": p_curve}, {"a": p_effect}, p_nothing)
+    rivalry = Rivalry((SimpleNamespace(),), 0.0, {"smooth.w.v": p_curve}, {"a": logit(p_effect)}, p_nothing)
     assert undecided(found, rivalry) is said
 
 
@@ -158,7 +159,7 @@ def gain(value):
 
 
 def decision(p, *fits):
-    nothing = Beyond(Rivalry((), -np.inf, {}, p, 0.0), None, 1.0)
+    nothing = Beyond(Rivalry((), -np.inf, {}, {}, 0.0), None, 1.0)
     return Decision(SimpleNamespace(), found_of(p, *fits), Growth(0.0, 0.0, NOISE), nothing)
 
 

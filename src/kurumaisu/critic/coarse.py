@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.special import expit, logit, softmax
+from scipy.special import expit, softmax
 
 from kurumaisu.critic.evidence import Fit
 from kurumaisu.critic.naming import Naming
@@ -24,19 +24,23 @@ _MISSED = 0.1
 _DIRECTIONS = 45
 
 
-def believed(found: Naming, p: Mapping[str, float]) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
-    """Return probabilities p of effects as far as the evidence is believed, and the sets that cannot be told apart."""
-    variance = _variance(found)
-    shares = {name: float(expit(logit(np.clip(share, 0.0, 1.0)) / variance)) for name, share in p.items()}
+def believed(found: Naming, odds: Mapping[str, float]) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
+    """Return probabilities of effects as far as the evidence is believed, and the sets that cannot be told apart.
+
+    odds: log odds of each. What speaks against an effect is believed: nothing is likelier than not for being in doubt.
+    """
+    doubt = variance(found)
+    shares = {name: float(expit(log / doubt if log > 0 else log)) for name, log in odds.items()}
     return shares, confounded(Posterior(found.fits, weights(found)))
 
 
 def weights(found: Naming) -> FloatArray:
     """Return how likely each set is, as far as the evidence is believed."""
-    return np.asarray(softmax(np.array([_worth(found, fit) for fit in found.fits]) / _variance(found)))
+    return np.asarray(softmax(np.array([_worth(found, fit) for fit in found.fits]) / variance(found)))
 
 
-def _variance(found: Naming) -> float:
+def variance(found: Naming) -> float:
+    """Return by what log posterior ratios are to be divided."""
     square = 2 * (found.best.log_likelihood - found.empty.log_likelihood)  # z^2 of all that acts
     return 1 + _MISSED**2 * max(square, 0.0) / _DIRECTIONS
 

@@ -94,7 +94,7 @@ def _judged(
     problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
     again = naming.search(problem, progress, found.best)
     beyond = smooth_judge.judge(problem, again, progress)
-    p, still_open = coarse.believed(again, beyond.rivalry.p_effects)
+    p, still_open = coarse.believed(again, beyond.rivalry.odds)
     return Decision(problem, weighed_anew(replace(again, confounded=still_open), p), growth, beyond)
 
 

@@ -77,7 +77,9 @@ def jumps(pose: Series, slack: float = 1.0) -> tuple[list[int], list[int]]:
         return [], []
     step = np.diff(xy, axis=0)
     usual = _running_median(step / dt[:, None]) * dt[:, None]
-    odd = np.hypot(*(step - usual).T)
+    strays = step - usual
+    odd = np.hypot(*strays.T)
+    beside = np.vstack([np.zeros(2), np.cumsum(strays, axis=0)])  # where it is next to where it was going
     fast = float(np.quantile(np.hypot(*step.T) / dt, 0.95))
     limit = np.maximum(
         _FAR * max(position_noise(pose), 1e-9) * 1.5, 1.5 * slack * fast * np.maximum(dt, float(np.median(dt)))
@@ -87,8 +89,8 @@ def jumps(pose: Series, slack: float = 1.0) -> tuple[list[int], list[int]]:
     lasting: list[int] = []
     single: list[int] = []
     for i in np.flatnonzero((odd > np.maximum(limit, 1e-6)) & far & (dt < _PAUSE)):
-        before = np.median(xy[max(0, i - 3) : i + 1] - xy[i], axis=0)
-        after = np.median(xy[i + 1 : i + 5] - xy[i + 1], axis=0) + step[i]
+        before = np.median(beside[max(0, i - 3) : i + 1], axis=0)
+        after = np.median(beside[i + 1 : i + 5], axis=0)
         here = lasting if np.hypot(*(after - before)) > 0.6 * odd[i] and len(xy) - i > 5 and i >= 4 else single
         here.append(int(i) + 1)
     return lasting, single

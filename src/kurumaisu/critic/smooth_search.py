@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import expit, logsumexp
 
+from kurumaisu.critic import coarse
 from kurumaisu.critic.catalogue import Candidate
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
@@ -20,7 +21,7 @@ from kurumaisu.types import FloatArray
 
 BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
 _ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
-_SHARE = 0.002  # posterior from which it is asked which effect a curve draws
+_SHARE = 0.002  # posterior, as far as it is believed, from which it is asked which effect a curve draws
 _FITS = 10  # sets of the catalogue beside which curves are tried
 
 
@@ -40,14 +41,20 @@ class Rivalry:
 
     rivals: best first, but for those that draw an effect of the catalogue in another form, and so speak for that;
     lead: of the best one over the best set without a curve [nat]; p: posterior of each curve by the id of its effect;
-    p_effects: of each effect of the catalogue, with curves in the running; p_nothing: that there is neither.
+    odds: log odds that each effect of the catalogue acts, with curves in the running, which a probability near 1 cannot
+    say; p_nothing: that there is neither.
     """
 
     rivals: tuple[Rival, ...]
     lead: float
     p: dict[str, float]
-    p_effects: dict[str, float]
+    odds: dict[str, float]
     p_nothing: float
+
+    @property
+    def p_effects(self) -> dict[str, float]:
+        """Return the posterior of each effect of the catalogue, with curves in the running."""
+        return {name: float(expit(odds)) for name, odds in self.odds.items()}
 
     @property
     def winner(self) -> Rival | None:
@@ -57,7 +64,9 @@ class Rivalry:
 
 def no_rivals(found: Naming) -> Rivalry:
     """Return the result where no curve can act: the catalogue's own."""
-    return Rivalry((), -np.inf, {}, dict(found.p), 1.0 - max(found.p.values(), default=0.0))
+    count = len(found.p)
+    sets = [(fit.score + log_prior(len(fit.candidates), count), fit.ids) for fit in found.fits]
+    return Rivalry((), -np.inf, {}, _odds(sets, found.p), 1.0 - max(found.p.values(), default=0.0))
 
 
 def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozenset()) -> Rivalry:
@@ -70,27 +79,37 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
         return no_rivals(found)
     plain = np.array([worth + np.log1p(-_ODDS) for _, worth in bare])
     total = logsumexp(np.concatenate([plain, [rival.worth for rival in rivals]]))
-    p = {
-        name: float(sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if name in fit.ids))
-        for name in found.p
-    }
+    acting = [(float(w), fit.ids) for (fit, _), w in zip(bare, plain, strict=True)]
     likeness, ceiling = Likeness(problem, found.best, designs), float(plain.max())
     beyond: list[Rival] = []
+    doubt = coarse.variance(found)
     for rival in rivals:
         share = float(np.exp(rival.worth - total))
-        draws = likeness.drawn(rival.fit, rival.curve, rival.belief) if share > _SHARE else {}
+        asked = (rival.worth - total) / doubt > np.log(_SHARE)
+        draws = likeness.drawn(rival.fit, rival.curve, rival.belief) if asked else {}
         drawn = {name for name, nats in draws.items() if rival.worth - ceiling < BEYOND + nats}
         wins = not drawn and rival.worth - ceiling > BEYOND and share > _SHARE
         part = likeness.part_of(rival.fit, rival.curve) if wins else set()
-        for name in (rival.fit.ids - part) | drawn:
-            p[name] += share
+        acting.append((rival.worth, (rival.fit.ids - part) | drawn))
         beyond += [] if drawn else [rival]
     curves: dict[str, float] = {}
     for rival in beyond:
         curves[rival.curve.id] = curves.get(rival.curve.id, 0.0) + float(np.exp(rival.worth - total))
     lead = beyond[0].worth - ceiling if beyond else -np.inf
     nothing = float(sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if not fit.ids))
-    return Rivalry(tuple(beyond), lead, curves, p, nothing)
+    return Rivalry(tuple(beyond), lead, curves, _odds(acting, found.p), nothing)
+
+
+def _odds(acting: Sequence[tuple[float, frozenset[str]]], names: Iterable[str]) -> dict[str, float]:
+    """Return the log odds of effects from log weights, of any sum, and the effects that act at each."""
+    weights = np.array([weight for weight, _ in acting])
+    out = {}
+    for name in names:
+        there = np.array([name in ids for _, ids in acting], dtype=np.bool_)
+        sides = (weights[there], weights[~there])
+        log, against = (float(logsumexp(side)) if len(side) else -np.inf for side in sides)
+        out[name] = log - against
+    return out
 
 
 def _tried(bare: Sequence[tuple[Fit, float]], also: frozenset[Candidate]) -> list[tuple[Fit, float]]:
