@@ -62,6 +62,12 @@ def test_what_may_not_act_at_all_is_in_no_set():
     assert confounded(posterior((0.6, "b"), (0.4, ""))) == ()
 
 
+def test_what_half_the_catalogue_could_do_is_no_set():
+    anything = [(0.1, f"a {name}") for name in "bcdefghijk"]
+    assert confounded(posterior(*anything)) == ()
+    assert confounded(posterior(*((0.2, names) for _, names in anything[:5]))) == (("b", "c", "d", "e", "f"),)
+
+
 def drive(v, w):
     """Return a drive with rates (n,) held for 0.5 s each and poses at 10 Hz."""
     rates = [np.repeat(np.asarray(rate, dtype=float), 50) for rate in (v, w)]

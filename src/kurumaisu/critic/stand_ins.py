@@ -9,6 +9,7 @@ from kurumaisu.critic.evidence import Fit
 from kurumaisu.types import FloatArray
 
 NAMED = 0.9  # posterior from which a cause is named
+_MOST = 7  # members of a set: more is no answer, and a chance leaving that everything explains a little
 RIVAL = 0.05  # posterior from which an effect counts as a rival of another
 
 
@@ -38,7 +39,8 @@ def confounded(posterior: Posterior) -> tuple[tuple[str, ...], ...]:
             group = _with_others(posterior, name, group)
         meeting = [other for other in merged if other & group]
         merged = [other for other in merged if not other & group] + [group.union(*meeting)]
-    return tuple(tuple(sorted(group)) for group in merged if len(group) > 1 and posterior.any_of(group) >= NAMED)
+    told = (group for group in merged if 1 < len(group) <= _MOST and posterior.any_of(group) >= NAMED)
+    return tuple(tuple(sorted(group)) for group in told)
 
 
 def _alone(posterior: Posterior, name: str) -> set[str]:
