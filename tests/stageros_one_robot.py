@@ -10,11 +10,10 @@ import pytest
 import rosgraph
 import rospy
 import tf2_ros
-from nav_msgs.msg import OccupancyGrid, Odometry
-from sensor_msgs.msg import LaserScan
+from nav_msgs.msg import OccupancyGrid
 from stageros_rig import STEP, place
 from stageros_services import Services
-from std_srvs.srv import Empty, SetBool, Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from kurumaisu.params import shipped
 from kurumaisu.ros.testing import Topic, wait_for

@@ -9,8 +9,8 @@ import geometry_msgs.msg
 import pytest
 from kurumaisu.srv import Delete, Seed, SetPose, Spawn, StateFile
 from nav_msgs.msg import Odometry
-from stageros_rig import ONE, STEP, Case, place
 from sensor_msgs.msg import LaserScan
+from stageros_rig import ONE, STEP, Case, place
 from std_srvs.srv import Empty, SetBool, Trigger
 
 from kurumaisu.ros.rotation import quaternion_of
