@@ -88,4 +88,19 @@ class Chair {
   std::optional<Said> said;
 };
 
+class DriveTest : public testing::Test {
+ protected:
+  DriveTest() { chair.run(0.3); }  // silent for longer than a timeout: whoever speaks now was released
+
+  Chair chair{driveSettings(kQuick)};
+};
+
+/// With limits that take time.
+class RideTest : public testing::Test {
+ protected:
+  RideTest() { chair.run(0.3); }
+
+  Chair chair{driveSettings(kGentle)};
+};
+
 }  // namespace kurumaisu::test

@@ -22,6 +22,32 @@ def browser():
 
 
 @pytest.fixture
+def running():
+    """The viewer's server, with a rig behind it."""
+    from viewer_rig import Running
+
+    with Running() as one:
+        yield one
+
+
+@pytest.fixture
+def page(running):
+    """A client of it, which may only look."""
+    from kurumaisu.bench.viewer_page import Page
+
+    one = Page(running.server.address)
+    yield one
+    one.close()
+
+
+@pytest.fixture
+def driver(running, page):
+    """The client, with control."""
+    page.let_in(running.server.new_address())
+    return page
+
+
+@pytest.fixture
 def shown():
     """What the viewer's page is to show: a rig that is paused, behind a server."""
     from viewer_page_rig import Shown

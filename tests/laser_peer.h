@@ -16,9 +16,30 @@
 #include <thread>
 #include <vector>
 
+#include "laser/port.h"
 #include "scip/code.h"
 
 namespace kurumaisu::test {
+
+constexpr int kBaud = 115200;
+
+/// What waits where a test should not: fails instead of hanging.
+inline double seconds(const std::function<void()>& action) {
+  const double start = laser::steadyTime();
+  action();
+  return laser::steadyTime() - start;
+}
+
+inline std::string problem(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "nothing";
+}
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 inline std::string summed(const std::string& line) { return line + scip::sum(line) + "\n"; }
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from scipy.stats import binomtest
 
-from kurumaisu.bench import critic_floors
+from kurumaisu.bench import critic, critic_floors, critic_table
 from kurumaisu.bench.hidden.baselines import BASELINES
 from kurumaisu.bench.hidden.case import Truth
 from kurumaisu.bench.hidden.score import score, scored_names
@@ -65,3 +65,36 @@ def test_a_curve_that_is_not_among_the_first_three_is_not_found():
 @pytest.mark.parametrize("figure", critic_floors.FIGURES, ids=lambda figure: figure.label)
 def test_a_figure_of_nothing_is_a_dash(figure):
     assert figure.count([]).startswith(("-", "nan"))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [["--effects", "base.delay"], ["--z", "0"], ["--form", "plain"], ["--form", "other"], ["--baselines"]],
+    ids=" ".join,
+)
+def test_an_option_of_one_kinds_table_is_refused_without_the_kind(given, capsys, monkeypatch):
+    monkeypatch.setattr(critic_floors, "run", lambda options: pytest.fail("it ran as if nothing were said"))
+    with pytest.raises(SystemExit) as stop:
+        critic.main(given)
+    assert stop.value.code == 2
+    assert f"error: {given[0]}: only with --kind" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("given", "form"), [([], "other"), (["--form", "plain"], "plain")])
+def test_one_kinds_table_has_what_was_asked(given, form, monkeypatch):
+    asked = []
+
+    def answers(jobs, processes, log):
+        asked.extend(jobs)
+        truths = [Truth(job.ask.kind, job.ask.ids, z=7.0) for job in jobs]
+        return [{"critic": replace(scored_names(t, frozenset(t.ids), 1.0), gain_share=None)} for t in truths]
+
+    monkeypatch.setattr(critic_table, "all_answers", answers)
+    options = ["--kind", "base", "--effects", "base.delay", "--z", "7", "--draws", "2", "--baselines", *given]
+    assert critic.main(options) == 0
+    assert {(j.ask.ids, j.ask.z, j.ask.form, j.baselines) for j in asked} == {(("base.delay",), 7.0, form, True)}
+
+
+def test_the_table_of_all_kinds_takes_what_concerns_all(monkeypatch):
+    monkeypatch.setattr(critic_floors, "run", lambda options: options.draws)
+    assert critic.main(["--draws", "3", "--seed", "5", "--jobs", "2", "--log", "a.jsonl"]) == 3

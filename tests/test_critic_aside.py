@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scans criticised in another process: the same answer as in this one, also when that process dies."""
 
-from pathlib import Path
-
 import pytest
 from laser_scene import recording
 
@@ -22,9 +20,16 @@ class Dying(Worker):
         super().send(int, "no number")
 
 
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """A recording, and what is found of it in this process."""
+    data = recording(tmp_path_factory.mktemp("room"), "laser.quadratic", 0.003, 7, scans=20)
+    return data, criticise(data, MODEL, lambda _: None)
+
+
 @pytest.mark.parametrize("worker", [Worker, Dying])
-def test_where_scans_are_criticised_makes_no_difference(tmp_path: Path, monkeypatch, worker):
-    data = recording(tmp_path, "laser.quadratic", 0.003, 7, scans=20)
+def test_where_scans_are_criticised_makes_no_difference(alone, monkeypatch, worker):
+    data, wanted = alone
     asked, here = [], []
     monkeypatch.setattr(module, "_MANY", 10)
     monkeypatch.setattr(module.os, "sched_getaffinity", lambda _: {0, 1})
@@ -33,7 +38,6 @@ def test_where_scans_are_criticised_makes_no_difference(tmp_path: Path, monkeypa
         found = scans_say(here.append)
     assert asked == [worker]
     assert bool(here) == (worker is Dying)
-    alone = criticise(data, MODEL, lambda _: None)
-    assert found.causes == alone.causes
-    assert found.details == alone.details
+    assert found.causes == wanted.causes
+    assert found.details == wanted.details
     assert [cause.id for cause in found.causes] == ["laser.quadratic"]

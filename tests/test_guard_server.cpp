@@ -1,129 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Guard and sentinel as processes that are really killed, in front of a board in shared memory.
+// What guard and sentinel do when a client, a device or one of them fails.
 #include <gtest/gtest.h>
-#include <poll.h>
-#include <sched.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
-#include <sys/wait.h>
 
 #include <array>
 #include <csignal>
-#include <cstdlib>
-#include <filesystem>
-#include <functional>
 #include <string>
-#include <thread>
 
-#include "guard/client.h"
-#include "guard/crash.h"
-#include "guard/realtime.h"
-#include "guard/sentinel.h"
 #include "guard/socket.h"
-#include "guarding.h"
-#include "shared_board.h"
+#include "guard_process.h"
 
 using namespace guarding;  // NOLINT: a test
-namespace fs = std::filesystem;
-
-namespace {
-
-constexpr double kPatience = 10;  // [s] for what must happen
-constexpr double kSoon =
-    1;  // [s] for what must not wait, on a busy machine; how soon, scripts/bench guard tells
-constexpr double kPeriod = 0.01;     // [s] of the client
-constexpr double kReplyWait = 0.05;  // [s]
-
-void pause(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
-
-bool isNeutral(const d::Volts& volts) {
-  return volts.translation == 0 && volts.steering == 0 && volts.reference == 2.5;
-}
-
-class GuardProcess : public testing::Test {
- protected:
-  GuardProcess() {
-    std::string name = (fs::temp_directory_path() / "guard_XXXXXX").string();
-    folder = mkdtemp(name.data());
-    settings.limits = limits();
-    settings.socket = folder / "socket";
-    settings.period = 0.01;
-    settings.priority = 0;
-    settings.reopening = {0.01, 0.05};
-    settings.sentinel_silence = 0.3;
-    settings.restart_pause = 0.02;
-    settings.neutral_patience = 0.5;
-  }
-
-  ~GuardProcess() override {
-    if (sentinel > 0) end(SIGTERM);
-    fs::remove_all(folder);
-  }
-
-  void start() {
-    sentinel = fork();
-    if (sentinel == 0) {
-      prctl(PR_SET_PDEATHSIG, SIGKILL);  // of a test that is killed nothing remains
-      _exit(g::runSentinel(settings, board.opener()));
-    }
-    waitFor([this] { return fs::exists(settings.socket); }, "the socket");
-  }
-
-  /// Ends the sentinel; returns its wait status.
-  int end(int signal) {
-    int status = 0;
-    kill(sentinel, signal);
-    waitpid(sentinel, &status, 0);
-    sentinel = -1;
-    return status;
-  }
-
-  static void waitFor(const std::function<bool()>& condition, const char* what) {
-    for (const double until = kurumaisu::steadyTime() + kPatience; !condition(); pause(0.001)) {
-      if (kurumaisu::steadyTime() > until) FAIL() << "waited in vain for " << what;
-    }
-  }
-
-  /// Puts until the status is as wished.
-  void putUntil(g::Client& client, double translation, const std::function<bool(const g::Status&)>& wish) {
-    waitFor(
-        [&] {
-          pause(kPeriod);
-          return wish(client.put({translation, 0, 2.5}));
-        },
-        "a status");
-  }
-
-  void arm(g::Client& client) {
-    putUntil(client, 0, [](const g::Status& s) { return s.state == g::State::kArmed; });
-  }
-
-  void drive(g::Client& client) {
-    arm(client);
-    putUntil(client, 0.4, [](const g::Status& s) { return s.volts.translation == 0.4; });
-    ASSERT_EQ(board->last().volts.translation, 0.4);
-  }
-
-  /// How long after `begin` [s] the board was neutral, for good.
-  double neutralAfter(double begin) {
-    waitFor([this] { return isNeutral(board->last().volts); }, "neutral");
-    std::size_t i = board->count - 1;
-    while (isNeutral(board->written[i - 1].volts)) --i;
-    return board->written[i].time - begin;
-  }
-
-  pid_t guardPid() { return board->last().by; }
-
-  g::Client client() const { return g::Client({settings.socket, kReplyWait, 0.01}); }
-
-  fs::path folder;
-  g::Settings settings{};
-  SharedBoard board;
-  pid_t sentinel = -1;
-};
 
 TEST_F(GuardProcess, WritesNeutralAndReferenceFirstAndAllTheTimeWithoutAClient) {
   start();
@@ -380,73 +269,6 @@ TEST_F(GuardProcess, TellsSystemdThatItIsReadyAndAlive) {
     EXPECT_EQ(heard, expected);
   }
 }
-
-/// What a child does with a client's connection, which a grandchild holds open until nobody has the gate's other end.
-void crash(const std::string& path, const std::array<int, 2>& gate) {
-  const rlimit none{0, 0};
-  setrlimit(RLIMIT_CORE, &none);
-  g::catchCrashes();
-  g::Client client({path, kReplyWait, 0.01});
-  client.put({0, 0, 2.5});
-  if (fork() == 0) {
-    close(gate[1]);
-    char byte = 0;
-    _exit(static_cast<int>(read(gate[0], &byte, 1)));
-  }
-  raise(SIGSEGV);
-}
-
-TEST(GuardClient, ACrashIsHeardThoughTheSocketIsStillOpen) {
-  std::string name = (fs::temp_directory_path() / "guard_XXXXXX").string();
-  const fs::path folder = mkdtemp(name.data());
-  const kurumaisu::Descriptor listener = g::listenAt(folder / "socket");
-  std::array<int, 2> gate{};
-  ASSERT_EQ(pipe(gate.data()), 0);
-  const pid_t child = fork();
-  if (child == 0) crash(folder / "socket", gate);
-  kurumaisu::Descriptor peer;
-  for (const double until = kurumaisu::steadyTime() + kPatience; !peer && kurumaisu::steadyTime() < until;) {
-    pause(0.001);
-    peer = kurumaisu::Descriptor(accept(listener.get(), nullptr, nullptr));
-  }
-  pollfd ready{peer.get(), POLLRDHUP, 0};
-  EXPECT_EQ(poll(&ready, 1, static_cast<int>(1e3 * kPatience)), 1);
-  int status = 0;
-  ASSERT_EQ(waitpid(child, &status, 0), child);
-  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGSEGV);
-  for (const int end : gate) close(end);
-  fs::remove_all(folder);
-}
-
-/// The policy of this thread once it has run for so long at a real-time priority; -1: it may have none.
-int policyAfter(double seconds) {
-  if (!g::favourThreads({1, 0.02, 0}).empty()) return -1;
-  timespec used{};
-  do clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
-  while (static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec) < seconds &&
-         sched_getscheduler(0) == SCHED_FIFO);
-  return sched_getscheduler(0);
-}
-
-TEST(GuardClient, WhoRunsTooLongLosesHisPriority) {
-  const pid_t child = fork();
-  if (child == 0) _exit(policyAfter(1) == SCHED_OTHER && g::unfavoured() == 1 ? 0 : geteuid() == 0 ? 1 : 77);
-  int status = 0;
-  ASSERT_EQ(waitpid(child, &status, 0), child);
-  ASSERT_TRUE(WIFEXITED(status));
-  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "may have no priority";
-  EXPECT_EQ(WEXITSTATUS(status), 0);
-}
-
-TEST(GuardClient, WithoutAGuardItDoesNotWait) {
-  g::Client client({"/nowhere/at/all", 1.0, 0.01});
-  const double begin = kurumaisu::steadyTime();
-  for (int i = 0; i < 100; ++i) EXPECT_FALSE(client.put({0.4, 0, 2.5}).connected);
-  EXPECT_LT(kurumaisu::steadyTime() - begin, kSoon);
-  EXPECT_EQ(client.status().volts.translation, 0);
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

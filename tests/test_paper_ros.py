@@ -84,18 +84,29 @@ def test_a_drive_is_watched_while_it_is_recorded(tmp_path):
         assert {"voltages", "ground_truth"} <= {name.lstrip("/") for name in topics}
 
 
-@contextlib.contextmanager
-def chair(tmp_path, *arguments):
-    """A chair that stands, on a master of its own; calibrate record beside it, and what it says."""
-    said = tmp_path / "said"
+@pytest.fixture(scope="module")
+def chair(tmp_path_factory):
+    """The environment of a chair that stands, on a master of its own.
+
+    At three times the speed: bags are split by their stamps, whatever the clock on the wall says.
+    """
     with (
         master() as ros,
-        running(["roslaunch", "kurumaisu", "sim.launch"], tmp_path / "sim.log", ros),
+        running(["roslaunch", "kurumaisu", "sim.launch", "speed:=3"], tmp_path_factory.mktemp("chair") / "log", ros),
     ):
         command = ["rostopic", "echo", "-n", "1", "--noarr", "/scan"]
         subprocess.run(command, env=ros, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
-        with running([program("calibrate"), "record", *arguments, "--every", "0.5"], said, ros) as watcher:
-            yield watcher, said
+        yield ros
+
+
+@contextlib.contextmanager
+def watching(bag, *arguments, environment):
+    """calibrate record, and the file of what it says."""
+    said = bag.with_name("said")
+    with running(
+        [program("calibrate"), "record", str(bag), *arguments, "--every", "0.5"], said, environment
+    ) as watcher:
+        yield watcher, said
 
 
 def wait_for(condition):
@@ -103,25 +114,6 @@ def wait_for(condition):
     while not condition() and time.monotonic() < deadline:
         time.sleep(0.1)
     assert condition()
-
-
-def test_what_is_recorded_is_packed_and_split_and_each_part_is_readable_alone(tmp_path):
-    bag = tmp_path / "drive.bag"
-    with chair(tmp_path, str(bag), "--split", "3") as (watcher, said):
-        wait_for((tmp_path / "drive_2.bag.active").exists)
-        watcher.send_signal(signal.SIGINT)
-        assert watcher.wait(PATIENCE) == 1
-    parts = sorted(tmp_path.glob("drive_*.bag"))
-    assert len(parts) >= 3
-    assert " ".join(map(str, parts)) in said.read_text()
-    assert "stretches of steady motion to this side, 8 are needed" in said.read_text()  # it stood
-    for part in parts[:-1]:  # the last had just begun
-        with rosbag.Bag(part) as recorded:
-            assert recorded.get_compression_info().compression == "lz4"
-            topics = {name.lstrip("/") for name in recorded.get_type_and_topic_info().topics}
-        assert {"voltages", "ground_truth", "scan", "tf_static"} <= topics
-    runs = [read_recording(part).runs[0] for part in parts[:-1]]
-    assert all(run.pose is not None and run.voltage is not None for run in runs)
 
 
 def test_nobody_there_is_told(tmp_path):
@@ -137,20 +129,6 @@ def test_nobody_there_is_told(tmp_path):
     with running([program("calibrate"), "record", str(tmp_path / "b.bag")], said, alone) as watcher:
         assert watcher.wait(PATIENCE) == 1
     assert "no ROS master at http://localhost:1: start robot.launch" in said.read_text()
-
-
-def test_a_recorder_that_dies_is_no_drive_that_is_enough(tmp_path):
-    bag = tmp_path / "drive.bag"
-    with chair(tmp_path, str(bag)) as (watcher, said):
-        wait_for(lambda: "still missing" in said.read_text())
-        (writer,) = [
-            int(path.parent.name)
-            for path in Path("/proc").glob("[0-9]*/cmdline")
-            if str(bag).encode() in (line := path.read_bytes()) and line.split(b"\0")[0].endswith(b"/record")
-        ]
-        os.kill(writer, signal.SIGKILL)
-        assert watcher.wait(PATIENCE) == 1
-    assert "rosbag record ended by itself; what it wrote: rosbag reindex" in said.read_text()
 
 
 def test_a_full_disk_is_told_before_and_while_it_is_recorded(tmp_path, monkeypatch):
@@ -198,3 +176,36 @@ def test_all_figures_are_repeated_and_one_that_fails_is_not_forgotten(monkeypatc
     monkeypatch.setattr(paper_parts, "simulated_wall", part("11-12", 0))
     assert main(["all", "--out", str(tmp_path)]) == 1
     assert done == ["3-6", "7-9", "conjecture", "10", "11-12"]
+
+
+def test_what_is_recorded_is_packed_and_split_and_each_part_is_readable_alone(chair, tmp_path):
+    bag = tmp_path / "drive.bag"
+    with watching(bag, "--split", "3", environment=chair) as (watcher, said):
+        wait_for((tmp_path / "drive_2.bag.active").exists)
+        watcher.send_signal(signal.SIGINT)
+        assert watcher.wait(PATIENCE) == 1
+    parts = sorted(tmp_path.glob("drive_*.bag"))
+    assert len(parts) >= 3
+    assert " ".join(map(str, parts)) in said.read_text()
+    assert "stretches of steady motion to this side, 8 are needed" in said.read_text()  # it stood
+    for part in parts[:-1]:  # the last had just begun
+        with rosbag.Bag(part) as recorded:
+            assert recorded.get_compression_info().compression == "lz4"
+            topics = {name.lstrip("/") for name in recorded.get_type_and_topic_info().topics}
+        assert {"voltages", "ground_truth", "scan", "tf_static"} <= topics
+    runs = [read_recording(part).runs[0] for part in parts[:-1]]
+    assert all(run.pose is not None and run.voltage is not None for run in runs)
+
+
+def test_a_recorder_that_dies_is_no_drive_that_is_enough(chair, tmp_path):
+    bag = tmp_path / "drive.bag"
+    with watching(bag, environment=chair) as (watcher, said):
+        wait_for(lambda: "still missing" in said.read_text())
+        (writer,) = [
+            int(path.parent.name)
+            for path in Path("/proc").glob("[0-9]*/cmdline")
+            if str(bag).encode() in (line := path.read_bytes()) and line.split(b"\0")[0].endswith(b"/record")
+        ]
+        os.kill(writer, signal.SIGKILL)
+        assert watcher.wait(PATIENCE) == 1
+    assert "rosbag record ended by itself; what it wrote: rosbag reindex" in said.read_text()

@@ -9,7 +9,7 @@ import time
 import aiohttp
 import numpy as np
 import pytest
-from viewer_rig import BEAMS, CHAIR, Running
+from viewer_rig import BEAMS, CHAIR
 
 
 def wait_for(condition, what):
@@ -71,12 +71,6 @@ class Talk:
         """Return the reply to a command."""
         await self.say(type="command", id=number, name=name, **arguments)
         return await self.next("reply", lambda reply: reply["id"] == number)
-
-
-@pytest.fixture
-def running():
-    with Running() as one:
-        yield one
 
 
 def test_a_page_is_told_all_that_there_is_to_see(running):

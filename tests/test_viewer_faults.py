@@ -5,8 +5,6 @@ import asyncio
 import json
 import socket
 import time
-import urllib.error
-import urllib.request
 
 import aiohttp
 import numpy as np
@@ -18,39 +16,9 @@ from viewer_rig import Running, viewer_settings
 from kurumaisu.bench.viewer_page import Page
 from kurumaisu.errors import Error
 from kurumaisu.settings import Section
-from kurumaisu.viewer import access, commands, protocol, read_settings
+from kurumaisu.viewer import commands, protocol, read_settings
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.server import Server
-
-
-@pytest.fixture
-def running():
-    with Running() as one:
-        yield one
-
-
-@pytest.fixture
-def page(running):
-    one = Page(running.server.address)
-    yield one
-    one.close()
-
-
-@pytest.fixture
-def driver(running, page):
-    """A page with control."""
-    page.let_in(running.server.new_address())
-    return page
-
-
-def get(running, path, **headers):
-    """Return status, headers and body of a request."""
-    request = urllib.request.Request(running.server.address.rstrip("/") + path, headers=headers)
-    try:
-        with urllib.request.urlopen(request, timeout=10) as answer:
-            return answer.status, answer.headers, answer.read()
-    except urllib.error.HTTPError as error:
-        return error.code, error.headers, error.read()
 
 
 @pytest.mark.parametrize(
@@ -155,97 +123,6 @@ def test_more_connections_than_allowed_are_refused(running):
         Page(few.server.address).close()
         for page in pages:
             page.close()
-
-
-def test_a_token_is_good_once(running, driver):
-    address = running.server.new_address()
-    second = Page(address)
-    second.let_in(address)
-    third = Page(address)
-    third.say(type="token", token=address.split("#token=")[1])
-    third.wait(lambda: None in third.replies, "a refusal")
-    assert "used already" in third.replies[None]["message"]
-    for page in (second, third):
-        page.close()
-
-
-def test_guessing_tokens_ends_the_connection(page):
-    for _ in range(5):
-        page.say(type="token", token="guess")
-    page.wait(lambda: page.closed, "the end of the connection")
-
-
-def test_without_control_no_token_is_good_and_nobody_commands():
-    with Running(control=False, mode="robot") as robot:
-        with pytest.raises(Error, match="only shows"):
-            robot.server.new_address()
-        page = Page(robot.server.address)
-        page.wait(lambda: "hello" in page.newest, "hello")
-        assert page.newest["hello"]["abilities"] == []
-        for name, arguments in (("drive", {"v": 0.1, "w": 0.0}), ("estop", {"on": False}), ("reset", {})):
-            assert "only shows" in page.ask(name, **arguments)["message"]
-        assert robot.rig.commands == []
-        page.close()
-
-
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "", "https://127.0.0.1", "http://127.0.0.1:1"])
-def test_a_foreign_page_cannot_connect(running, origin):
-    with pytest.raises(aiohttp.WSServerHandshakeError) as refusal:
-        Page(running.server.address, origin=origin)
-    assert refusal.value.status == 403
-    assert running.hub.clients == 0
-
-
-@pytest.mark.parametrize(
-    "host", ["evil.example", "evil.example:8642", "localhost.evil.example", "127.0.0.1.nip.io", "[", ""]
-)
-def test_a_foreign_name_is_refused(running, host):
-    """DNS rebinding: a page of evil.example, whose name suddenly means 127.0.0.1."""
-    status, _, body = get(running, "/", Host=host)
-    assert status in (400, 403)
-    assert b"kurumaisu</title>" not in body
-
-
-@pytest.mark.parametrize("host", ["localhost:9000", "127.0.0.1", "[::1]:9000", "192.168.0.7:8642"])
-def test_addresses_and_localhost_are_no_foreign_names(running, host):
-    assert get(running, "/", Host=host)[0] == 200
-
-
-def test_a_name_can_be_allowed():
-    access.check_host("Chair.local:8642", ("chair.local",))
-    with pytest.raises(Error, match="names"):
-        access.check_host("chair.local", ())
-    with pytest.raises(Error, match="None"):
-        access.check_host(None, ())
-
-
-def test_every_answer_has_the_policy(running):
-    for path in ("/", "/page/moon.js", "/map/7.png", "/report/moon.html", "/moon"):
-        _, headers, _ = get(running, path)
-        policy = headers["Content-Security-Policy"]
-        assert "default-src 'none'" in policy
-        assert "unsafe" not in policy
-        assert headers["X-Content-Type-Options"] == "nosniff"
-
-
-@pytest.mark.parametrize(
-    "path",
-    [
-        "/page/../server.py",
-        "/page/..%2Fserver.py",
-        "/page/..%2F..%2Fcritic%2Freport.html",  # of a kind that is served
-        "/page/%2e%2e%2f%2e%2e%2fcritic%2freport.html",
-        "/page/%2e%2e/hub.py",
-        "/page//etc/passwd",
-        "/page/.hidden.js",
-    ],
-)
-def test_no_file_beside_the_page_is_served(running, path):
-    status, _, body = get(running, path)
-    assert status in (400, 403, 404)
-    assert b"import" not in body
-    assert b"<html" not in body
-    assert b"root:" not in body
 
 
 def test_a_port_that_is_taken_is_said():

@@ -16,4 +16,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1000)
     critic_table.options_of(parser)
     options = parser.parse_args(arguments)
+    idle = [] if options.kind else critic_table.without_kind(options)
+    if idle:
+        parser.error(f"{', '.join(idle)}: only with --kind, the table of all kinds has its own")
     return critic_table.run(options) if options.kind else critic_floors.run(options)

@@ -68,19 +68,27 @@ class Job:
 def options_of(parser: argparse.ArgumentParser) -> None:
     """Add the options of this table."""
     parser.add_argument("--kind", choices=sorted(KINDS), help="what is hidden; without it all kinds, with the floors")
-    parser.add_argument("--effects", nargs="+", default=(), help="ids, or names of unknown or wrong things; all")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--form", choices=("plain", "other"), default="other", help="equations that hide an id")
-    parser.add_argument("--z", type=float, help="whitened norm; without it log-uniform in 5 to 60")
-    parser.add_argument("--baselines", action="store_true", help="rows of the baselines, too (base only)")
     parser.add_argument("--log", type=Path, help="file for one JSON line per draw: truth and answer")
+    one = parser.add_argument_group("with --kind only")
+    one.add_argument("--effects", nargs="+", default=(), help="ids, or names of unknown or wrong things; all")
+    one.add_argument("--form", choices=("plain", "other"), help="equations that hide an id; other")
+    one.add_argument("--z", type=float, help="whitened norm; without it log-uniform in 5 to 60")
+    one.add_argument("--baselines", action="store_true", help="rows of the baselines, too (base only)")
+
+
+def without_kind(options: argparse.Namespace) -> list[str]:
+    """Return the options given that say nothing where the table is of all kinds."""
+    given = {"--effects": options.effects, "--form": options.form, "--baselines": options.baselines}
+    asked = [name for name, value in given.items() if value]
+    return asked if options.z is None else [*asked, "--z"]
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the table of one kind. Raise Error for a name that this kind does not know."""
     kind, family = KINDS[options.kind]
     rows = tuple(options.effects) or (("",) if kind in ("null", "pair", "triple") else names_of(kind, family))
-    asks = [Ask(kind, (name,) if name else (), options.z, options.form, family=family) for name in rows]
+    asks = [Ask(kind, (name,) if name else (), options.z, options.form or "other", family=family) for name in rows]
     baselines = options.baselines and family == "base"
     jobs = [Job(ask, options.seed + i, baselines) for i, ask in enumerate(np.repeat(np.array(asks), options.draws))]
     answers = all_answers(jobs, options.jobs, options.log)

@@ -1,0 +1,5 @@
+#!/usr/bin/env bash
+# Builds the test programs, on all cores as scripts/setup built the rest: make alone takes one.
+set -eu
+source "$(dirname "$0")/../scripts/environment.bash"
+exec cmake --build "$root/.ws/build" --target tests -- "-j$(jobs)"
