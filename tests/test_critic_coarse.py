@@ -59,3 +59,12 @@ def test_where_nothing_acts_probabilities_stay_as_they_are():
     fits = (fit_of({}, 0.0), fit_of({"small": 3.0}, -1.0))
     p = EFFECTS | {"small": 0.27}
     assert coarse.believed(Naming(fits, p, (), 0.0), p)[0] == pytest.approx(p)
+
+
+def test_what_rounding_leaves_of_certainty_is_no_doubt():
+    """Shares are sums of exponentials of logs of thousands of nats: their last digits mean nothing."""
+    fits = (fit_of({"strong": 300.0}, -9000.0), fit_of({}, -54000.0))
+    for share in (1.0 - 3e-13, 1.0 + 3e-13):
+        assert coarse.believed(Naming(fits, EFFECTS, (), 0.0), EFFECTS | {"strong": share})[0]["strong"] == 1.0
+    doubted = coarse.believed(Naming(fits, EFFECTS, (), 0.0), EFFECTS | {"strong": 1.0 - 1e-9})[0]["strong"]
+    assert doubted < 0.8

@@ -28,7 +28,10 @@ def believed(found: Naming, p: Mapping[str, float]) -> tuple[dict[str, float], t
     square = 2 * (found.best.log_likelihood - found.empty.log_likelihood)  # z^2 of all that acts
     variance = 1 + _MISSED**2 * max(square, 0.0) / _DIRECTIONS
     posterior = Posterior(found.fits, softmax(np.array([_worth(found, fit) for fit in found.fits]) / variance))
-    shares = {name: float(expit(logit(np.clip(share, 0.0, 1.0)) / variance)) for name, share in p.items()}
+    # What is certain is so but for the rounding of the logs, of which no doubt is to be made by believing less.
+    certain = 1.0 - 2 * np.spacing(abs(found.best.score))
+    sure = {name: 1.0 if share > certain else max(share, 0.0) for name, share in p.items()}
+    shares = {name: float(expit(logit(share) / variance)) for name, share in sure.items()}
     return shares, confounded(posterior)
 
 
