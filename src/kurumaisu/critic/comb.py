@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from kurumaisu.critic import replay
 from kurumaisu.critic.catalogue import Term, settings_of
@@ -54,7 +55,8 @@ class Comb:
         self._plain = [replay.motion(drive, model, ()) for drive in self._drives]
         self._columns: list[FloatArray] = []
         for drive, plain in zip(self._drives, self._plain, strict=True):
-            held = np.repeat(np.eye(-(-len(drive.v) // _CELLS)), _CELLS, axis=0)[: len(drive.v)]
+            cells = np.arange(len(drive.v))
+            held = csr_array((np.ones(len(cells)), (cells, cells // _CELLS)))
             sensitivity = Sensitivity(drive, plain)
             both = np.column_stack([sensitivity.increments(channel, held) for channel in ("v", "w")])
             self._columns.append(whitened(drive, both, noise)[0])
