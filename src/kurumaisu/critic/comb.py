@@ -74,7 +74,7 @@ class Comb:
             return []
         if key not in self._squares:
             parts = zip(self._grams, self._parts(changes), strict=True)
-            self._squares[key] = np.sum([np.sum((own @ gram) * own, axis=1) for gram, own in parts], axis=0)
+            self._squares[key] = np.sum([_squares(gram, own) for gram, own in parts], axis=0)
         pull = np.concatenate([c.T @ r[: len(c)] for c, r in zip(self._columns, residual, strict=False)])
         gained = changes @ pull - 0.5 * self._squares[key]
         peaks = np.flatnonzero((gained >= np.append(gained[1:], -np.inf)) & (gained >= np.append(-np.inf, gained[:-1])))
@@ -119,6 +119,13 @@ class Comb:
         moved = [replay.motion(drive, self._model, settings) for drive in self._drives]
         pairs = zip(moved, self._plain, strict=True)
         return np.concatenate([_means(rate) for a, b in pairs for rate in (a.v - b.v, a.w - b.w)])
+
+
+def _squares(gram: FloatArray, changes: FloatArray) -> FloatArray:
+    """Return the square of what each of the changes (k, bins) does, (k,); many change one rate only, and not at rest."""
+    use = np.flatnonzero(changes.any(axis=0))
+    own = changes[:, use]
+    return np.asarray(np.einsum("kb,kb->k", own @ gram[np.ix_(use, use)], own))
 
 
 def _begin(drive: Drive, seconds: float) -> Drive:
