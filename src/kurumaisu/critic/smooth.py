@@ -81,13 +81,14 @@ def _channels(covariate: str) -> Iterator[str]:
 
 def columns(problem: Problem, settings: Sequence[EffectSetting], curves: Sequence[Curve]) -> FloatArray:
     """Return the whitened columns of curves about drives simulated with some effects, (rows, k)."""
+    rows = [3 * (len(drive.times) - 1) for drive in problem.drives]
+    out = np.empty((sum(rows), sum(curve.basis.size for curve in curves)))
     if not curves:  # a chair that never changes its rates follows nothing
-        return np.empty((sum(3 * (len(drive.times) - 1) for drive in problem.drives), 0))
-    parts = []
-    for drive in problem.drives:
+        return out
+    for drive, end in zip(problem.drives, np.cumsum(rows), strict=True):
         own = raw_columns(drive, problem.model, settings, curves)
-        parts.append(problem.whitened(drive, own))
-    return np.concatenate(parts)
+        out[end - len(own) : end] = problem.whitened(drive, own)
+    return out
 
 
 def raw_columns(drive: Drive, model: Model, settings: Sequence[EffectSetting], curves: Sequence[Curve]) -> FloatArray:
