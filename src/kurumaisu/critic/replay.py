@@ -18,7 +18,7 @@ from kurumaisu.params import EffectSetting, Model, follow_commands, load_model
 from kurumaisu.sim import plant
 from kurumaisu.types import FloatArray
 
-_ROOM = 2**26  # bytes of increments that are kept
+_ROOM = 2**27  # bytes of increments that are kept
 _UNUSED = np.random.default_rng(0)  # nothing is drawn: effects that draw are left out
 
 
@@ -104,7 +104,8 @@ def seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> Float
     poses = plant.path(motion, np.zeros(3))
     if not chair.effects.reference:
         below, share = drive.places
-        return np.asarray(poses[below] + share[:, None] * (poses[below + 1] - poses[below]))
+        low, high = poses.take(below, axis=0), poses.take(below + 1, axis=0)
+        return np.asarray(low + share[:, None] * (high - low))
     times = GRID * np.arange(len(poses))  # since the start: a clock that runs fast is right at the start
     measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses)))
     return geometry.interpolate(drive.start + measured.times, measured.poses, drive.times)
