@@ -122,7 +122,7 @@ class Comb:
 
 
 def _squares(gram: FloatArray, changes: FloatArray) -> FloatArray:
-    """Return the square of what each of the changes (k, bins) does, (k,); many change one rate only, and not at rest."""
+    """Return the square of what changes (k, bins) do, (k,): most change one rate only, and not at rest."""
     use = np.flatnonzero(changes.any(axis=0))
     own = changes[:, use]
     return np.asarray(np.einsum("kb,kb->k", own @ gram[np.ix_(use, use)], own))
