@@ -96,7 +96,7 @@ struct Processes {
 
   static constexpr double kRounding = 1e-12;
   std::array<Colour, 2> colours;
-  std::array<double, 3 * kColours> variance;
+  std::array<double, std::size_t{3} * kColours> variance;
   double dt = 0.0;
   std::array<OuStep, kColours> steps{};
 };
@@ -214,12 +214,12 @@ class Covariance {
       cov_[i][i] += processes_.steps[(i - 3) / 3].var_u * processes_.variance[i - 3];
   }
 
-  std::array<double, 3> pose_;
-  Processes<kColours> processes_;
   alignas(64) double cov_[kSize][kRow] = {};
   alignas(64) double seen_[3][kRow] = {};
   alignas(64) double cross_[3][kRow] = {};
   alignas(64) double gained_[3][kRow] = {};
+  std::array<double, 3> pose_;
+  Processes<kColours> processes_;
 };
 
 template <int kColours>
