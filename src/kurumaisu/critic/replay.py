@@ -18,7 +18,7 @@ from kurumaisu.params import EffectSetting, Model, follow_commands, load_model
 from kurumaisu.sim import plant
 from kurumaisu.types import FloatArray
 
-_ROOM = 2**27  # bytes of increments that are kept
+_ROOM = 3 * 2**25  # bytes of increments that are kept: for ten minutes of driving, nearly all that are asked for again
 _UNUSED = np.random.default_rng(0)  # nothing is drawn: effects that draw are left out
 
 
