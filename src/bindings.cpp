@@ -32,10 +32,13 @@ void requireSameSize(const Array& a, const Array& b, const char* what) {
 Array ratesAlong(k::AxisInverse& inverse, const Array& volts, const Array& sign) {
   requireSameSize(volts, sign, "volts and sign");
   Array out(volts.size());
+  const double* volt = volts.data();
+  const double* meant = sign.data();
+  double* rate = out.mutable_data();
   for (py::ssize_t i = 0; i < volts.size(); ++i) {
-    const double s = sign.at(i);
+    const double s = meant[i];
     const auto commanded = std::isnan(s) ? std::nullopt : std::optional<int>((s > 0) - (s < 0));
-    out.mutable_at(i) = inverse.rate(volts.at(i), commanded);
+    rate[i] = inverse.rate(volt[i], commanded);
   }
   return out;
 }
@@ -46,12 +49,15 @@ Array integrate(const Array& v, const Array& w, const Array& dt, const std::arra
   Array out({v.size() + 1, static_cast<py::ssize_t>(3)});
   k::Pose2D pose{start[0], start[1], start[2]};
   auto poses = out.mutable_unchecked<2>();
+  const auto forward = v.unchecked<1>();
+  const auto turning = w.unchecked<1>();
+  const auto held = dt.unchecked<1>();
   for (py::ssize_t i = 0;; ++i) {
     poses(i, 0) = pose.x;
     poses(i, 1) = pose.y;
     poses(i, 2) = pose.theta;
     if (i == v.size()) return out;
-    pose = k::advance(pose, v.at(i), w.at(i), dt.at(i));
+    pose = k::advance(pose, forward(i), turning(i), held(i));
   }
 }
 

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "kalman/whiten.h"
 
-#include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
+#include <vector>
 
 namespace kurumaisu {
 namespace {
 
+// Compiled for machines that take two, four or eight numbers at once; the sums are the same.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define KURUMAISU_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define KURUMAISU_WIDE
+#endif
+#define KURUMAISU_INLINE inline __attribute__((always_inline))
+
 using Matrix3 = Eigen::Matrix3d;
-// Of e_k (pose error, map frame) and u_k (rate error, one of each colour).
-template <int kColours>
-using State = Eigen::Matrix<double, 3 + 3 * kColours, 3 + 3 * kColours>;
-template <int kColours>
-using Increments = Eigen::Matrix<double, 3, 3 + 3 * kColours>;  // e_k, u_k to one increment
 
 /// Discrete Ornstein-Uhlenbeck process of unit variance over dt, with its integral over the interval.
 struct OuStep {
@@ -74,129 +78,290 @@ void check(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eig
   }
 }
 
+/// What a step needs of the processes.
 template <int kColours>
-std::vector<Whitener::Step<3 + 3 * kColours>> filter(const Eigen::MatrixXd& poses,
-                                                     const Eigen::VectorXd& times,
-                                                     const Eigen::VectorXd& activity,
-                                                     const MotionNoise& noise,
-                                                     Eigen::MatrixX3d& log_determinants) {
-  constexpr int kSize = 3 + 3 * kColours;
-  const Eigen::Index n = poses.rows() - 1;
-  const Matrix3 pose_cov = Eigen::Vector3d(noise.position_sd, noise.position_sd, noise.heading_sd)
-                               .array()
-                               .square()
-                               .matrix()
-                               .asDiagonal();
-  const std::array<Colour, 2> colours{noise.fast, noise.slow};
-  std::array<Matrix3, kColours> rate_cov;
-  State<kColours> cov = State<kColours>::Zero();
-  cov.template topLeftCorner<3, 3>() = pose_cov;
-  for (int c = 0; c < kColours; ++c) {
-    rate_cov[c] = colours[c].sd.array().square().matrix().asDiagonal();
-    cov.template block<3, 3>(3 + 3 * c, 3 + 3 * c) = rate_cov[c];
+struct Processes {
+  explicit Processes(const MotionNoise& noise) : colours{noise.fast, noise.slow} {
+    for (int c = 0; c < kColours; ++c) {
+      for (int i = 0; i < 3; ++i) variance[3 * c + i] = colours[c].sd[i] * colours[c].sd[i];
+    }
   }
 
-  std::vector<Whitener::Step<kSize>> steps(static_cast<std::size_t>(n));
-  double dt = 0.0;  // of the processes as worked out last: many increments are alike
-  std::array<OuStep, kColours> processes{};
-  for (Eigen::Index k = 0; k < n; ++k) {
-    Jacobians j = jacobians(poses.row(k).transpose(), poses.row(k + 1).transpose());
-    j.motion *= activity[k];
-    if (times[k + 1] - times[k] != dt) {
-      dt = times[k + 1] - times[k];
-      for (int c = 0; c < kColours; ++c) processes[c] = ouStep(dt, colours[c].tau);
+  /// Works them out for a time step, unless it is the last one again but for its rounding: many increments are alike.
+  void advance(double next) {
+    if (std::abs(next - dt) <= kRounding * next) return;
+    dt = next;
+    for (int c = 0; c < kColours; ++c) steps[c] = ouStep(dt, colours[c].tau);
+  }
+
+  static constexpr double kRounding = 1e-12;
+  std::array<Colour, 2> colours;
+  std::array<double, std::size_t{3} * kColours> variance;
+  double dt = 0.0;
+  std::array<OuStep, kColours> steps{};
+};
+
+/// The filter's covariance, step by step. Rows are a little longer than needed, for the machine takes some at once.
+template <int kColours>
+class Covariance {
+ public:
+  static constexpr int kSize = 3 + 3 * kColours;
+
+  explicit Covariance(const MotionNoise& noise)
+      : pose_{noise.position_sd * noise.position_sd, noise.position_sd * noise.position_sd,
+              noise.heading_sd * noise.heading_sd},
+        processes_(noise) {
+    for (int i = 0; i < 3; ++i) cov_[i][i] = pose_[i];
+    for (int i = 3; i < kSize; ++i) cov_[i][i] = processes_.variance[i - 3];
+  }
+
+  /// Goes on by an increment of dt [s], and tells what that does to any column, and its log variances. Returns false
+  /// where its covariance is singular.
+  KURUMAISU_INLINE bool advance(const Jacobians& j, double dt, Whitener::Step<kSize>& step, double* logs) {
+    processes_.advance(dt);
+    see(j, step);
+    double root[3][3];
+    if (!cholesky(step, j, root)) return false;
+    for (int r = 0; r < 3; ++r) logs[r] = 2.0 * std::log(root[r][r]);
+    const double l00 = 1.0 / root[0][0], l11 = 1.0 / root[1][1], l22 = 1.0 / root[2][2];
+    const double l10 = -root[1][0] * l00 * l11;
+    const double l21 = -root[2][1] * l11 * l22;
+    const double l20 = -(root[2][0] * l00 + root[2][1] * l10) * l22;
+    step.lower = {l00, l10, l11, l20, l21, l22};
+    cross(j, step);
+    for (int i = 0; i < kSize; ++i) {  // gained: the root of what the increment tells of the state
+      const double a = cross_[0][i], b = cross_[1][i], c = cross_[2][i];
+      gained_[0][i] = l00 * a;
+      gained_[1][i] = l10 * a + l11 * b;
+      gained_[2][i] = l20 * a + l21 * b + l22 * c;
+      step.gain[i] = {l00 * gained_[0][i] + l10 * gained_[1][i] + l20 * gained_[2][i],
+                      l11 * gained_[1][i] + l21 * gained_[2][i], l22 * gained_[2][i]};
     }
+    update(step);
+    return true;
+  }
 
-    // Next state (e_{k+1}, u_{k+1}): a new pose error, and rate errors that decay; h: the state to this increment.
-    Increments<kColours> h;
-    h.template leftCols<3>() = j.from;
-    State<kColours> q = State<kColours>::Zero();
-    q.template topLeftCorner<3, 3>() = pose_cov;
-    Eigen::Matrix<double, kSize, 1> keep = Eigen::Matrix<double, kSize, 1>::Zero();
-    Eigen::Matrix<double, kSize, 3> shared;  // noise that the next state and this increment have in common
-    shared.template topRows<3>() = pose_cov * j.to.transpose();
-    Matrix3 fresh = j.to * pose_cov * j.to.transpose();
-    for (int c = 0; c < kColours; ++c) {
-      const OuStep& ou = processes[c];
-      h.template middleCols<3>(3 + 3 * c) = ou.reach * j.motion;
-      q.template block<3, 3>(3 + 3 * c, 3 + 3 * c) = ou.var_u * rate_cov[c];
-      keep.template segment<3>(3 + 3 * c).setConstant(ou.decay);
-      shared.template middleRows<3>(3 + 3 * c) = ou.cov * rate_cov[c] * j.motion.transpose();
-      fresh += j.motion * (ou.var_integral * rate_cov[c]) * j.motion.transpose();
-    }
+ private:
+  static constexpr int kRow = (kSize + 3) / 4 * 4;
 
-    const Eigen::Matrix<double, kSize, 3> seen = cov * h.transpose();
-    const Eigen::LLT<Matrix3> llt(h * seen + fresh);
-    if (llt.info() != Eigen::Success) throw std::invalid_argument("the increments' covariance is singular");
-    log_determinants.row(k) = 2.0 * llt.matrixLLT().diagonal().array().log().transpose();
-    const Eigen::Matrix<double, kSize, 3> cross = keep.asDiagonal() * seen + shared;
-    const Eigen::Matrix<double, kSize, 3> gain = llt.solve(cross.transpose()).transpose();
-    const Matrix3 lower = llt.matrixL().solve(Matrix3::Identity());
-    cov = (keep.asDiagonal() * cov * keep.asDiagonal()).eval() + q - gain * cross.transpose();
-    cov = 0.5 * (cov + cov.transpose()).eval();
-
-    Whitener::Step<kSize>& step = steps[static_cast<std::size_t>(k)];
-    for (int i = 0; i < kSize; ++i) {
-      for (int r = 0; r < 3; ++r) {
-        step.seen[r][i] = h(r, i);
-        step.gain[i][r] = gain(i, r);
+  /// State to increment, and its covariance with the increment.
+  KURUMAISU_INLINE void see(const Jacobians& j, Whitener::Step<kSize>& step) {
+    for (int r = 0; r < 3; ++r) {
+      for (int i = 0; i < 3; ++i) {
+        step.seen[r][i] = j.from(r, i);
+        for (int c = 0; c < kColours; ++c)
+          step.seen[r][3 + 3 * c + i] = processes_.steps[c].reach * j.motion(r, i);
       }
-      step.keep[i] = keep[i];
+      for (int i = 0; i < kRow; ++i) seen_[r][i] = 0.0;
+      for (int k = 0; k < kSize; ++k) {
+        const double by = step.seen[r][k];
+        for (int i = 0; i < kRow; ++i) seen_[r][i] += by * cov_[k][i];
+      }
     }
-    step.lower = {lower(0, 0), lower(1, 0), lower(1, 1), lower(2, 0), lower(2, 1), lower(2, 2)};
+  }
+
+  /// The root of the increment's covariance.
+  KURUMAISU_INLINE bool cholesky(const Whitener::Step<kSize>& step, const Jacobians& j,
+                                 double (&root)[3][3]) const {
+    double spread[3] = {0.0, 0.0, 0.0};  // of the rates' own noise during the increment
+    for (int c = 0; c < kColours; ++c) {
+      for (int i = 0; i < 3; ++i)
+        spread[i] += processes_.steps[c].var_integral * processes_.variance[3 * c + i];
+    }
+    for (int r = 0; r < 3; ++r) {
+      for (int s = 0; s <= r; ++s) {
+        double sum = 0.0;
+        for (int i = 0; i < kSize; ++i) sum += step.seen[r][i] * seen_[s][i];
+        for (int i = 0; i < 3; ++i) {
+          sum += pose_[i] * j.to(r, i) * j.to(s, i) + spread[i] * j.motion(r, i) * j.motion(s, i);
+        }
+        for (int k = 0; k < s; ++k) sum -= root[r][k] * root[s][k];
+        if (r == s && sum <= 0) return false;
+        root[r][s] = r == s ? std::sqrt(sum) : sum / root[s][s];
+      }
+    }
+    return true;
+  }
+
+  /// Covariance of the next state with this increment: e anew, u decayed, and the noise that both have in common.
+  KURUMAISU_INLINE void cross(const Jacobians& j, Whitener::Step<kSize>& step) {
+    for (int i = 0; i < 3; ++i) step.keep[i] = 0.0;
+    for (int r = 0; r < 3; ++r) {
+      for (int i = 0; i < 3; ++i) cross_[r][i] = pose_[i] * j.to(r, i);
+      for (int c = 0; c < kColours; ++c) {
+        const OuStep& ou = processes_.steps[c];
+        for (int i = 3 + 3 * c; i < 6 + 3 * c; ++i) {
+          step.keep[i] = ou.decay;
+          cross_[r][i] =
+              ou.decay * seen_[r][i] + ou.cov * processes_.variance[i - 3] * j.motion(r, i - 3 - 3 * c);
+        }
+      }
+    }
+  }
+
+  /// Covariance of the next state, given this increment.
+  KURUMAISU_INLINE void update(const Whitener::Step<kSize>& step) {
+    double keep[kRow] = {};
+    for (int i = 0; i < kSize; ++i) keep[i] = step.keep[i];
+    for (int k = 0; k < kSize; ++k) {
+      const double a = gained_[0][k], b = gained_[1][k], c = gained_[2][k], own = keep[k];
+      for (int i = 0; i < kRow; ++i) {
+        cov_[k][i] = own * keep[i] * cov_[k][i] - (a * gained_[0][i] + b * gained_[1][i] + c * gained_[2][i]);
+      }
+    }
+    for (int i = 0; i < 3; ++i) cov_[i][i] += pose_[i];
+    for (int i = 3; i < kSize; ++i)
+      cov_[i][i] += processes_.steps[(i - 3) / 3].var_u * processes_.variance[i - 3];
+  }
+
+  alignas(64) double cov_[kSize][kRow] = {};
+  alignas(64) double seen_[3][kRow] = {};
+  alignas(64) double cross_[3][kRow] = {};
+  alignas(64) double gained_[3][kRow] = {};
+  std::array<double, 3> pose_;
+  Processes<kColours> processes_;
+};
+
+template <int kColours>
+KURUMAISU_INLINE std::vector<Whitener::Step<3 + 3 * kColours>> filterAll(const Eigen::MatrixXd& poses,
+                                                                         const Eigen::VectorXd& times,
+                                                                         const Eigen::VectorXd& activity,
+                                                                         const MotionNoise& noise,
+                                                                         Eigen::MatrixX3d& log_determinants) {
+  Covariance<kColours> covariance(noise);
+  std::vector<Whitener::Step<3 + 3 * kColours>> steps(static_cast<std::size_t>(poses.rows() - 1));
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    Jacobians j = jacobians(poses.row(at).transpose(), poses.row(at + 1).transpose());
+    j.motion *= activity[at];
+    double logs[3];
+    if (!covariance.advance(j, times[at + 1] - times[at], steps[k], logs)) {
+      throw std::invalid_argument("the increments' covariance is singular");
+    }
+    log_determinants.row(at) << logs[0], logs[1], logs[2];
   }
   return steps;
 }
 
-constexpr Eigen::Index kLargest = 9;  // numbers in a state
-constexpr Eigen::Index kLane = 8;     // columns that go through a step side by side
-
-/// Filters some columns by one increment: `in` and `out` are rows of so many numbers, three of them; mean: of the state.
-template <int kSize, int kColumns>
-void filterLane(const Whitener::Step<kSize>& step, const double* in, Eigen::Index in_stride, double* out,
-                Eigen::Index out_stride, double* mean) {
-  using Lane = Eigen::Array<double, 1, kColumns>;
-  std::array<Lane, kSize> state;
-  for (int i = 0; i < kSize; ++i) state[i] = Eigen::Map<const Lane>(mean + std::ptrdiff_t{i} * kColumns);
-  std::array<Lane, 3> innovation;
-  for (int r = 0; r < 3; ++r) {
-    innovation[r] = Eigen::Map<const Lane>(in + r * in_stride);
-    for (int i = 0; i < kSize; ++i) innovation[r] -= step.seen[r][i] * state[i];
-  }
-  const auto& [l00, l10, l11, l20, l21, l22] = step.lower;
-  Eigen::Map<Lane>{out} = l00 * innovation[0];
-  Eigen::Map<Lane>{out + out_stride} = l10 * innovation[0] + l11 * innovation[1];
-  Eigen::Map<Lane>{out + std::ptrdiff_t{2}* out_stride} =
-      l20 * innovation[0] + l21 * innovation[1] + l22 * innovation[2];
-  for (int i = 0; i < kSize; ++i) {
-    const auto& gain = step.gain[i];
-    Eigen::Map<Lane>{mean + std::ptrdiff_t{i}* kColumns} =
-        step.keep[i] * state[i] + gain[0] * innovation[0] + gain[1] * innovation[1] + gain[2] * innovation[2];
-  }
+KURUMAISU_WIDE std::vector<Whitener::Step<6>> filterOne(const Eigen::MatrixXd& poses,
+                                                        const Eigen::VectorXd& times,
+                                                        const Eigen::VectorXd& activity,
+                                                        const MotionNoise& noise,
+                                                        Eigen::MatrixX3d& log_determinants) {
+  return filterAll<1>(poses, times, activity, noise, log_determinants);
 }
 
-/// Filters m columns by one increment.
+KURUMAISU_WIDE std::vector<Whitener::Step<9>> filterTwo(const Eigen::MatrixXd& poses,
+                                                        const Eigen::VectorXd& times,
+                                                        const Eigen::VectorXd& activity,
+                                                        const MotionNoise& noise,
+                                                        Eigen::MatrixX3d& log_determinants) {
+  return filterAll<2>(poses, times, activity, noise, log_determinants);
+}
+
+constexpr Eigen::Index kLane = 8;  // columns that go through a step side by side
+struct alignas(kLane * sizeof(double)) Lane {
+  double of __attribute__((vector_size(kLane * sizeof(double))));
+};
+using Lanes = std::vector<Lane>;
+/// Filters lanes of columns by one increment: rows: three of so many lanes, in place; mean: of the state.
 template <int kSize>
-void filterStep(const Whitener::Step<kSize>& step, const double* in, Eigen::Index in_stride, double* out,
-                Eigen::Index m, double* mean) {
-  Eigen::Index at = 0;
-  for (; at + kLane <= m; at += kLane) {
-    filterLane<kSize, kLane>(step, in + at, in_stride, out + at, m, mean + kSize * at);
-  }
-  for (; at + 2 <= m; at += 2) filterLane<kSize, 2>(step, in + at, in_stride, out + at, m, mean + kSize * at);
-  if (at < m) filterLane<kSize, 1>(step, in + at, in_stride, out + at, m, mean + kSize * at);
-}
-
-/// Adds the products of all pairs of m columns of some rows to the upper triangle of a gram.
-void addProducts(const Rows& rows, Rows& gram) {
-  const Eigen::Index m = gram.rows();
-  for (Eigen::Index i = 0; i < m; ++i) {
-    for (Eigen::Index r = 0; r < rows.rows(); r += 3) {
-      gram.row(i).tail(m - i) += rows(r, i) * rows.row(r).tail(m - i) +
-                                 rows(r + 1, i) * rows.row(r + 1).tail(m - i) +
-                                 rows(r + 2, i) * rows.row(r + 2).tail(m - i);
+KURUMAISU_INLINE void filterStep(const Whitener::Step<kSize>& step, Lane* rows, std::size_t lanes,
+                                 Lane* mean) {
+  const auto& [l00, l10, l11, l20, l21, l22] = step.lower;
+  for (std::size_t at = 0; at < lanes; ++at) {
+    Lane* state = mean + kSize * at;
+    Lane innovation[3];
+    for (int r = 0; r < 3; ++r) {
+      innovation[r] = rows[r * lanes + at];
+      for (int i = 0; i < kSize; ++i) innovation[r].of -= step.seen[r][i] * state[i].of;
+    }
+    rows[at].of = l00 * innovation[0].of;
+    rows[lanes + at].of = l10 * innovation[0].of + l11 * innovation[1].of;
+    rows[2 * lanes + at].of = l20 * innovation[0].of + l21 * innovation[1].of + l22 * innovation[2].of;
+    for (int i = 0; i < kSize; ++i) {
+      const auto& gain = step.gain[i];
+      state[i].of = step.keep[i] * state[i].of + gain[0] * innovation[0].of + gain[1] * innovation[1].of +
+                    gain[2] * innovation[2].of;
     }
   }
+}
+
+/// Adds the products of all pairs of columns of three rows to the upper triangle of a gram, whose rows are lanes, too.
+KURUMAISU_INLINE void addProducts(const Lane* rows, std::size_t lanes, Eigen::Index columns, Lane* gram) {
+  for (Eigen::Index i = 0; i < columns; ++i) {
+    const std::size_t own = static_cast<std::size_t>(i / kLane);
+    const double a = rows[own].of[i % kLane];
+    const double b = rows[lanes + own].of[i % kLane];
+    const double c = rows[2 * lanes + own].of[i % kLane];
+    Lane* sums = gram + static_cast<std::size_t>(i) * lanes;
+    for (std::size_t at = own; at < lanes; ++at) {
+      sums[at].of += a * rows[at].of + b * rows[lanes + at].of + c * rows[2 * lanes + at].of;
+    }
+  }
+}
+
+/// Three rows of columns (3 n, m), and as many lanes of them.
+struct Triple {
+  explicit Triple(Eigen::Index columns)
+      : lanes(static_cast<std::size_t>((columns + kLane - 1) / kLane)), rows(3 * lanes, Lane{}) {}
+  double* row(int r) { return reinterpret_cast<double*>(rows.data() + r * lanes); }
+
+  std::size_t lanes;
+  Lanes rows;
+};
+
+template <int kSize>
+KURUMAISU_INLINE void whitenAll(const std::vector<Whitener::Step<kSize>>& steps,
+                                const Eigen::Ref<const Rows>& columns, Rows& out) {
+  const auto bytes = static_cast<std::size_t>(columns.cols()) * sizeof(double);
+  Triple some(columns.cols());
+  Lanes mean(kSize * some.lanes, Lane{});
+  Eigen::Index row = 0;
+  for (const auto& step : steps) {
+    for (int r = 0; r < 3; ++r) std::memcpy(some.row(r), columns.row(row + r).data(), bytes);
+    filterStep(step, some.rows.data(), some.lanes, mean.data());
+    for (int r = 0; r < 3; ++r) std::memcpy(out.row(row + r).data(), some.row(r), bytes);
+    row += 3;
+  }
+}
+
+template <int kSize>
+KURUMAISU_INLINE void gramOfAll(const std::vector<Whitener::Step<kSize>>& steps,
+                                const Eigen::Ref<const Rows>& columns, Rows& out) {
+  const Eigen::Index m = columns.cols();
+  const auto bytes = static_cast<std::size_t>(m) * sizeof(double);
+  Triple some(m);
+  Lanes mean(kSize * some.lanes, Lane{});
+  Lanes gram(static_cast<std::size_t>(m) * some.lanes, Lane{});
+  Eigen::Index row = 0;
+  for (const auto& step : steps) {
+    for (int r = 0; r < 3; ++r) std::memcpy(some.row(r), columns.row(row + r).data(), bytes);
+    filterStep(step, some.rows.data(), some.lanes, mean.data());
+    addProducts(some.rows.data(), some.lanes, m, gram.data());
+    row += 3;
+  }
+  for (Eigen::Index i = 0; i < m; ++i) std::memcpy(out.row(i).data(), gram.data() + i * some.lanes, bytes);
+}
+
+KURUMAISU_WIDE void whitenSteps(const std::vector<Whitener::Step<6>>& steps,
+                                const Eigen::Ref<const Rows>& columns, Rows& out) {
+  whitenAll(steps, columns, out);
+}
+
+KURUMAISU_WIDE void whitenSteps(const std::vector<Whitener::Step<9>>& steps,
+                                const Eigen::Ref<const Rows>& columns, Rows& out) {
+  whitenAll(steps, columns, out);
+}
+
+KURUMAISU_WIDE void gramOfSteps(const std::vector<Whitener::Step<6>>& steps,
+                                const Eigen::Ref<const Rows>& columns, Rows& out) {
+  gramOfAll(steps, columns, out);
+}
+
+KURUMAISU_WIDE void gramOfSteps(const std::vector<Whitener::Step<9>>& steps,
+                                const Eigen::Ref<const Rows>& columns, Rows& out) {
+  gramOfAll(steps, columns, out);
 }
 
 }  // namespace
@@ -206,9 +371,9 @@ Whitener::Whitener(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times,
   check(poses, times, activity, noise);
   log_determinants_.resize(poses.rows() - 1, 3);
   if ((noise.slow.sd.array() > 0).any()) {
-    steps_ = filter<2>(poses, times, activity, noise, log_determinants_);
+    steps_ = filterTwo(poses, times, activity, noise, log_determinants_);
   } else {
-    steps_ = filter<1>(poses, times, activity, noise, log_determinants_);
+    steps_ = filterOne(poses, times, activity, noise, log_determinants_);
   }
 }
 
@@ -220,38 +385,15 @@ void Whitener::requireRows(const Eigen::Ref<const Rows>& columns) const {
 
 Rows Whitener::whiten(const Eigen::Ref<const Rows>& columns) const {
   requireRows(columns);
-  const Eigen::Index m = columns.cols();
-  Rows out(columns.rows(), m);
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(kLargest * m);
-  std::visit(
-      [&](const auto& steps) {
-        Eigen::Index row = 0;
-        for (const auto& step : steps) {
-          filterStep(step, columns.row(row).data(), columns.outerStride(), out.row(row).data(), m,
-                     mean.data());
-          row += 3;
-        }
-      },
-      steps_);
+  Rows out(columns.rows(), columns.cols());
+  std::visit([&](const auto& steps) { whitenSteps(steps, columns, out); }, steps_);
   return out;
 }
 
 Rows Whitener::gram(const Eigen::Ref<const Rows>& columns) const {
   requireRows(columns);
-  const Eigen::Index m = columns.cols();
-  Rows out = Rows::Zero(m, m);
-  Rows white(3, m);
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(kLargest * m);
-  std::visit(
-      [&](const auto& steps) {
-        Eigen::Index row = 0;
-        for (const auto& step : steps) {
-          filterStep(step, columns.row(row).data(), columns.outerStride(), white.data(), m, mean.data());
-          addProducts(white, out);
-          row += 3;
-        }
-      },
-      steps_);
+  Rows out(columns.cols(), columns.cols());
+  std::visit([&](const auto& steps) { gramOfSteps(steps, columns, out); }, steps_);
   return out.selfadjointView<Eigen::Upper>();
 }
 

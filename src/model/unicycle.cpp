@@ -6,8 +6,12 @@
 namespace kurumaisu {
 namespace {
 
-/// sin(x) / x. Below the bound the series is exact to double precision and needs no division by 0.
-double sinc(double x) { return std::abs(x) < 1e-4 ? 1.0 - x * x / 6.0 : std::sin(x) / x; }
+/// sin(x) / x. Below the bound the series is exact to double precision and needs neither a sine nor a division by 0.
+double sinc(double x) {
+  const double square = x * x;
+  if (square > 1e-3) return std::sin(x) / x;
+  return 1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0));
+}
 
 }  // namespace
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from kurumaisu.critic import replay
 from kurumaisu.critic.catalogue import Term, settings_of
@@ -54,7 +55,8 @@ class Comb:
         self._plain = [replay.motion(drive, model, ()) for drive in self._drives]
         self._columns: list[FloatArray] = []
         for drive, plain in zip(self._drives, self._plain, strict=True):
-            held = np.repeat(np.eye(-(-len(drive.v) // _CELLS)), _CELLS, axis=0)[: len(drive.v)]
+            cells = np.arange(len(drive.v))
+            held = csr_array((np.ones(len(cells)), (cells, cells // _CELLS)))
             sensitivity = Sensitivity(drive, plain)
             both = np.column_stack([sensitivity.increments(channel, held) for channel in ("v", "w")])
             self._columns.append(whitened(drive, both, noise)[0])
@@ -72,7 +74,7 @@ class Comb:
             return []
         if key not in self._squares:
             parts = zip(self._grams, self._parts(changes), strict=True)
-            self._squares[key] = np.sum([np.sum((own @ gram) * own, axis=1) for gram, own in parts], axis=0)
+            self._squares[key] = np.sum([_squares(gram, own) for gram, own in parts], axis=0)
         pull = np.concatenate([c.T @ r[: len(c)] for c, r in zip(self._columns, residual, strict=False)])
         gained = changes @ pull - 0.5 * self._squares[key]
         peaks = np.flatnonzero((gained >= np.append(gained[1:], -np.inf)) & (gained >= np.append(-np.inf, gained[:-1])))
@@ -117,6 +119,13 @@ class Comb:
         moved = [replay.motion(drive, self._model, settings) for drive in self._drives]
         pairs = zip(moved, self._plain, strict=True)
         return np.concatenate([_means(rate) for a, b in pairs for rate in (a.v - b.v, a.w - b.w)])
+
+
+def _squares(gram: FloatArray, changes: FloatArray) -> FloatArray:
+    """Return the square of what changes (k, bins) do, (k,): most change one rate only, and not at rest."""
+    use = np.flatnonzero(changes.any(axis=0))
+    own = changes[:, use]
+    return np.asarray(np.einsum("kb,kb->k", own @ gram[np.ix_(use, use)], own))
 
 
 def _begin(drive: Drive, seconds: float) -> Drive:

@@ -10,7 +10,7 @@ parameters of the rival that are free, it is z^2 (1 - rho^2) / 2 of Hunter and R
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def planned(script: Script, model: Model, settings: Sequence[EffectSetting]) -> 
         path = nominal_path(script.phases)
     poses = Series(t, path, ("x", "y", "theta"))
     drive = prepare(Run(script.name, voltage=voltage, pose=poses), model)
-    return Drive(**{**vars(drive), "poses": replay.path(drive, model, settings)})
+    return replace(drive, poses=replay.path(drive, model, settings))
 
 
 def predict(drive: Drive, model: Model, noise: Noise, explanation: Explanation) -> Prediction:

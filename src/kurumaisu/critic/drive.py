@@ -51,10 +51,17 @@ class Drive:
     heading: float | None = None
     still: BoolArray | None = None
 
-    @property
+    @cached_property
     def measured(self) -> FloatArray:
         """Body increments of the reference, (m, 3)."""
         return geometry.between(self.poses[:-1], self.poses[1:])
+
+    @cached_property
+    def places(self) -> tuple[IntArray, FloatArray]:
+        """Where the reference's times lie among the edges of the grid: the edge before, and the share of its cell."""
+        place = np.clip((self.times - self.start) / GRID, 0, len(self.v))
+        below = np.minimum(place.astype(int), len(self.v) - 1)
+        return below, place - below
 
     @cached_property
     def activity(self) -> FloatArray:

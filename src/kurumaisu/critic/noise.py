@@ -12,11 +12,11 @@ from operator import itemgetter
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.optimize import minimize
 from scipy.special import expit
 
 from kurumaisu._core import Whitener
 from kurumaisu.critic.drive import Drive
+from kurumaisu.critic.noise_search import lowest
 from kurumaisu.critic.prior import occam
 from kurumaisu.types import FloatArray
 
@@ -183,7 +183,7 @@ class Scatter:
             names = [name for name in names if name not in ("position_sd", "heading_sd")]
         centre = np.log([getattr(_SLOW, name) for name in names])
         spread = np.array([_SPREAD[name] for name in names])
-        bounds = [(np.log(_FLOOR[name]), np.log(_CEILING[name])) for name in names]
+        bounds = np.log([[_FLOOR[name], _CEILING[name]] for name in names])
 
         def noise_at(log_values: FloatArray) -> Noise:
             return replace(start, **dict(zip(names, np.exp(log_values).tolist(), strict=True)))
@@ -192,10 +192,9 @@ class Scatter:
             distance = (log_values - centre) / spread
             return self._cost(noise_at(log_values)) + 0.5 * float(distance @ distance)
 
-        begin = np.clip(np.log([getattr(start, name) for name in names]), *np.array(bounds).T)
-        options = {"eps": 0.01, "ftol": 3e-6, "maxiter": 60}
-        found = minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options=options)
-        return Estimate(noise_at(found.x), float(found.fun))
+        begin = np.clip(np.log([getattr(start, name) for name in names]), *bounds.T)
+        where, least = lowest(cost, begin, bounds)
+        return Estimate(noise_at(where), least)
 
     def _cost(self, noise: Noise) -> float:
         """Return minus the restricted log likelihood, up to a constant."""

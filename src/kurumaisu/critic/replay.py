@@ -18,7 +18,8 @@ from kurumaisu.params import EffectSetting, Model, follow_commands, load_model
 from kurumaisu.sim import plant
 from kurumaisu.types import FloatArray
 
-_ROOM = 2**26  # bytes of increments that are kept
+_ROOM = 3 * 2**25  # bytes of increments that are kept: for ten minutes of driving, nearly all that are asked for again
+_UNUSED = np.random.default_rng(0)  # nothing is drawn: effects that draw are left out
 
 
 def model_of(recording: Recording, model_file: Path, *, assume_law: bool) -> Model:
@@ -101,9 +102,11 @@ def seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> Float
     """Return what the reference measures of the simulated chair at its times, (m + 1, 3), in a frame of its own."""
     chair, motion = _driven(drive, model, settings)
     poses = plant.path(motion, np.zeros(3))
-    times = GRID * np.arange(len(poses))  # since the start: a clock that runs fast is right at the start
     if not chair.effects.reference:
-        return geometry.interpolate(drive.start + times, poses, drive.times)
+        below, share = drive.places
+        low, high = poses.take(below, axis=0), poses.take(below + 1, axis=0)
+        return np.asarray(low + share[:, None] * (high - low))
+    times = GRID * np.arange(len(poses))  # since the start: a clock that runs fast is right at the start
     measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses)))
     return geometry.interpolate(drive.start + measured.times, measured.poses, drive.times)
 
@@ -111,7 +114,7 @@ def seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> Float
 def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:
     extended = extend(model, settings)
     mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in _random()))
-    chair = plant.Plant(mean, GRID, np.random.default_rng(0))
+    chair = plant.Plant(mean, GRID, _UNUSED)
     # The grid begins at the first pose, or a little before it, unless the drive is a part of a longer one.
     heading = float(drive.poses[0, 2]) if drive.heading is None else drive.heading
     return chair, chair.from_rates(drive.v, drive.w, heading, drive.known)

@@ -76,17 +76,14 @@ class Screen:
         own = sorted(self.centre.candidates, key=_name)
         others = [c for c in self.problem.candidates if c.usual and not c.fixed and c not in self.centre.candidates]
         pool = [*own, *others]
+        joint = [[self._common(one, other) > _JOINT for other in pool] for one in pool]
         for size in range(_SWAPS + 1):
-            for changes in combinations(pool, size):
-                if size == _SWAPS and not self._related(changes):
+            for changes in combinations(range(len(pool)), size):
+                if size == _SWAPS and not all(any(joint[i][j] for j in changes if j != i) for i in changes):
                     continue
-                chosen = self.centre.candidates.symmetric_difference(changes)
+                chosen = self.centre.candidates.symmetric_difference(pool[i] for i in changes)
                 if self._allowed(chosen):
                     yield chosen
-
-    def _related(self, changes: Sequence[Candidate]) -> bool:
-        """Tell whether each of the changes has a part in common with another one of them."""
-        return all(any(self._common(a, b) > _JOINT for b in changes if b is not a) for a in changes)
 
     def _common(self, one: Candidate, other: Candidate) -> float:
         return max(

@@ -81,13 +81,14 @@ def _channels(covariate: str) -> Iterator[str]:
 
 def columns(problem: Problem, settings: Sequence[EffectSetting], curves: Sequence[Curve]) -> FloatArray:
     """Return the whitened columns of curves about drives simulated with some effects, (rows, k)."""
+    rows = [3 * (len(drive.times) - 1) for drive in problem.drives]
+    out = np.empty((sum(rows), sum(curve.basis.size for curve in curves)))
     if not curves:  # a chair that never changes its rates follows nothing
-        return np.empty((sum(3 * (len(drive.times) - 1) for drive in problem.drives), 0))
-    parts = []
-    for drive in problem.drives:
+        return out
+    for drive, end in zip(problem.drives, np.cumsum(rows), strict=True):
         own = raw_columns(drive, problem.model, settings, curves)
-        parts.append(problem.whitened(drive, own))
-    return np.concatenate(parts)
+        out[end - len(own) : end] = problem.whitened(drive, own)
+    return out
 
 
 def raw_columns(drive: Drive, model: Model, settings: Sequence[EffectSetting], curves: Sequence[Curve]) -> FloatArray:
@@ -95,7 +96,11 @@ def raw_columns(drive: Drive, model: Model, settings: Sequence[EffectSetting], c
     motion = replay.motion(drive, model, settings)
     sensitivity = Sensitivity(drive, motion)
     matrices = {basis.covariate: basis.matrix(basis.samples(motion)) for basis in (curve.basis for curve in curves)}
-    return np.column_stack([sensitivity.increments(curve.channel, matrices[curve.basis.covariate]) for curve in curves])
+    out = np.empty((3 * (len(drive.times) - 1), sum(curve.basis.size for curve in curves)))
+    for curve, end in zip(curves, np.cumsum([curve.basis.size for curve in curves]), strict=True):
+        own = sensitivity.increments(curve.channel, matrices[curve.basis.covariate])
+        out[:, end - curve.basis.size : end] = own
+    return out
 
 
 def beside(problem: Problem, fit: Fit, of: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -116,12 +121,11 @@ def taken_up(problem: Problem, fit: Fit) -> tuple[FloatArray, FloatArray]:
 
 def belief(gram: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> Belief:
     """Return how much a curve explains: b = X'y, gram = X'X of its whitened columns; any of the priors may hold."""
-    found = []
-    for scaled, axes, sizes in _axes(gram, priors):
-        found += [(float(nats), size**2 * scaled) for nats, size in zip(_nats(sizes, axes.T @ b), _SIZES, strict=True)]
-    weighed = [nats + weight for (nats, _), weight in zip(found, np.tile(_LOG_WEIGHTS, len(priors)), strict=True)]
-    best = int(np.argmax(weighed))
-    return Belief(float(logsumexp(weighed) - np.log(len(priors))), found[best][1])
+    scaled, axes, sizes = _axes(gram, priors)
+    nats = _nats(sizes, axes.transpose(0, 2, 1) @ b)
+    weighed = nats + _LOG_WEIGHTS
+    prior, size = np.unravel_index(int(np.argmax(weighed)), weighed.shape)
+    return Belief(float(logsumexp(weighed) - np.log(len(priors))), _SIZES[size] ** 2 * scaled[prior])
 
 
 def null_evidence(design: Design, columns: FloatArray, draws: int) -> FloatArray:
@@ -134,24 +138,24 @@ def null_evidence(design: Design, columns: FloatArray, draws: int) -> FloatArray
         own = columns[:, curve.columns]
         parts = [
             logsumexp(_nats(sizes, b[:, curve.columns] @ axes) + _LOG_WEIGHTS, axis=-1)
-            for _, axes, sizes in _axes(own.T @ own, curve.basis.priors)
+            for axes, sizes in zip(*_axes(own.T @ own, curve.basis.priors)[1:], strict=True)
         ]
         best = np.maximum(best, logsumexp(parts, axis=0) - np.log(len(parts)))
     return best
 
 
-def _axes(gram: FloatArray, priors: Sequence[FloatArray]) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Yield, for each prior: it, scaled to a signal of norm 1; its own axes in b, (k, k); the gram along them, (k,)."""
-    for prior in priors:
-        scaled = prior / max(float(np.sum(gram * prior)), 1e-12)
-        values, vectors = np.linalg.eigh(scaled)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        sizes, turns = np.linalg.eigh(root.T @ gram @ root)
-        yield scaled, root @ turns, np.maximum(sizes, 0.0)
+def _axes(gram: FloatArray, priors: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return, for each prior: it, scaled to a signal of norm 1; its own axes in b, (k, k); the gram along them."""
+    scaled = np.stack(priors)
+    scaled = scaled / np.maximum(np.sum(gram * scaled, axis=(1, 2)), 1e-12)[:, None, None]
+    values, vectors = np.linalg.eigh(scaled)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    sizes, turns = np.linalg.eigh(root.transpose(0, 2, 1) @ gram @ root)
+    return scaled, root @ turns, np.maximum(sizes, 0.0)
 
 
 def _nats(sizes: FloatArray, c: FloatArray) -> FloatArray:
-    """Return the log evidence for each of _SIZES, (..., sizes); sizes (k,), c (..., k): gram and b along own axes."""
-    spread = 1 + np.multiply.outer(_SIZES**2, sizes)
+    """Return the log evidence for each of _SIZES, (..., sizes); sizes, c (..., k): gram and b along own axes."""
+    spread = 1 + _SIZES[:, None] ** 2 * sizes[..., None, :]
     gained = (c**2)[..., None, :] * (_SIZES[:, None] ** 2 / spread)
     return np.asarray(0.5 * (gained - np.log(spread)).sum(axis=-1))

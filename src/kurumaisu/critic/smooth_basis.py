@@ -136,7 +136,12 @@ def knots_of(values: FloatArray, hats: int = _HATS) -> FloatArray:
 
 def _matrix(knots: FloatArray, period: float, at: FloatArray) -> FloatArray:
     if len(knots):
-        return np.column_stack([np.interp(at, knots, row) for row in np.eye(len(knots))])
+        inside = np.clip(at, knots[0], knots[-1])
+        below = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
+        share = (inside - knots[below]) / (knots[below + 1] - knots[below])
+        rows, hats = np.arange(len(at)), np.zeros((len(at), len(knots)))
+        hats[rows, below], hats[rows, below + 1] = 1 - share, share
+        return hats
     phase = np.multiply.outer(_TURN * at / period, np.arange(1, _HARMONICS + 1))
     return np.column_stack([np.ones(len(at)), np.cos(phase), np.sin(phase)])
 

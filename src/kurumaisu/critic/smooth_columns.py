@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
+from scipy.sparse import csr_array
 
 from kurumaisu import effects
 from kurumaisu.critic.drive import GRID, Drive
@@ -12,53 +15,70 @@ from kurumaisu.types import FloatArray
 
 
 class Sensitivity:
-    """The derivative of a drive's body increments by rates that are added to its motion while the chair moves."""
+    """The derivative of a drive's body increments by rates that are added to its motion while the chair moves.
+
+    An increment depends on the few cells of the grid that it spans, so the derivative is a sparse matrix: for all the
+    columns of a basis at once, no sum over the whole drive is made.
+    """
 
     def __init__(self, drive: Drive, motion: effects.Motion) -> None:
         poses = plant.path(motion, np.array([0.0, 0.0, motion.heading or 0.0]))
-        edges = drive.start + GRID * np.arange(len(poses))
-        self._moving = ((motion.v != 0) | (motion.w != 0)).astype(float)[:, None]
-        self._rates = {"v_gain": motion.v[:, None], "w_gain": motion.w[:, None]}
+        moving = ((motion.v != 0) | (motion.w != 0)).astype(float)
+        self._weights = {"": GRID * moving, "v_gain": GRID * moving * motion.v, "w_gain": GRID * moving * motion.w}
         self._heading = 0.5 * (poses[:-1, 2] + poses[1:, 2])
+        # Anything summed over the grid is taken at the reference's times, linear within a cell: the share of it before.
+        below, share = drive.places
+        self._headings = poses[below, 2] + share * (poses[below + 1, 2] - poses[below, 2])
+        counts = np.diff(below) + 1
+        self._rows = np.append(0, np.cumsum(counts))  # where each increment's cells begin
+        self._increment = np.repeat(np.arange(len(counts)), counts)
+        self._cells = np.arange(self._rows[-1]) - self._rows[self._increment] + below[self._increment]
+        self._first, last = self._rows[:-1], self._rows[1:] - 1
+        self._before = share[:-1]
+        self._spanned = np.ones(self._rows[-1])  # share of each cell that its increment spans
+        self._spanned[last] = share[1:]
+        self._spanned[self._first] -= self._before
         self._steps = np.diff(poses[:, :2], axis=0)
-        # Interpolation of anything summed over the grid at the reference's times: two weights each.
-        place = np.clip((drive.times - edges[0]) / GRID, 0, len(poses) - 1)
-        self._below = np.minimum(place.astype(int), len(poses) - 2)
-        self._share = (place - self._below)[:, None]
-        self._positions = self._at(poses[:, :2])
-        self._headings = self._at(poses[:, 2:])[:, 0]
+        self._derivatives: dict[str, list[csr_array]] = {}
 
-    def increments(self, channel: str, rates: FloatArray) -> FloatArray:
+    def increments(self, channel: str, rates: FloatArray | csr_array) -> FloatArray:
         """Return the change of the increments by rates (n, k) added to a channel, or by factors less 1; (3 m, k)."""
-        rates = rates * self._moving * GRID * self._rates.get(channel, 1.0)
-        if channel.startswith("w"):
-            return self._turned(rates)
-        heading = (self._heading + (np.pi / 2 if channel == "lateral" else 0.0))[:, None]
-        x, y = (self._differences(_sum(rates * side(heading))) for side in (np.cos, np.sin))
-        return self._in_body(x, y, np.zeros_like(x))
+        if channel not in self._derivatives:
+            self._derivatives[channel] = list(self._derivative(channel))
+        out = np.zeros((len(self._first), 3, rates.shape[1]))
+        for axis, derivative in enumerate(self._derivatives[channel]):
+            change = derivative @ rates
+            out[:, axis] = change if isinstance(change, np.ndarray) else change.toarray()
+        return out.reshape(-1, rates.shape[1])
 
-    def _turned(self, turns: FloatArray) -> FloatArray:
-        """Return the change by turns (n, k) [rad]: what lies ahead of a turn swings round it."""
-        total = _sum(turns)
-        middle = 0.5 * (total[:-1] + total[1:])
-        at = self._at(total)
-        way = np.diff(self._positions, axis=0)
-        x = self._differences(_sum(-middle * self._steps[:, 1:])) + at[:-1] * way[:, 1:]
-        y = self._differences(_sum(middle * self._steps[:, :1])) - at[:-1] * way[:, :1]
-        return self._in_body(x, y, np.diff(at, axis=0))
+    def _derivative(self, channel: str) -> Iterator[csr_array]:
+        """Yield the derivatives (m, n) of dx, dy and, where a channel turns the chair, of the turn."""
+        along = self._turned() if channel.startswith("w") else self._moved(np.pi / 2 if channel == "lateral" else 0.0)
+        weights = self._weights[channel if channel.endswith("_gain") else ""][self._cells]
+        for part in along:
+            yield csr_array((weights * part, self._cells, self._rows), shape=(len(self._first), len(self._steps)))
 
-    def _in_body(self, x: FloatArray, y: FloatArray, turn: FloatArray) -> FloatArray:
-        cos, sin = np.cos(self._headings[:-1, None]), np.sin(self._headings[:-1, None])
-        stacked = np.stack([cos * x + sin * y, -sin * x + cos * y, turn], axis=1)
-        return np.asarray(stacked.reshape(-1, x.shape[1]))
+    def _moved(self, leftward: float) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives, per cell of each increment, of dx and dy by a way along a direction [rad]."""
+        ahead = self._heading[self._cells] + leftward
+        return self._in_body(self._spanned * np.cos(ahead), self._spanned * np.sin(ahead))
 
-    def _at(self, values: FloatArray) -> FloatArray:
-        low, high = values[self._below], values[self._below + 1]
-        return np.asarray(low + self._share * (high - low))
+    def _turned(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the derivatives of dx, dy and the turn by a turn [rad]: what lies ahead of it swings round it."""
+        x, y = (self._ahead(self._spanned * step[self._cells]) for step in self._steps.T)
+        return *self._in_body(-y, x), self._spanned
 
-    def _differences(self, sums: FloatArray) -> FloatArray:
-        return np.asarray(np.diff(self._at(sums), axis=0))
+    def _ahead(self, ways: FloatArray) -> FloatArray:
+        """Return what of the ways (cells,) within an increment lies ahead of each of its cells, of its own one half."""
+        total = np.add.reduceat(ways, self._first)
+        sums = np.cumsum(ways)
+        since = np.append(0.0, sums)[self._first]  # before each increment
+        after = (since + total)[self._increment] - sums
+        out = after + 0.5 * ways
+        # The first cell's turn has partly been made when the increment begins.
+        out[self._first] = (1 - self._before) * after[self._first] + (0.5 - self._before) * ways[self._first]
+        return np.asarray(out)
 
-
-def _sum(steps: FloatArray) -> FloatArray:
-    return np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+    def _in_body(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        cos, sin = (side(self._headings[:-1])[self._increment] for side in (np.cos, np.sin))
+        return cos * x + sin * y, cos * y - sin * x

@@ -3,20 +3,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic import replay
 from kurumaisu.critic.evidence import Problem
-from kurumaisu.critic.noise import whitened
 from kurumaisu.critic.smooth_columns import Sensitivity
 from kurumaisu.params import EffectSetting
+from kurumaisu.types import FloatArray
 
 _SHORTEST, _LONGEST = 0.3, 3.0  # [m] girths of casters and drive wheels, and more
 _TURNS = 3.0  # of the wheel in all drives, at least: fewer are a slope or a carpet
 _MOST = 150  # periods
+_AT_ONCE = 16  # of them: more leave the processor's cache
 
 
 def girth(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, int] | None:
@@ -33,13 +34,27 @@ def girth(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, i
     waves = np.linspace(low, high, int(np.clip(2 * longest * (high - low), 2, _MOST)))
     gram, pull = np.zeros((len(waves), 2, 2)), np.zeros((len(waves), 2))
     for drive, motion, way in zip(problem.drives, motions, ways, strict=True):
-        phase = 2 * np.pi * np.multiply.outer(way, waves)
         sensitivity = Sensitivity(drive, motion)
-        parts = [sensitivity.increments("v_gain", side(phase)) for side in (np.cos, np.sin)]
+        along = [sensitivity.increments("v_gain", some) for some in _waved(way, waves)]
         left = (drive.measured - problem.simulated(drive, settings)).reshape(-1, 1)
-        white = whitened(drive, np.column_stack([left, *parts]), problem.noise)[0]
-        both = np.stack([white[:, 1 : 1 + len(waves)], white[:, 1 + len(waves) :]], axis=-1)
+        white = problem.whitened(drive, np.column_stack([left, *along]))
+        both = white[:, 1:].reshape(len(white), -1, 2)
         gram += np.einsum("nki,nkj->kij", both, both)
         pull += np.einsum("nki,n->ki", both, white[:, 0])
     gained = np.einsum("ki,ki->k", pull, np.linalg.solve(gram + 1e-9 * np.eye(2), pull[..., None])[..., 0])
     return float(1 / waves[int(np.argmax(gained))]), len(waves)
+
+
+def _waved(way: FloatArray, waves: FloatArray) -> Iterator[FloatArray]:
+    """Yield pairs of cosine and sine (n, 2 k) of evenly spaced waves along a way (n,), few at a time.
+
+    Each is the one before it, turned on by as much again.
+    """
+    first, apart = np.exp(2j * np.pi * np.multiply.outer([waves[0], waves[1] - waves[0]], way))
+    for at in range(0, len(waves), _AT_ONCE):
+        turned = np.empty((len(way), min(_AT_ONCE, len(waves) - at)), dtype=complex)
+        turned[:, 0] = first
+        turned[:, 1:] = apart[:, None]
+        np.cumprod(turned, axis=1, out=turned)
+        first = turned[:, -1] * apart
+        yield turned.view(np.float64)
