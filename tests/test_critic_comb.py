@@ -4,10 +4,11 @@
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import base_case
+from kurumaisu.bench.hidden import Ask, base_case, make
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import USUAL
-from kurumaisu.critic import replay
+from kurumaisu.bench.hidden.oracle import noise_of
+from kurumaisu.critic import naming, replay
 from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.noise import Noise
@@ -43,6 +44,17 @@ def test_without_steps_no_tooth_is_worth_its_cost():
     fits = [problem.fit_candidates([candidate], {}) for candidate in problem.candidates]
     assert len(fits) == 4  # rounded, without a 0, cut, and resting at 0 V
     assert all(fit.score < nothing for fit in fits)
+
+
+def test_steps_are_found_although_smooth_effects_together_draw_their_mean():
+    """Beside all of them no tooth stands out; beside the lag alone, one does."""
+    case = make(Ask("pair"), 17110)
+    smooth = ("lag_w", "curvature_w", "dead_zone_w", "dac_zero_s", "gain_w", "cross_w_to_v")
+    ids = frozenset((STEP, *(f"base.{name}" for name in smooth)))
+    drives = [prepare(run, MODEL) for run in case.recording.runs]
+    found = naming.search(Problem(drives, MODEL, noise_of(case.known.regime), ids=ids), lambda _: None)
+    assert found.best.ids == {STEP, "base.lag_w"} == set(case.truth.ids)
+    assert found.best.start[STEP, "step"] == pytest.approx(case.truth.parameters[STEP]["step"], rel=3e-3)
 
 
 def replayed(start, settings):

@@ -2,19 +2,26 @@
 """What is decided after the search: which sets stay open, and when all is judged anew."""
 
 from collections import defaultdict
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from kurumaisu.bench.hidden import base_case
+from kurumaisu.bench.hidden.noise import Colour, Regime
+from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic import decide, naming
 from kurumaisu.critic.catalogue import Term
 from kurumaisu.critic.decide import Decision
+from kurumaisu.critic.drive import prepare
+from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.noise import START, Growth
 from kurumaisu.critic.smooth_judge import Beyond
 from kurumaisu.critic.smooth_search import Rivalry
 from kurumaisu.effects import Parameter
+from kurumaisu.params import load_model, shipped
 
 
 def fit_of(names):
@@ -89,3 +96,31 @@ def test_a_fit_that_first_values_beat_is_stuck(start, better):
     fit = SimpleNamespace(terms=(Term("a", parameter, 0.0),), log_likelihood=-2.0)
     assert naming.begins_better(problem, fit, start) is better
     assert not naming.begins_better(problem, SimpleNamespace(terms=()), start)
+
+
+@pytest.mark.parametrize(("by_noise", "curved"), [(0.0, True), (4.0, False)])
+def test_a_curve_has_to_beat_the_noise_that_would_take_it_up(judged, monkeypatch, by_noise, curved):
+    curve = SimpleNamespace()
+    won = decision(found_of("a"))
+    won = replace(won, beyond=Beyond(Rivalry((curve,), 5.0, {}, {}, 0.0), curve, 0.0))
+    monkeypatch.setattr(decide.smooth_judge, "hinted", lambda *_: curve)
+    monkeypatch.setattr(decide, "_by_noise", lambda *_: by_noise)
+    plain = decision(found_of("a"))
+    monkeypatch.setattr(decide, "_judged", lambda _first, _found, hint, *_: plain if hint is None else won)
+    assert decided() is (won if curved else plain)
+
+
+def test_slow_noise_is_heard_where_noise_about_a_curve_lacks_it():
+    regime = Regime((Colour((0.01, 0.002, 0.01), 0.2), Colour((0.01, 0.001, 0.03), 3.0)), 0.002, 0.002)
+    data = base_case.recording("null", base_case.draw_drives("rich", regime, np.random.default_rng(1), rate=5.0), ())
+    model, own = load_model(shipped("launch/md100.yaml")), noise_of(regime)
+    problem = Problem([prepare(run, model) for run in data.runs], model, own, ids=frozenset({"base.gain_v"}))
+    nothing = problem.fit_candidates((), {})
+
+    def by_noise(lacking):
+        about = problem.changed(noise=replace(own, slow_w=lacking * own.slow_w))
+        made = SimpleNamespace(problem=about, found=SimpleNamespace(best=nothing))
+        return decide._by_noise(problem, made, (0.002, 0.002))
+
+    assert by_noise(0.3) > 10
+    assert by_noise(1.0) < 5  # what fits better than the truth by chance, with seven parameters

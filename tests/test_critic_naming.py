@@ -195,7 +195,7 @@ def test_another_form_is_tried_without_what_stood_in_for_it():
     zero, other = (Candidate("zero", (Term("zero", OFFSET, 0.0, rough=rough),), 2.0) for rough in (False, True))
     needless = Candidate("needless", (Term("needless", OFFSET, 0.0),), 1.0)
     problem = SimpleNamespace(candidates=(zero, other, needless))
-    screen = SimpleNamespace(fixed=(), related=lambda *_: True, mends=lambda *_: True)
+    screen = SimpleNamespace(fixed=(), parts=list, related=lambda *_: True, mends=lambda *_: True)
     fit = SimpleNamespace(candidates=frozenset({zero, needless}), ids=frozenset({"zero", "needless"}), start={})
     assert frozenset({other}) in {chosen for chosen, _ in naming._neighbours(problem, screen, screen, fit)}
 

@@ -41,7 +41,8 @@ def weights(found: Naming) -> FloatArray:
 
 def variance(found: Naming) -> float:
     """Return by what log posterior ratios are to be divided."""
-    square = 2 * (found.best.log_likelihood - found.empty.log_likelihood)  # z^2 of all that acts
+    least = min(fit.log_likelihood for fit in found.fits)  # nothing's
+    square = 2 * (found.best.log_likelihood - least)  # z^2 of all that acts
     return 1 + _MISSED**2 * max(square, 0.0) / _DIRECTIONS
 
 

@@ -14,6 +14,7 @@ from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.prior import odds
 from kurumaisu.critic.smooth_fit import Extension
+from kurumaisu.critic.smooth_search import BEYOND
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
@@ -63,7 +64,8 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
     hint = smooth_judge.hinted(first, found)
     if hint is not None:
         made = _judged(first, found, hint, truth, progress)
-        if made.beyond.extension is not None and made.beyond.rivalry.winner is not None:
+        won = made.beyond.extension is not None and made.beyond.rivalry.winner is not None
+        if won and made.beyond.rivalry.lead - _by_noise(first, made, truth) > BEYOND:
             return made
     for _ in range(_ANEW + 1):
         made, before = _judged(first, found, None, truth, progress), found.best.ids
@@ -73,6 +75,24 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
             break
     settled = made.found if made.beyond.extension is not None else doubtful.left_out(made.found)
     return made if settled is made.found else replace(made, found=settled)
+
+
+def _by_noise(first: Problem, made: Decision, truth: Truth) -> float:
+    """Return by how many nats the best set without a curve explains more with the noise about itself.
+
+    What wanders slowly is a curve over the place as well: the noise about a curve lacks what the curve has taken up, so
+    it speaks for it. Nobody knows the noise beforehand, so each side is heard with its own.
+    """
+    best = made.found.best
+    own = first.changed(noise=scatter(first, best, truth, project=True).estimate(first.noise).noise)
+    return max(_density(own, best) - _density(made.problem, best), 0.0)
+
+
+def _density(problem: Problem, fit: Fit) -> float:
+    """Return the log density of the drives about a fit, up to a constant."""
+    left = problem.residual(fit.terms, fit.values)
+    volume = sum(float(noise.whitener(drive, problem.noise).log_determinants.sum()) for drive in problem.drives)
+    return -0.5 * (float(left @ left) + volume)
 
 
 def _judged(

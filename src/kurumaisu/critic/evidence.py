@@ -24,7 +24,7 @@ _STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a refit ma
 _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
 _ROUGH_DERIVATIVE = 1e-4  # the same of what has a comb of likely values: right between its teeth
 _PLACES = 17  # that are tried on a tooth of a comb
-_HOPE = 4.0  # [nat] less is not worth a closer look: a tooth costs more
+HOPE = 4.0  # [nat] less is not worth a closer look: a tooth costs more
 _ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
 
 
@@ -205,12 +205,20 @@ class Problem:
         residual = [self._whitened(drive, settings) for drive in self.drives]
         form = [other for other in terms if other.id == terms[i].id and other.fixed]
         starts = self._comb.starts(terms[i], form, residual)
-        if not starts or starts[0].nats < _HOPE:
+        if not starts or starts[0].nats < HOPE:
             return np.where(np.arange(len(values)) == i, starts[0].value if starts else values[i], values)
         apart = {start.value: start.apart for start in starts}
         found = self._nearest(terms, values, i, apart)
         places = np.linspace(-1.0, 1.0, _PLACES) * apart.get(float(found[i]), 0.0)
         return self._nearest(terms, found, i, found[i] + places[places != 0])
+
+    def hope(self, rough: Candidate, terms: Sequence[Term], values: FloatArray) -> float:
+        """Return what the best tooth of a rough candidate explains beside other effects, by lines, in nats."""
+        settings = settings_of(terms, values)
+        residual = [self._whitened(drive, settings) for drive in self.drives]
+        form = [term for term in rough.terms if term.fixed]
+        starts = [self._comb.starts(term, form, residual) for term in rough.terms if term.rough]
+        return max((found[0].nats for found in starts if found), default=0.0)
 
     @cached_property
     def _comb(self) -> Comb:

@@ -10,11 +10,12 @@ import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu.critic import stand_ins
-from kurumaisu.critic.catalogue import Candidate, Key
-from kurumaisu.critic.evidence import Fit, Problem
+from kurumaisu.critic.catalogue import Candidate, Key, Term
+from kurumaisu.critic.evidence import HOPE, Fit, Problem
 from kurumaisu.critic.prior import log_prior
-from kurumaisu.critic.scan import Screen
+from kurumaisu.critic.scan import Guess, Screen
 from kurumaisu.critic.stand_ins import Posterior, confounded
+from kurumaisu.types import FloatArray
 
 NAMED, RIVAL = stand_ins.NAMED, stand_ins.RIVAL
 _REFITS = 10  # sets refitted after each scan
@@ -149,6 +150,32 @@ def _neighbours(
         if other.rough and other.id not in fit.ids:
             yield frozenset({other}), {}
             yield fit.candidates | {other}, kept
+    yield from _combs(problem, screen, fit)
+
+
+def _combs(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
+    """Yield what has a comb of likely values beside the part of the set that leaves it most to explain.
+
+    Smooth effects that draw the mean of its steps together leave no tooth that stands out beside all of them.
+    """
+    parts = [(part, *_left(problem, part)) for part in screen.parts()]
+    for other in problem.candidates if parts else ():
+        if not other.rough or other in fit.candidates:
+            continue
+        hopes = [(problem.hope(other, terms, values), likelihood, part) for part, terms, values, likelihood in parts]
+        hope, likelihood, part = max(hopes, key=lambda found: found[0] + found[1])
+        if hope > HOPE and likelihood + hope > fit.log_likelihood - _CLOSE:
+            begin = {key: value for key, value in part.start.items() if key[0] != other.id}
+            yield frozenset(each for each in part.chosen if each.id != other.id) | {other}, begin
+
+
+def _left(problem: Problem, part: Guess) -> tuple[tuple[Term, ...], FloatArray, float]:
+    """Return the terms and values of a guess, and its log likelihood when simulated."""
+    ordered = sorted(part.chosen, key=lambda candidate: candidate.id)
+    terms = tuple(term for candidate in ordered for term in candidate.terms)
+    values = np.array([term.parameter.lower if term.fixed else part.start.get(term.key, term.null) for term in terms])
+    left = problem.residual(terms, values)
+    return terms, values, -0.5 * float(left @ left)
 
 
 def _false_alarm(screen: Screen) -> float:

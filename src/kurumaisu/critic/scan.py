@@ -71,6 +71,15 @@ class Screen:
         found = [guess for chosen in self._sets() if (guess := self._guess(chosen)) is not None]
         return sorted(found, key=lambda guess: -guess.score)
 
+    def parts(self) -> list[Guess]:
+        """Return of each size below the set's, down to 1, the part that explains most alone."""
+        own = sorted(self.centre.candidates, key=_name)
+        found = []
+        for size in range(1, len(own)):
+            guesses = (self._guess(frozenset(part)) for part in combinations(own, size))
+            found += [max(filter(None, guesses), key=lambda guess: guess.score, default=None)]
+        return [guess for guess in found if guess is not None]
+
     def _sets(self) -> Iterator[frozenset[Candidate]]:
         """Yield the fit's set with effects added and taken out; three changes only where some of them may cancel."""
         own = sorted(self.centre.candidates, key=_name)
