@@ -13,6 +13,7 @@ from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.laser.spread import ScatterSearch
+from kurumaisu.critic.laser.spread_fit import Piece, ScatterFit
 from kurumaisu.critic.laser.statistics import Statistics, _mixed
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -65,6 +66,35 @@ def test_it_is_not_certain_which_of_two_alike_acts():
     (found,) = ScatterSearch(simulate, simulate([at("laser.quantisation", step=0.01)], 5), (), ids).run()
     assert found.p < 0.9
     assert sum(found.rivals.values()) + found.p == pytest.approx(1.0, abs=1e-6)
+
+
+def test_what_may_have_either_sign_crosses_zero_though_it_was_taken_for_next_to_nothing():
+    simulate = _Linear(
+        {
+            "laser.range_noise.share": (6.0, 6.0, 6.0, 6.0, 6.0),
+            "laser.range_noise.slope": (-4.0, -2.0, 0.0, 3.0, 6.0),
+        }
+    )
+    ids = frozenset({"laser.range_noise"})
+    fit = ScatterFit(simulate, simulate([at("laser.range_noise", share=0.3, slope=0.0013)], 5), (), ids)
+    start = at("laser.range_noise", share=0.6, slope=-5e-5)
+    (found,), _ = fit.together([Piece(effects.by_id(start.id), start, ("share", "slope"), 0.0, 0.0)], ())
+    assert found.setting.parameters["slope"] == pytest.approx(0.0013, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "size", "least", "most"),
+    [
+        ("laser.beam_correlation", "rho", 0.3, 0.08, 0.12),
+        ("laser.quantisation", "step", 0.01, 0.0, 0.001),
+    ],
+)
+def test_another_form_may_pass_for_another_size_however_many_numbers_follow_it(name, parameter, size, least, most):
+    """A grid is a grid, but neighbours hang together in many ways."""
+    simulate = _Linear({f"{name}.{parameter}": (9.0, 9.0, 9.0, 9.0, 9.0)})
+    truth = [at(name, **{parameter: size})]
+    (found,) = ScatterSearch(simulate, simulate(truth, 5), (), frozenset({name})).run()
+    assert least < found.sds[parameter] < most
 
 
 def _assembly(tmp_path):
