@@ -14,7 +14,7 @@ from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.laser.spread import ScatterSearch
 from kurumaisu.critic.laser.spread_fit import Piece, ScatterFit
-from kurumaisu.critic.laser.statistics import Statistics, _mixed
+from kurumaisu.critic.laser.statistics import Statistics, _lasting, _mixed
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -137,3 +137,13 @@ def test_readings_between_two_sides_are_told_from_sides_and_slopes():
     assert not _mixed(np.linspace(1.0, 3.0, 16)[np.newaxis]).any(), "a slope is no jump"
     one[0, 6] = np.nan
     assert not _mixed(one).any(), "nobody knows whether that side goes on"
+
+
+def test_a_narrow_face_that_stays_is_no_mixed_reading():
+    """From one place a face is read alike scan by scan; from another place, or a drive, alike means nothing."""
+    readings = np.tile([1.0] * 5 + [1.4] + [2.0] * 6, (6, 1))
+    readings[3:, 5] = [1.3, 1.7, 1.4]
+    stand = np.array([0, 0, 0, 1, 1, 1])
+    assert _mixed(readings)[:, 2].all()
+    assert _lasting(readings, stand)[:, 2].tolist() == [True, True, True, False, False, False]
+    assert not _lasting(readings, np.full(6, -1)).any()
