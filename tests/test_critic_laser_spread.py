@@ -147,3 +147,17 @@ def test_a_narrow_face_that_stays_is_no_mixed_reading():
     assert _mixed(readings)[:, 2].all()
     assert _lasting(readings, stand)[:, 2].tolist() == [True, True, True, False, False, False]
     assert not _lasting(readings, np.full(6, -1)).any()
+
+
+def test_what_came_while_another_was_fitted_ill_goes_when_that_is_mended():
+    simulate = _Linear(
+        {"laser.quantisation.step": (30.0,) * 4 + (0.0,), "laser.beam_correlation.rho": (0.0,) * 4 + (4.0,)}
+    )
+    truth = at("laser.quantisation", step=0.01)
+    stale = at("laser.beam_correlation", rho=0.001)
+    search = ScatterSearch(simulate, simulate([truth], 5), (), frozenset({truth.id, stale.id}))
+    pieces = [
+        Piece(effects.by_id(truth.id), truth, ("step",), 1.0, 700.0),
+        Piece(effects.by_id(stale.id), stale, ("rho",), 1.0, 53.0),
+    ]
+    assert [piece.setting.id for piece in search._polished(pieces)] == [truth.id]
