@@ -53,7 +53,7 @@ _bias(
 )
 _bias("laser.incidence_bias", lambda p, b: p["k"] * _footprint(b.incidence))
 _spread("laser.incidence_noise", lambda p, b: b.sd + b.sd * p["gain"] * _footprint(b.incidence))
-_spread("laser.range_noise", lambda p, b: max(0.0, b.sd + p["share"] * b.sd + p["slope"] * b.range))
+_spread("laser.range_noise", lambda p, b: max(0.0, b.sd + p["share"] * b.sd + p["slope"] * (b.range - 2)))
 _bias("laser.beam_bias", lambda p, b: p["amplitude"] * math.cos(p["phase"] - b.bearing))  # with sd 0: the mirror alone
 
 

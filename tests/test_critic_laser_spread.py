@@ -13,7 +13,8 @@ from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.laser.spread import ScatterSearch
-from kurumaisu.critic.laser.statistics import Statistics, _mixed
+from kurumaisu.critic.laser.spread_fit import Piece, ScatterFit
+from kurumaisu.critic.laser.statistics import Statistics, _lasting, _mixed
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -67,6 +68,35 @@ def test_it_is_not_certain_which_of_two_alike_acts():
     assert sum(found.rivals.values()) + found.p == pytest.approx(1.0, abs=1e-6)
 
 
+def test_what_may_have_either_sign_crosses_zero_though_it_was_taken_for_next_to_nothing():
+    simulate = _Linear(
+        {
+            "laser.range_noise.share": (6.0, 6.0, 6.0, 6.0, 6.0),
+            "laser.range_noise.slope": (-4.0, -2.0, 0.0, 3.0, 6.0),
+        }
+    )
+    ids = frozenset({"laser.range_noise"})
+    fit = ScatterFit(simulate, simulate([at("laser.range_noise", share=0.3, slope=0.0013)], 5), (), ids)
+    start = at("laser.range_noise", share=0.6, slope=-5e-5)
+    (found,), _ = fit.together([Piece(effects.by_id(start.id), start, ("share", "slope"), 0.0, 0.0)], ())
+    assert found.setting.parameters["slope"] == pytest.approx(0.0013, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "size", "least", "most"),
+    [
+        ("laser.beam_correlation", "rho", 0.3, 0.08, 0.12),
+        ("laser.quantisation", "step", 0.01, 0.0, 0.001),
+    ],
+)
+def test_another_form_may_pass_for_another_size_however_many_numbers_follow_it(name, parameter, size, least, most):
+    """A grid is a grid, but neighbours hang together in many ways."""
+    simulate = _Linear({f"{name}.{parameter}": (9.0, 9.0, 9.0, 9.0, 9.0)})
+    truth = [at(name, **{parameter: size})]
+    (found,) = ScatterSearch(simulate, simulate(truth, 5), (), frozenset({name})).run()
+    assert least < found.sds[parameter] < most
+
+
 def _assembly(tmp_path):
     return Assembly(gather(recording(tmp_path, None, 0.0, 1, scans=12), MODEL), frozenset())
 
@@ -107,3 +137,27 @@ def test_readings_between_two_sides_are_told_from_sides_and_slopes():
     assert not _mixed(np.linspace(1.0, 3.0, 16)[np.newaxis]).any(), "a slope is no jump"
     one[0, 6] = np.nan
     assert not _mixed(one).any(), "nobody knows whether that side goes on"
+
+
+def test_a_narrow_face_that_stays_is_no_mixed_reading():
+    """From one place a face is read alike scan by scan; from another place, or a drive, alike means nothing."""
+    readings = np.tile([1.0] * 5 + [1.4] + [2.0] * 6, (6, 1))
+    readings[3:, 5] = [1.3, 1.7, 1.4]
+    stand = np.array([0, 0, 0, 1, 1, 1])
+    assert _mixed(readings)[:, 2].all()
+    assert _lasting(readings, stand)[:, 2].tolist() == [True, True, True, False, False, False]
+    assert not _lasting(readings, np.full(6, -1)).any()
+
+
+def test_what_came_while_another_was_fitted_ill_goes_when_that_is_mended():
+    simulate = _Linear(
+        {"laser.quantisation.step": (30.0,) * 4 + (0.0,), "laser.beam_correlation.rho": (0.0,) * 4 + (4.0,)}
+    )
+    truth = at("laser.quantisation", step=0.01)
+    stale = at("laser.beam_correlation", rho=0.001)
+    search = ScatterSearch(simulate, simulate([truth], 5), (), frozenset({truth.id, stale.id}))
+    pieces = [
+        Piece(effects.by_id(truth.id), truth, ("step",), 1.0, 700.0),
+        Piece(effects.by_id(stale.id), stale, ("rho",), 1.0, 53.0),
+    ]
+    assert [piece.setting.id for piece in search._polished(pieces)] == [truth.id]

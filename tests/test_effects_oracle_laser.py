@@ -26,6 +26,7 @@ MOMENTS = [
     "laser.crosstalk",
 ]
 TESTED = [*oracle_laser.READINGS, *MOMENTS]
+NO_OUTLIERS = {"outliers": 0.0, "reach": 0.1}
 
 
 def beams(rng, n=N):
@@ -177,7 +178,7 @@ def test_neighbours_err_together(rho):
 @pytest.mark.parametrize("inverse_nu", [0.1, 0.2, 0.4])
 def test_tails_are_student_s_of_the_same_size(inverse_nu):
     n, nu = 40_000, 1 / inverse_nu
-    z = (chain("laser.heavy_tails", 2, inverse_nu=inverse_nu, core=0.0).read(flat(n, 4)) - 2.0) / 0.001
+    z = (chain("laser.heavy_tails", 2, inverse_nu=inverse_nu, core=0.0, **NO_OUTLIERS).read(flat(n, 4)) - 2.0) / 0.001
     assert stats.kstest(z * np.sqrt(nu / (nu - 2)), stats.t(nu).cdf).pvalue > 1e-3
     assert stats.kstest(z, "norm").pvalue < 1e-6, "and not the normal distribution"
     far = 2 * stats.t(nu).sf(3 * np.sqrt(nu / (nu - 2)))
@@ -246,5 +247,16 @@ def test_another_laser_s_light_comes_from_a_sector_that_drifts():
 
 
 def test_tails_on_an_unchanged_core_are_student_s_own():
-    z = (chain("laser.heavy_tails", 2, inverse_nu=0.25, core=1.0).read(flat(40_000, 4)) - 2.0) / 0.001
+    z = (chain("laser.heavy_tails", 2, inverse_nu=0.25, core=1.0, **NO_OUTLIERS).read(flat(40_000, 4)) - 2.0) / 0.001
     assert stats.kstest(z, stats.t(4).cdf).pvalue > 1e-3
+
+
+def test_outliers_are_as_many_and_as_far_as_asked_anywhere_in_the_fan():
+    n, share, reach = 60_000, 0.05, 0.3
+    errors = chain("laser.heavy_tails", 2, inverse_nu=0.0, core=0.0, outliers=share, reach=reach).read(flat(n, 4)) - 2.0
+    far = np.abs(errors) > 0.01
+    expected = share * 2 * stats.norm.sf(0.01 / reach)
+    assert far.mean() == pytest.approx(expected, abs=SIGMAS * np.sqrt(expected / n))
+    assert stats.kstest(errors[far & (errors > 0)], stats.truncnorm(0.01 / reach, 9, scale=reach).cdf).pvalue > 1e-3
+    assert stats.kstest(np.flatnonzero(far) / n, "uniform").pvalue > 1e-3, "no bursts"
+    assert stats.kstest(errors[~far] / 0.001, "norm").pvalue > 1e-3, "the rest as it was"

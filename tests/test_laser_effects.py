@@ -84,8 +84,8 @@ def test_biases_at_chosen_values():
     ("name", "values", "more", "sd"),
     [
         ("laser.range_noise", {"share": 0.5}, {}, 0.003),
-        ("laser.range_noise", {"share": -1.0, "slope": 0.001}, {}, 0.001 * RANGES[HIT]),
-        ("laser.range_noise", {"share": -1.0, "slope": -0.001}, {}, 0.0),
+        ("laser.range_noise", {"share": -1.0, "slope": 0.001}, {}, 0.001 * np.maximum(RANGES[HIT] - 2, 0)),
+        ("laser.range_noise", {"share": -1.0, "slope": -0.001}, {}, 0.001 * np.maximum(2 - RANGES[HIT], 0)),
         ("laser.incidence_noise", {"gain": 0.5}, {"incidence": np.full(N, np.pi / 3)}, 0.003),
         ("laser.reflectance", {"noise": 1.0}, {"returns": np.full(N, 0.5)}, 0.003),
         ("laser.reflectance", {"noise": 1.0}, {"returns": np.full(N, 3.0)}, 0.0),

@@ -17,6 +17,7 @@ from kurumaisu import effects
 from kurumaisu.critic.laser.columns import Form
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.rivals import Rival
+from kurumaisu.critic.smooth_alike import FORM
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
@@ -27,6 +28,7 @@ _SETTLED = 0.5  # sds by which a parameter may still move between two of them
 _STEP = 0.05  # of a finite difference, in units of the larger of a parameter and its scale
 _SHAPE = 1.0  # prior sd of what only shapes an effect, in the same units
 _SIZE = 100.0  # and of its size
+_WAYS = 4  # in which a form may differ, of which one passes for another effect's size
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,7 @@ def pinned(
                 at[each.index][p.name] = float(np.clip(at[each.index][p.name] + by, p.lower, p.upper))
         if np.all(np.abs(_values(free, at) - before) < _SETTLED * sds):
             break
+    sds = np.hypot(sds, _doubt(assembly, normal, forms, at, free) * sds)
     out: list[dict[str, float]] = [{} for _ in forms]
     for each, sd in zip(free, sds.tolist(), strict=True):
         out[each.index][each.parameter.name] = sd
@@ -113,6 +116,30 @@ def _step(
     step, sds = prior * (inverse @ (prior * gram[:-1, -1])), prior * np.sqrt(np.diag(inverse))
     count = len(free)
     return step[:count], sds[:count], step[count:]
+
+
+def _doubt(
+    assembly: Assembly, normal: Normal, forms: Sequence[Form], at: Sequence[dict[str, float]], free: Sequence[_Free]
+) -> FloatArray:
+    """Return what other forms of what acts may shift each parameter by, in standard deviations.
+
+    Nobody can refuse a form that differs by FORM of what the effect does. At which range or angle a size counts is the
+    form's choice, so its own size is in doubt by all of it; of others, what is like their own marks passes for them.
+    """
+    guessed = [i for i, form in enumerate(forms) if effects.by_id(form.id).empirical]
+    if not guessed:
+        return np.zeros(len(free))
+    every = _settings(forms, at)
+    whole = assembly.marks.together(every)
+    signals = [whole - assembly.marks.together([one for one in every if one is not every[i]]) for i in guessed]
+    slopes = [_slope(assembly, forms, at, each) for each in free]
+    gram = assembly.products(normal, np.stack([*slopes, *signals], axis=-1), assembly.residual)[:-1, :-1]
+    norms = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    count = len(free)
+    alike = (gram / np.outer(norms, norms))[:count, count:]
+    own = np.array([[each.index == i for i in guessed] for each in free])
+    share = np.where(own, FORM, FORM / np.sqrt(_WAYS))
+    return np.asarray(np.sqrt(np.sum((share * alike * norms[count:]) ** 2, axis=1)))
 
 
 def _settings(forms: Sequence[Form], at: Sequence[dict[str, float]]) -> list[EffectSetting]:

@@ -195,7 +195,9 @@ class ScatterSearch:
         strong = max(piece.nats for piece in group)
         for old in sorted(group, key=lambda piece: piece.nats):
             others = [piece for piece in group if piece.effect is not old.effect]
-            if old.nats > _WEAK * strong or not others:
+            # What it was worth when it came: the others were not yet fitted as well as now.
+            still = self._fit.misfit([piece.setting for piece in others]) - cost
+            if not others or (old.nats > _WEAK * strong and still >= self._least(others, old)):
                 continue
             fewer, more = self._fit.together(others, ())
             z = np.sqrt(max(2 * (more - cost), 0.0))

@@ -27,6 +27,9 @@ _FINER = 0.5  # of one step's difference is the next one's
 _SETTLED = 0.3  # nats that another step must bring
 _FREE = 2.0  # nats that a further parameter must bring
 _POOR = 15.0  # nats of misfit from which shapes of an effect are tried, too
+# Share of its size, 1 sd, by which another form of an effect that is empirical may pass for another size: all numbers
+# follow it together, so that many of them do not average it out. Two papers' tails or edges agree no better.
+_OTHER = 0.3
 
 
 @dataclass(frozen=True)
@@ -174,7 +177,7 @@ class ScatterFit:
         """Return effects fitted together beside others, and the misfit."""
         places = [(i, p) for i, each in enumerate(pieces) for p in each.effect.parameters if p.name in each.free]
         centre = np.array([pieces[i].setting.parameters[p.name] for i, p in places])
-        step = np.array([0.3 * abs(x - p.null) or 0.1 * p.scale for x, (_, p) in zip(centre, places, strict=True)])
+        step = np.array([_step(p, x) for x, (_, p) in zip(centre.tolist(), places, strict=True)])
 
         def at(x: FloatArray) -> list[Piece]:
             values = [dict(piece.setting.parameters) for piece in pieces]
@@ -205,11 +208,12 @@ class ScatterFit:
     def errors(self, piece: Piece, every: Sequence[EffectSetting]) -> dict[str, float]:
         """Return sds of the parameters that were fitted, from how the statistics follow each.
 
-        What only shapes the effect is in doubt, too, fitted or not: as far as is usual.
+        The effect's other parameters are in doubt, too, fitted or not: as far as is usual. So is its form.
         """
         setting = piece.setting
         shapes = {p.name for p in piece.effect.parameters if (setting.id, p.name) in self._shapes}
-        parameters = [p for p in piece.effect.parameters if p.name in shapes | set(piece.free)]
+        parameters = self._parameters(piece.effect)
+        usual = shapes | {p.name for p in parameters if p.name not in piece.free}
         beside = [other for other in every if other is not setting]
         slopes = []
         for p in parameters:
@@ -230,10 +234,19 @@ class ScatterFit:
             slopes.append(sure * change / (ends[1] - ends[0]))
         j = np.array(slopes).T
         scale = np.array([p.scale for p in parameters])
-        prior = np.array([1.0 if p.name in shapes else 1e-4 for p in parameters])
+        prior = np.array([1.0 if p.name in usual else 1e-4 for p in parameters])
         inverse = np.linalg.inv((j * scale).T @ (j * scale) + np.diag(prior))
         sds = np.sqrt(np.diag(inverse)) * scale
+        other = _OTHER if piece.effect.empirical else 0.0
+        form = [other * abs(setting.parameters[p.name] - p.null) * (p.name not in shapes) for p in parameters]
+        sds = np.hypot(sds, form)
         return {p.name: float(sd) for p, sd in zip(parameters, sds, strict=True) if p.name in piece.free}
+
+
+def _step(p: Parameter, value: float) -> float:
+    """Return by how far a parameter is moved to see what it does: what may have either sign can cross zero."""
+    share = 0.3 * abs(value - p.null)
+    return max(share, 0.1 * p.scale) if p.lower < p.null else share or 0.1 * p.scale
 
 
 def _sizes(p: Parameter) -> list[float]:

@@ -26,6 +26,7 @@ _JUMP = 0.15  # [m] between the two sides of an edge, at least
 _FLAT = 0.2  # share of it by which either side may go on
 _BESIDE = 3  # beams by which errors of the pose move a narrow face that lies between two sides in truth
 _INSIDE = 0.15  # share of it from either side, beyond which a reading lies between them
+_LASTS = 0.03  # [m] within which a reading between two sides comes again where a beam meets a third one
 _LEVER = 0.5  # [m] from base_link to a laser, at most
 _ROUNDS = 3
 _SOME = 4  # every so-manieth reading says how wide all are
@@ -91,7 +92,7 @@ class Statistics:
         out += [_between(z, inside, np.broadcast_to(np.arange(z.shape[1]), z.shape)), _between(z, inside, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
-        out.append(_share(_mixed(readings) & self._jumps))
+        out.append(_share(_mixed(readings) & self._jumps & ~_lasting(readings, self._stand)))
         return np.array([*out, *_values(readings[self._trust])])
 
     def names(self) -> list[str]:
@@ -178,6 +179,21 @@ def _mixed(readings: FloatArray) -> BoolArray:
         share = (here - left) / jump
         flat = np.maximum(np.abs(left - before), np.abs(after - right)) < _FLAT * np.abs(jump)
         return np.asarray((np.abs(jump) > _JUMP) & flat & (share > _INSIDE) & (share < 1 - _INSIDE))
+
+
+def _lasting(readings: FloatArray, stand: IntArray) -> BoolArray:
+    """Return which readings (k, b - 6) come again in the scan before or after from the same place; stand (k,).
+
+    What lies between two sides there is a narrow face that an error of the pose hides from the model: one face, but
+    counted in every scan. Mixed readings differ from scan to scan.
+    """
+    with np.errstate(invalid="ignore"):
+        same = np.abs(np.diff(readings[:, 3:-3], axis=0)) < _LASTS
+    same &= ((stand[1:] == stand[:-1]) & (stand[1:] >= 0))[:, np.newaxis]
+    out = np.zeros(readings[:, 3:-3].shape, dtype=bool)
+    out[1:] |= same
+    out[:-1] |= same
+    return out
 
 
 def _jumps(ranges: FloatArray, incidence: FloatArray) -> BoolArray:

@@ -246,7 +246,10 @@ def _spread_of(assembly: Assembly, normal: Normal, made: _Made) -> float:
 
 def _gain(made: _Made, name: str) -> float:
     """Return the log evidence of the best set over the best one without an effect [nat]."""
+    curve = made.winner is not None and made.winner.free.basis is not None
+    # A curve that does not lead by enough is out of the running here, too, as it is where p comes from.
+    rivals = [rival for rival in made.weighed.rivals if curve or rival.free.basis is None]
     sets = [(fit.ids, fit.score) for fit in made.found.fits]
-    sets += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in made.weighed.rivals]
+    sets += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in rivals]
     own = max((worth for ids, worth in sets if name in ids), default=-np.inf)
     return float(own - max((worth for ids, worth in sets if name not in ids), default=-np.inf))

@@ -18,6 +18,7 @@ class BeamCorrelation(ReadingEffect):
     sentence = "neighbouring beams err together"
     formula = "z_i = rho · z_(i−1) + √(1 − rho²) · n_i"
     source = "a real URG-04LX: 0.52, 0.31, 0.18, 0.09 at lags 1, 2, 3, 5"
+    empirical = True
     random = True
 
     def apply(self, echoes: Echoes) -> Echoes:

@@ -24,6 +24,7 @@ class Crosstalk(ReadingEffect):
     sentence = "bursts of random ranges come and go, as from another laser's light"
     formula = "where |φ − drift · t| < width / 2 (mod 2π), with probability: reading uniform in 0 to reach"
     source = "assumed; 0.1-10 % of the readings"
+    empirical = True
     random = True
 
     def apply(self, echoes: Echoes) -> Echoes:

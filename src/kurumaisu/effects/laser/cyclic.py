@@ -22,6 +22,7 @@ class Cyclic(ReadingEffect):
     sentence = "the error of the ranges repeats with the range, as of a phase-shift laser"
     formula = "µ + amplitude · sin(2π r / wavelength + phase)"
     source = "Kawata 2005: the phase of amplitude-modulated light; 1-10 mm"
+    empirical = True
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by the sine."""

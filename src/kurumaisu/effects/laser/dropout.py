@@ -24,6 +24,7 @@ class Dropout(ReadingEffect):
     sentence = "some beams give no valid reading"
     formula = "NaN with probability + per_metre · r + oblique · (1 − cos a) + dark · (1 − ρ), within 0 and 1"
     source = "codes 0-19 of the URG-04LX; 12 % of the beams of a real one"
+    empirical = True
     random = True
 
     def apply(self, echoes: Echoes) -> Echoes:

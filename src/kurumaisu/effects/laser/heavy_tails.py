@@ -8,12 +8,14 @@ import numpy as np
 from kurumaisu.effects.laser.base import Echoes, LaserStage, ReadingEffect
 from kurumaisu.effects.mechanism import Parameter
 
+_LEAST = 1e-9  # [m] a deviation that is none: then there is nothing to add noise to
+
 
 class HeavyTails(ReadingEffect):
     """Student's t in place of the normal distribution; 0: normal.
 
     core 0: of the same standard deviation, so that most readings err less; core 1: its middle as it was, and the tails
-    come on top.
+    come on top. outliers: share of readings, anywhere and at any time, that are off by about `reach` besides.
     """
 
     id = "laser.heavy_tails"
@@ -21,17 +23,27 @@ class HeavyTails(ReadingEffect):
     parameters = (
         Parameter("inverse_nu", "1", null=0.0, scale=0.2, lower=0.0, upper=0.45),
         Parameter("core", "1", null=0.0, scale=0.5, lower=0.0, upper=1.5),
+        Parameter("outliers", "1", null=0.0, scale=0.02, lower=0.0, upper=0.5),
+        Parameter("reach", "m", null=0.1, scale=0.1, lower=0.001, upper=10.0),
     )
     sentence = "large errors of the ranges are more frequent than of normal noise"
-    formula = "z · (1 − 2 / ν)^((1 − core) / 2) · √(ν / χ²_ν), ν = 1 / inverse_nu"
-    source = "assumed; ν 3-10"
+    formula = (
+        "z · (1 − 2 / ν)^((1 − core) / 2) · √(ν / χ²_ν), ν = 1 / inverse_nu; "
+        "with probability outliers: reach / σ · n added, n normal"
+    )
+    source = "assumed; ν 3-10; outliers 1e-4 to 1e-2 of the readings"
+    empirical = True
     random = True
 
     def apply(self, echoes: Echoes) -> Echoes:
-        """Scale each beam's noise at random."""
-        if self.values["inverse_nu"] == 0:
-            return echoes
-        nu = 1 / self.values["inverse_nu"]
-        narrower = (1 - 2 / nu) ** ((1 - self.values["core"]) / 2)
-        factors = narrower * np.sqrt(nu / self.rng.chisquare(nu, len(echoes.noise)))
-        return replace(echoes, noise=echoes.noise * factors)
+        """Scale each beam's noise at random, and throw some readings far off."""
+        noise = echoes.noise
+        if self.values["inverse_nu"] > 0:
+            nu = 1 / self.values["inverse_nu"]
+            narrower = (1 - 2 / nu) ** ((1 - self.values["core"]) / 2)
+            noise = noise * (narrower * np.sqrt(nu / self.rng.chisquare(nu, len(noise))))
+        if self.values["outliers"] > 0:
+            wild = self.rng.random(len(noise)) < self.values["outliers"]
+            off = self.values["reach"] * self.rng.standard_normal(len(noise))
+            noise = noise + np.where(wild, off / np.maximum(echoes.sd, _LEAST), 0.0)
+        return replace(echoes, noise=noise)

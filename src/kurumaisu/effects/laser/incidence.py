@@ -27,6 +27,7 @@ class IncidenceBias(ReadingEffect):
     sentence = "walls that are met obliquely read too long or too short"
     formula = "µ + k · (1 / cos a − 1), a up to 80°"
     source = "Kneip 2009, Ye and Borenstein 2002, Okubo 2009; 1-10 mm at 60°"
+    empirical = True
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by the incidence."""
@@ -43,6 +44,7 @@ class IncidenceNoise(ReadingEffect):
     sentence = "walls that are met obliquely read more noisily"
     formula = "σ · (1 + gain · (1 / cos a − 1)), a up to 80°"
     source = "paper, on figure 9: noise at short range is from oblique incidence; gain 0-1"
+    empirical = True
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Widen the noise by the incidence."""

@@ -21,6 +21,7 @@ class MixedPixels(ReadingEffect):
     sentence = "at edges the laser reads points between foreground and background"
     formula = "beside |r_i − r_(i+1)| > jump, with probability: reading between both, uniformly"
     source = "Ye and Borenstein 2002, Okubo 2009; probability 0.3-1"
+    empirical = True
     random = True
 
     def apply(self, echoes: Echoes) -> Echoes:

@@ -48,6 +48,7 @@ class RangeQuadratic(ReadingEffect):
     sentence = "ranges are off in proportion to the range's square"
     formula = "µ + quadratic · r²"
     source = _SOURCE + "2 mm/m²"
+    empirical = True
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean with the square."""

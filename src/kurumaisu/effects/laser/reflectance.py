@@ -21,6 +21,7 @@ class Reflectance(ReadingEffect):
     sentence = "ranges depend on the colour of what they meet"
     formula = "µ + bias · (1 − ρ), σ · max(0, 1 + noise · (1 − ρ)); ρ: the world's ranger_return"
     source = "Kneip 2009: strongly dependent on the target; 5-30 mm"
+    empirical = True
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift and widen by the darkness."""

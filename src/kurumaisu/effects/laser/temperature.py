@@ -22,6 +22,7 @@ class Temperature(ReadingEffect):
     sentence = "ranges follow the temperature"
     formula = "µ + coefficient · (T − reference); T − reference = swing · sin(2π t / period) where T is unknown"
     source = "assumed; 0.1-1 mm/K"
+    empirical = True
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by the temperature of now."""

@@ -20,6 +20,7 @@ class WarmUp(ReadingEffect):
     sentence = "ranges drift after the laser is switched on"
     formula = "µ + amplitude · exp(−t / tau)"
     source = "Kneip 2009, Okubo 2009; 5-20 mm over 5-40 min"
+    empirical = True
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by what is left."""

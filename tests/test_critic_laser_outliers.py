@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Readings that are something else: anywhere and at any time they are tails, in bursts another laser's light."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from laser_scene import recording
+
+from kurumaisu.critic.laser.verdicts import criticise
+from kurumaisu.params import load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+IDS = frozenset({"laser.heavy_tails", "laser.crosstalk", "laser.mixed_pixels", "laser.range_noise"})
+
+
+def anywhere(rng, scan):
+    """One reading of fifty is off by up to a metre, whatever the beam and the scan."""
+    wild = rng.random(scan.values.shape) < 0.02
+    return scan.values + np.where(wild, rng.uniform(-1, 1, scan.values.shape), 0.0)
+
+
+def in_bursts(rng, scan):
+    """A fifth of the readings of some hundred neighbours, others from scan to scan, are anything up to 4 m."""
+    beams = np.arange(scan.values.shape[1])
+    start = rng.integers(0, len(beams), len(scan.t))[:, np.newaxis]
+    hit = (np.abs(beams - start) < 50) & (rng.random(scan.values.shape) < 0.2)
+    return np.where(hit, rng.uniform(0, 4, scan.values.shape), scan.values)
+
+
+@pytest.mark.parametrize(("spoil", "name"), [(anywhere, "laser.heavy_tails"), (in_bursts, "laser.crosstalk")])
+def test_outliers_anywhere_are_tails_and_bursts_are_crosstalk(tmp_path, spoil, name):
+    told, rng = recording(tmp_path, None, 0.0, 6, scans=30), np.random.default_rng(11)
+    runs = tuple(replace(run, scan=replace(run.scan, values=np.round(spoil(rng, run.scan), 3))) for run in told.runs)
+    finding = criticise(replace(told, runs=runs), MODEL, lambda _: None, IDS)
+    assert [cause.id for cause in finding.causes] == [name]
+    assert not finding.confounded
