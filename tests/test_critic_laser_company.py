@@ -27,6 +27,9 @@ class _Powers:
     def null(self, effect):
         return {p.name: p.null for p in effect.parameters}
 
+    def nulls(self, seeds):
+        return np.array([self((), seed) for seed in seeds])
+
     def __call__(self, settings, seed):
         wider, own = 1.0, 0.0
         for setting in settings:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a cause of the laser is worth, and how far its size may be off: another form of its equation included."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,7 @@ from kurumaisu.critic.laser.pinned import pinned
 from kurumaisu.critic.laser.rivals import Rival
 from kurumaisu.critic.laser.search import Fitted
 from kurumaisu.critic.laser.shots import gather
-from kurumaisu.critic.laser.verdicts import _gain
+from kurumaisu.critic.laser.verdicts import _gain, criticise
 from kurumaisu.critic.smooth import Belief
 from kurumaisu.critic.smooth_alike import FORM
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -38,14 +39,31 @@ def test_a_curve_out_of_the_running_does_not_make_a_named_cause_worth_less_than_
 
 def test_a_size_is_no_surer_than_the_form_that_it_belongs_to(tmp_path):
     """An offset is an offset; what grows with the range may grow otherwise, and counts at another range then."""
-    assembly = Assembly(gather(recording(tmp_path, None, 0.0, 1, scans=16), MODEL))
-    normal = assembly.settle(None)
+    shots = gather(recording(tmp_path, None, 0.0, 1, scans=16), MODEL)
+    marks = Assembly(shots).marks
     sizes = {"laser.offset": {"offset": 0.4}, "laser.quadratic": {"quadratic": 0.09}}
-    sds = {}
+    sds, missed = {}, {}
     for name, values in sizes.items():
+        told = [EffectSetting(name, values)]
+        assembly = Assembly(replace(shots, measured=marks.base + marks.together(told)))
         forms = [form for form in assembly.forms if form.id == name]
-        assembly.residual = assembly.marks.together([EffectSetting(name, values)])
-        ((setting, known),) = pinned(assembly, normal, forms, [EffectSetting(name, values)], None, None).settings
+        fit = pinned(assembly, assembly.settle(None), forms, told, None, None)
+        ((setting, known),) = fit.settings
+        assert setting.parameters[name.removeprefix("laser.")] == pytest.approx(next(iter(values.values())), rel=1e-3)
+        missed[name] = fit.missed
         sds |= {p: sd / setting.parameters[p] for p, sd in known.items()}
     assert sds["offset"] < 0.05
-    assert FORM < sds["quadratic"] < 1.2 * FORM
+    assert 0.99 * FORM < sds["quadratic"] < 1.2 * FORM
+    assert missed["laser.offset"].shape[2] == 0
+    what = FORM * marks.together([EffectSetting("laser.quadratic", sizes["laser.quadratic"])])
+    np.testing.assert_allclose(missed["laser.quadratic"][:, :, 0], np.nan_to_num(what), rtol=1e-2, atol=1e-4)
+
+
+@pytest.mark.parametrize(("name", "size"), [("laser.scale", 0.05), ("laser.cyclic", 0.03), ("laser.quadratic", 0.02)])
+def test_a_cause_far_out_of_the_noise_leaves_no_scatter(tmp_path, name, size):
+    """It has moved poses and made outliers of readings until it was known."""
+    seen = criticise(recording(tmp_path, name, size, 2), MODEL, lambda _: None)
+    assert [cause.id for cause in seen.causes] == [name]
+    (told,) = (cause.parameters for cause in seen.causes)
+    first = next(iter(told.values()))
+    assert first.lo90 < size < first.hi90

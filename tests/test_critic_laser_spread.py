@@ -32,6 +32,9 @@ class _Linear:
     def null(self, effect):
         return {p.name: p.null for p in effect.parameters}
 
+    def nulls(self, seeds):
+        return np.array([self((), seed) for seed in seeds])
+
     def __call__(self, settings, seed):
         out = 0.02 * np.random.default_rng(seed).standard_normal(5)
         for setting in settings:

@@ -8,7 +8,7 @@ and a size is only as sure as the shape that it belongs to.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from kurumaisu.types import FloatArray
 _STEPS = 2
 _ROUNDS = 4  # times that the scans are seen anew with what moves their beams
 _SETTLED = 0.5  # sds by which a parameter may still move between two of them
+_LOUD = 1.0  # rms of what acts, in sds of single readings, from which scans are seen anew with it
 _STEP = 0.05  # of a finite difference, in units of the larger of a parameter and its scale
 _SHAPE = 1.0  # prior sd of what only shapes an effect, in the same units
 _SIZE = 100.0  # and of its size
@@ -46,12 +47,13 @@ class Pinned:
     """Settings of what acts on the mean, with the sds of what was fitted; where that was, and what it leaves.
 
     assembly: the scans as they are seen with these effects, where any of them moves beams; left (k, b) [m]: of the
-    residual there.
+    residual there; missed (k, b, n) [m]: what equations that are only nearly right may have wrong in it, 1 sd.
     """
 
     settings: tuple[tuple[EffectSetting, dict[str, float]], ...]
     assembly: Assembly
     left: FloatArray
+    missed: FloatArray
 
 
 def pinned(
@@ -67,11 +69,15 @@ def pinned(
     winner: a block that acts beside them, whose coefficients are integrated out; truth: known sd of the reference.
     """
     if not forms and winner is None:
-        return Pinned((), assembly, assembly.residual)
+        return Pinned((), assembly, assembly.residual, np.empty((*assembly.residual.shape, 0)))
     at = [dict(setting.parameters) for setting in settings]
     block = _block(assembly, winner)
-    moving = any(not issubclass(effects.by_id(form.id), effects.ReadingEffect) for form in forms)
+    # What is as large as a reading's own scatter has moved poses, and made outliers of readings, as much.
+    moving = _loud(assembly, normal, _settings(forms, at)) or any(
+        not issubclass(effects.by_id(form.id), effects.ReadingEffect) for form in forms
+    )
     free = [each for i, form in enumerate(forms) for each in _free(i, form, at[i])]
+    absent = [EffectSetting(form.id, assembly.marks.null(effects.by_id(form.id))) for form in forms]
     sds, left = np.zeros(len(free)), assembly.residual
     for _ in range(_ROUNDS if moving else 1):
         if moving:
@@ -89,11 +95,31 @@ def pinned(
                 at[each.index][p.name] = float(np.clip(at[each.index][p.name] + by, p.lower, p.upper))
         if np.all(np.abs(_values(free, at) - before) < _SETTLED * sds):
             break
-    sds = np.hypot(sds, _doubt(assembly, normal, forms, at, free) * sds)
+    guessed = [i for i, form in enumerate(forms) if effects.by_id(form.id).empirical]
+    signals = _signals(assembly, _settings(forms, at), {i: absent[i] for i in guessed})
+    slopes = [_slope(assembly, forms, at, each) for each in free]
+    sds = np.hypot(sds, _doubt(assembly, normal, free, (slopes, guessed, signals)) * sds)
     out: list[dict[str, float]] = [{} for _ in forms]
     for each, sd in zip(free, sds.tolist(), strict=True):
         out[each.index][each.parameter.name] = sd
-    return Pinned(tuple(zip(_settings(forms, at), out, strict=True)), assembly, left)
+    missed = FORM * np.nan_to_num(np.stack(signals, axis=-1)) if signals else np.empty((*left.shape, 0))
+    return Pinned(tuple(zip(_settings(forms, at), out, strict=True)), assembly, left, missed)
+
+
+def _signals(
+    assembly: Assembly, every: Sequence[EffectSetting], absent: Mapping[int, EffectSetting]
+) -> list[FloatArray]:
+    """Return what some of the effects do to the mean (k, b) [m] beside all others; absent: what they are without."""
+    whole = assembly.marks.together(every)
+    others = ([without if j == i else one for j, one in enumerate(every)] for i, without in absent.items())
+    return [whole - assembly.marks.together(other) for other in others]
+
+
+def _loud(assembly: Assembly, normal: Normal, settings: Sequence[EffectSetting]) -> bool:
+    """Tell whether effects move readings by more than they scatter anyway."""
+    beam = normal.beam_noise
+    change = np.nan_to_num(assembly.marks.together(settings) / assembly.first.sd)
+    return bool(np.mean(change[beam.valid] ** 2) > _LOUD**2)
 
 
 def _values(free: Sequence[_Free], at: Sequence[dict[str, float]]) -> FloatArray:
@@ -119,20 +145,20 @@ def _step(
 
 
 def _doubt(
-    assembly: Assembly, normal: Normal, forms: Sequence[Form], at: Sequence[dict[str, float]], free: Sequence[_Free]
+    assembly: Assembly,
+    normal: Normal,
+    free: Sequence[_Free],
+    parts: tuple[Sequence[FloatArray], Sequence[int], Sequence[FloatArray]],
 ) -> FloatArray:
     """Return what other forms of what acts may shift each parameter by, in standard deviations.
 
     Nobody can refuse a form that differs by FORM of what the effect does. At which range or angle a size counts is the
     form's choice, so its own size is in doubt by all of it; of others, what is like their own marks passes for them.
+    parts: how the mean follows each parameter, which effects are empirical, and what these do.
     """
-    guessed = [i for i, form in enumerate(forms) if effects.by_id(form.id).empirical]
+    slopes, guessed, signals = parts
     if not guessed:
         return np.zeros(len(free))
-    every = _settings(forms, at)
-    whole = assembly.marks.together(every)
-    signals = [whole - assembly.marks.together([one for one in every if one is not every[i]]) for i in guessed]
-    slopes = [_slope(assembly, forms, at, each) for each in free]
     gram = assembly.products(normal, np.stack([*slopes, *signals], axis=-1), assembly.residual)[:-1, :-1]
     norms = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     count = len(free)

@@ -82,7 +82,7 @@ class ScatterFit:
         ids: the effects to look for; None for all.
         """
         self._ids = ids
-        nulls = np.array([simulate((), 1000 + i) for i in range(_NULLS)])
+        nulls = simulate.nulls(range(1000, 1000 + _NULLS))
         self._simulate, self._means = simulate, set(means)
         self._shapes: set[tuple[str, str]] = set()
         self.likeness = Likeness(nulls, measured, simulate.counts())

@@ -151,7 +151,7 @@ def _scatter(
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
     measured = few.shots.measured
     seen = statistics.of(measured, np.where(np.isfinite(measured), fit.left[rows], np.nan))
-    search = ScatterSearch(Simulator(few, statistics), seen, sorted(means), ids)
+    search = ScatterSearch(Simulator(few, statistics, fit.missed[rows]), seen, sorted(means), ids)
     found = search.run()
     return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
