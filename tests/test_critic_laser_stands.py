@@ -93,6 +93,9 @@ class _Three:
     def null(self, effect):
         return {p.name: p.null for p in effect.parameters}
 
+    def nulls(self, seeds):
+        return np.array([self((), seed) for seed in seeds])
+
     def __call__(self, settings, seed):
         at = {f"{setting.id}.{name}": value for setting in settings for name, value in setting.parameters.items()}
         step, own = at.get("laser.quantisation.step", 0.001), at.get("laser.beam_bias.sd", 0.0)
