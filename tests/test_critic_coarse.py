@@ -20,6 +20,7 @@ def fit_of(sizes, nats):
     return SimpleNamespace(
         candidates=frozenset(sizes),
         ids=frozenset(sizes),
+        terms=tuple(SimpleNamespace(fixed=name == "sign") for name in sizes),
         score=score,
         log_likelihood=0.5 * sum(z**2 for z in sizes.values()),
     )
@@ -72,3 +73,30 @@ def test_a_cause_that_drowns_all_else_is_certain():
     assert p["strong"] > 0.999
     assert p["small"] == pytest.approx(np.exp(-5.0), rel=0.01)  # the doubt about the strong one makes it no likelier
     assert sets == ()
+
+
+def test_what_fits_worse_than_nothing_makes_no_cause_stronger():
+    """A sign that is not wrong explains nothing at all: it must not count as what acts."""
+    fits = (
+        fit_of({"strong": 17.0}, 100.0),
+        fit_of({"rival": 16.8}, 95.0),
+        fit_of({}, 0.0),
+        fit_of({"other": 0.0}, -1e4),
+    )
+    fits[-1].log_likelihood = -1e4
+    p, _ = coarse.believed(Naming(fits, EFFECTS, (), 0.0), {"strong": 4.9})
+    assert p["strong"] > 0.98
+
+
+def test_a_simpler_cause_of_the_same_is_certain_however_strong_it_is():
+    """A factor of -1 needs nothing to be fitted; a gain of -2 does the same, and costs 20 nats."""
+
+    def p_of(name, odds):
+        found = Naming(
+            (fit_of({name: 300.0}, 44980.0), fit_of({"rival": 300.0}, 44960.0), fit_of({}, 0.0)), EFFECTS, (), 0.0
+        )
+        return coarse.believed(found, {name: odds})[0][name]
+
+    assert p_of("sign", 20.0) > 0.999
+    assert p_of("strong", 20.0) < 0.9  # what is fitted as well only happened to be likelier
+    assert p_of("sign", 3.0) < 0.9  # a curve is nearer than the gain

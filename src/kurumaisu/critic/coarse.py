@@ -22,6 +22,7 @@ from kurumaisu.types import FloatArray
 _MISSED = 0.1
 # Directions among which that is spread: as many as the catalogue has parameters, or so.
 _DIRECTIONS = 45
+_NEAR = 1.0  # [nat] by which many sets together speak louder than the best of them
 
 
 def believed(found: Naming, odds: Mapping[str, float]) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
@@ -29,9 +30,13 @@ def believed(found: Naming, odds: Mapping[str, float]) -> tuple[dict[str, float]
 
     odds: log odds of each. What speaks against an effect is believed: nothing is likelier than not for being in doubt.
     """
-    doubt = variance(found)
-    shares = {name: float(expit(log / doubt if log > 0 else log)) for name, log in odds.items()}
+    shares = {name: float(expit(log if log <= 0 else _doubted(found, name, log))) for name, log in odds.items()}
     return shares, confounded(Posterior(found.fits, weights(found)))
+
+
+def _doubted(found: Naming, name: str, odds: float) -> float:
+    plain = min(_simpler(found, name, odds), odds)
+    return (odds - plain) / variance(found) + plain
 
 
 def weights(found: Naming) -> FloatArray:
@@ -41,11 +46,30 @@ def weights(found: Naming) -> FloatArray:
 
 def variance(found: Naming) -> float:
     """Return by what log posterior ratios are to be divided."""
-    least = min(fit.log_likelihood for fit in found.fits)  # nothing's
-    square = 2 * (found.best.log_likelihood - least)  # z^2 of all that acts
+    nothing = next((fit for fit in found.fits if not fit.candidates), found.best)
+    square = 2 * (found.best.log_likelihood - nothing.log_likelihood)  # z^2 of all that acts
     return 1 + _MISSED**2 * max(square, 0.0) / _DIRECTIONS
 
 
 def _worth(found: Naming, fit: Fit) -> float:
     """Return the log posterior of a set, not normalised."""
     return fit.score + log_prior(len(fit.candidates), len(found.p))
+
+
+def _simpler(found: Naming, name: str, odds: float) -> float:
+    """Return what of an effect's odds [nat] is no evidence of the drives: what could stand in needs more to be fitted.
+
+    A wrong sign says by itself what a gain must be fitted to say, however strong it is.
+    """
+    sides = ([fit for fit in found.fits if (name in fit.ids) is there] for there in (True, False))
+    first, other = (max(side, key=lambda fit: _worth(found, fit), default=None) for side in sides)
+    if first is None or other is None or odds < _worth(found, first) - _worth(found, other) - _NEAR:
+        return 0.0  # a curve is nearer than any other set
+    if _fitted(first) >= _fitted(other):
+        return 0.0
+    costs = [fit.log_likelihood - _worth(found, fit) for fit in (other, first)]
+    return max(costs[0] - costs[1], 0.0)
+
+
+def _fitted(fit: Fit) -> int:
+    return sum(not term.fixed for term in fit.terms)
