@@ -24,6 +24,7 @@ from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.noise import Growth, Noise, Scatter, whitener
 from kurumaisu.critic.pruned import pruned
+from kurumaisu.critic.scan import Screen
 from kurumaisu.critic.smooth import Belief
 from kurumaisu.critic.smooth_alike import Likeness
 from kurumaisu.critic.smooth_designs import Designs
@@ -218,3 +219,12 @@ def test_what_clips_does_not_hide_what_else_it_may_be():
     # That the top speed lies just below the one that was driven would be chance.
     assert abs(best["base.saturation"].log_likelihood - best["base.gain_v"].log_likelihood) < 0.5
     assert best["base.saturation"].score < best["base.gain_v"].score - 1.0
+
+
+def test_no_dozen_of_effects_is_pieced_together():
+    """What is strong and in no catalogue would be followed a little by every effect: for minutes, and to no end."""
+    screen = Screen.__new__(Screen)
+    screen.alike = lambda *_: False
+    some = [Candidate(f"effect {i}", (), 1.0) for i in range(7)]
+    assert screen._allowed(frozenset(some[:6]))
+    assert not screen._allowed(frozenset(some))

@@ -19,6 +19,7 @@ _JOINT = 0.6  # correlation from which three changes are tried together: two may
 _ENOUGH = 3  # residuals per parameter of the catalogue, at least
 _STAND_IN = 0.3  # correlation from which one effect may pass for another
 _SWAPS = 3  # changes to a set at most
+_LARGEST = 6  # effects in a set: what is in no catalogue and strong would be pieced together from a dozen, for minutes
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,8 @@ class Screen:
 
     def _allowed(self, chosen: frozenset[Candidate]) -> bool:
         ids = [candidate.id for candidate in chosen]
-        return len(set(ids)) == len(ids) and not any(self.alike(a, b) for a, b in combinations(chosen, 2))
+        few = len(set(ids)) == len(ids) <= _LARGEST
+        return few and not any(self.alike(a, b) for a, b in combinations(chosen, 2))
 
     def _guess(self, chosen: frozenset[Candidate]) -> Guess | None:
         """Return a set's estimate and score by the linearisation; None where a parameter leaves its bounds."""
