@@ -41,7 +41,7 @@ def _doubted(found: Naming, name: str, odds: float) -> float:
 
 def weights(found: Naming) -> FloatArray:
     """Return how likely each set is, as far as the evidence is believed."""
-    return np.asarray(softmax(np.array([_worth(found, fit) for fit in found.fits]) / variance(found)))
+    return np.asarray(softmax(np.array([worth(found, fit) for fit in found.fits]) / variance(found)))
 
 
 def variance(found: Naming) -> float:
@@ -51,7 +51,7 @@ def variance(found: Naming) -> float:
     return 1 + _MISSED**2 * max(square, 0.0) / _DIRECTIONS
 
 
-def _worth(found: Naming, fit: Fit) -> float:
+def worth(found: Naming, fit: Fit) -> float:
     """Return the log posterior of a set, not normalised."""
     return fit.score + log_prior(len(fit.candidates), len(found.p))
 
@@ -62,12 +62,12 @@ def _simpler(found: Naming, name: str, odds: float) -> float:
     A wrong sign says by itself what a gain must be fitted to say, however strong it is.
     """
     sides = ([fit for fit in found.fits if (name in fit.ids) is there] for there in (True, False))
-    first, other = (max(side, key=lambda fit: _worth(found, fit), default=None) for side in sides)
-    if first is None or other is None or odds < _worth(found, first) - _worth(found, other) - _NEAR:
+    first, other = (max(side, key=lambda fit: worth(found, fit), default=None) for side in sides)
+    if first is None or other is None or odds < worth(found, first) - worth(found, other) - _NEAR:
         return 0.0  # a curve is nearer than any other set
     if _fitted(first) >= _fitted(other):
         return 0.0
-    costs = [fit.log_likelihood - _worth(found, fit) for fit in (other, first)]
+    costs = [fit.log_likelihood - worth(found, fit) for fit in (other, first)]
     return max(costs[0] - costs[1], 0.0)
 
 

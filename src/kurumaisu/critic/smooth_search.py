@@ -64,8 +64,7 @@ class Rivalry:
 
 def no_rivals(found: Naming) -> Rivalry:
     """Return the result where no curve can act: the catalogue's own."""
-    count = len(found.p)
-    sets = [(fit.score + log_prior(len(fit.candidates), count), fit.ids) for fit in found.fits]
+    sets = [(coarse.worth(found, fit), fit.ids) for fit in found.fits]
     return Rivalry((), -np.inf, {}, _odds(sets, found.p), 1.0 - max(found.p.values(), default=0.0))
 
 
