@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The whitening filter against the joint covariance written out in full."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import dblquad
@@ -24,12 +26,40 @@ def run(n: int, seed: int):
 
 
 def integral_covariance(a, b, c, d, tau):
-    """Of the integrals of a unit OU process over (a, b) and (c, d)."""
-    inner = dblquad(lambda t, s: np.exp(-abs(s - t) / tau), a, b, lambda s: c, lambda s: d, epsabs=1e-12)
-    return inner[0]
+    """Of a unit OU process over (a, b) and over (c, d): its integrals, plain and weighted by how late it is, (2, 2)."""
+
+    def product(first, second):
+        def kernel(t, s):
+            weights = ((s - a) / (b - a) - 0.5) ** first * ((t - c) / (d - c) - 0.5) ** second
+            return weights * np.exp(-abs(s - t) / tau)
+
+        if a != c:
+            return dblquad(kernel, a, b, lambda s: c, lambda s: d, epsabs=1e-12)[0]
+        # The kernel has a kink where the times are the same: on each side of it there is none.
+        below = dblquad(kernel, a, b, lambda s: c, lambda s: s, epsabs=1e-13)[0]
+        return below + dblquad(kernel, a, b, lambda s: s, lambda s: d, epsabs=1e-13)[0]
+
+    return np.array([[product(i, j) for j in (0, 1)] for i in (0, 1)])
 
 
-def joint_covariance(times, poses, noise, activity):
+def arcs(poses):
+    """Return the ways of a chair that drives straight from pose to pose while it turns evenly, (n, 8)."""
+    share = (np.arange(4000) + 0.5) / 4000
+    out = []
+    for here, there in pairwise(poses):
+        dx, dy, turn = geometry.between(here, there)
+        along = np.stack([np.cos(share * turn), np.sin(share * turn), (1 - share) * dx, (1 - share) * dy])
+        out.append([*along.mean(axis=1), *(np.polyfit(share, row, 1)[0] for row in along)])
+    return np.array(out)
+
+
+def motion(way):
+    """Return the derivative of an increment by the integrals of rate errors, plain and by lateness, (2, 3, 3)."""
+    plain, late = ([[c, -s, -y], [s, c, x], [0, 0, turn]] for (c, s, x, y), turn in ((way[:4], 1), (way[4:], 0)))
+    return np.array(plain), np.array(late)
+
+
+def joint_covariance(times, poses, noise, activity, ways):
     """Of all increments' residuals, by numerical derivatives of the increments and quadrature of the OU processes."""
     n = len(times) - 1
     sds = [noise["position_sd"], noise["position_sd"], noise["heading_sd"]]
@@ -43,16 +73,17 @@ def joint_covariance(times, poses, noise, activity):
             (geometry.between(up[:-1], up[1:]) - geometry.between(down[:-1], down[1:])) / (2 * step)
         ).ravel()
     cov = by_pose @ np.diag(np.tile(np.square(sds), n + 1)) @ by_pose.T
-    motions = []
-    for k in range(n):
-        dx, dy, turn = geometry.between(poses[k], poses[k + 1])
-        c, s = np.cos(turn / 2), np.sin(turn / 2)
-        motions.append(activity[k] * np.array([[c, -s, -dy / 2], [s, c, dx / 2], [0, 0, 1]]))
+    motions = [[share * part for part in motion(way)] for way, share in zip(ways, activity, strict=True)]
     for j in range(n):
         for k in range(n):
             for sd, tau in zip(noise["process_sd"], noise["process_tau"], strict=True):
-                rates = integral_covariance(*times[j : j + 2], *times[k : k + 2], tau) * np.diag(np.square(sd))
-                cov[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] += motions[j] @ rates @ motions[k].T
+                shared = integral_covariance(*times[j : j + 2], *times[k : k + 2], tau)
+                block = sum(
+                    shared[p, q] * motions[j][p] @ np.diag(np.square(sd)) @ motions[k][q].T
+                    for p in (0, 1)
+                    for q in (0, 1)
+                )
+                cov[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] += block
     return cov
 
 
@@ -63,9 +94,10 @@ def test_against_the_joint_covariance(slow, activity, count):
     times, poses = run(6, 1)
     columns = np.random.default_rng(2).normal(size=(18, count))
     noise = {**NOISE, "process_sd": [NOISE["process_sd"][0], slow]}
-    whitener = Whitener(poses, times, np.array(activity, dtype=float), **noise)
+    ways = arcs(poses)
+    whitener = Whitener(poses, times, np.array(activity, dtype=float), ways, **noise)
     white, log_determinants = whitener.whiten(columns), whitener.log_determinants
-    cov = joint_covariance(times, poses, noise, activity)
+    cov = joint_covariance(times, poses, noise, activity, ways)
     np.testing.assert_allclose(whitener.gram(columns), white.T @ white, rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(white.T @ white, columns.T @ np.linalg.solve(cov, columns), rtol=1e-5)
     assert log_determinants.sum() == pytest.approx(np.linalg.slogdet(cov)[1], abs=1e-4)
@@ -74,7 +106,7 @@ def test_against_the_joint_covariance(slow, activity, count):
 def test_short_steps_do_not_cancel():
     times = np.arange(50) * 1e-4
     poses = np.zeros((50, 3))
-    whitener = Whitener(poses, times, np.ones(49), **NOISE)
+    whitener = Whitener(poses, times, np.ones(49), arcs(poses), **NOISE)
     assert np.isfinite(whitener.whiten(np.ones((147, 1)))).all()
     assert np.isfinite(whitener.log_determinants).all()
 
@@ -87,6 +119,8 @@ def test_short_steps_do_not_cancel():
         ({"poses": np.zeros((7, 2))}, "shape"),
         ({"activity": np.ones(5)}, "one factor per increment"),
         ({"activity": -np.ones(6)}, "none negative"),
+        ({"ways": np.zeros((5, 8))}, "one finite row per increment"),
+        ({"ways": np.full((6, 8), np.nan)}, "one finite row per increment"),
         ({"process_tau": [0.0, 1.0]}, "positive"),
         ({"process_tau": [1.0, 0.0]}, "positive"),
         ({"process_sd": [[0.1, -0.1, 0.1], [0.0, 0.0, 0.0]]}, "positive"),
@@ -99,6 +133,7 @@ def test_bad_input_is_refused(change, message):
         "poses": poses,
         "times": times,
         "activity": np.ones(6),
+        "ways": arcs(poses),
         **NOISE,
         **change,
     }
@@ -109,4 +144,4 @@ def test_bad_input_is_refused(change, message):
 def test_columns_of_another_drive_are_refused():
     times, poses = run(6, 1)
     with pytest.raises(ValueError, match="three rows per increment"):
-        Whitener(poses, times, np.ones(6), **NOISE).whiten(np.zeros((17, 1)))
+        Whitener(poses, times, np.ones(6), arcs(poses), **NOISE).whiten(np.zeros((17, 1)))

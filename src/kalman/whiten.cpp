@@ -20,13 +20,18 @@ namespace {
 
 using Matrix3 = Eigen::Matrix3d;
 
-/// Discrete Ornstein-Uhlenbeck process of unit variance over dt, with its integral over the interval.
+/// Discrete Ornstein-Uhlenbeck process of unit variance over dt, with its integral over the interval and its lateness:
+/// the integral of u (t / dt - 1/2), which tells whether it acted late or early in the interval.
 struct OuStep {
   double decay;         ///< u' = decay u + noise
   double reach;         ///< integral = reach u + noise [s]
+  double late;          ///< lateness = late u + noise [s]; less than 0
   double var_u;         ///< of the noise in u'
   double var_integral;  ///< of the noise in the integral [s^2]
-  double cov;           ///< between the two [s]
+  double var_late;      ///< of the noise in the lateness [s^2]
+  double cov;           ///< between those in u' and the integral [s]
+  double cov_late;      ///< between those in u' and the lateness [s]
+  double cov_both;      ///< between those in the integral and the lateness [s^2]
 };
 
 OuStep ouStep(double dt, double tau) {
@@ -36,33 +41,43 @@ OuStep ouStep(double dt, double tau) {
   // For small x the closed form cancels to nothing; its series does not.
   const double spread =
       x < 1e-2 ? 2.0 / 3.0 * x * x * x - 0.5 * x * x * x * x : 2.0 * x - 4.0 * lost - std::expm1(-2.0 * x);
-  return {decay, tau * lost, -std::expm1(-2.0 * x), tau * tau * spread, tau * lost * lost};
+  const double late = x < 1e-2 ? x * x * (x / 24.0 - 1.0 / 12.0) : (lost - x * decay) / x - 0.5 * lost;
+  const double lateness =
+      x < 1e-2 ? x * x * x * (1.0 / 60.0 - x / 144.0) : 2.0 * (x / 12.0 + (0.5 + 1.0 / x) * late);
+  return {decay,
+          tau * lost,
+          tau * late,
+          -std::expm1(-2.0 * x),
+          tau * tau * spread,
+          tau * tau * (lateness - late * late),
+          tau * lost * lost,
+          -tau * late * (1.0 + decay),
+          -tau * tau * late * lost};
 }
 
-/// Partial derivatives of one body increment by its two end poses and by the integrated rate errors.
+/// Partial derivatives of one body increment by its two end poses, by the integrated rate errors and by their lateness.
 struct Jacobians {
-  Matrix3 from, to, motion;
+  Matrix3 from, to, motion, late;
 };
 
-Jacobians jacobians(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+Jacobians jacobians(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::RowVectorXd& way) {
   const double c = std::cos(a.z());
   const double s = std::sin(a.z());
   const Eigen::Vector3d world = b - a;
-  const double dx = c * world.x() + s * world.y();
-  const double dy = -s * world.x() + c * world.y();
-  const double mid = 0.5 * world.z();
   Jacobians j;
   j.to << c, s, 0, -s, c, 0, 0, 0, 1;
   j.from = -j.to;
-  j.from(0, 2) = dy;
-  j.from(1, 2) = -dx;
-  // A rate error acts over the whole interval: along the mean heading, and a yaw error swings the rest of the way.
-  j.motion << std::cos(mid), -std::sin(mid), -0.5 * dy, std::sin(mid), std::cos(mid), 0.5 * dx, 0, 0, 1;
+  j.from(0, 2) = -s * world.x() + c * world.y();
+  j.from(1, 2) = -c * world.x() - s * world.y();
+  // An error of a speed acts along the heading, and one of the yaw rate swings the rest of the way. Without the late
+  // ones, a reference better than that would make noise of the motion pass for an effect.
+  j.motion << way[0], -way[1], -way[3], way[1], way[0], way[2], 0, 0, 1;
+  j.late << way[4], -way[5], -way[7], way[5], way[4], way[6], 0, 0, 0;
   return j;
 }
 
-void check(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::VectorXd& activity,
-           const MotionNoise& noise) {
+void check(const Track& track, const MotionNoise& noise) {
+  const auto& [poses, times, activity, ways] = track;
   const Eigen::Index n = poses.rows() - 1;
   if (n < 1 || poses.cols() != 3) throw std::invalid_argument("poses must have shape (n + 1, 3), n > 0");
   if (times.size() != n + 1) throw std::invalid_argument("times and poses must have the same length");
@@ -71,6 +86,9 @@ void check(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eig
   }
   if (activity.size() != n || !(activity.array() >= 0).all()) {
     throw std::invalid_argument("activity must have one factor per increment, none negative");
+  }
+  if (ways.rows() != n || !ways.allFinite()) {
+    throw std::invalid_argument("ways must have one finite row per increment");
   }
   if (!(noise.position_sd > 0 && noise.heading_sd > 0 && noise.fast.tau > 0 && noise.slow.tau > 0) ||
       !(noise.fast.sd.array() > 0).all() || !(noise.slow.sd.array() >= 0).all()) {
@@ -149,8 +167,10 @@ class Covariance {
     for (int r = 0; r < 3; ++r) {
       for (int i = 0; i < 3; ++i) {
         step.seen[r][i] = j.from(r, i);
-        for (int c = 0; c < kColours; ++c)
-          step.seen[r][3 + 3 * c + i] = processes_.steps[c].reach * j.motion(r, i);
+        for (int c = 0; c < kColours; ++c) {
+          const OuStep& ou = processes_.steps[c];
+          step.seen[r][3 + 3 * c + i] = ou.reach * j.motion(r, i) + ou.late * j.late(r, i);
+        }
       }
       for (int i = 0; i < kRow; ++i) seen_[r][i] = 0.0;
       for (int k = 0; k < kSize; ++k) {
@@ -163,17 +183,24 @@ class Covariance {
   /// The root of the increment's covariance.
   KURUMAISU_INLINE bool cholesky(const Whitener::Step<kSize>& step, const Jacobians& j,
                                  double (&root)[3][3]) const {
-    double spread[3] = {0.0, 0.0, 0.0};  // of the rates' own noise during the increment
+    double spread[3] = {}, late[3] = {}, both[3] = {};  // of the rates' own noise during the increment
     for (int c = 0; c < kColours; ++c) {
-      for (int i = 0; i < 3; ++i)
-        spread[i] += processes_.steps[c].var_integral * processes_.variance[3 * c + i];
+      const OuStep& ou = processes_.steps[c];
+      for (int i = 0; i < 3; ++i) {
+        const double variance = processes_.variance[3 * c + i];
+        spread[i] += ou.var_integral * variance;
+        late[i] += ou.var_late * variance;
+        both[i] += ou.cov_both * variance;
+      }
     }
     for (int r = 0; r < 3; ++r) {
       for (int s = 0; s <= r; ++s) {
         double sum = 0.0;
         for (int i = 0; i < kSize; ++i) sum += step.seen[r][i] * seen_[s][i];
         for (int i = 0; i < 3; ++i) {
-          sum += pose_[i] * j.to(r, i) * j.to(s, i) + spread[i] * j.motion(r, i) * j.motion(s, i);
+          sum += pose_[i] * j.to(r, i) * j.to(s, i) + spread[i] * j.motion(r, i) * j.motion(s, i) +
+                 late[i] * j.late(r, i) * j.late(s, i) +
+                 both[i] * (j.motion(r, i) * j.late(s, i) + j.late(r, i) * j.motion(s, i));
         }
         for (int k = 0; k < s; ++k) sum -= root[r][k] * root[s][k];
         if (r == s && sum <= 0) return false;
@@ -191,9 +218,11 @@ class Covariance {
       for (int c = 0; c < kColours; ++c) {
         const OuStep& ou = processes_.steps[c];
         for (int i = 3 + 3 * c; i < 6 + 3 * c; ++i) {
+          const int axis = i - 3 - 3 * c;
           step.keep[i] = ou.decay;
           cross_[r][i] =
-              ou.decay * seen_[r][i] + ou.cov * processes_.variance[i - 3] * j.motion(r, i - 3 - 3 * c);
+              ou.decay * seen_[r][i] +
+              processes_.variance[i - 3] * (ou.cov * j.motion(r, axis) + ou.cov_late * j.late(r, axis));
         }
       }
     }
@@ -223,17 +252,17 @@ class Covariance {
 };
 
 template <int kColours>
-KURUMAISU_INLINE std::vector<Whitener::Step<3 + 3 * kColours>> filterAll(const Eigen::MatrixXd& poses,
-                                                                         const Eigen::VectorXd& times,
-                                                                         const Eigen::VectorXd& activity,
+KURUMAISU_INLINE std::vector<Whitener::Step<3 + 3 * kColours>> filterAll(const Track& track,
                                                                          const MotionNoise& noise,
                                                                          Eigen::MatrixX3d& log_determinants) {
+  const auto& [poses, times, activity, ways] = track;
   Covariance<kColours> covariance(noise);
   std::vector<Whitener::Step<3 + 3 * kColours>> steps(static_cast<std::size_t>(poses.rows() - 1));
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
-    Jacobians j = jacobians(poses.row(at).transpose(), poses.row(at + 1).transpose());
+    Jacobians j = jacobians(poses.row(at).transpose(), poses.row(at + 1).transpose(), ways.row(at));
     j.motion *= activity[at];
+    j.late *= activity[at];
     double logs[3];
     if (!covariance.advance(j, times[at + 1] - times[at], steps[k], logs)) {
       throw std::invalid_argument("the increments' covariance is singular");
@@ -243,20 +272,14 @@ KURUMAISU_INLINE std::vector<Whitener::Step<3 + 3 * kColours>> filterAll(const E
   return steps;
 }
 
-KURUMAISU_WIDE std::vector<Whitener::Step<6>> filterOne(const Eigen::MatrixXd& poses,
-                                                        const Eigen::VectorXd& times,
-                                                        const Eigen::VectorXd& activity,
-                                                        const MotionNoise& noise,
+KURUMAISU_WIDE std::vector<Whitener::Step<6>> filterOne(const Track& track, const MotionNoise& noise,
                                                         Eigen::MatrixX3d& log_determinants) {
-  return filterAll<1>(poses, times, activity, noise, log_determinants);
+  return filterAll<1>(track, noise, log_determinants);
 }
 
-KURUMAISU_WIDE std::vector<Whitener::Step<9>> filterTwo(const Eigen::MatrixXd& poses,
-                                                        const Eigen::VectorXd& times,
-                                                        const Eigen::VectorXd& activity,
-                                                        const MotionNoise& noise,
+KURUMAISU_WIDE std::vector<Whitener::Step<9>> filterTwo(const Track& track, const MotionNoise& noise,
                                                         Eigen::MatrixX3d& log_determinants) {
-  return filterAll<2>(poses, times, activity, noise, log_determinants);
+  return filterAll<2>(track, noise, log_determinants);
 }
 
 constexpr Eigen::Index kLane = 8;  // columns that go through a step side by side
@@ -366,14 +389,13 @@ KURUMAISU_WIDE void gramOfSteps(const std::vector<Whitener::Step<9>>& steps,
 
 }  // namespace
 
-Whitener::Whitener(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times,
-                   const Eigen::VectorXd& activity, const MotionNoise& noise) {
-  check(poses, times, activity, noise);
-  log_determinants_.resize(poses.rows() - 1, 3);
+Whitener::Whitener(const Track& track, const MotionNoise& noise) {
+  check(track, noise);
+  log_determinants_.resize(track.poses.rows() - 1, 3);
   if ((noise.slow.sd.array() > 0).any()) {
-    steps_ = filterTwo(poses, times, activity, noise, log_determinants_);
+    steps_ = filterTwo(track, noise, log_determinants_);
   } else {
-    steps_ = filterOne(poses, times, activity, noise, log_determinants_);
+    steps_ = filterOne(track, noise, log_determinants_);
   }
 }
 

@@ -24,6 +24,18 @@ struct MotionNoise {
   Colour slow;
 };
 
+/// Where a robot was, and how it went from pose to pose.
+struct Track {
+  using Ways = Eigen::Matrix<double, Eigen::Dynamic, 8, Eigen::RowMajor>;
+
+  Eigen::MatrixXd poses;     ///< (n + 1, 3) reference x, y [m], theta [rad]
+  Eigen::VectorXd times;     ///< (n + 1,) increasing [s]
+  Eigen::VectorXd activity;  ///< (n,) factors on the noise of the rates, 0 for a robot that is held at rest
+  /// Of each increment, in the frame of its first pose: means of the heading's cosine and sine and of the way x, y [m]
+  /// that lies ahead; and by how much each of them grows from its beginning to its end, by least squares.
+  Ways ways;
+};
+
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Whitens columns of residual increments: L^-1 X with L L' the joint covariance of all increments of a run.
@@ -32,12 +44,9 @@ using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMaj
 /// the robot. What the filter does depends on no column: it is worked out once, O(n), for any number of columns.
 class Whitener {
  public:
-  /// poses: (n + 1, 3) reference x, y, theta; times: n + 1, increasing [s]; activity: (n,) factors on the noise of the
-  /// rates during each increment, 0 for a robot that is held at rest.
   /// Throws std::invalid_argument for shapes that do not fit, times that do not increase, or noise that is not
   /// positive.
-  Whitener(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::VectorXd& activity,
-           const MotionNoise& noise);
+  Whitener(const Track& track, const MotionNoise& noise);
 
   /// Columns (3 n, m), row 3k..3k+2 being dx, dy [m] and dtheta [rad] of increment k in the body frame at pose k; O(n m).
   /// Throws std::invalid_argument for another number of rows.

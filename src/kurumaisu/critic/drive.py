@@ -10,9 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from kurumaisu import geometry
+from kurumaisu import _core, geometry
 from kurumaisu._core import AxisInverse
 from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.ways import ways
 from kurumaisu.effects import LATE
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
@@ -85,6 +86,13 @@ class Drive:
         moved = np.where(own > 0, own, rolling)
         usual = float(moved[moved > 0].mean()) if (moved > 0).any() else 0.0
         return np.asarray(np.where(moved > 0, moved, usual))
+
+    @cached_property
+    def ways(self) -> FloatArray:
+        """How the chair went from each pose to the next, (m, 8): see ways.ways."""
+        edges = self.start + GRID * np.arange(len(self.v) + 1)
+        asked = _core.integrate(self.v, self.w, np.full(len(self.v), GRID), [0.0, 0.0, 0.0])
+        return ways(self.times, self.poses, edges, asked)
 
     @property
     def _moving(self) -> FloatArray:

@@ -70,6 +70,7 @@ def whitener(drive: Drive, noise: Noise) -> Whitener:
         drive.poses,
         drive.times,
         np.maximum(drive.activity, noise.rest) * (1 + noise.growth * drive.pace),
+        drive.ways,
         position_sd=noise.position_sd,
         heading_sd=noise.heading_sd,
         process_sd=[
