@@ -11,6 +11,7 @@ from kurumaisu.critic.arrays import criticise_arrays, recording_of
 from kurumaisu.critic.clean import Faults
 from kurumaisu.critic.meta import Meta
 from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.recording import Fan
 from kurumaisu.critic.rolling import Rolled, Rolling
 from kurumaisu.critic.window import Heard, Window
 from kurumaisu.critic.write_csv import write_csv_run
@@ -75,6 +76,21 @@ def test_a_window_forgets_what_is_old_but_not_the_command_that_still_holds():
     assert window.heard("command") == Heard(1, 0.0, 1.0)
     window.add("command", 30.5, (0.0, 0.0))
     assert window.run("window", Faults()).command.t.tolist() == [1.0, 30.5]
+
+
+def test_scans_of_another_fan_begin_the_window_of_scans_anew():
+    window = Window(("scan", "pose"), 1e9, 1_000_000)
+    first, second = Fan(-2.0, 0.1, 40, 0.0, 0.1), Fan(-2.0, 0.05, 80, 0.0, 0.1)
+    for t in range(3):
+        window.add("pose", float(t), (0.0, 0.0, 0.0))
+        window.add_scan(float(t), first, np.ones(40))
+    assert window.run("window", Faults()).fan == first
+    window.add_scan(3.0, second, np.ones(80))
+    window.add_scan(4.0, second, np.ones(80))
+    run = window.run("window", Faults())
+    assert run.fan == second
+    assert run.scan.values.shape == (2, 80)
+    assert len(run.pose.t) == 3
 
 
 def test_a_window_stays_within_its_memory_and_begins_anew_when_the_clock_is_set_back():

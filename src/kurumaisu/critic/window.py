@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class Window:
         self._limit = limit
         self._rows: dict[str, deque[tuple[float, FloatArray]]] = {part: deque() for part in parts}
         self._newest = -np.inf
-        self.fan: Fan | None = None
+        self._fan: Fan | None = None
 
     def add(self, part: str, t: float, row: Sequence[float] | FloatArray) -> None:
         """Take a row measured at t [s]; one of a clock that was set back forgets all others."""
@@ -52,6 +52,13 @@ class Window:
         self._forget()
         while len(rows) * (_OVERHEAD + values.nbytes) > self._limit:
             rows.popleft()
+
+    def add_scan(self, t: float, fan: Fan, ranges: FloatArray) -> None:
+        """Take a scan begun at t [s]; one of another fan, as after a driver's restart, forgets those before it."""
+        if fan != self._fan:
+            self._rows["scan"].clear()
+            self._fan = fan
+        self.add("scan", t, ranges)
 
     def add_received(self, part: str, t: float, row: Sequence[float] | FloatArray) -> None:
         """Take a row without a stamp, received at t [s].
@@ -79,7 +86,7 @@ class Window:
     def run(self, name: str, faults: Faults) -> Run:
         """Return what is kept as a run, cleaned as tables are; a single row of a part says too little."""
         tables = {part: np.array([[t, *row] for t, row in rows]) for part, rows in self._rows.items() if len(rows) > 1}
-        return run_of(name, tables, faults)
+        return replace(run_of(name, tables, faults), fan=self._fan)
 
     def _forget(self) -> None:
         for part, rows in self._rows.items():

@@ -18,14 +18,16 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, LaserScan, Temperature
 
 from kurumaisu.critic import messages
-from kurumaisu.critic.checks import usable
+from kurumaisu.critic.checks import check_run, usable
 from kurumaisu.critic.clean import Faults
+from kurumaisu.critic.meta import Meta, read_meta
 from kurumaisu.critic.options import add_effects, whole_number
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.results import causes
 from kurumaisu.critic.rolling import Rolled, Rolling
 from kurumaisu.critic.selection import effect_ids
 from kurumaisu.critic.window import Heard, Window
+from kurumaisu.errors import Error, one_line
 from kurumaisu.msg import Voltages
 from kurumaisu.params import load_model, shipped
 
@@ -56,14 +58,16 @@ _EPILOG = """\
 examples:
   critic watch
   critic watch --window 300 --every 60 ground_truth:=/mocap/pose
+  critic watch --meta recordings/office/meta.yaml
   rostopic echo /diagnostics"""
 
 
 class CriticWatch:
     """Hears topics in threads of their own; step, called once a second, criticises and publishes."""
 
-    def __init__(self, options: argparse.Namespace, model: Path, ids: frozenset[str] | None) -> None:
+    def __init__(self, options: argparse.Namespace, model: Path, meta: Meta, ids: frozenset[str] | None) -> None:
         self._model = load_model(model).name
+        self._meta = meta
         self._every = options.every
         self._lock = threading.Lock()
         self._window = Window(tuple(_TOPICS), options.window, _LIMIT)
@@ -87,44 +91,56 @@ class CriticWatch:
             self._last, self._answered = answer, rospy.get_time()
             self._number += 1
         if not self._rolling.busy and now - self._begun >= self._every:
-            recording = self._recording()
-            if recording is not None:
-                self._begun = now
-                self._rolling.start(recording, now)
+            self._begin(now)
         self._publish()
+
+    def _begin(self, now: float) -> None:
+        try:
+            recording = self._recording()
+        except Error as error:
+            self._begun, self._last = now, Rolled(None, one_line(error))
+            return
+        if recording is not None:
+            self._begun = now
+            self._rolling.start(recording, now)
 
     def close(self) -> None:
         """End what was begun."""
         self._rolling.close()
 
     def _hear(self, part: str, message: Any) -> None:
+        row, stamp = _row(part, message), _stamp(message)
         with self._lock:
-            row, stamp = self._row(part, message), _stamp(message)
-            if stamp is None:
+            if part == "scan":
+                fan, ranges, _ = row
+                self._window.add_scan(rospy.get_time() if stamp is None else stamp, fan, ranges)
+            elif stamp is None:
                 self._window.add_received(part, float(rospy.get_time()), row)
             else:
                 self._window.add(part, stamp, row)
 
-    def _row(self, part: str, message: Any) -> Any:
-        if part == "battery":
-            return (message.voltage,)
-        if part == "temperature":
-            return (message.temperature,)
-        convert = messages.converter(part, message._type.replace("/", "/msg/"))
-        assert convert is not None
-        row = convert(message)
-        if part == "scan":
-            self._window.fan, row = row
-        return row
-
     def _recording(self) -> Recording | None:
-        """Return what is in the window, None while nothing can be said of it."""
-        faults = Faults()
+        """Return what is in the window, None while nothing can be said of it.
+
+        Raise Error for scans that are not of the laser of meta.yaml.
+        """
+        faults, meta = Faults(), self._meta
         with self._lock:
             run = self._window.run("window", faults)
         if not usable(run):
             return None
-        return Recording("window", (run,), ("window",), problems=tuple(faults.notes), invalid=tuple(faults.invalid))
+        check_run(run, meta.laser, faults)
+        return Recording(
+            "window",
+            (run,),
+            ("window",),
+            model=meta.model,
+            world=meta.world,
+            laser=meta.laser,
+            truth=meta.truth,
+            problems=tuple(faults.notes),
+            invalid=tuple(faults.invalid),
+        )
 
     def _publish(self) -> None:
         with self._lock:
@@ -173,6 +189,17 @@ def _missing(topics: dict[str, tuple[bool, str]]) -> str:
     return told
 
 
+def _row(part: str, message: Any) -> Any:
+    """Return a message as a row of its part; of a scan the fan, the ranges and the intensities."""
+    if part == "battery":
+        return (message.voltage,)
+    if part == "temperature":
+        return (message.temperature,)
+    convert = messages.converter(part, message._type.replace("/", "/msg/"))
+    assert convert is not None
+    return convert(message)
+
+
 def _stamp(message: Any) -> float | None:
     """Return when a message was measured [s]; None where it does not say so."""
     header = getattr(message, "header", None)
@@ -183,10 +210,11 @@ def main(arguments: Sequence[str]) -> int:
     """Watch until ROS ends; return the exit code. Raise Error for options that make no sense."""
     options = _parser().parse_args(rospy.myargv(["watch", *arguments])[1:])
     ids = effect_ids(options.only, options.without)
-    model = options.model or shipped("launch/md100.yaml")
+    meta = read_meta(options.meta) if options.meta is not None else Meta()
+    model = options.model or meta.model or shipped("launch/md100.yaml")
     load_model(model)
     rospy.init_node("critic_watch")
-    watch = CriticWatch(options, model, ids)
+    watch = CriticWatch(options, model, meta, ids)
     try:
         while not rospy.is_shutdown():
             watch.step()
@@ -207,5 +235,6 @@ def _parser() -> argparse.ArgumentParser:
     add("--window", type=whole_number, default=120, metavar="S", help="seconds of driving to judge by (120)")
     add("--every", type=whole_number, default=30, metavar="S", help="seconds from one criticism to the next (30)")
     add("--model", type=Path, metavar="FILE", help="model to criticise (md100.yaml)")
+    add("--meta", type=Path, metavar="FILE", help="a recording's meta.yaml: its model, world, laser and truth are used")
     add_effects(parser)
     return parser

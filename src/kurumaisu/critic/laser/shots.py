@@ -78,7 +78,9 @@ def missing(recording: Recording) -> str | None:
         return "no scans were recorded; room_poses records them"
     if recording.world is None:
         return "there is no map: give world in meta.yaml, a Stage world of measured walls"
-    posed = [run for run in scanned if run.pose is not None]
+    posed = [run for run in scanned if _referred(run)]
+    if not posed and any(run.pose is not None for run in scanned):
+        return "the reference pose was made from these very scans, in a frame of its own; give pose.csv, as room_poses does"
     if not posed:
         return "there is no reference pose at the scans; give pose.csv, as room_poses does"
     if sum(len(_within(run)) for run in posed) < _FEWEST_SCANS:
@@ -86,11 +88,16 @@ def missing(recording: Recording) -> str | None:
     return None
 
 
+def _referred(run: Run) -> bool:
+    """Tell whether a run has poses that its scans can be judged by."""
+    return run.pose is not None and run.pose_source == "measured"
+
+
 def gather(recording: Recording, model: Model) -> Shots:
     """Return the scans of the runs to fit, thinned evenly to at most MOST_SCANS. missing(recording) must be None."""
     assert recording.world is not None
     laser = laser_of(model.laser, recording.laser, recording.runs)
-    runs = [run for run in recording.runs if run.name in recording.train and run.scan is not None and run.pose]
+    runs = [run for run in recording.runs if run.name in recording.train and run.scan is not None and _referred(run)]
     chosen = [(i, index) for i, run in enumerate(runs) for index in _within(run)]
     chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, MOST_SCANS).astype(int))]
     zero = min(float(run.scan.t[0]) for run in runs if run.scan is not None)
