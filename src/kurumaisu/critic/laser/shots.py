@@ -80,7 +80,7 @@ def missing(recording: Recording) -> str | None:
         return "there is no map: give world in meta.yaml, a Stage world of measured walls"
     posed = [run for run in scanned if _referred(run)]
     if not posed and any(run.pose is not None for run in scanned):
-        return "the reference pose was made from these very scans, in a frame of its own; give pose.csv, as room_poses does"
+        return "the reference pose comes from these very scans, in a frame of its own; measure one, as room_poses does"
     if not posed:
         return "there is no reference pose at the scans; give pose.csv, as room_poses does"
     if sum(len(_within(run)) for run in posed) < _FEWEST_SCANS:
