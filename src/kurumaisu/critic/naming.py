@@ -12,7 +12,6 @@ from scipy.special import logsumexp
 from kurumaisu.critic import stand_ins
 from kurumaisu.critic.catalogue import Candidate, Key, Term
 from kurumaisu.critic.evidence import HOPE, Fit, Problem
-from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.scan import Guess, Screen
 from kurumaisu.critic.stand_ins import Posterior, confounded
 from kurumaisu.types import FloatArray
@@ -73,9 +72,6 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
     empty = problem.fit_candidates((), {})
     fits: dict[Chosen, Fit] = {empty.candidates: empty}
 
-    def worth(fit: Fit) -> float:
-        return fit.score + log_prior(len(fit.candidates), count)
-
     def try_sets(guesses: Iterable[tuple[Chosen, Mapping[Key, float]]]) -> Fit:
         for chosen, start in guesses:
             old = fits.get(chosen)
@@ -85,7 +81,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
             fit = problem.fit_candidates(chosen, start)
             if old is None or fit.score > old.score:
                 fits[chosen] = fit
-        return max(fits.values(), key=worth)
+        return max(fits.values(), key=lambda fit: fit.worth(count))
 
     nothing = screen = Screen(problem, empty)
     centre = empty
@@ -105,8 +101,8 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
             break
         centre = best
         screen = Screen(problem, centre)
-    ranked = sorted(fits.values(), key=lambda fit: -worth(fit))
-    weights = np.array([worth(fit) for fit in ranked])
+    ranked = sorted(fits.values(), key=lambda fit: -fit.worth(count))
+    weights = np.array([fit.worth(count) for fit in ranked])
     weights = np.exp(weights - logsumexp(weights))
 
     posterior = Posterior(ranked, weights)
