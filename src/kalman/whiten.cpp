@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace kurumaisu {
@@ -39,9 +40,10 @@ OuStep ouStep(double dt, double tau) {
   return {decay, tau * lost, -std::expm1(-2.0 * x), tau * tau * spread, tau * lost * lost};
 }
 
-/// Partial derivatives of one body increment by its two end poses and by the integrated rate errors.
+/// Partial derivatives of one body increment by its two end poses, by the integrated rate errors, and by such errors
+/// that act on this increment alone.
 struct Jacobians {
-  Matrix3 from, to, motion;
+  Matrix3 from, to, motion, rolling;
 };
 
 Jacobians jacobians(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -61,17 +63,22 @@ Jacobians jacobians(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return j;
 }
 
+void checkFactors(const char* name, const Eigen::VectorXd& factors, Eigen::Index n) {
+  if (factors.size() != n || !(factors.array() >= 0).all()) {
+    throw std::invalid_argument(std::string(name) + " must have one factor per increment, none negative");
+  }
+}
+
 void check(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::VectorXd& activity,
-           const MotionNoise& noise) {
+           const Eigen::VectorXd& rolling, const MotionNoise& noise) {
   const Eigen::Index n = poses.rows() - 1;
   if (n < 1 || poses.cols() != 3) throw std::invalid_argument("poses must have shape (n + 1, 3), n > 0");
   if (times.size() != n + 1) throw std::invalid_argument("times and poses must have the same length");
   if (!((times.tail(n) - times.head(n)).array() > 0).all()) {
     throw std::invalid_argument("times must increase");
   }
-  if (activity.size() != n || !(activity.array() >= 0).all()) {
-    throw std::invalid_argument("activity must have one factor per increment, none negative");
-  }
+  checkFactors("activity", activity, n);
+  checkFactors("rolling", rolling, n);
   if (!(noise.position_sd > 0 && noise.heading_sd > 0 && noise.fast.tau > 0 && noise.slow.tau > 0) ||
       !(noise.fast.sd.array() > 0).all() || !(noise.slow.sd.array() >= 0).all()) {
     throw std::invalid_argument("every noise parameter must be positive");
@@ -164,16 +171,21 @@ class Covariance {
   KURUMAISU_INLINE bool cholesky(const Whitener::Step<kSize>& step, const Jacobians& j,
                                  double (&root)[3][3]) const {
     double spread[3] = {0.0, 0.0, 0.0};  // of the rates' own noise during the increment
+    double whole[3] = {0.0, 0.0, 0.0};   // the same of noise that begins with it
     for (int c = 0; c < kColours; ++c) {
-      for (int i = 0; i < 3; ++i)
-        spread[i] += processes_.steps[c].var_integral * processes_.variance[3 * c + i];
+      const OuStep& ou = processes_.steps[c];
+      for (int i = 0; i < 3; ++i) {
+        spread[i] += ou.var_integral * processes_.variance[3 * c + i];
+        whole[i] += (ou.var_integral + ou.reach * ou.reach) * processes_.variance[3 * c + i];
+      }
     }
     for (int r = 0; r < 3; ++r) {
       for (int s = 0; s <= r; ++s) {
         double sum = 0.0;
         for (int i = 0; i < kSize; ++i) sum += step.seen[r][i] * seen_[s][i];
         for (int i = 0; i < 3; ++i) {
-          sum += pose_[i] * j.to(r, i) * j.to(s, i) + spread[i] * j.motion(r, i) * j.motion(s, i);
+          sum += pose_[i] * j.to(r, i) * j.to(s, i) + spread[i] * j.motion(r, i) * j.motion(s, i) +
+                 whole[i] * j.rolling(r, i) * j.rolling(s, i);
         }
         for (int k = 0; k < s; ++k) sum -= root[r][k] * root[s][k];
         if (r == s && sum <= 0) return false;
@@ -223,16 +235,15 @@ class Covariance {
 };
 
 template <int kColours>
-KURUMAISU_INLINE std::vector<Whitener::Step<3 + 3 * kColours>> filterAll(const Eigen::MatrixXd& poses,
-                                                                         const Eigen::VectorXd& times,
-                                                                         const Eigen::VectorXd& activity,
-                                                                         const MotionNoise& noise,
-                                                                         Eigen::MatrixX3d& log_determinants) {
+KURUMAISU_INLINE std::vector<Whitener::Step<3 + 3 * kColours>> filterAll(
+    const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::VectorXd& activity,
+    const Eigen::VectorXd& rolling, const MotionNoise& noise, Eigen::MatrixX3d& log_determinants) {
   Covariance<kColours> covariance(noise);
   std::vector<Whitener::Step<3 + 3 * kColours>> steps(static_cast<std::size_t>(poses.rows() - 1));
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
     Jacobians j = jacobians(poses.row(at).transpose(), poses.row(at + 1).transpose());
+    j.rolling = rolling[at] * j.motion;
     j.motion *= activity[at];
     double logs[3];
     if (!covariance.advance(j, times[at + 1] - times[at], steps[k], logs)) {
@@ -243,20 +254,16 @@ KURUMAISU_INLINE std::vector<Whitener::Step<3 + 3 * kColours>> filterAll(const E
   return steps;
 }
 
-KURUMAISU_WIDE std::vector<Whitener::Step<6>> filterOne(const Eigen::MatrixXd& poses,
-                                                        const Eigen::VectorXd& times,
-                                                        const Eigen::VectorXd& activity,
-                                                        const MotionNoise& noise,
-                                                        Eigen::MatrixX3d& log_determinants) {
-  return filterAll<1>(poses, times, activity, noise, log_determinants);
+KURUMAISU_WIDE std::vector<Whitener::Step<6>> filterOne(
+    const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::VectorXd& activity,
+    const Eigen::VectorXd& rolling, const MotionNoise& noise, Eigen::MatrixX3d& log_determinants) {
+  return filterAll<1>(poses, times, activity, rolling, noise, log_determinants);
 }
 
-KURUMAISU_WIDE std::vector<Whitener::Step<9>> filterTwo(const Eigen::MatrixXd& poses,
-                                                        const Eigen::VectorXd& times,
-                                                        const Eigen::VectorXd& activity,
-                                                        const MotionNoise& noise,
-                                                        Eigen::MatrixX3d& log_determinants) {
-  return filterAll<2>(poses, times, activity, noise, log_determinants);
+KURUMAISU_WIDE std::vector<Whitener::Step<9>> filterTwo(
+    const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::VectorXd& activity,
+    const Eigen::VectorXd& rolling, const MotionNoise& noise, Eigen::MatrixX3d& log_determinants) {
+  return filterAll<2>(poses, times, activity, rolling, noise, log_determinants);
 }
 
 constexpr Eigen::Index kLane = 8;  // columns that go through a step side by side
@@ -367,13 +374,14 @@ KURUMAISU_WIDE void gramOfSteps(const std::vector<Whitener::Step<9>>& steps,
 }  // namespace
 
 Whitener::Whitener(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times,
-                   const Eigen::VectorXd& activity, const MotionNoise& noise) {
-  check(poses, times, activity, noise);
+                   const Eigen::VectorXd& activity, const Eigen::VectorXd& rolling,
+                   const MotionNoise& noise) {
+  check(poses, times, activity, rolling, noise);
   log_determinants_.resize(poses.rows() - 1, 3);
   if ((noise.slow.sd.array() > 0).any()) {
-    steps_ = filterTwo(poses, times, activity, noise, log_determinants_);
+    steps_ = filterTwo(poses, times, activity, rolling, noise, log_determinants_);
   } else {
-    steps_ = filterOne(poses, times, activity, noise, log_determinants_);
+    steps_ = filterOne(poses, times, activity, rolling, noise, log_determinants_);
   }
 }
 

@@ -33,11 +33,12 @@ using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMaj
 class Whitener {
  public:
   /// poses: (n + 1, 3) reference x, y, theta; times: n + 1, increasing [s]; activity: (n,) factors on the noise of the
-  /// rates during each increment, 0 for a robot that is held at rest.
+  /// rates during each increment, 0 for a robot that is held at rest; rolling: (n,) factors on noise as strong that an
+  /// increment shares with no other, for a robot of which nobody knows whether it is shaken still.
   /// Throws std::invalid_argument for shapes that do not fit, times that do not increase, or noise that is not
   /// positive.
   Whitener(const Eigen::MatrixXd& poses, const Eigen::VectorXd& times, const Eigen::VectorXd& activity,
-           const MotionNoise& noise);
+           const Eigen::VectorXd& rolling, const MotionNoise& noise);
 
   /// Columns (3 n, m), row 3k..3k+2 being dx, dy [m] and dtheta [rad] of increment k in the body frame at pose k; O(n m).
   /// Throws std::invalid_argument for another number of rows.
