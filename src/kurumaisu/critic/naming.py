@@ -12,6 +12,7 @@ from scipy.special import logsumexp
 from kurumaisu.critic import stand_ins
 from kurumaisu.critic.catalogue import Candidate, Key, Term
 from kurumaisu.critic.evidence import HOPE, Fit, Problem
+from kurumaisu.critic.exchanged import exchanges
 from kurumaisu.critic.scan import Guess, Screen
 from kurumaisu.critic.stand_ins import Posterior, confounded
 from kurumaisu.types import FloatArray
@@ -101,6 +102,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
             break
         centre = best
         screen = Screen(problem, centre)
+    try_sets(exchanges(sorted(fits.values(), key=lambda fit: -fit.worth(count)), count))
     ranked = sorted(fits.values(), key=lambda fit: -fit.worth(count))
     weights = np.array([fit.worth(count) for fit in ranked])
     weights = np.exp(weights - logsumexp(weights))
