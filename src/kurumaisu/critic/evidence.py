@@ -55,9 +55,10 @@ class Fit:
         """Return the values by term, from which another fit may start."""
         return {term.key: float(value) for term, value in zip(self.terms, self.values, strict=True)}
 
-    def worth(self, of: int) -> float:
-        """Return the log posterior [nat] of the set, not normalised, among sets of so many effects that could show."""
-        return self.score + log_prior(len(self.candidates), of)
+
+def log_posterior(fit: Fit, of: int) -> float:
+    """Return the log posterior [nat] of a set, not normalised, among sets of so many effects that could show."""
+    return fit.score + log_prior(len(fit.candidates), of)
 
 
 class Problem:

@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 
 from kurumaisu.critic import stand_ins
 from kurumaisu.critic.catalogue import Candidate, Key, Term
-from kurumaisu.critic.evidence import HOPE, Fit, Problem
+from kurumaisu.critic.evidence import HOPE, Fit, Problem, log_posterior
 from kurumaisu.critic.exchanged import exchanges
 from kurumaisu.critic.scan import Guess, Screen
 from kurumaisu.critic.stand_ins import Posterior, confounded
@@ -83,7 +83,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
             fit = problem.fit_candidates(chosen, start)
             if old is None or fit.score > old.score:
                 fits[chosen] = fit
-        return max(fits.values(), key=lambda fit: fit.worth(count))
+        return max(fits.values(), key=lambda fit: log_posterior(fit, count))
 
     nothing = screen = Screen(problem, empty)
     centre, screened = empty, set[Chosen]()
@@ -107,7 +107,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
         screen = Screen(problem, centre)
     try_sets(exchanges(_ranked(fits, count), count))
     ranked = _ranked(fits, count)
-    weights = np.array([fit.worth(count) for fit in ranked])
+    weights = np.array([log_posterior(fit, count) for fit in ranked])
     weights = np.exp(weights - logsumexp(weights))
 
     posterior = Posterior(ranked, weights)
@@ -116,7 +116,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
 
 
 def _ranked(fits: Mapping[Chosen, Fit], of: int) -> list[Fit]:
-    return sorted(fits.values(), key=lambda fit: -fit.worth(of))
+    return sorted(fits.values(), key=lambda fit: -log_posterior(fit, of))
 
 
 def _beside_rivals(
@@ -126,7 +126,7 @@ def _beside_rivals(
 
     Where one effect does what two others do together, the best set may be several exchanges away from the second best.
     """
-    likely = [fit for fit in ranked[1:] if fit.worth(of) > ranked[0].worth(of) + np.log(RIVAL)]
+    likely = [fit for fit in ranked[1:] if log_posterior(fit, of) > log_posterior(ranked[0], of) + np.log(RIVAL)]
     for fit in likely[:_RIVALS]:
         if fit.candidates and fit.candidates not in screened:
             screened.add(fit.candidates)
