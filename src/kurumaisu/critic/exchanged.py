@@ -15,7 +15,7 @@ from kurumaisu.critic.catalogue import Candidate, Key
 from kurumaisu.critic.evidence import Fit, log_posterior
 from kurumaisu.critic.stand_ins import RIVAL
 
-_MOST = 16  # sets that are tried, the likeliest first
+_MOST = 8  # sets that are tried, the likeliest first: of a long recording, each takes a second
 
 
 def exchanges(ranked: Sequence[Fit], of: int) -> list[tuple[frozenset[Candidate], Mapping[Key, float]]]:

@@ -19,7 +19,7 @@ from kurumaisu.types import FloatArray
 
 NAMED, RIVAL = stand_ins.NAMED, stand_ins.RIVAL
 _REFITS = 10  # sets refitted after each scan
-_RIVALS = 3  # likely sets besides the best one from which others are looked for
+_RIVALS = 2  # likely sets besides the best one from which others are looked for
 _CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
 _ROUNDS = 8  # scans at most
 _STUCK = 0.5  # [nat] by which a fit must be beaten by mere first values to be made again
