@@ -88,3 +88,18 @@ def test_an_interval_ends_at_the_bound():
     values = np.zeros_like(fit.values)
     tau = sizes.estimates(problem, replace(fit, values=values), "base.lag_v")["tau"]
     assert tau.lo90 == 0.0 < tau.hi90
+
+
+def test_beside_the_steps_of_a_converter_a_size_has_room_on_both_sides():
+    """Where its step goes with another size, it goes off its tooth at once: that is no end of the other's interval."""
+    hidden = {
+        "base.dac_quantisation": {"size": 0.045},
+        "base.slope": {"size": 0.024, "bearing": 2.5},
+        "base.delay": {"size": 0.12},
+    }
+    problem, _ = fitted([*hidden], hidden, seed=3)
+    usual = [candidate for candidate in problem.candidates if candidate.usual]
+    fit = problem.fit_candidates(usual, {("base.dac_quantisation", "step"): 0.045})
+    sds = {term.key: sd for term, sd in zip(fit.terms, fit.sds, strict=True)}
+    for key in (("base.slope", "climb_x"), ("base.slope", "climb_y"), ("base.delay", "delay")):
+        assert min(halves(sizes.estimates(problem, fit, key[0])[key[1]])) > 0.8 * NORMAL90 * sds[key]

@@ -59,7 +59,7 @@ def motion(way):
     return np.array(plain), np.array(late)
 
 
-def joint_covariance(times, poses, noise, activity, ways):
+def joint_covariance(times, poses, noise, activity, rolling, ways):
     """Of all increments' residuals, by numerical derivatives of the increments and quadrature of the OU processes."""
     n = len(times) - 1
     sds = [noise["position_sd"], noise["position_sd"], noise["heading_sd"]]
@@ -73,31 +73,39 @@ def joint_covariance(times, poses, noise, activity, ways):
             (geometry.between(up[:-1], up[1:]) - geometry.between(down[:-1], down[1:])) / (2 * step)
         ).ravel()
     cov = by_pose @ np.diag(np.tile(np.square(sds), n + 1)) @ by_pose.T
-    motions = [[share * part for part in motion(way)] for way, share in zip(ways, activity, strict=True)]
+    motions = [motion(way) for way in ways]
     for j in range(n):
         for k in range(n):
             for sd, tau in zip(noise["process_sd"], noise["process_tau"], strict=True):
                 shared = integral_covariance(*times[j : j + 2], *times[k : k + 2], tau)
-                block = sum(
-                    shared[p, q] * motions[j][p] @ np.diag(np.square(sd)) @ motions[k][q].T
-                    for p in (0, 1)
-                    for q in (0, 1)
-                )
+                first, second = motions[j], motions[k] * np.square(sd)
+                block = activity[j] * activity[k] * np.einsum("pab,pq,qcb->ac", first, shared, second)
+                if j == k:
+                    block += rolling[k] ** 2 * shared[0, 0] * first[0] @ second[0].T
                 cov[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] += block
     return cov
 
 
 @pytest.mark.parametrize("slow", [[0.0, 0.0, 0.0], [0.02, 0.0, 0.03]], ids=["one colour", "two colours"])
-@pytest.mark.parametrize("activity", [[1, 1, 1, 1, 1, 1], [1.5, 0.0, 0.1, 1.0, 2.0, 0.3]], ids=["steady", "gated"])
+@pytest.mark.parametrize(
+    ("activity", "rolling"),
+    [
+        ([1, 1, 1, 1, 1, 1], [0, 0, 0, 0, 0, 0]),
+        ([1.5, 0.0, 0.1, 1.0, 2.0, 0.3], [0, 0, 0, 0, 0, 0]),
+        ([1.0, 0.4, 0.0, 0.0, 0.7, 1.0], [0.0, 0.8, 0.6, 0.0, 0.4, 0.0]),
+    ],
+    ids=["steady", "gated", "rolling"],
+)
 @pytest.mark.parametrize("count", [1, 2, 11])  # columns go through the filter several at a time
-def test_against_the_joint_covariance(slow, activity, count):
+def test_against_the_joint_covariance(slow, activity, rolling, count):
     times, poses = run(6, 1)
     columns = np.random.default_rng(2).normal(size=(18, count))
     noise = {**NOISE, "process_sd": [NOISE["process_sd"][0], slow]}
     ways = arcs(poses)
-    whitener = Whitener(poses, times, np.array(activity, dtype=float), ways, **noise)
+    factors = [np.array(each, dtype=float) for each in (activity, rolling)]
+    whitener = Whitener(poses, times, *factors, ways, **noise)
     white, log_determinants = whitener.whiten(columns), whitener.log_determinants
-    cov = joint_covariance(times, poses, noise, activity, ways)
+    cov = joint_covariance(times, poses, noise, activity, rolling, ways)
     np.testing.assert_allclose(whitener.gram(columns), white.T @ white, rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(white.T @ white, columns.T @ np.linalg.solve(cov, columns), rtol=1e-5)
     assert log_determinants.sum() == pytest.approx(np.linalg.slogdet(cov)[1], abs=1e-4)
@@ -106,7 +114,7 @@ def test_against_the_joint_covariance(slow, activity, count):
 def test_short_steps_do_not_cancel():
     times = np.arange(50) * 1e-4
     poses = np.zeros((50, 3))
-    whitener = Whitener(poses, times, np.ones(49), arcs(poses), **NOISE)
+    whitener = Whitener(poses, times, np.ones(49), np.zeros(49), arcs(poses), **NOISE)
     assert np.isfinite(whitener.whiten(np.ones((147, 1)))).all()
     assert np.isfinite(whitener.log_determinants).all()
 
@@ -117,8 +125,10 @@ def test_short_steps_do_not_cancel():
         ({"times": np.zeros(7)}, "times must increase"),
         ({"times": np.arange(6.0)}, "same length"),
         ({"poses": np.zeros((7, 2))}, "shape"),
-        ({"activity": np.ones(5)}, "one factor per increment"),
+        ({"activity": np.ones(5)}, "activity must have one factor per increment"),
         ({"activity": -np.ones(6)}, "none negative"),
+        ({"rolling": np.ones(5)}, "rolling must have one factor per increment"),
+        ({"rolling": np.full(6, np.nan)}, "none negative"),
         ({"ways": np.zeros((5, 8))}, "one finite row per increment"),
         ({"ways": np.full((6, 8), np.nan)}, "one finite row per increment"),
         ({"process_tau": [0.0, 1.0]}, "positive"),
@@ -133,6 +143,7 @@ def test_bad_input_is_refused(change, message):
         "poses": poses,
         "times": times,
         "activity": np.ones(6),
+        "rolling": np.zeros(6),
         "ways": arcs(poses),
         **NOISE,
         **change,
@@ -144,4 +155,4 @@ def test_bad_input_is_refused(change, message):
 def test_columns_of_another_drive_are_refused():
     times, poses = run(6, 1)
     with pytest.raises(ValueError, match="three rows per increment"):
-        Whitener(poses, times, np.ones(6), arcs(poses), **NOISE).whiten(np.zeros((17, 1)))
+        Whitener(poses, times, np.ones(6), np.zeros(6), arcs(poses), **NOISE).whiten(np.zeros((17, 1)))

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace kurumaisu {
@@ -55,9 +56,10 @@ OuStep ouStep(double dt, double tau) {
           -tau * tau * late * lost};
 }
 
-/// Partial derivatives of one body increment by its two end poses, by the integrated rate errors and by their lateness.
+/// Partial derivatives of one body increment by its two end poses, by the integrated rate errors and by their lateness,
+/// and by such errors that act on this increment alone.
 struct Jacobians {
-  Matrix3 from, to, motion, late;
+  Matrix3 from, to, motion, late, rolling;
 };
 
 Jacobians jacobians(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::RowVectorXd& way) {
@@ -76,17 +78,22 @@ Jacobians jacobians(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Ei
   return j;
 }
 
+void checkFactors(const char* name, const Eigen::VectorXd& factors, Eigen::Index n) {
+  if (factors.size() != n || !(factors.array() >= 0).all()) {
+    throw std::invalid_argument(std::string(name) + " must have one factor per increment, none negative");
+  }
+}
+
 void check(const Track& track, const MotionNoise& noise) {
-  const auto& [poses, times, activity, ways] = track;
+  const auto& [poses, times, activity, rolling, ways] = track;
   const Eigen::Index n = poses.rows() - 1;
   if (n < 1 || poses.cols() != 3) throw std::invalid_argument("poses must have shape (n + 1, 3), n > 0");
   if (times.size() != n + 1) throw std::invalid_argument("times and poses must have the same length");
   if (!((times.tail(n) - times.head(n)).array() > 0).all()) {
     throw std::invalid_argument("times must increase");
   }
-  if (activity.size() != n || !(activity.array() >= 0).all()) {
-    throw std::invalid_argument("activity must have one factor per increment, none negative");
-  }
+  checkFactors("activity", activity, n);
+  checkFactors("rolling", rolling, n);
   if (ways.rows() != n || !ways.allFinite()) {
     throw std::invalid_argument("ways must have one finite row per increment");
   }
@@ -184,6 +191,7 @@ class Covariance {
   KURUMAISU_INLINE bool cholesky(const Whitener::Step<kSize>& step, const Jacobians& j,
                                  double (&root)[3][3]) const {
     double spread[3] = {}, late[3] = {}, both[3] = {};  // of the rates' own noise during the increment
+    double whole[3] = {};                               // spread of noise that begins with it
     for (int c = 0; c < kColours; ++c) {
       const OuStep& ou = processes_.steps[c];
       for (int i = 0; i < 3; ++i) {
@@ -191,6 +199,7 @@ class Covariance {
         spread[i] += ou.var_integral * variance;
         late[i] += ou.var_late * variance;
         both[i] += ou.cov_both * variance;
+        whole[i] += (ou.var_integral + ou.reach * ou.reach) * variance;
       }
     }
     for (int r = 0; r < 3; ++r) {
@@ -200,7 +209,8 @@ class Covariance {
         for (int i = 0; i < 3; ++i) {
           sum += pose_[i] * j.to(r, i) * j.to(s, i) + spread[i] * j.motion(r, i) * j.motion(s, i) +
                  late[i] * j.late(r, i) * j.late(s, i) +
-                 both[i] * (j.motion(r, i) * j.late(s, i) + j.late(r, i) * j.motion(s, i));
+                 both[i] * (j.motion(r, i) * j.late(s, i) + j.late(r, i) * j.motion(s, i)) +
+                 whole[i] * j.rolling(r, i) * j.rolling(s, i);
         }
         for (int k = 0; k < s; ++k) sum -= root[r][k] * root[s][k];
         if (r == s && sum <= 0) return false;
@@ -255,12 +265,13 @@ template <int kColours>
 KURUMAISU_INLINE std::vector<Whitener::Step<3 + 3 * kColours>> filterAll(const Track& track,
                                                                          const MotionNoise& noise,
                                                                          Eigen::MatrixX3d& log_determinants) {
-  const auto& [poses, times, activity, ways] = track;
+  const auto& [poses, times, activity, rolling, ways] = track;
   Covariance<kColours> covariance(noise);
   std::vector<Whitener::Step<3 + 3 * kColours>> steps(static_cast<std::size_t>(poses.rows() - 1));
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
     Jacobians j = jacobians(poses.row(at).transpose(), poses.row(at + 1).transpose(), ways.row(at));
+    j.rolling = rolling[at] * j.motion;
     j.motion *= activity[at];
     j.late *= activity[at];
     double logs[3];

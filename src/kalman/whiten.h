@@ -31,6 +31,9 @@ struct Track {
   Eigen::MatrixXd poses;     ///< (n + 1, 3) reference x, y [m], theta [rad]
   Eigen::VectorXd times;     ///< (n + 1,) increasing [s]
   Eigen::VectorXd activity;  ///< (n,) factors on the noise of the rates, 0 for a robot that is held at rest
+  /// (n,) factors on noise as strong that an increment shares with no other, for a robot of which nobody knows whether
+  /// it is shaken still.
+  Eigen::VectorXd rolling;
   /// Of each increment, in the frame of its first pose: means of the heading's cosine and sine and of the way x, y [m]
   /// that lies ahead; and by how much each of them grows from its beginning to its end, by least squares.
   Ways ways;

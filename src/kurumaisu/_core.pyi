@@ -71,6 +71,7 @@ class Whitener:
         poses: FloatArray,
         times: FloatArray,
         activity: FloatArray,
+        rolling: FloatArray,
         ways: FloatArray,
         *,
         position_sd: float,

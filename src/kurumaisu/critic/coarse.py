@@ -12,9 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import expit, softmax
 
-from kurumaisu.critic.evidence import Fit
+from kurumaisu.critic.evidence import Fit, log_posterior
 from kurumaisu.critic.naming import Naming
-from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.stand_ins import Posterior, confounded
 from kurumaisu.types import FloatArray
 
@@ -53,7 +52,7 @@ def variance(found: Naming) -> float:
 
 def worth(found: Naming, fit: Fit) -> float:
     """Return the log posterior of a set, not normalised."""
-    return fit.score + log_prior(len(fit.candidates), len(found.p))
+    return log_posterior(fit, len(found.p))
 
 
 def _simpler(found: Naming, name: str, odds: float) -> float:

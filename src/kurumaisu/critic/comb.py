@@ -27,11 +27,13 @@ _TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a 
 _ALIKE = (0.4, 0.8)  # correlation of neighbouring sizes: below, there is one between them; above, they may be farther
 _GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
 _SIZES = 500  # at most
+_HALVINGS = 6  # of the way between two sizes: the narrowest teeth are that much closer than rates tell
 _FAINT = 0.2  # of the norm of its neighbour
 _BEST = 6  # that are tried
 
 
 Way = tuple[object, ...]  # an effect's parameter, with the form in which it acts
+Walk = tuple[float, FloatArray]  # a size with what it changes, (bins,)
 Walked = dict[Way, tuple[FloatArray, FloatArray]]  # sizes (k,), and what each changes, (k, bins)
 
 
@@ -67,14 +69,12 @@ class Comb:
         """Return the most promising values of a term beside fixed ones; residual: of each drive, whitened."""
         key = (term.key, *((other.key, other.parameter.lower) for other in fixed))
         if key not in self._walked:
-            found = list(self._walk(term, fixed))
-            self._walked[key] = np.array([value for value, _ in found]), np.array([change for _, change in found])
+            self._walked[key] = self._close(term, fixed, list(self._walk(term, fixed)))
         values, changes = self._walked[key]
         if not len(values):
             return []
         if key not in self._squares:
-            parts = zip(self._grams, self._parts(changes), strict=True)
-            self._squares[key] = np.sum([_squares(gram, own) for gram, own in parts], axis=0)
+            self._squares[key] = self._products(changes)[0]
         pull = np.concatenate([c.T @ r[: len(c)] for c, r in zip(self._columns, residual, strict=False)])
         gained = changes @ pull - 0.5 * self._squares[key]
         peaks = np.flatnonzero((gained >= np.append(gained[1:], -np.inf)) & (gained >= np.append(-np.inf, gained[:-1])))
@@ -82,20 +82,52 @@ class Comb:
         apart = np.abs(np.diff(values, append=1.1 * values[-1]))
         return [Start(float(values[k]), float(apart[k]), float(gained[k])) for k in best]
 
+    def _close(self, term: Term, fixed: Sequence[Term], found: Sequence[Walk]) -> tuple[FloatArray, FloatArray]:
+        """Return sizes with what they change, and more between neighbours of which the drives see no likeness.
+
+        What steers and what drives show by so different amounts that rates alike may hide teeth of the weaker one.
+        """
+        values, changes = np.array([value for value, _ in found]), np.array([change for _, change in found])
+        for _ in range(_HALVINGS):
+            if not 1 < len(values) < _SIZES:
+                break
+            squares, between = self._products(changes)
+            seen = np.minimum(squares[:-1], squares[1:]) > _FAINT**2 * np.maximum(squares[:-1], squares[1:])
+            apart = (values[1:] / values[:-1] > 1 + _GROWTH[0]) & seen
+            far = np.flatnonzero(apart & (between < _ALIKE[0] * np.sqrt(squares[:-1] * squares[1:])))
+            if not len(far):
+                break
+            more = np.sqrt(values[far] * values[far + 1]) * np.sign(values[far])
+            own = np.array([self._change(term, fixed, float(value)) for value in more])
+            values, changes = np.insert(values, far + 1, more), np.insert(changes, far + 1, own, axis=0)
+        return values, changes
+
+    def _products(self, changes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the square of what each of some changes (k, bins) does, (k,), and its product with the next, (k - 1,).
+
+        Most change one rate only, and not at rest.
+        """
+        squares, between = np.zeros(len(changes)), np.zeros(max(len(changes) - 1, 0))
+        for gram, own in zip(self._grams, self._parts(changes), strict=True):
+            use = np.flatnonzero(own.any(axis=0))
+            loud = own[:, use]
+            seen = loud @ gram[np.ix_(use, use)]
+            squares += np.einsum("kb,kb->k", seen, loud)
+            between += np.einsum("kb,kb->k", seen[:-1], loud[1:])
+        return squares, between
+
     def _parts(self, changes: FloatArray) -> list[FloatArray]:
         """Return what belongs to each drive of changes (k, bins)."""
         return np.split(changes, np.cumsum([len(gram) for gram in self._grams])[:-1], axis=1)
 
-    def _walk(self, term: Term, fixed: Sequence[Term]) -> Iterator[tuple[float, FloatArray]]:
+    def _walk(self, term: Term, fixed: Sequence[Term]) -> Iterator[Walk]:
         """Yield sizes with what they change, as far apart as that differs; either way where there are two."""
         p = term.parameter
         for sign, room in ((-1.0, term.null - p.lower), (1.0, p.upper - term.null)):
             if room > 0:
                 yield from self._one_way(term, fixed, sign, room)
 
-    def _one_way(
-        self, term: Term, fixed: Sequence[Term], sign: float, room: float
-    ) -> Iterator[tuple[float, FloatArray]]:
+    def _one_way(self, term: Term, fixed: Sequence[Term], sign: float, room: float) -> Iterator[Walk]:
         size, growth = abs(term.step) * term.parameter.scale / 3, _GROWTH[1]
         before: FloatArray | None = None
         for _ in range(_SIZES):
@@ -119,13 +151,6 @@ class Comb:
         moved = [replay.motion(drive, self._model, settings) for drive in self._drives]
         pairs = zip(moved, self._plain, strict=True)
         return np.concatenate([_means(rate) for a, b in pairs for rate in (a.v - b.v, a.w - b.w)])
-
-
-def _squares(gram: FloatArray, changes: FloatArray) -> FloatArray:
-    """Return the square of what changes (k, bins) do, (k,): most change one rate only, and not at rest."""
-    use = np.flatnonzero(changes.any(axis=0))
-    own = changes[:, use]
-    return np.asarray(np.einsum("kb,kb->k", own @ gram[np.ix_(use, use)], own))
 
 
 def _begin(drive: Drive, seconds: float) -> Drive:

@@ -66,11 +66,18 @@ class Drive:
 
     @cached_property
     def activity(self) -> FloatArray:
-        """Share of each increment's noise that acts, (m,): floor and casters shake a chair that moves.
+        """Share of each increment's noise that acts, (m,): floor and casters shake a chair that moves."""
+        return self._means(self._moving, 0.0)
 
-        A chair asked to rest may roll on for a while.
+    @cached_property
+    def rolling(self) -> FloatArray:
+        """Share of each increment's noise that may act besides, and tells nothing about the noise under way, (m,).
+
+        A chair asked to rest may roll on for a while. One that does not says that nothing shakes it now: it does not
+        say that little did before. Nor is it known when within an increment noise that is not slow acts.
         """
-        return np.sqrt(self._means(self._moving, _ROLLS))
+        whole = np.maximum(self._means(self._moving, _ROLLS), self.activity)
+        return np.asarray(np.sqrt(np.maximum(whole - self.activity**2, 0.0)))  # but for rounding
 
     @cached_property
     def pace(self) -> FloatArray:

@@ -15,7 +15,7 @@ from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalog
 from kurumaisu.critic.comb import Comb, Walked
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.noise import Noise, whitener
-from kurumaisu.critic.prior import Z_USUAL, occam, occam_plane
+from kurumaisu.critic.prior import Z_USUAL, log_prior, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
@@ -54,6 +54,11 @@ class Fit:
     def start(self) -> dict[Key, float]:
         """Return the values by term, from which another fit may start."""
         return {term.key: float(value) for term, value in zip(self.terms, self.values, strict=True)}
+
+
+def log_posterior(fit: Fit, of: int) -> float:
+    """Return the log posterior [nat] of a set, not normalised, among sets of so many effects that could show."""
+    return fit.score + log_prior(len(fit.candidates), of)
 
 
 class Problem:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,14 +11,15 @@ from scipy.special import logsumexp
 
 from kurumaisu.critic import stand_ins
 from kurumaisu.critic.catalogue import Candidate, Key, Term
-from kurumaisu.critic.evidence import HOPE, Fit, Problem
-from kurumaisu.critic.prior import log_prior
+from kurumaisu.critic.evidence import HOPE, Fit, Problem, log_posterior
+from kurumaisu.critic.exchanged import exchanges
 from kurumaisu.critic.scan import Guess, Screen
 from kurumaisu.critic.stand_ins import Posterior, confounded
 from kurumaisu.types import FloatArray
 
 NAMED, RIVAL = stand_ins.NAMED, stand_ins.RIVAL
 _REFITS = 10  # sets refitted after each scan
+_RIVALS = 2  # likely sets besides the best one from which others are looked for
 _CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
 _ROUNDS = 8  # scans at most
 _STUCK = 0.5  # [nat] by which a fit must be beaten by mere first values to be made again
@@ -73,9 +74,6 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
     empty = problem.fit_candidates((), {})
     fits: dict[Chosen, Fit] = {empty.candidates: empty}
 
-    def worth(fit: Fit) -> float:
-        return fit.score + log_prior(len(fit.candidates), count)
-
     def try_sets(guesses: Iterable[tuple[Chosen, Mapping[Key, float]]]) -> Fit:
         for chosen, start in guesses:
             old = fits.get(chosen)
@@ -85,10 +83,10 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
             fit = problem.fit_candidates(chosen, start)
             if old is None or fit.score > old.score:
                 fits[chosen] = fit
-        return max(fits.values(), key=worth)
+        return max(fits.values(), key=lambda fit: log_posterior(fit, count))
 
     nothing = screen = Screen(problem, empty)
-    centre = empty
+    centre, screened = empty, set[Chosen]()
     if first is not None and first.candidates:
         centre = try_sets([(first.candidates, first.start)])
         screen = Screen(problem, centre) if centre is not empty else nothing
@@ -102,16 +100,39 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
             ]
             best = try_sets([*alone, *_neighbours(problem, screen, nothing, best)])
         if best is centre:
+            best = try_sets(_beside_rivals(problem, _ranked(fits, count), count, screened))
+        if best is centre:
             break
         centre = best
         screen = Screen(problem, centre)
-    ranked = sorted(fits.values(), key=lambda fit: -worth(fit))
-    weights = np.array([worth(fit) for fit in ranked])
+    try_sets(exchanges(_ranked(fits, count), count))
+    ranked = _ranked(fits, count)
+    weights = np.array([log_posterior(fit, count) for fit in ranked])
     weights = np.exp(weights - logsumexp(weights))
 
     posterior = Posterior(ranked, weights)
     p = {name: posterior.p.get(name, 0.0) for name in sorted({candidate.id for candidate in problem.candidates})}
     return Naming(tuple(ranked), p, confounded(posterior), _false_alarm(nothing), nothing.enough)
+
+
+def _ranked(fits: Mapping[Chosen, Fit], of: int) -> list[Fit]:
+    return sorted(fits.values(), key=lambda fit: -log_posterior(fit, of))
+
+
+def _beside_rivals(
+    problem: Problem, ranked: Sequence[Fit], of: int, screened: set[Chosen]
+) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
+    """Yield what promises more than a likely rival of the best set, seen from there; screened: whence it was seen.
+
+    Where one effect does what two others do together, the best set may be several exchanges away from the second best.
+    """
+    likely = [fit for fit in ranked[1:] if log_posterior(fit, of) > log_posterior(ranked[0], of) + np.log(RIVAL)]
+    for fit in likely[:_RIVALS]:
+        if fit.candidates and fit.candidates not in screened:
+            screened.add(fit.candidates)
+            guesses = Screen(problem, fit).guesses()
+            own = next((guess.score for guess in guesses if guess.chosen == fit.candidates), -np.inf)
+            yield from ((guess.chosen, guess.start) for guess in guesses[:_REFITS] if guess.score > own)
 
 
 def begins_better(problem: Problem, fit: Fit, start: Mapping[Key, float]) -> bool:

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic import design, naming
+from kurumaisu.critic import coarse, design, naming
 from kurumaisu.critic.design import Explanation
 from kurumaisu.critic.digits import odds
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
-from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.verdict import NextExperiment
 from kurumaisu.experiments import Script, names, shipped_script
 from kurumaisu.types import FloatArray
@@ -53,7 +52,7 @@ def drives() -> tuple[Script, ...]:
 
 def propose(problem: Problem, found: Naming, scripts: Sequence[Script]) -> Proposal:
     """Return the script with the highest expected information per second between the rivals of a search."""
-    fits, weights = remaining(problem, found)
+    fits, weights = remaining(found)
     if len(fits) < 2:
         return Proposal()
     open_ids = sorted(frozenset.union(*(f.ids for f in fits)) - frozenset.intersection(*(f.ids for f in fits)))
@@ -73,15 +72,14 @@ def propose(problem: Problem, found: Naming, scripts: Sequence[Script]) -> Propo
     return Proposal(experiment, sentence, tuple(options))
 
 
-def remaining(problem: Problem, found: Naming) -> tuple[list[Fit], FloatArray]:
+def remaining(found: Naming) -> tuple[list[Fit], FloatArray]:
     """Return the explanations that are not much less probable than the best one, and their posterior, (h,).
 
     Of the ways in which the same effects may act, the most probable one stands for all.
     """
-    of = len({candidate.id for candidate in problem.candidates})
     best: dict[frozenset[str], tuple[float, Fit]] = {}
     for fit in found.fits:
-        log = fit.score + log_prior(len(fit.ids), of)
+        log = coarse.worth(found, fit)
         if fit.ids not in best or log > best[fit.ids][0]:
             best[fit.ids] = (log, fit)
     ranked = sorted(best.values(), key=lambda pair: -pair[0])[:_RIVALS]

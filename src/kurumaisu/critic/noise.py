@@ -66,10 +66,12 @@ _SAME = 0.03  # share of a column beyond those before it that makes it one of it
 
 def whitener(drive: Drive, noise: Noise) -> Whitener:
     """Return what whitens any columns of a drive as whitened does."""
+    grown = 1 + noise.growth * drive.pace
     return Whitener(
         drive.poses,
         drive.times,
-        np.maximum(drive.activity, noise.rest) * (1 + noise.growth * drive.pace),
+        np.maximum(drive.activity, noise.rest) * grown,
+        drive.rolling * grown,
         drive.ways,
         position_sd=noise.position_sd,
         heading_sd=noise.heading_sd,

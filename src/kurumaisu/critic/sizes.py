@@ -44,7 +44,11 @@ def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
             sd = float(np.sqrt(spread[k, k])) * abs(float(unit[k]))
             ridge = np.zeros(len(fit.terms))  # where the others go with this one
             ridge[known] = spread[:, k] * unit / (spread[k, k] * unit[k])
-            low, high = ends_of(problem, fit, at, ridge, sd)
+            # Off its tooth, the step of a converter fits nothing: the way then goes on beside the step as it is.
+            held = np.array([other.rough and i != at for i, other in enumerate(fit.terms)])
+            ways = [ridge, np.where(held, 0.0, ridge)] if (ridge[held] != 0).any() else [ridge]
+            lows, highs = zip(*(ends_of(problem, fit, at, way, sd) for way in ways), strict=True)
+            low, high = min(lows), max(highs)
             beyond = 0.0 if term.shape else order * abs(value - term.null)
             more = NORMAL90 * float(np.hypot(doubt[k] * sd, beyond))
             ends = value - np.hypot(value - low, more), value + np.hypot(high - value, more)

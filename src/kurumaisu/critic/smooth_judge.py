@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic import naming, replay
+from kurumaisu.critic import coarse, naming, replay
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
-from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.smooth import Design, beside, null_evidence
 from kurumaisu.critic.smooth_fit import Extension, extend
 from kurumaisu.critic.smooth_search import Rivalry, compare, no_rivals
@@ -63,7 +62,7 @@ def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> B
     other = naming.search(problem.changed(model=curved), progress).best
     if other.candidates not in {fit.candidates for fit in found.fits}:
         more = problem.fit_candidates(other.candidates, other.start)
-        if _worth(problem, more) > _worth(problem, found.best):
+        if coarse.worth(found, more) > coarse.worth(found, found.best):
             return Beyond(rivalry, None, 1.0, more)
         found = replace(found, fits=(*found.fits, more))
     rivalry = compare(problem, found, also=other.candidates)
@@ -100,11 +99,6 @@ def false_alarm(problem: Problem, rivalry: Rivalry) -> float:
     design = Design(problem, best.fit.settings)
     drawn = null_evidence(design, beside(problem, best.fit, design.columns)[1], naming.NULLS)
     return float(np.mean(drawn >= best.belief.nats))
-
-
-def _worth(problem: Problem, fit: Fit) -> float:
-    """Return the log posterior of a set, not normalised."""
-    return fit.score + log_prior(len(fit.candidates), len({candidate.id for candidate in problem.candidates}))
 
 
 def _asked(problem: Problem) -> bool:

@@ -13,7 +13,6 @@ from kurumaisu.critic import coarse
 from kurumaisu.critic.catalogue import Candidate
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
-from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.smooth import Belief, Curve, Design, belief, taken_up
 from kurumaisu.critic.smooth_alike import Likeness
 from kurumaisu.critic.smooth_designs import Designs
@@ -70,9 +69,8 @@ def no_rivals(found: Naming) -> Rivalry:
 
 def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozenset()) -> Rivalry:
     """Try every curve beside the best sets of the catalogue, beside none, and beside one more."""
-    count = len({candidate.id for candidate in problem.candidates})
     designs = Designs(problem, found.best)
-    bare = [(fit, fit.score + log_prior(len(fit.candidates), count)) for fit in found.fits]
+    bare = [(fit, coarse.worth(found, fit)) for fit in found.fits]
     rivals = sorted(_rivals(problem, designs, _tried(bare, also)), key=lambda rival: -rival.worth)
     if not rivals:
         return no_rivals(found)
