@@ -139,11 +139,11 @@ def slipping():
 
 
 def test_effects_beside_a_curve_over_the_same_are_not_named(slipping):
-    """What the curve's knots lack for a step, effects supply that do not act."""
+    """What a curve beside them does as well, they only seem to do."""
     problem, bent = slipping
     rivalry = compare(problem, Naming((bent, problem.fit_candidates((), {})), dict.fromkeys(bent.ids, 1.0), (), 0.0))
     only = compare(problem, Naming((bent,), dict.fromkeys(bent.ids, 1.0), (), 0.0))
-    assert (only.winner.curve.id, only.winner.fit.ids) == ("smooth.w.w", bent.ids)
+    assert (only.winner.curve.id, only.winner.fit.ids) == ("smooth.w_gain.abs_w", bent.ids)
     assert only.winner.worth < rivalry.winner.worth
     assert max(only.p_effects.values()) < 0.01
 
@@ -199,7 +199,7 @@ def test_a_curve_beside_nothing_is_one_over_rates_that_nothing_has_bent(slipping
     assert all(bent.start[key] < -0.2 for key in (("base.dead_zone_w", "width"), ("base.gain_w", "gain")))
     rivalry = compare(problem, Naming((bent, empty), dict.fromkeys(names, 1.0), (), 0.0))
     alone = compare(problem, Naming((empty,), dict.fromkeys(names, 0.0), (), 0.0))
-    assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.w.w", frozenset())
+    assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.w_gain.abs_w", frozenset())
     assert rivalry.winner.belief.nats == pytest.approx(alone.winner.belief.nats, abs=1e-6)
     assert max(rivalry.p_effects.values()) < 0.01
 

@@ -43,7 +43,7 @@ def criticism(
     beside = explain.criticism(recording, replace(made, problem=curved, found=inner), worth, drives, proposal)
     share = moved_share(problem, extension.settings, extension.fit.settings)
     felt = felt_share(problem, extension.settings, extension.fit.settings)
-    gains = confirmed(worth, beyond.rivalry.lead)
+    gains = confirmed(worth, _nats(found, beyond))
     told = _told(extension, beyond, share)
     if not gains or (share < MATERIAL and felt < FELT):
         small = f"{told} It is too small to matter, or was not confirmed on data held out."
@@ -60,6 +60,12 @@ def criticism(
         rivals=tuple(_rivals(found, beyond)),
     )
     return Criticism(verdict, story, problem.model, settings)
+
+
+def _nats(found: Naming, beyond: Beyond) -> float:
+    """Return the evidence [nat] for what was found: over the catalogue, or, where an effect may be it, over nothing."""
+    best = beyond.rivalry.rivals[0]
+    return beyond.rivalry.lead if beyond.rivalry.winner else found.nats(best.fit) + best.belief.nats
 
 
 def figure(problem: Problem, extension: Extension) -> Misfit:
