@@ -22,6 +22,7 @@ from kurumaisu.types import FloatArray
 _PLACES = 24  # with as many samples between them
 _FINER = 9  # between the neighbours of the best one, and once more between those of the best of these
 _WIDTH = 1e-3  # share of the covariate's span within which a jump is made: a model file has no steeper curve
+_SEEN = 1e-4  # share of the signal's square on either side, at least: of what rolls out to nothing, nothing is known
 _FAR = 4.0  # [nat] behind the best place: hardly there
 # Before the data: nothing below the place, nothing beyond it, or something on either side.
 _PRIORS = (np.diag([0.0, 1.0]), np.diag([1.0, 0.0]), np.eye(2))
@@ -72,8 +73,10 @@ class _Tried:
 
     def add(self, gram: FloatArray, b: FloatArray) -> None:
         """Weigh the places by normal equations of a column of ones and one for each, and choose closer ones."""
-        found = beliefs(*_two_sided(gram, b), _PRIORS)
-        nats = np.array([belief.nats for belief in found])
+        grams, pulls = _two_sided(gram, b)
+        found = beliefs(grams, pulls, _PRIORS)
+        seen = np.einsum("nii->ni", grams).min(axis=1) > _SEEN * gram[0, 0]
+        nats = np.where(seen, [belief.nats for belief in found], -np.inf)
         best = int(np.argmax(nats))
         self.nats.append(nats)
         self.at.append(self.places)
@@ -107,7 +110,7 @@ class _Tried:
 
     def _interval(self) -> FloatArray:
         """Return the 90 % interval of the place: of the closest places beyond whose ends it hardly is."""
-        held = [nats.max() - max(nats[0], nats[-1]) > _FAR for nats in self.nats]
+        held = [max(nats[0], nats[-1]) < nats.max() - _FAR for nats in self.nats]
         level = max((i for i, inside in enumerate(held) if inside), default=0)
         at, nats = self.at[level], self.nats[level]
         sums = np.append(0.0, np.cumsum(np.exp(nats - nats.max())))
@@ -141,7 +144,7 @@ def jumps(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[tuple
         for one, side, end in zip(tried, sides, ends, strict=True):
             part = free[:, end - side.basis.size : end]
             one.add(part.T @ part, part.T @ y)
-    yield from (one.rival() for one in tried)
+    yield from (one.rival() for one in tried if np.isfinite(one.nats[0]).any())
 
 
 def _first(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[_Tried]:
