@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Curves against the catalogue: derivatives, evidence and words by themselves, then whole criticisms."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -218,6 +219,23 @@ def test_a_curve_and_an_effect_of_the_catalogue_are_fitted_together():
     left = [d.measured - problem.simulated(d, extension.settings) for d in problem.drives]
     white = np.concatenate([problem.whitened(d, r.reshape(-1, 1)) for d, r in zip(problem.drives, left, strict=True)])
     assert float(np.mean(white**2)) == pytest.approx(1.07, abs=0.07)
+
+
+def test_a_curve_and_effects_that_draw_the_same_are_fitted_no_worse_than_without_it():
+    """Whole steps overshoot together, from round to round."""
+    bent = hidden.Kind(0, "v", lambda s, a, b: math.sin(9 * s.v) * abs(s.v))
+    problem = Problem(
+        drives_of(hidden.make(bent, 80.0, 1009, seconds=40.0, runs=2).recording), hidden.MODEL, hidden.USUAL
+    )
+    both = problem.fit(["base.curvature_v", "base.dead_zone_v"], {})
+    (curve,) = (c for c in smooth.Design(problem, both.settings).curves if c.id == "smooth.v.v")
+    free = smooth.columns(problem, both.settings, [curve])
+    y, own = smooth.taken_up(problem, both)
+    free = free - own @ (own.T @ free)
+    extension = extend(problem, both, curve, smooth.belief(free.T @ free, free.T @ y, curve.basis.priors).prior)
+    curved = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
+    left = curved.residual(extension.fit.terms, extension.fit.values)
+    assert -0.5 * left @ left > both.log_likelihood + 10
 
 
 def drawn(law, sd):

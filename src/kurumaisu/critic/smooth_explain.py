@@ -14,7 +14,7 @@ from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, confirmed, felt_share, moved_share
+from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, STRONG, confirmed, felt_share, moved_share
 from kurumaisu.critic.misfit import bins, moments
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
@@ -26,6 +26,7 @@ from kurumaisu.critic.verdict import NORMAL90, Gain, Unknown
 from kurumaisu.types import BoolArray, FloatArray
 
 _LISTED = 3  # curves that may act, at most
+_SEEN_IN = {"v": "dx", "lateral": "dy", "w": "dtheta"}  # channels of a gain
 _PLAUSIBLE = 0.02  # posterior from which another curve is listed
 
 
@@ -43,7 +44,8 @@ def criticism(
     beside = explain.criticism(recording, replace(made, problem=curved, found=inner), worth, drives, proposal)
     share = moved_share(problem, extension.settings, extension.fit.settings)
     felt = felt_share(problem, extension.settings, extension.fit.settings)
-    gains = confirmed(worth, _nats(found, beyond))
+    nats = _nats(found, beyond)
+    gains = confirmed(worth, nats) or (nats >= STRONG and _nearer(worth, extension.curve.channel))
     told = _told(extension, beyond, share)
     if not gains or (share < MATERIAL and felt < FELT):
         small = f"{told} It is too small to matter, or was not confirmed on data held out."
@@ -66,6 +68,15 @@ def _nats(found: Naming, beyond: Beyond) -> float:
     """Return the evidence [nat] for what was found: over the catalogue, or, where an effect may be it, over nothing."""
     best = beyond.rivalry.rivals[0]
     return beyond.rivalry.lead if beyond.rivalry.winner else found.nats(best.fit) + best.belief.nats
+
+
+def _nearer(worth: Gain | None, channel: str) -> bool:
+    """Return whether drives held out are simulated nearer to what was measured, in the direction of a channel.
+
+    What a curve leaves of something strong is no normal noise: a few surprises may cost all that the density gains.
+    """
+    seen = worth and worth.channels.get(_SEEN_IN[channel.removesuffix("_gain")])
+    return bool(seen and seen.rmse and seen.rmse.lo90 > 0)
 
 
 def figure(problem: Problem, extension: Extension) -> Misfit:

@@ -96,6 +96,7 @@ class _Tried:
         place = self.at[level][int(np.argmax(self.nats[level]))]
         basis = self.curve.basis
         half = _WIDTH / 2 * (basis.high - basis.low)
+        low, high = self._interval()
         jump = Jump(
             basis.covariate,
             np.array([place - half, place + half]),
@@ -103,7 +104,7 @@ class _Tried:
             _PRIORS,
             basis.low,
             basis.high,
-            place=np.array([place, *self._interval()]),
+            place=np.array([place, min(low, place), max(high, place)]),
             hats=basis.knots,
         )
         return replace(self.curve, basis=jump, columns=slice(0, 2)), Belief(total, self.priors[level])
