@@ -4,9 +4,11 @@
 from types import SimpleNamespace
 
 import pytest
+import unknown_effects as hidden
 
-from kurumaisu.critic import smooth_explain
+from kurumaisu.critic import pipeline, smooth_explain
 from kurumaisu.critic.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
+from kurumaisu.params import shipped
 
 LOST = LogDensityGain(1.0, 0.9, -0.1, -0.2, 0.1)
 
@@ -36,3 +38,17 @@ def test_evidence_is_over_nothing_where_an_effect_may_be_it_as_well(winner, nats
     rivalry = SimpleNamespace(rivals=(best,), lead=5.0, winner=winner)
     found = SimpleNamespace(nats={fit: 22.0}.__getitem__)
     assert smooth_explain._nats(found, SimpleNamespace(rivalry=rivalry)) == nats
+
+
+@pytest.mark.parametrize(("least", "verdict"), [(50.0, "unknown"), (1e9, "none")])
+def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, least, verdict):
+    """Nothing is extended by what did not hold, and no curve is certain."""
+    recording = hidden.make(hidden.KINDS["gully"], 40.0, 1010, seconds=40.0, runs=2).recording
+    monkeypatch.setattr(smooth_explain, "confirmed", lambda worth, nats: False)
+    monkeypatch.setattr(smooth_explain, "_nearer", lambda worth, channel: False)
+    monkeypatch.setattr(smooth_explain, "_NO_NOISE", least)
+    found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None)
+    assert (found.verdict.verdict, found.verdict.causes) == (verdict, ())
+    assert not any(setting.id.startswith("smooth") for setting in found.settings)
+    assert all(one.p <= 0.5 for one in found.verdict.unknown)
+    assert bool(found.verdict.unknown) == ("not hold on data held out: it is not" in found.story.headline)

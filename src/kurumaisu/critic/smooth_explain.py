@@ -26,6 +26,9 @@ from kurumaisu.critic.verdict import NORMAL90, Gain, Unknown
 from kurumaisu.types import BoolArray, FloatArray
 
 _LISTED = 3  # curves that may act, at most
+# [nat] over nothing: were the noise twice as large as estimated, a quarter of it would still be beyond doubt.
+_NO_NOISE = 50.0
+_UNHELD = 0.5  # probability at most of a curve that did not hold
 _SEEN_IN = {"v": "dx", "lateral": "dy", "w": "dtheta"}  # channels of a gain
 _PLAUSIBLE = 0.02  # posterior from which another curve is listed
 
@@ -50,7 +53,8 @@ def criticism(
     if not gains or (share < MATERIAL and felt < FELT):
         small = f"{told} It is too small to matter, or was not confirmed on data held out."
         story = replace(beside.story, unexplained=(small, *beside.story.unexplained))
-        return replace(beside, story=story, model=problem.model)
+        kept = replace(beside, story=story, model=problem.model)
+        return _unheld(kept, problem, made, worth) if share >= MATERIAL else kept
     verdict = replace(beside.verdict, verdict="unknown", unknown=tuple(_unknowns(problem, beyond)))
     settings = (*extension.settings, process_noise(problem))
     story = replace(
@@ -62,6 +66,22 @@ def criticism(
         rivals=tuple(_rivals(found, beyond)),
     )
     return Criticism(verdict, story, problem.model, settings)
+
+
+def _unheld(kept: Criticism, problem: Problem, made: Decision, worth: Gain | None) -> Criticism:
+    """Return a criticism of what did not hold on data held out, as unknown where it cannot be noise.
+
+    It follows more than one thing, or none that is known: the curves only say where to look, and extend nothing.
+    """
+    found, beyond = made.found, made.beyond
+    best, extension = beyond.rivalry.rivals[0], beyond.extension
+    assert extension is not None
+    if worth is None or found.nats(best.fit) + best.belief.nats < _NO_NOISE:
+        return kept
+    curves = tuple(replace(one, p=min(one.p, _UNHELD)) for one in _unknowns(problem, beyond))
+    headline = f"{smooth_words.headline(extension)} That does not hold on data held out: it is not the whole of it."
+    verdict = replace(kept.verdict, verdict="unknown", unknown=curves)
+    return replace(kept, verdict=verdict, story=replace(kept.story, headline=headline))
 
 
 def _nats(found: Naming, beyond: Beyond) -> float:
