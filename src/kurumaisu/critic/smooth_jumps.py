@@ -23,7 +23,7 @@ _PLACES = 24  # with as many samples between them
 _FINER = 9  # between the neighbours of the best one, and once more between those of the best of these
 _WIDTH = 1e-3  # share of the covariate's span within which a jump is made: a model file has no steeper curve
 _SEEN = 1e-4  # share of the signal's square on either side, at least: of what rolls out to nothing, nothing is known
-_FAR = 4.0  # [nat] behind the best place: hardly there
+_BETWEEN = 20  # places between two, for the interval
 # Before the data: nothing below the place, nothing beyond it, or something on either side.
 _PRIORS = (np.diag([0.0, 1.0]), np.diag([1.0, 0.0]), np.eye(2))
 
@@ -110,14 +110,13 @@ class _Tried:
         return replace(self.curve, basis=jump, columns=slice(0, 2)), Belief(total, self.priors[level])
 
     def _interval(self) -> FloatArray:
-        """Return the 90 % interval of the place: of the closest places beyond whose ends it hardly is."""
-        held = [max(nats[0], nats[-1]) < nats.max() - _FAR for nats in self.nats]
-        level = max((i for i, inside in enumerate(held) if inside), default=0)
-        at, nats = self.at[level], self.nats[level]
-        sums = np.append(0.0, np.cumsum(np.exp(nats - nats.max())))
-        middle = (at[1:] + at[:-1]) / 2
-        ends = np.concatenate([[at[0]], middle, [at[-1]]])
-        return np.interp(np.array([0.05, 0.95]) * sums[-1], sums, ends)
+        """Return the 90 % interval of the place: the log likelihood is taken to be straight between the places."""
+        at, nats = np.concatenate(self.at), np.concatenate(self.nats)
+        order = np.argsort(at)[np.isfinite(nats[np.argsort(at)])]
+        at, nats = at[order], nats[order]
+        close = np.interp(np.arange(_BETWEEN * (len(at) - 1) + 1) / _BETWEEN, np.arange(len(at)), at)
+        weights = np.exp(np.interp(close, at, nats) - nats.max()) * np.gradient(close) if len(at) > 1 else np.ones(1)
+        return np.interp(np.array([0.05, 0.95]) * weights.sum(), np.cumsum(weights), close)
 
 
 def over_own(curves: Iterable[Curve]) -> Iterator[Curve]:
