@@ -101,7 +101,7 @@ def _nearer(worth: Gain | None, channel: str) -> bool:
 
 def figure(problem: Problem, extension: Extension) -> Misfit:
     """Return the residual without the curve over the covariate, and the curve with its band."""
-    name, covariate, unit = smooth_words.covariate(extension.curve)
+    _, covariate, unit = smooth_words.covariate(extension.curve)
     x, residual, left, use = (
         np.concatenate(parts)
         for parts in zip(*(_samples(problem, drive, extension) for drive in problem.drives), strict=True)
@@ -118,7 +118,7 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
         covariate=x,
         residual=residual,
         bins=bins(x, residual),
-        explained_by=f"not in the catalogue, over {name}",
+        explained_by=f"not in the catalogue, {smooth_words.followed(extension.curve)}",
         curve=np.column_stack([at, mean]),
         after=bins(x, left),
         band=np.column_stack([at, mean - NORMAL90 * sd, mean + NORMAL90 * sd]),
@@ -156,7 +156,7 @@ def _samples(
 
 def _told(extension: Extension, beyond: Beyond, share: float) -> str:
     curve = extension.curve
-    where = f"{smooth_words.channel(curve)} over {smooth_words.covariate(curve)[0]}"
+    where = f"{smooth_words.channel(curve)} {smooth_words.followed(curve)}"
     better = f"explains {beyond.rivalry.lead:.1f} nats more than the best set of the catalogue"
     return (
         f"Outside the catalogue: {where} ({smooth_words.shape(extension)}) {better}; "
@@ -186,5 +186,5 @@ def _rivals(found: Naming, beyond: Beyond) -> Iterator[Rival]:
         if rival.curve.id not in seen and len(seen) <= _LISTED:
             seen.add(rival.curve.id)
             beside = "".join(f" + {name}" for name in sorted(rival.fit.ids))
-            name = f"{smooth_words.channel(rival.curve)} over {smooth_words.covariate(rival.curve)[0]}{beside}"
+            name = f"{smooth_words.channel(rival.curve)} {smooth_words.followed(rival.curve)}{beside}"
             yield Rival(name, rival.worth - best.worth, "a curve over something else explains less")

@@ -52,6 +52,11 @@ def channel(curve: Curve) -> str:
     return f"base.{curve.channel.removesuffix('_gain')}"
 
 
+def followed(curve: Curve) -> str:
+    """Return what a curve follows: over a covariate, or nothing."""
+    return "constant" if curve.basis.covariate == effects.MOVING else f"over {covariate(curve)[0]}"
+
+
 def unit_of(curve: Curve) -> str:
     """Return the unit of the curve; in words where it is a share."""
     return _SHARES.get(curve.channel, effects.CHANNELS[curve.channel])
