@@ -72,6 +72,7 @@ def watched(v, w, u, heading):
                 "distance": distance + abs(speed) * DT / 2,
                 "x": x + east * DT / 2,
                 "y": y + north * DT / 2,
+                "moving": 1.0,
                 "rust": 0.5,
             }
         )

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Curves against the catalogue: derivatives, evidence and words by themselves, then whole criticisms."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -139,11 +140,11 @@ def slipping():
 
 
 def test_effects_beside_a_curve_over_the_same_are_not_named(slipping):
-    """What the curve's knots lack for a step, effects supply that do not act."""
+    """What a curve beside them does as well, they only seem to do."""
     problem, bent = slipping
     rivalry = compare(problem, Naming((bent, problem.fit_candidates((), {})), dict.fromkeys(bent.ids, 1.0), (), 0.0))
     only = compare(problem, Naming((bent,), dict.fromkeys(bent.ids, 1.0), (), 0.0))
-    assert (only.winner.curve.id, only.winner.fit.ids) == ("smooth.w.w", bent.ids)
+    assert (only.winner.curve.id, only.winner.fit.ids) == ("smooth.w_gain.abs_w", bent.ids)
     assert only.winner.worth < rivalry.winner.worth
     assert max(only.p_effects.values()) < 0.01
 
@@ -199,7 +200,7 @@ def test_a_curve_beside_nothing_is_one_over_rates_that_nothing_has_bent(slipping
     assert all(bent.start[key] < -0.2 for key in (("base.dead_zone_w", "width"), ("base.gain_w", "gain")))
     rivalry = compare(problem, Naming((bent, empty), dict.fromkeys(names, 1.0), (), 0.0))
     alone = compare(problem, Naming((empty,), dict.fromkeys(names, 0.0), (), 0.0))
-    assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.w.w", frozenset())
+    assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.w_gain.abs_w", frozenset())
     assert rivalry.winner.belief.nats == pytest.approx(alone.winner.belief.nats, abs=1e-6)
     assert max(rivalry.p_effects.values()) < 0.01
 
@@ -218,6 +219,23 @@ def test_a_curve_and_an_effect_of_the_catalogue_are_fitted_together():
     left = [d.measured - problem.simulated(d, extension.settings) for d in problem.drives]
     white = np.concatenate([problem.whitened(d, r.reshape(-1, 1)) for d, r in zip(problem.drives, left, strict=True)])
     assert float(np.mean(white**2)) == pytest.approx(1.07, abs=0.07)
+
+
+def test_a_curve_and_effects_that_draw_the_same_are_fitted_no_worse_than_without_it():
+    """Whole steps overshoot together, from round to round."""
+    bent = hidden.Kind(0, "v", lambda s, a, b: math.sin(9 * s.v) * abs(s.v))
+    problem = Problem(
+        drives_of(hidden.make(bent, 80.0, 1009, seconds=40.0, runs=2).recording), hidden.MODEL, hidden.USUAL
+    )
+    both = problem.fit(["base.curvature_v", "base.dead_zone_v"], {})
+    (curve,) = (c for c in smooth.Design(problem, both.settings).curves if c.id == "smooth.v.v")
+    free = smooth.columns(problem, both.settings, [curve])
+    y, own = smooth.taken_up(problem, both)
+    free = free - own @ (own.T @ free)
+    extension = extend(problem, both, curve, smooth.belief(free.T @ free, free.T @ y, curve.basis.priors).prior)
+    curved = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
+    left = curved.residual(extension.fit.terms, extension.fit.values)
+    assert -0.5 * left @ left > both.log_likelihood + 10
 
 
 def drawn(law, sd):

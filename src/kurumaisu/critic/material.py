@@ -19,7 +19,7 @@ from kurumaisu.types import FloatArray, IntArray
 MATERIAL = 0.005  # share of the way (or of the turn) from which an effect matters to a driver
 FELT = 0.1  # share of what is uncertain anyway, per increment, from which an effect matters to a prediction
 _SAME = 1e-6  # [s] less than any clock resolves: stamps of equal spacing differ by rounding
-_STRONG = 8.0  # [nat] of evidence from which _LIKELY will do
+STRONG = 8.0  # [nat] of evidence from which _LIKELY will do
 _LIKELY = 0.84  # standard deviations: a gain with a probability of 0.8
 HORIZON = 2.0  # [s] over which ways and turns are compared
 
@@ -33,7 +33,7 @@ def confirmed(worth: Gain | None, nats: float) -> bool:
         return False
     gain = worth.log_density_per_sample
     sd = max(gain.hi90 - gain.lo90, 1e-12) / (2 * NORMAL90)
-    return gain.lo90 > 0 or (nats >= _STRONG and gain.gain > _LIKELY * sd)
+    return gain.lo90 > 0 or (nats >= STRONG and gain.gain > _LIKELY * sd)
 
 
 def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:

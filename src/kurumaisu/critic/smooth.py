@@ -21,6 +21,7 @@ from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.prior import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.critic.smooth_basis import Basis, bases
 from kurumaisu.critic.smooth_columns import Sensitivity
+from kurumaisu.critic.smooth_level import CHANNELS, level
 from kurumaisu.critic.smooth_waves import girth
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -69,6 +70,11 @@ class Design:
                 if effects.smooth_id(channel, basis.covariate) not in taken:
                     self.curves.append(Curve(channel, basis, slice(at, at + basis.size)))
                     at += basis.size
+        end = max((float(drive.times[-1] - drive.start) for drive in problem.drives), default=0.0)
+        for channel in CHANNELS if self.curves else ():
+            if effects.smooth_id(channel, effects.MOVING) not in taken:
+                self.curves.append(Curve(channel, level(end), slice(at, at + 1)))
+                at += 1
         self.columns = columns(problem, settings, self.curves)
 
 
@@ -95,10 +101,10 @@ def raw_columns(drive: Drive, model: Model, settings: Sequence[EffectSetting], c
     """Return the derivative of a drive's increments by the coefficients of curves, (3 m, k)."""
     motion = replay.motion(drive, model, settings)
     sensitivity = Sensitivity(drive, motion)
-    matrices = {basis.covariate: basis.matrix(basis.samples(motion)) for basis in (curve.basis for curve in curves)}
+    matrices = {id(basis): basis.matrix(basis.samples(motion)) for basis in (curve.basis for curve in curves)}
     out = np.empty((3 * (len(drive.times) - 1), sum(curve.basis.size for curve in curves)))
     for curve, end in zip(curves, np.cumsum([curve.basis.size for curve in curves]), strict=True):
-        own = sensitivity.increments(curve.channel, matrices[curve.basis.covariate])
+        own = sensitivity.increments(curve.channel, matrices[id(curve.basis)])
         out[:, end - curve.basis.size : end] = own
     return out
 
@@ -121,11 +127,20 @@ def taken_up(problem: Problem, fit: Fit) -> tuple[FloatArray, FloatArray]:
 
 def belief(gram: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> Belief:
     """Return how much a curve explains: b = X'y, gram = X'X of its whitened columns; any of the priors may hold."""
-    scaled, axes, sizes = _axes(gram, priors)
-    nats = _nats(sizes, axes.transpose(0, 2, 1) @ b)
-    weighed = nats + _LOG_WEIGHTS
-    prior, size = np.unravel_index(int(np.argmax(weighed)), weighed.shape)
-    return Belief(float(logsumexp(weighed) - np.log(len(priors))), _SIZES[size] ** 2 * scaled[prior])
+    return beliefs(gram[None], b[None], priors)[0]
+
+
+def beliefs(grams: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> list[Belief]:
+    """Return how much each of several curves (n, k, k), (n, k) explains."""
+    count = len(priors)
+    scaled, axes, sizes = _axes(np.repeat(grams, count, axis=0), np.tile(np.stack(priors), (len(grams), 1, 1)))
+    nats = _nats(sizes, (axes.transpose(0, 2, 1) @ np.repeat(b, count, axis=0)[..., None])[..., 0])
+    weighed = (nats + _LOG_WEIGHTS).reshape(len(grams), -1)
+    best = np.argmax(weighed, axis=1)
+    totals = logsumexp(weighed, axis=1) - np.log(count)
+    rows = count * np.arange(len(grams)) + best // len(_SIZES)
+    found = zip(totals, rows, best % len(_SIZES), strict=True)
+    return [Belief(float(total), _SIZES[size] ** 2 * scaled[row]) for total, row, size in found]
 
 
 def null_evidence(design: Design, columns: FloatArray, draws: int) -> FloatArray:
@@ -144,9 +159,12 @@ def null_evidence(design: Design, columns: FloatArray, draws: int) -> FloatArray
     return best
 
 
-def _axes(gram: FloatArray, priors: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return, for each prior: it, scaled to a signal of norm 1; its own axes in b, (k, k); the gram along them."""
-    scaled = np.stack(priors)
+def _axes(gram: FloatArray, priors: Sequence[FloatArray] | FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return, for each prior: it, scaled to a signal of norm 1; its own axes in b, (k, k); the gram along them.
+
+    gram (k, k) of all priors or (priors, k, k).
+    """
+    scaled = np.stack(list(priors))
     scaled = scaled / np.maximum(np.sum(gram * scaled, axis=(1, 2)), 1e-12)[:, None, None]
     values, vectors = np.linalg.eigh(scaled)
     root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]

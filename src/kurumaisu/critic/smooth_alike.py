@@ -10,9 +10,11 @@ import numpy as np
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.smooth import Belief, Curve, columns, taken_up
 from kurumaisu.critic.smooth_designs import Designs
+from kurumaisu.critic.smooth_jumps import Jump
 from kurumaisu.types import FloatArray
 
 _ALIKE = 0.9  # correlation of signals from which a curve draws an effect; noise alone bends a curve by as much
+_CHANCE = 3.0  # [nat] that a level more and the best of many places explain of noise
 FORM = 0.15  # share of its signal by which a chair's fault may differ from the catalogue's equation for it
 
 
@@ -34,16 +36,23 @@ class Likeness:
         if len(missing) != 1 or fit.ids - self._best.ids:
             return {}
         y, own = taken_up(self._problem, fit)
-        free = self._designs.about(fit).columns[:, curve.columns]
+        free = self._designs.columns(fit, curve)
         free = free - own @ (own.T @ free)
         spread = np.eye(free.shape[1]) + belief.prior @ (free.T @ free)
         drawn = free @ np.linalg.solve(spread, belief.prior @ (free.T @ y))
         signals = {name: self._signals[name] - own @ (own.T @ self._signals[name]) for name in sorted(missing)}
-        return {
+        found = {
             name: 0.5 * float(FORM**2 * signal @ signal)
             for name, signal in signals.items()
             if _correlation(drawn, signal) > _ALIKE
         }
+        if isinstance(curve.basis, Jump):
+            # No other form of an equation jumps: what a jump explains beyond it, and beyond chance, is no form.
+            better = 0.5 * float(y @ free @ np.linalg.lstsq(free, y, rcond=None)[0]) - (
+                self._best.log_likelihood - fit.log_likelihood
+            )
+            found = {name: nats for name, nats in found.items() if better < nats + _CHANCE}
+        return found
 
     def part_of(self, fit: Fit, curve: Curve) -> set[str]:
         """Return the effects of a fit that are themselves curves over what a curve beside them follows.
@@ -55,7 +64,9 @@ class Likeness:
             return set()
         finer = replace(curve, basis=curve.basis.finer())
         free = columns(self._problem, fit.settings, [finer])
-        if curve.channel.endswith("_gain"):  # a curve of factors may be one about another gain than 1
+        rate = curve.channel.removesuffix("_gain")
+        # A curve of factors may be one about another gain than 1, but for one over the rate itself: it holds the gain.
+        if rate not in (curve.channel, curve.basis.covariate.removeprefix("abs_")):
             level = free[:, :1] if not len(curve.basis.knots) else free.sum(axis=1, keepdims=True)
             level = level / np.linalg.norm(level)
             free = free - level @ (level.T @ free)

@@ -7,7 +7,7 @@ import numpy as np
 
 from kurumaisu.critic import replay
 from kurumaisu.critic.evidence import Fit, Problem
-from kurumaisu.critic.smooth import Design
+from kurumaisu.critic.smooth import Curve, Design, columns
 from kurumaisu.types import FloatArray
 
 # Share of the rates by which another fit may differ. Effects that make up for each other, such as a gain of -0.6 and a
@@ -33,6 +33,13 @@ class Designs:
                 self._made.append((rates, near[0]))
             self._of[fit.candidates] = near[0]
         return self._of[fit.candidates]
+
+    def columns(self, fit: Fit, curve: Curve) -> FloatArray:
+        """Return the whitened columns of a curve beside a fit, (rows, k)."""
+        design = self.about(fit)
+        if any(curve is one for one in design.curves):
+            return design.columns[:, curve.columns]
+        return columns(self._problem, fit.settings, [curve])
 
     def _rates(self, fit: Fit) -> FloatArray:
         """Return v and w of all drives, (2, n)."""

@@ -14,7 +14,7 @@ from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, confirmed, felt_share, moved_share
+from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, STRONG, confirmed, felt_share, moved_share
 from kurumaisu.critic.misfit import bins, moments
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
@@ -26,6 +26,10 @@ from kurumaisu.critic.verdict import NORMAL90, Gain, Unknown
 from kurumaisu.types import BoolArray, FloatArray
 
 _LISTED = 3  # curves that may act, at most
+# [nat] over nothing: were the noise twice as large as estimated, a quarter of it would still be beyond doubt.
+_NO_NOISE = 50.0
+_UNHELD = 0.5  # probability at most of a curve that did not hold
+_SEEN_IN = {"v": "dx", "lateral": "dy", "w": "dtheta"}  # channels of a gain
 _PLAUSIBLE = 0.02  # posterior from which another curve is listed
 
 
@@ -43,12 +47,14 @@ def criticism(
     beside = explain.criticism(recording, replace(made, problem=curved, found=inner), worth, drives, proposal)
     share = moved_share(problem, extension.settings, extension.fit.settings)
     felt = felt_share(problem, extension.settings, extension.fit.settings)
-    gains = confirmed(worth, beyond.rivalry.lead)
+    nats = _nats(found, beyond)
+    gains = confirmed(worth, nats) or (nats >= STRONG and _nearer(worth, extension.curve.channel))
     told = _told(extension, beyond, share)
     if not gains or (share < MATERIAL and felt < FELT):
         small = f"{told} It is too small to matter, or was not confirmed on data held out."
         story = replace(beside.story, unexplained=(small, *beside.story.unexplained))
-        return replace(beside, story=story, model=problem.model)
+        kept = replace(beside, story=story, model=problem.model)
+        return _unheld(kept, problem, made, worth) if share >= MATERIAL else kept
     verdict = replace(beside.verdict, verdict="unknown", unknown=tuple(_unknowns(problem, beyond)))
     settings = (*extension.settings, process_noise(problem))
     story = replace(
@@ -62,9 +68,40 @@ def criticism(
     return Criticism(verdict, story, problem.model, settings)
 
 
+def _unheld(kept: Criticism, problem: Problem, made: Decision, worth: Gain | None) -> Criticism:
+    """Return a criticism of what did not hold on data held out, as unknown where it cannot be noise.
+
+    It follows more than one thing, or none that is known: the curves only say where to look, and extend nothing.
+    """
+    found, beyond = made.found, made.beyond
+    best, extension = beyond.rivalry.rivals[0], beyond.extension
+    assert extension is not None
+    if worth is None or found.nats(best.fit) + best.belief.nats < _NO_NOISE:
+        return kept
+    curves = tuple(replace(one, p=min(one.p, _UNHELD)) for one in _unknowns(problem, beyond))
+    headline = f"{smooth_words.headline(extension)} That does not hold on data held out: it is not the whole of it."
+    verdict = replace(kept.verdict, verdict="unknown", unknown=curves)
+    return replace(kept, verdict=verdict, story=replace(kept.story, headline=headline))
+
+
+def _nats(found: Naming, beyond: Beyond) -> float:
+    """Return the evidence [nat] for what was found: over the catalogue, or, where an effect may be it, over nothing."""
+    best = beyond.rivalry.rivals[0]
+    return beyond.rivalry.lead if beyond.rivalry.winner else found.nats(best.fit) + best.belief.nats
+
+
+def _nearer(worth: Gain | None, channel: str) -> bool:
+    """Return whether drives held out are simulated nearer to what was measured, in the direction of a channel.
+
+    What a curve leaves of something strong is no normal noise: a few surprises may cost all that the density gains.
+    """
+    seen = worth and worth.channels.get(_SEEN_IN[channel.removesuffix("_gain")])
+    return bool(seen and seen.rmse and seen.rmse.lo90 > 0)
+
+
 def figure(problem: Problem, extension: Extension) -> Misfit:
     """Return the residual without the curve over the covariate, and the curve with its band."""
-    name, covariate, unit = smooth_words.covariate(extension.curve)
+    _, covariate, unit = smooth_words.covariate(extension.curve)
     x, residual, left, use = (
         np.concatenate(parts)
         for parts in zip(*(_samples(problem, drive, extension) for drive in problem.drives), strict=True)
@@ -81,7 +118,7 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
         covariate=x,
         residual=residual,
         bins=bins(x, residual),
-        explained_by=f"not in the catalogue, over {name}",
+        explained_by=f"not in the catalogue, {smooth_words.followed(extension.curve)}",
         curve=np.column_stack([at, mean]),
         after=bins(x, left),
         band=np.column_stack([at, mean - NORMAL90 * sd, mean + NORMAL90 * sd]),
@@ -119,7 +156,7 @@ def _samples(
 
 def _told(extension: Extension, beyond: Beyond, share: float) -> str:
     curve = extension.curve
-    where = f"{smooth_words.channel(curve)} over {smooth_words.covariate(curve)[0]}"
+    where = f"{smooth_words.channel(curve)} {smooth_words.followed(curve)}"
     better = f"explains {beyond.rivalry.lead:.1f} nats more than the best set of the catalogue"
     return (
         f"Outside the catalogue: {where} ({smooth_words.shape(extension)}) {better}; "
@@ -149,5 +186,5 @@ def _rivals(found: Naming, beyond: Beyond) -> Iterator[Rival]:
         if rival.curve.id not in seen and len(seen) <= _LISTED:
             seen.add(rival.curve.id)
             beside = "".join(f" + {name}" for name in sorted(rival.fit.ids))
-            name = f"{smooth_words.channel(rival.curve)} over {smooth_words.covariate(rival.curve)[0]}{beside}"
+            name = f"{smooth_words.channel(rival.curve)} {smooth_words.followed(rival.curve)}{beside}"
             yield Rival(name, rival.worth - best.worth, "a curve over something else explains less")

@@ -17,7 +17,10 @@ from kurumaisu.critic.smooth_basis import Basis
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
-_ROUNDS = 3  # from columns linearised anew; the curve itself is linear in all but the path it leads to
+_ROUNDS = 6  # from columns linearised anew; the curve itself is linear in all but the path it leads to
+_ENOUGH = 0.1  # [nat] less to gain ends them
+# Shares of a step that are tried: a curve and effects that draw the same by turns overshoot together.
+_SHARES = (1.0, 0.5, 0.2, 0.05)
 
 
 @dataclass(frozen=True)
@@ -55,9 +58,39 @@ def extend(problem: Problem, fit: Fit, curve: Curve, prior: FloatArray) -> Exten
     values, vectors = np.linalg.eigh(prior)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     extension = Extension(fit, curve, prior, np.zeros(curve.basis.size), prior)
+    worth = _worth(problem, extension, root)
     for _ in range(_ROUNDS):
-        extension = _step(problem, extension, root)
+        whole = _step(problem, extension, root)
+        for share in _SHARES:
+            moved = whole if share == 1.0 else _part(problem, extension, whole, share)
+            gained = _worth(problem, moved, root) - worth
+            if gained > 0:
+                break
+        extension, worth = (moved, worth + gained) if gained > 0 else (_where(extension, whole), worth)
+        if gained < _ENOUGH:
+            break
     return extension
+
+
+def _worth(problem: Problem, extension: Extension, root: FloatArray) -> float:
+    """Return the log posterior density of a curve's coefficients and the effects beside it, up to a constant."""
+    curved = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
+    left = curved.residual(extension.fit.terms, extension.fit.values)
+    sizes = np.linalg.lstsq(root, extension.coefficients, rcond=None)[0]
+    return -0.5 * float(left @ left + sizes @ sizes)
+
+
+def _part(problem: Problem, extension: Extension, whole: Extension, share: float) -> Extension:
+    """Return an extension that is moved by a share of the way to another one."""
+    values = extension.fit.values + share * (whole.fit.values - extension.fit.values)
+    settings = replay.completed(problem.model, settings_of(extension.fit.terms, values))
+    coefficients = extension.coefficients + share * (whole.coefficients - extension.coefficients)
+    return replace(whole, fit=replace(whole.fit, values=values, settings=settings), coefficients=coefficients)
+
+
+def _where(extension: Extension, whole: Extension) -> Extension:
+    """Return an extension where it is, with the doubts of another one."""
+    return replace(extension, fit=replace(extension.fit, sds=whole.fit.sds), covariance=whole.covariance)
 
 
 def again(extension: Extension, drives: Sequence[Drive], problem: Problem) -> Extension:
@@ -91,10 +124,11 @@ def _step(problem: Problem, extension: Extension, root: FloatArray) -> Extension
     fit = extension.fit
     beside = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
     y, slopes = beside.linearised(fit.terms, fit.values, fit.terms)
-    own = columns(problem, fit.settings, [extension.curve]) @ root
+    free = columns(problem, fit.settings, [extension.curve])
+    own = free @ root
     k = slopes.shape[1]
     design = np.hstack([slopes, own])
-    target = y + columns(problem, fit.settings, [extension.curve]) @ extension.coefficients
+    target = y + free @ extension.coefficients
     precision = design.T @ design + np.diag(np.append(np.full(k, 1e-6), np.ones(own.shape[1])))
     covariance: FloatArray = np.linalg.inv(precision)
     solved = np.asarray(covariance @ (design.T @ target))

@@ -59,7 +59,7 @@ def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> B
         return Beyond(no_rivals(found), None, 1.0)
     curved = replay.extend(problem.model, [first.unknown])
     # With the curve in, sets may be best that nobody would have tried without it.
-    other = naming.search(problem.changed(model=curved), progress).best
+    other = naming.search(problem.changed(model=curved), progress, first.fit).best
     if other.candidates not in {fit.candidates for fit in found.fits}:
         more = problem.fit_candidates(other.candidates, other.start)
         if coarse.worth(found, more) > coarse.worth(found, found.best):

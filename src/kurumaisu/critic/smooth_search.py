@@ -16,12 +16,15 @@ from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.smooth import Belief, Curve, Design, belief, taken_up
 from kurumaisu.critic.smooth_alike import Likeness
 from kurumaisu.critic.smooth_designs import Designs
+from kurumaisu.critic.smooth_jumps import jumps, over_own
 from kurumaisu.types import FloatArray
 
 BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
 _ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
 _SHARE = 0.002  # posterior, as far as it is believed, from which it is asked which effect a curve draws
 _FITS = 10  # sets of the catalogue beside which curves are tried
+_JUMPING = 0.2  # share of what is outside the catalogue that jumps
+_HINTS = 3  # curves beside a set that are tried with a jump: most of one shows in a curve that cannot jump
 
 
 @dataclass(frozen=True)
@@ -110,9 +113,10 @@ def _odds(acting: Sequence[tuple[float, frozenset[str]]], names: Iterable[str]) 
 
 
 def _tried(bare: Sequence[tuple[Fit, float]], also: frozenset[Candidate]) -> list[tuple[Fit, float]]:
-    """Return the best sets, the empty one, and one more."""
+    """Return the best sets, the best one without each of its effects, the empty one, and one more."""
     ranked = sorted(bare, key=lambda pair: -pair[1])
     wanted: set[frozenset[Candidate]] = {frozenset(), also}
+    wanted |= {ranked[0][0].candidates - {one} for one in ranked[0][0].candidates}
     return ranked[:_FITS] + [pair for pair in ranked[_FITS:] if pair[0].candidates in wanted]
 
 
@@ -124,6 +128,7 @@ def _rivals(problem: Problem, designs: Designs, fits: Sequence[tuple[Fit, float]
             grams[design] = [_gram(design.columns[:, curve.columns]) for curve in design.curves]
         share = float(np.log(_ODDS / max(len(design.curves), 1)))
         y, own = taken_up(problem, fit)
+        beside: list[Rival] = []
         # Of columns without what the fit can take up: normal equations, of which only a little changes with the fit.
         products = np.column_stack([own, y]).T @ design.columns
         cross, b = products[:-1], products[-1]
@@ -132,7 +137,12 @@ def _rivals(problem: Problem, designs: Designs, fits: Sequence[tuple[Fit, float]
             found = belief(gram - part.T @ part, b[curve.columns], curve.basis.priors)
             # All curves of a kind that the data chose from share what one has.
             chosen = replace(found, nats=found.nats - float(np.log(curve.basis.ways)))
-            yield Rival(fit, curve, chosen, worth + chosen.nats + share)
+            beside.append(Rival(fit, curve, chosen, worth + chosen.nats + share + float(np.log1p(-_JUMPING))))
+        yield from beside
+        if fit.ids <= fits[0][0].ids:  # in its place an effect may have taken up the jump
+            hints = [rival.curve for rival in sorted(beside, key=lambda rival: -rival.worth)[:_HINTS]]
+            for curve, found in jumps(problem, fit, [*hints, *(c for c in over_own(design.curves) if c not in hints)]):
+                yield Rival(fit, curve, found, worth + found.nats + share + float(np.log(_JUMPING)))
 
 
 def _gram(columns: FloatArray) -> FloatArray:

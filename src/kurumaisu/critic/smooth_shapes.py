@@ -10,6 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from kurumaisu.critic.smooth_basis import Basis
+from kurumaisu.critic.smooth_jumps import Jump
+from kurumaisu.critic.smooth_level import Level
 from kurumaisu.types import FloatArray
 
 _POINTS = 60  # at which a curve is described
@@ -36,11 +38,11 @@ class Described(Protocol):
 
 @dataclass(frozen=True)
 class Shape:
-    """kind: a key of TEMPLATES, periodic or irregular; place, size: estimate and 90 % interval, (3,) each.
+    """kind: a key of TEMPLATES, jump, constant, periodic or irregular; place, size: estimate and 90 % interval, (3,).
 
-    The place is that of a step, threshold or bump, the period of an oscillation, and the middle of a straight line;
-    size: from end to end of a line or beyond a threshold, height of a step or bump, amplitude of an oscillation, and
-    from the lowest to the highest value of what is irregular.
+    The place is that of a jump, step, threshold or bump, the period of an oscillation, and the middle of what is
+    straight; size: the constant, from end to end of a line or beyond a threshold, height of a jump, step or bump,
+    amplitude of an oscillation, and from the lowest to the highest value of what is irregular.
     """
 
     kind: str
@@ -84,6 +86,10 @@ TEMPLATES: dict[str, tuple[Callable[[FloatArray, float], FloatArray], ...]] = {
 def grid(described: Described) -> FloatArray:
     """Return values of the covariate at which its curve is known."""
     basis = described.basis
+    if isinstance(basis, Level):
+        return np.array([basis.low, basis.high])
+    if isinstance(basis, Jump):
+        return np.sort(np.append(np.linspace(basis.low, basis.high, _POINTS), basis.knots))
     if len(basis.knots):
         low, high = max(basis.low, float(basis.knots[0])), min(basis.high, float(basis.knots[-1]))
         return np.linspace(low, high, _POINTS)
@@ -104,8 +110,14 @@ def shape_of(described: Described) -> Shape:
         described.coefficients, described.covariance, size=_DRAWS, check_valid="ignore"
     )
     curves = np.vstack([described.coefficients, draws]) @ described.basis.matrix(at).T
+    if isinstance(described.basis, Level):
+        return Shape("constant", np.full(3, (at[0] + at[-1]) / 2), _interval(curves[:, 0]))
     if not len(described.basis.knots):
         return _periodic(described, np.vstack([described.coefficients, draws]))
+    if isinstance(described.basis, Jump):
+        return Shape(
+            "jump", described.basis.place, _interval(np.diff(np.vstack([described.coefficients, draws]))[:, 0])
+        )
     x = (at - at[0]) / (at[-1] - at[0])
     noise = float(np.mean(curves[1:].var(axis=0)))
     kind = min(TEMPLATES, key=lambda name: _cost(name, x, curves[0], noise))

@@ -35,6 +35,7 @@ COVARIATES = {
     "distance": ("distance", "distance travelled", "m"),
     "x": ("x", "x in the map", "m"),
     "y": ("y", "y in the map", "m"),
+    effects.MOVING: ("constant", "time since the start", "s"),
     "v_f": ("v_f mod step", "translation voltage within a step of the converter", "V"),
     "v_s": ("v_s mod step", "steering voltage within a step of the converter", "V"),
 }
@@ -49,6 +50,11 @@ def covariate(curve: Curve) -> tuple[str, str, str]:
 def channel(curve: Curve) -> str:
     """Return the channel as the verdict has it."""
     return f"base.{curve.channel.removesuffix('_gain')}"
+
+
+def followed(curve: Curve) -> str:
+    """Return what a curve follows: over a covariate, or nothing."""
+    return "constant" if curve.basis.covariate == effects.MOVING else f"over {covariate(curve)[0]}"
 
 
 def unit_of(curve: Curve) -> str:
@@ -73,6 +79,10 @@ def shape(extension: Extension, *, intervals: bool = True) -> str:
     if found.kind == "irregular":
         return f"irregular, within {size} {span}"
     place = _quantity(found, "place", unit, intervals)
+    if found.kind == "constant":
+        return f"constant, {size} while the chair moves"
+    if found.kind == "jump":
+        return f"it jumps at {place} by {size}"
     what = {"step": f"of {size}", "bump": f"of {size}", "threshold": f"; beyond it a change of up to {size}"}
     return f"{found.kind} at {place} {what[found.kind]}".replace(" ;", ";")
 
@@ -80,6 +90,11 @@ def shape(extension: Extension, *, intervals: bool = True) -> str:
 def headline(extension: Extension) -> str:
     """Return the finding in one sentence."""
     name = covariate(extension.curve)[1]
+    if extension.curve.basis.covariate == effects.MOVING:
+        return (
+            f"The {CHANNELS[extension.curve.channel]} is off in a way that is not in the catalogue. "
+            f"The error follows nothing that is known: {shape(extension, intervals=False)}."
+        )
     return (
         f"The {CHANNELS[extension.curve.channel]} is off in a way that is not in the catalogue. The error follows the "
         f"{name}: {shape(extension, intervals=False)}."

@@ -53,7 +53,15 @@ from kurumaisu.effects.saturation import Saturation
 from kurumaisu.effects.sign import Sign
 from kurumaisu.effects.slope import Slope
 from kurumaisu.effects.smooth import CHANNELS, SMOOTH, constant_of, curve, smooth_id, smooth_of
-from kurumaisu.effects.smooth_covariates import CONSTANTS, COVARIATES, MEANINGS, PERIODIC, RECORDING_TIME, Follower
+from kurumaisu.effects.smooth_covariates import (
+    CONSTANTS,
+    COVARIATES,
+    MEANINGS,
+    MOVING,
+    PERIODIC,
+    RECORDING_TIME,
+    Follower,
+)
 from kurumaisu.effects.smooth_laser import RANGE_COVARIATES, smooth_range_id, smooth_range_of
 from kurumaisu.effects.steering_law import SteeringLaw
 from kurumaisu.effects.understeer import Understeer
@@ -220,6 +228,7 @@ __all__ = [
     "LASER",
     "LATE",
     "MEANINGS",
+    "MOVING",
     "PERIODIC",
     "RANGE_COVARIATES",
     "RECORDING_TIME",

@@ -20,6 +20,7 @@ CONSTANTS: Mapping[str, tuple[str, str]] = {
     "wheel_right": ("track", "m"),
     **{name: ("period", _PERIODS.get(name, "V")) for name in PERIODIC},
 }
+MOVING = "moving"  # what follows nothing but that the chair moves
 RECORDING_TIME = "recording_time"  # [s] since the first run began; known of recordings only
 MEANINGS: Mapping[str, str] = {
     "v": "forward speed that the effects before have left [m/s]",
@@ -36,6 +37,7 @@ MEANINGS: Mapping[str, str] = {
     "distance": "distance travelled since the start, back or forth [m]; periodic, for wheels out of round",
     "x": "place in the map [m]",
     "y": "place in the map [m]",
+    MOVING: "nothing: 1 while the chair moves",
     "v_f": "translation voltage [V]; periodic, for steps of the D/A converter",
     "v_s": "steering voltage [V]; periodic likewise",
 }
@@ -148,6 +150,7 @@ COVARIATES: Mapping[str, Callable[[Follower, Motion], FloatArray]] = {
     "distance": Follower.distance,
     "x": lambda self, motion: self.place(motion, 0),
     "y": lambda self, motion: self.place(motion, 1),
+    MOVING: lambda _, motion: np.ones_like(motion.v),
 }
 
 

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""When what is outside the catalogue is told: drives held out confirm it, by density or by where the chair comes to."""
+
+from types import SimpleNamespace
+
+import pytest
+import unknown_effects as hidden
+
+from kurumaisu.critic import pipeline, smooth_explain
+from kurumaisu.critic.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
+from kurumaisu.params import shipped
+
+LOST = LogDensityGain(1.0, 0.9, -0.1, -0.2, 0.1)
+
+
+def gain(low):
+    """Return a gain that lost in density, and may be nearer along the way by `low` metres at least."""
+    rmse = RmseGain(0.15, 0.12, 0.03, low, 0.05, "m")
+    return Gain(LOST, {}, {"dx": ChannelGain(LOST, rmse), "dtheta": ChannelGain(LOST)})
+
+
+@pytest.mark.parametrize(("channel", "low", "near"), [("v", 0.01, True), ("v_gain", 0.01, True), ("v", -0.01, False)])
+def test_surprises_do_not_hide_that_the_chair_is_simulated_nearer(channel, low, near):
+    assert smooth_explain._nearer(gain(low), channel) is near
+
+
+def test_what_is_not_known_confirms_nothing():
+    assert not smooth_explain._nearer(None, "v")
+    assert not smooth_explain._nearer(gain(0.01), "w")
+    assert not smooth_explain._nearer(gain(0.01), "lateral")
+
+
+@pytest.mark.parametrize(("winner", "nats"), [("a curve", 5.0), (None, 62.0)])
+def test_evidence_is_over_nothing_where_an_effect_may_be_it_as_well(winner, nats):
+    """What lies between a curve and an effect that explain as much is no evidence that neither acts."""
+    fit = object()
+    best = SimpleNamespace(fit=fit, belief=SimpleNamespace(nats=40.0))
+    rivalry = SimpleNamespace(rivals=(best,), lead=5.0, winner=winner)
+    found = SimpleNamespace(nats={fit: 22.0}.__getitem__)
+    assert smooth_explain._nats(found, SimpleNamespace(rivalry=rivalry)) == nats
+
+
+@pytest.mark.parametrize(("least", "verdict"), [(50.0, "unknown"), (1e9, "none")])
+def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, least, verdict):
+    """Nothing is extended by what did not hold, and no curve is certain."""
+    recording = hidden.make(hidden.KINDS["gully"], 40.0, 1010, seconds=40.0, runs=2).recording
+    monkeypatch.setattr(smooth_explain, "confirmed", lambda worth, nats: False)
+    monkeypatch.setattr(smooth_explain, "_nearer", lambda worth, channel: False)
+    monkeypatch.setattr(smooth_explain, "_NO_NOISE", least)
+    found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None)
+    assert (found.verdict.verdict, found.verdict.causes) == (verdict, ())
+    assert not any(setting.id.startswith("smooth") for setting in found.settings)
+    assert all(one.p <= 0.5 for one in found.verdict.unknown)
+    assert bool(found.verdict.unknown) == ("not hold on data held out: it is not" in found.story.headline)
