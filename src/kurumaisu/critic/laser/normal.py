@@ -11,7 +11,7 @@ import numpy as np
 
 from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.columns import Form, Marks
-from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, refined
+from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, near, refined
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, rows_of
@@ -87,7 +87,7 @@ class Assembly:
     def _errors(self) -> list[FloatArray]:
         """Return the errors of the poses (q, 3) under each scan, by that scan alone, within what is plausible."""
         size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
-        beam = self.first
+        beam = self._begun()
         out: list[FloatArray] = []
         for _ in range(2):  # without outliers in the second round
             left, out = np.full_like(self.residual, np.nan), []
@@ -103,6 +103,11 @@ class Assembly:
             z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
             beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * MAD * np.nanmedian(z)))
         return out
+
+    def _begun(self) -> BeamNoise:
+        """Return the noise of the readings before any is known, without those that are of something else."""
+        with np.errstate(invalid="ignore"):
+            return replace(self.first, valid=near(self.residual / self.first.sd, self.first.valid))
 
     def refine(self, fitted: Sequence[Form], beam: BeamNoise, scan: ScanNoise) -> None:
         """Put in place of each fitted form's shape the one between those of the grid that explains most."""
@@ -146,7 +151,7 @@ class Assembly:
         Without the blocks of many columns, but for those that change whole scans.
         """
         project = self._projected(fitted)
-        beam = self.first
+        beam = self._begun()
         for _ in range(_ROUNDS):
             beam = refined(self.first, beam, lambda last: self.leftover(last, project), self.marks.seen, self.layout)
         narrow = max((free.span.stop for free in self.free if free.whole), default=self._fixed)

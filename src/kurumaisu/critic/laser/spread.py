@@ -52,6 +52,10 @@ def _low(rough: Rough) -> float:
     return rough.low
 
 
+def _cost(fitted: tuple[list[Piece], float]) -> float:
+    return fitted[1]
+
+
 def _nats(piece: Piece) -> float:
     return piece.nats
 
@@ -86,7 +90,7 @@ class ScatterSearch:
             new = self._step(pushes, chosen, gone)
             if new is None or new.nats < self._least(chosen, new):
                 break
-            chosen = self._settled(chosen, new, gone)
+            chosen = self._settled(pushes, chosen, new, gone)
         chosen = self._reweighed(self._polished(chosen))
         settings = [piece.setting for piece in chosen]
         return [
@@ -168,14 +172,18 @@ class ScatterSearch:
         left = (_LEFT * piece.nats * self._fit.overlap(piece, new) ** 2 for piece in chosen)
         return max(_ENOUGH, *(min(_MOST_LEFT, nats) for nats in left)) if chosen else _ENOUGH
 
-    def _settled(self, chosen: Sequence[Piece], new: Piece, gone: set[type[Mechanism]]) -> list[Piece]:
+    def _settled(
+        self, pushes: Sequence[Push], chosen: Sequence[Piece], new: Piece, gone: set[type[Mechanism]]
+    ) -> list[Piece]:
         """Return the pieces with a new one, fitted together with those like it; what it makes superfluous is gone."""
         like = [piece for piece in chosen if self._fit.overlap(piece, new) > _OVERLAP]
         rest = [piece for piece in chosen if piece not in like]
         if not like:
             return [*chosen, new]
         beside = [piece.setting for piece in rest]
-        group, cost = self._fit.together([*like, new], beside)
+        group, cost = min(
+            [self._fit.together([*like, new], beside), *self._other_way(pushes, like, new, beside)], key=_cost
+        )
         for old in like:
             fewer, more = self._fit.together([piece for piece in group if piece.effect is not old.effect], beside)
             z = np.sqrt(max(2 * (more - cost), 0.0))
@@ -186,6 +194,28 @@ class ScatterSearch:
             else:
                 group = [replace(piece, nats=nats) if piece.effect is old.effect else piece for piece in group]
         return [*rest, *group]
+
+    def _other_way(
+        self, pushes: Sequence[Push], like: Sequence[Piece], new: Piece, beside: Sequence[EffectSetting]
+    ) -> Iterator[tuple[list[Piece], float]]:
+        """Yield fits of an effect and a new one as if the new one had come first, and their misfits.
+
+        Alone, one of several shapes had bent to do what the other does, too, from where no small step leads back.
+        """
+        for old in like:
+            first = next((rival for rival in old.rivals if rival.effect is new.effect), None)
+            others = [piece for piece in like if piece is not old]
+            known = (*beside, *(piece.setting for piece in others))
+            if first is None or len(old.free) < 2:
+                continue
+            own = [push for push in pushes if push.effect is old.effect]
+            start = self._fit.rough(own, self._fit.statistics((*known, first.setting), (1, 2)))
+            piece, _ = self._fit.alone(start, (*known, first.setting))
+            both = (
+                replace(old, setting=piece.setting, free=piece.free),
+                replace(new, setting=first.setting, free=first.free),
+            )
+            yield self._fit.together([*others, *both], beside)
 
     def _polished(self, chosen: Sequence[Piece]) -> list[Piece]:
         """Return all pieces fitted together, without weak ones that stood in for wrong sizes of others."""

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from kurumaisu.critic.laser.deviations import ELSEWHERE, near
 from kurumaisu.critic.laser.noise import ScanNoise
 from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
 _FAR = 6.0  # deviations of an outlier
-_ELSEWHERE = (
-    25.0  # deviations that hardly any noise reaches, however heavy its tails: it is a reading of something else
-)
 _COMMON = 0.005  # [m] plausible common mode of a scan, when it is read off one scan alone
 _CELL = 0.5  # [m] of the map in which errors are averaged
 _GRID = 1e-3  # [m] to which readings are rounded before their values are counted
@@ -85,7 +83,7 @@ class Statistics:
             both = inside[:, lag:] & inside[:, :-lag]
             out.append(float(np.mean(z[:, lag:][both] * z[:, :-lag][both])) / power)
         size = np.abs(left[inside])
-        out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > _ELSEWHERE)]
+        out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > ELSEWHERE)]
         far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
         out.append(_share((far[:, 1:] & far[:, :-1])[inside[:, 1:]]))
         out += [_log(float(np.mean(common**2))), float(common[1:] @ common[:-1]) / float(common @ common)]
@@ -111,7 +109,7 @@ class Statistics:
         return [
             *((f"spread, {name}", False) for name in groups),
             *((f"correlation of beams {lag} apart", False) for lag in (1, 2, 4)),
-            *((f"readings more than {far:g} sd off", True) for far in (3, 4.5, _FAR, _ELSEWHERE)),
+            *((f"readings more than {far:g} sd off", True) for far in (3, 4.5, _FAR, ELSEWHERE)),
             (f"neighbours more than {_FAR:g} sd off", True),
             ("spread of whole scans", False),
             ("correlation of whole scans", False),
@@ -133,7 +131,7 @@ class Statistics:
         z = error / self._sd
         known = self._trust & np.isfinite(z)
         fitted = np.zeros_like(z)
-        inside = known
+        inside = near(z, known)
         coefficients = np.zeros(self._size.shape)
         for _ in range(_ROUNDS):
             filled = np.where(inside, np.nan_to_num(z), fitted).astype(np.float32)
