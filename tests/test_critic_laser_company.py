@@ -57,7 +57,7 @@ def test_two_effects_act_together_though_each_explains_nearly_all_alone():
 
 def test_numbers_that_nothing_explains_yet_do_not_bend_what_explains_others():
     nulls = np.random.default_rng(1).standard_normal((50, 3))
-    likeness = Likeness(nulls, np.array([80.0, 5.0, 5.0]), np.zeros(3, dtype=bool))
+    likeness = Likeness(nulls, np.array([80.0, 5.0, 5.0]), np.zeros(3, dtype=bool), np.ones(3, dtype=bool))
     right, bent = np.array([0.0, 5.0, 5.0]), np.array([2.0, 17.0, 17.0])
     assert likeness.cost(right) < likeness.cost(bent)
     step = likeness.step(right, np.array([[2.0, 12.0, 12.0]]))

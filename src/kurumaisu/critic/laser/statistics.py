@@ -95,32 +95,37 @@ class Statistics:
 
     def names(self) -> list[str]:
         """Return what a reader calls the numbers, in their order."""
-        return [name for name, _ in self._told()]
+        return [name for name, *_ in self._told()]
 
     def counts(self) -> BoolArray:
         """Return which of the numbers are roots of counts."""
-        return np.array([count for _, count in self._told()])
+        return np.array([count for _, count, _ in self._told()])
 
-    def _told(self) -> list[tuple[str, bool]]:
+    def of_errors(self) -> BoolArray:
+        """Return which of the numbers follow how far readings are off their mean."""
+        return np.array([off for *_, off in self._told()])
+
+    def _told(self) -> list[tuple[str, bool, bool]]:
+        """Return the numbers' names, whether each is a root of a count, and whether it follows readings' errors."""
         groups = [
             f"reflectance {at}" if kind == "return" else f"{kind} {int(at) + 1} of 4"
             for kind, at in (name.split() for name in self._groups.names)
         ]
         return [
-            *((f"spread, {name}", False) for name in groups),
-            *((f"correlation of beams {lag} apart", False) for lag in (1, 2, 4)),
-            *((f"readings more than {far:g} sd off", True) for far in (3, 4.5, _FAR, ELSEWHERE)),
-            (f"neighbours more than {_FAR:g} sd off", True),
-            ("spread of whole scans", False),
-            ("correlation of whole scans", False),
-            ("spread of the beams' means", False),
-            ("spread of the places' means", False),
-            *((f"missing readings, {name}", True) for name in groups),
-            ("readings without return", True),
-            ("readings inside jumps", True),
-            ("different values", False),
-            ("readings of the least value", True),
-            ("readings of the greatest value", True),
+            *((f"spread, {name}", False, True) for name in groups),
+            *((f"correlation of beams {lag} apart", False, True) for lag in (1, 2, 4)),
+            *((f"readings more than {far:g} sd off", True, True) for far in (3, 4.5, _FAR, ELSEWHERE)),
+            (f"neighbours more than {_FAR:g} sd off", True, True),
+            ("spread of whole scans", False, True),
+            ("correlation of whole scans", False, True),
+            ("spread of the beams' means", False, True),
+            ("spread of the places' means", False, True),
+            *((f"missing readings, {name}", True, False) for name in groups),
+            ("readings without return", True, False),
+            ("readings inside jumps", True, False),
+            ("different values", False, False),
+            ("readings of the least value", True, False),
+            ("readings of the greatest value", True, False),
         ]
 
     def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
