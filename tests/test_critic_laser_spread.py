@@ -146,6 +146,16 @@ def test_readings_of_something_else_pull_no_scan_away(tmp_path):
     assert settled.beam_noise.valid.sum() > 0.9 * np.delete(every, np.s_[300:340], axis=1).sum()
 
 
+def test_what_errors_of_the_poses_move_is_no_reading_of_something_else(tmp_path):
+    """A heading that errs moves what an oblique beam reads by a hundred deviations, and all of it can be fitted."""
+    assembly = _assembly(tmp_path)
+    statistics = Statistics(assembly, ScanNoise(0.002, 0.005, 1e-4, 1.0))
+    turned = 0.015 * np.nan_to_num(assembly.poses[:, :, 2])
+    assert np.abs(turned / assembly.first.sd)[assembly.geometry].max() > 30
+    left = statistics._leftover(turned)[0]
+    assert np.nanmax(np.abs(left)) < 1.5
+
+
 def test_scans_at_a_jump_of_the_rates_say_nothing_about_the_scatter(tmp_path):
     assembly = _assembly(tmp_path)
     before = assembly.smooth_rows(len(assembly.hats))

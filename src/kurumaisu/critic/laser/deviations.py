@@ -32,14 +32,15 @@ class BeamNoise:
     own_sd: float = 0.0
 
 
-def near(z: FloatArray, known: BoolArray) -> BoolArray:
+def near(z: FloatArray, known: BoolArray, reach: FloatArray) -> BoolArray:
     """Return which readings are of what was to be met; z: in deviations from there, nothing fitted yet.
 
-    A scan whose first fit gives way to readings that are off by metres comes near none of the others, ever.
+    reach: by how many deviations errors that a scan shares move each of them, 1 sd. A scan whose first fit gives way to
+    readings that are off by metres comes near none of the others, ever.
     """
     width = MAD * float(np.median(np.abs(z[known]))) if known.any() else 0.0
     with np.errstate(invalid="ignore"):
-        return np.asarray(known & (np.abs(z) < max(ELSEWHERE, OUTLIER * width)))
+        return np.asarray(known & (np.abs(z) < np.maximum(max(ELSEWHERE, OUTLIER * width), OUTLIER * reach)))
 
 
 def refined(

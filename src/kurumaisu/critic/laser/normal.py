@@ -106,8 +106,10 @@ class Assembly:
 
     def _begun(self) -> BeamNoise:
         """Return the noise of the readings before any is known, without those that are of something else."""
+        size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
         with np.errstate(invalid="ignore"):
-            return replace(self.first, valid=near(self.residual / self.first.sd, self.first.valid))
+            reach = np.sqrt(np.sum((self.poses * size) ** 2, axis=2)) / self.first.sd
+            return replace(self.first, valid=near(self.residual / self.first.sd, self.first.valid, reach))
 
     def refine(self, fitted: Sequence[Form], beam: BeamNoise, scan: ScanNoise) -> None:
         """Put in place of each fitted form's shape the one between those of the grid that explains most."""

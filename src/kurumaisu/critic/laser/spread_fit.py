@@ -27,6 +27,7 @@ _FARTHEST = 3.0  # such a step, in units of the first difference
 _FINER = 0.5  # of one step's difference is the next one's
 _SETTLED = 0.3  # nats that another step must bring
 _FREE = 2.0  # nats that a further parameter must bring
+_PASSES = 2  # over an effect's further parameters: one may help only where another has been found
 _POOR = 15.0  # nats of misfit from which shapes of an effect are tried, too
 # Factor, at 90 %, by which another form of an effect that is empirical may pass for another size: all numbers follow it
 # together, so that many of them do not average it out. What one counts for each edge, another counts for each beam.
@@ -170,20 +171,29 @@ class ScatterFit:
         null = self._simulate.null(start.effect)
         setting = EffectSetting(start.effect.id, {**null, **start.values})
         (piece,), low = self.together([Piece(start.effect, setting, tuple(start.values), 0.0, 0.0)], beside)
-        for p in 2 * self._parameters(start.effect):  # one may help only where another has been found
-            if p.name in piece.free or low < _POOR:
-                continue
-            values = piece.setting.parameters
-            tried = [EffectSetting(start.effect.id, {**values, p.name: value}) for value in _sizes(p)]
-            misfits = [self.misfit((*beside, each)) for each in tried]
-            better = replace(piece, setting=tried[int(np.argmin(misfits))], free=(*piece.free, p.name))
-            if min(misfits) < low - _FREE:
-                (piece,), low = self.together([better], beside)
-            elif (start.effect.id, p.name) in self._shapes:
-                # A wider burst of fewer readings: neither of both helps alone.
-                (better,), misfit = self.together([replace(better, setting=piece.setting)], beside)
-                piece, low = (better, misfit) if misfit < low - _FREE else (piece, low)
+        for _ in range(_PASSES):
+            known = piece.free
+            for p in self._parameters(start.effect):
+                if p.name not in piece.free and low > _POOR:
+                    piece, low = self._with(p, piece, low, beside)
+            if piece.free == known:
+                break
         return piece, low
+
+    def _with(self, p: Parameter, piece: Piece, low: float, beside: Sequence[EffectSetting]) -> tuple[Piece, float]:
+        """Return an effect with a further parameter fitted, where that helps, and its misfit; low: without it."""
+        name, values = piece.setting.id, piece.setting.parameters
+        tried = [EffectSetting(name, {**values, p.name: value}) for value in _sizes(p)]
+        misfits = [self.misfit((*beside, each)) for each in tried]
+        more = replace(piece, setting=tried[int(np.argmin(misfits))], free=(*piece.free, p.name))
+        if min(misfits) < low - _FREE:
+            (better,), least = self.together([more], beside)
+        elif (name, p.name) in self._shapes:
+            # A wider burst of fewer readings: neither of both helps alone.
+            (better,), least = self.together([replace(more, setting=piece.setting)], beside)
+        else:
+            return piece, low
+        return (better, least) if least < low - _FREE else (piece, low)
 
     def together(self, pieces: Sequence[Piece], beside: Sequence[EffectSetting]) -> tuple[list[Piece], float]:
         """Return effects fitted together beside others, and the misfit."""

@@ -61,6 +61,7 @@ class Statistics:
         inverse = np.linalg.inv(inner)
         self._solve = (inverse @ weighed.transpose(0, 2, 1)).astype(np.float32)  # half the memory, twice as fast
         self._fitted = (self._basis / self._sd[:, :, np.newaxis]).astype(np.float32)
+        self._reach = np.sqrt(np.sum((self._basis * self._size[:, np.newaxis, :]) ** 2, axis=2)) / self._sd
         self._common_sd = _common_sd(inner, inverse, self._size)
 
     def pose_errors(self, rng: np.random.Generator) -> FloatArray:
@@ -136,7 +137,7 @@ class Statistics:
         z = error / self._sd
         known = self._trust & np.isfinite(z)
         fitted = np.zeros_like(z)
-        inside = near(z, known)
+        inside = near(z, known, self._reach)
         coefficients = np.zeros(self._size.shape)
         for _ in range(_ROUNDS):
             filled = np.where(inside, np.nan_to_num(z), fitted).astype(np.float32)

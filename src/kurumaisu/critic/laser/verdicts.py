@@ -179,12 +179,13 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
         settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
-    causes = tuple(
-        Cause(name, min(found.p[name], 1.0), estimates[name], _gain(made, name))
-        for name in settings
-        if found.p.get(name, 0.0) >= NAMED
-    )
     curve = made.winner is not None and made.curve and made.winner.free.id in matters
+    gains = {name: _gain(made, name) for name in settings if found.p.get(name, 0.0) >= NAMED}
+    # A curve is what one covariate shows of a thing nobody knows: what it leaves may be as much, and looks like others.
+    least = made.winner.belief.nats if made.winner is not None and curve else -np.inf
+    causes = tuple(
+        Cause(name, min(found.p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
+    )
     unknown = tuple(unknowns(made.weighed, normal.gram)) if curve else ()
     groups = () if curve else _confused(assembly, normal, made, causes)
     confounded = tuple(group for group in groups if matters & set(group))
