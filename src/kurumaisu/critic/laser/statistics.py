@@ -122,11 +122,11 @@ class Statistics:
             ("spread of the beams' means", False, True),
             ("spread of the places' means", False, True),
             *((f"missing readings, {name}", True, False) for name in groups),
-            ("readings without return", True, False),
-            ("readings inside jumps", True, False),
+            ("readings without return", True, True),
+            ("readings inside jumps", True, True),
             ("different values", False, False),
-            ("readings of the least value", True, False),
-            ("readings of the greatest value", True, False),
+            ("readings of the least value", True, True),
+            ("readings of the greatest value", True, True),
         ]
 
     def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
