@@ -64,6 +64,15 @@ def test_numbers_that_nothing_explains_yet_do_not_bend_what_explains_others():
     assert abs(step[0]) < 0.4, "the number that is far off would have it all the way"
 
 
+def test_a_tenth_more_readings_beyond_three_deviations_matters_to_nobody():
+    """So many come with a spread that differs by less than anyone minds."""
+    nulls = np.array([24.0, 1.2]) + 0.1 * np.random.default_rng(1).standard_normal((50, 2))
+    likeness = Likeness(nulls, np.array([25.2, 1.2]), np.ones(2, dtype=bool), np.ones(2, dtype=bool))
+    many, few = likeness.units(likeness.measured + np.array([0.0, 3.0]))
+    assert many < 0.9
+    assert few > 2.9
+
+
 def _forms():
     offset = effects.by_id("laser.offset").parameters[0]
     warmth = effects.by_id("laser.temperature").parameters[0]

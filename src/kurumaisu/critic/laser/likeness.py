@@ -11,6 +11,8 @@ from kurumaisu.types import BoolArray, FloatArray
 _SIMULATED = 0.5  # variance of the numbers of simulations, of which two are averaged, in theirs
 _COUNT = 1.0  # sd of twice the root of a count, also of one that is always 0 in simulations
 _MATTERS = 0.02  # of any other number, a log of a square or a correlation, by which it may differ and matter to nobody
+# Share of twice the root of a count likewise: a spread that differs by so little has a tenth more or less beyond 3 sds.
+_TAILS = 0.05
 _SILENT = 1e6  # sd of a number that says nothing
 _FAR = 5.0  # sds from which a number pulls no harder: what nothing explains yet must not bend what explains the others
 _DAMPED = 0.02  # share by which the curvature is raised: other draws make the slopes uncertain
@@ -23,11 +25,12 @@ class Likeness:
     def __init__(self, nulls: FloatArray, measured: FloatArray, counts: BoolArray, heard: BoolArray) -> None:
         """Take numbers of simulations of the model as it is (n, m), the measured ones (m,), which are roots of counts.
 
-        The latter have all the same sd, whatever there is to count. heard: numbers that say anything.
+        The latter have the same sd, few or many. heard: numbers that say anything.
         """
         self.offset, self.measured = nulls.mean(axis=0), measured
         spread = nulls.std(axis=0)
-        self.sd = np.where(counts, np.maximum(spread, _COUNT), np.hypot(spread, _MATTERS))
+        count_sd = np.hypot(np.maximum(spread, _COUNT), _TAILS * np.abs(self.offset))
+        self.sd = np.where(counts, count_sd, np.hypot(spread, _MATTERS))
         self.sd = np.where(heard, self.sd, _SILENT)
         unit = (nulls - self.offset) / self.sd
         half = 0.5 * (unit.T @ unit / len(nulls) + np.eye(len(measured)))  # few draws leave correlations uncertain

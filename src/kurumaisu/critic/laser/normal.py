@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
+from kurumaisu.critic.laser.blocked import blocked
 from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, near, refined
 from kurumaisu.critic.laser.free import blocks
@@ -50,12 +51,13 @@ class Assembly:
         self.kinked = [np.zeros(len(track.times), dtype=bool) for track in shots.tracks]
         self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
         self._linearise(shots, roughly=True)
+        self.blocked = blocked(shots.measured, self.marks.base)
         self.first = self._trust()
         for i in range(_SHIFTS):
             found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._errors())
             self._linearise(found, roughly=i < _SHIFTS - 1)
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
-        self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base)
+        self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base) & ~self.blocked
         self.forms, fixed = self.marks.forms(ids)
         self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
         self.columns = np.concatenate([fixed, more], axis=2)
@@ -77,7 +79,7 @@ class Assembly:
         one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
         sd = np.maximum(np.nan_to_num(one), _LEAST)  # a beam that meets nothing has none
         smooth = self._on_smooth_path()[:, np.newaxis]
-        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & smooth)
+        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & smooth & ~self.blocked)
 
     def _on_smooth_path(self) -> BoolArray:
         """Return which scans (k,) lie where the chair's path is smooth; all where that is seldom."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.laser import pictures, rivals, still
+from kurumaisu.critic.laser.blocked import told
 from kurumaisu.critic.laser.estimates import estimates_of, of_block, settings_of, with_scatter
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
@@ -186,7 +187,8 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     causes = tuple(
         Cause(name, min(found.p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
     )
-    unknown = tuple(unknowns(made.weighed, normal.gram)) if curve else ()
+    unknown = tuple(told(assembly.blocked, assembly.shots.measured, assembly.shots.laser.bearings))
+    unknown += tuple(unknowns(made.weighed, normal.gram)) if curve else ()
     groups = () if curve else _confused(assembly, normal, made, causes)
     confounded = tuple(group for group in groups if matters & set(group))
     causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
