@@ -85,10 +85,12 @@ def criticise(
     progress("laser: fitting what acts")
     fit = pinned(assembly, normal, made.fit.forms, settings_of(assembly, made.fit), made.winner, recording.truth)
     progress("laser: weighing effects on the scatter")
-    scatter, comparison = _scatter(assembly, normal, fit, ids, strange=made.curve)
+    scatter, comparison = _scatter(assembly, fit, ids, strange=made.curve)
     if not made.curve:
-        seen = assembly.common_mode(normal, recording.truth, made.fit.forms)
-        scatter = with_whole_scans(scatter, seen, normal.scan_noise, recording, ids)
+        # Seen anew, scans have no forms to project out; where they were not, effects may have moved them all together.
+        again = fit.assembly is not assembly
+        seen = fit.assembly.common_mode(fit.normal, recording.truth, () if again else made.fit.forms)
+        scatter = with_whole_scans(scatter, seen, fit.normal.scan_noise, recording, ids)
         scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made))
     finding = _finding(assembly, normal, made, fit, scatter)
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
@@ -148,7 +150,7 @@ def _with(winner: Rival, normal: Normal) -> tuple[Fitted, Rival, FloatArray, Flo
 
 
 def _scatter(
-    assembly: Assembly, normal: Normal, fit: Pinned, ids: frozenset[str] | None, *, strange: bool
+    assembly: Assembly, fit: Pinned, ids: frozenset[str] | None, *, strange: bool
 ) -> tuple[list[Scatter], tuple[Comparison, ...]]:
     """Return the effects on how readings scatter about the best fit of their mean, and what they mend.
 
@@ -157,7 +159,7 @@ def _scatter(
     """
     rows = fit.assembly.smooth_rows(_SCATTERED)
     few = fit.assembly.thinned(rows)
-    statistics = Statistics(few, normal.scan_noise)
+    statistics = Statistics(few, fit.normal.scan_noise)
     means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
     measured = few.shots.measured
