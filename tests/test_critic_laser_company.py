@@ -57,11 +57,20 @@ def test_two_effects_act_together_though_each_explains_nearly_all_alone():
 
 def test_numbers_that_nothing_explains_yet_do_not_bend_what_explains_others():
     nulls = np.random.default_rng(1).standard_normal((50, 3))
-    likeness = Likeness(nulls, np.array([80.0, 5.0, 5.0]), np.zeros(3, dtype=bool))
+    likeness = Likeness(nulls, np.array([80.0, 5.0, 5.0]), np.zeros(3, dtype=bool), np.ones(3, dtype=bool))
     right, bent = np.array([0.0, 5.0, 5.0]), np.array([2.0, 17.0, 17.0])
     assert likeness.cost(right) < likeness.cost(bent)
     step = likeness.step(right, np.array([[2.0, 12.0, 12.0]]))
     assert abs(step[0]) < 0.4, "the number that is far off would have it all the way"
+
+
+def test_a_tenth_more_readings_beyond_three_deviations_matters_to_nobody():
+    """So many come with a spread that differs by less than anyone minds."""
+    nulls = np.array([24.0, 1.2]) + 0.1 * np.random.default_rng(1).standard_normal((50, 2))
+    likeness = Likeness(nulls, np.array([25.2, 1.2]), np.ones(2, dtype=bool), np.ones(2, dtype=bool))
+    many, few = likeness.units(likeness.measured + np.array([0.0, 3.0]))
+    assert many < 0.9
+    assert few > 2.9
 
 
 def _forms():

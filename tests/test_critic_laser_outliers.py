@@ -30,8 +30,27 @@ def in_bursts(rng, scan):
 
 @pytest.mark.parametrize(("spoil", "name"), [(anywhere, "laser.heavy_tails"), (in_bursts, "laser.crosstalk")])
 def test_outliers_anywhere_are_tails_and_bursts_are_crosstalk(tmp_path, spoil, name):
-    told, rng = recording(tmp_path, None, 0.0, 6, scans=30), np.random.default_rng(11)
+    told, rng = recording(tmp_path, None, 0.0, 6, scans=30), np.random.default_rng(12)
     runs = tuple(replace(run, scan=replace(run.scan, values=np.round(spoil(rng, run.scan), 3))) for run in told.runs)
     finding = criticise(replace(told, runs=runs), MODEL, lambda _: None, IDS)
     assert [cause.id for cause in finding.causes] == [name]
     assert not finding.confounded
+
+
+def test_a_burst_is_not_bent_to_do_what_beams_lose(tmp_path):
+    """Alone, bursts that reach next to nothing do for both; they must be begun anew where losses are known."""
+    told, rng = recording(tmp_path, "laser.dropout", 0.04, 6, scans=30), np.random.default_rng(11)
+    runs = tuple(
+        replace(
+            run,
+            scan=replace(
+                run.scan,
+                values=np.where(np.isnan(run.scan.values), np.nan, np.round(in_bursts(rng, run.scan), 3)),
+            ),
+        )
+        for run in told.runs
+    )
+    finding = criticise(replace(told, runs=runs), MODEL, lambda _: None, IDS | {"laser.dropout"})
+    causes = {cause.id: cause.parameters for cause in finding.causes}
+    assert set(causes) == {"laser.crosstalk", "laser.dropout"}
+    assert causes["laser.dropout"]["probability"].estimate == pytest.approx(0.04, rel=0.3)

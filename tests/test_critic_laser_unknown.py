@@ -51,6 +51,17 @@ def test_a_step_of_the_range_is_outside_the_catalogue(tmp_path, size):
     assert beyond - near == pytest.approx(size, rel=0.4)
 
 
+def test_beside_what_is_in_no_catalogue_nothing_is_told_of_scatter_but_what_is_lost(tmp_path):
+    """Knots miss the edges of a stripe, which then looks like noise, tails, and scans that are off together."""
+    data = recording(tmp_path, "laser.dropout", 0.1, 11, scans=30)
+    run = data.runs[0]
+    stripe = 0.03 * (np.abs(np.arange(run.scan.values.shape[1]) - 450) < 30)
+    data = replace(data, runs=(replace(run, scan=replace(run.scan, values=np.round(run.scan.values - stripe, 3))),))
+    finding = criticise(data, MODEL, say)
+    assert finding.unknown[0].covariate == "bearing"
+    assert {cause.id for cause in finding.causes} == {"laser.dropout"}
+
+
 def added(setting, ranges):
     """What an effect adds to the mean of one reading [m]."""
     chain = effects.build_laser((setting,), np.random.default_rng(0))

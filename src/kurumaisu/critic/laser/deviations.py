@@ -13,6 +13,8 @@ from kurumaisu.critic.laser.shots import Look
 from kurumaisu.types import BoolArray, FloatArray
 
 OUTLIER = 4.5  # deviations from which a reading does not count
+# Deviations that hardly any noise reaches, however heavy its tails: it is a reading of something else.
+ELSEWHERE = 25.0
 MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
 _BINS = 6  # of the range, and of the incidence, in which the deviation is estimated
 _JOLT = 4.0  # sds among scans from which one of them does not count
@@ -28,6 +30,17 @@ class BeamNoise:
     rho: float
     valid: BoolArray
     own_sd: float = 0.0
+
+
+def near(z: FloatArray, known: BoolArray, reach: FloatArray) -> BoolArray:
+    """Return which readings are of what was to be met; z: in deviations from there, nothing fitted yet.
+
+    reach: by how many deviations errors that a scan shares move each of them, 1 sd. A scan whose first fit gives way to
+    readings that are off by metres comes near none of the others, ever.
+    """
+    width = MAD * float(np.median(np.abs(z[known]))) if known.any() else 0.0
+    with np.errstate(invalid="ignore"):
+        return np.asarray(known & (np.abs(z) < np.maximum(max(ELSEWHERE, OUTLIER * width), OUTLIER * reach)))
 
 
 def refined(

@@ -98,8 +98,9 @@ def _off_null(setting: EffectSetting) -> dict[str, float]:
 def _joined(cause: Cause | None, scatter: Scatter) -> Cause:
     parameters = {p.name: p for p in effects.by_id(scatter.setting.id).parameters}
     estimates = dict(cause.parameters) if cause is not None else {}
-    for name, sd in scatter.sds.items():
-        p, value, half = parameters[name], scatter.setting.parameters[name], NORMAL90 * sd
-        estimates[name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
+    for name, (below, above) in scatter.sds.items():
+        p, value = parameters[name], scatter.setting.parameters[name]
+        low, high = max(value - NORMAL90 * below, p.lower), min(value + NORMAL90 * above, p.upper)
+        estimates[name] = Estimate(value, low, high, p.unit)
     nats = scatter.nats + (cause.gain_nats if cause is not None else 0.0)
     return Cause(scatter.setting.id, max(min(scatter.p, 1.0), cause.p if cause is not None else 0.0), estimates, nats)

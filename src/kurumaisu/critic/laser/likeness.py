@@ -11,6 +11,9 @@ from kurumaisu.types import BoolArray, FloatArray
 _SIMULATED = 0.5  # variance of the numbers of simulations, of which two are averaged, in theirs
 _COUNT = 1.0  # sd of twice the root of a count, also of one that is always 0 in simulations
 _MATTERS = 0.02  # of any other number, a log of a square or a correlation, by which it may differ and matter to nobody
+# Share of twice the root of a count likewise: a spread that differs by so little has a tenth more or less beyond 3 sds.
+_TAILS = 0.05
+_SILENT = 1e6  # sd of a number that says nothing
 _FAR = 5.0  # sds from which a number pulls no harder: what nothing explains yet must not bend what explains the others
 _DAMPED = 0.02  # share by which the curvature is raised: other draws make the slopes uncertain
 _FORM = 0.1  # share of what an effect does to a number, by which a real effect of that name may do more or less
@@ -19,14 +22,16 @@ _FORM = 0.1  # share of what an effect does to a number, by which a real effect 
 class Likeness:
     """Normal numbers about those of a simulation, with the covariance of the model's own."""
 
-    def __init__(self, nulls: FloatArray, measured: FloatArray, counts: BoolArray) -> None:
+    def __init__(self, nulls: FloatArray, measured: FloatArray, counts: BoolArray, heard: BoolArray) -> None:
         """Take numbers of simulations of the model as it is (n, m), the measured ones (m,), which are roots of counts.
 
-        The latter have all the same sd, whatever there is to count.
+        The latter have the same sd, few or many. heard: numbers that say anything.
         """
         self.offset, self.measured = nulls.mean(axis=0), measured
         spread = nulls.std(axis=0)
-        self.sd = np.where(counts, np.maximum(spread, _COUNT), np.hypot(spread, _MATTERS))
+        count_sd = np.hypot(np.maximum(spread, _COUNT), _TAILS * np.abs(self.offset))
+        self.sd = np.where(counts, count_sd, np.hypot(spread, _MATTERS))
+        self.sd = np.where(heard, self.sd, _SILENT)
         unit = (nulls - self.offset) / self.sd
         half = 0.5 * (unit.T @ unit / len(nulls) + np.eye(len(measured)))  # few draws leave correlations uncertain
         self._covariance = (1 + _SIMULATED) * half
@@ -44,6 +49,11 @@ class Likeness:
         near = np.minimum(np.abs(white), _FAR)
         misfit = float(np.sum(near * (np.abs(white) - 0.5 * near)))
         return misfit - 0.5 * self._log_det + float(np.log(np.diag(lower)).sum())
+
+    def heat(self, numbers: FloatArray) -> float:
+        """Return the mean square by which the measured numbers are off simulated ones, in sds; 1 at least."""
+        far = np.minimum(np.abs(self.whitened(numbers - self.measured, numbers)), _FAR)
+        return max(float(np.mean(far**2)), 1.0)
 
     def step(self, numbers: FloatArray, slopes: FloatArray) -> FloatArray:
         """Return the shares (n,) of some changes of the numbers (n, m) that bring them closest to the measured ones."""

@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
+from kurumaisu.critic.laser.blocked import blocked
 from kurumaisu.critic.laser.columns import Form, Marks
-from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, refined
+from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, near, refined
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate, marginal, whitened
 from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, rows_of
@@ -50,12 +51,13 @@ class Assembly:
         self.kinked = [np.zeros(len(track.times), dtype=bool) for track in shots.tracks]
         self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
         self._linearise(shots, roughly=True)
+        self.blocked = blocked(shots.measured, self.marks.base)
         self.first = self._trust()
         for i in range(_SHIFTS):
             found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._errors())
             self._linearise(found, roughly=i < _SHIFTS - 1)
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
-        self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base)
+        self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base) & ~self.blocked
         self.forms, fixed = self.marks.forms(ids)
         self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
         self.columns = np.concatenate([fixed, more], axis=2)
@@ -77,7 +79,7 @@ class Assembly:
         one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
         sd = np.maximum(np.nan_to_num(one), _LEAST)  # a beam that meets nothing has none
         smooth = self._on_smooth_path()[:, np.newaxis]
-        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & smooth)
+        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & smooth & ~self.blocked)
 
     def _on_smooth_path(self) -> BoolArray:
         """Return which scans (k,) lie where the chair's path is smooth; all where that is seldom."""
@@ -87,7 +89,7 @@ class Assembly:
     def _errors(self) -> list[FloatArray]:
         """Return the errors of the poses (q, 3) under each scan, by that scan alone, within what is plausible."""
         size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
-        beam = self.first
+        beam = self._begun()
         out: list[FloatArray] = []
         for _ in range(2):  # without outliers in the second round
             left, out = np.full_like(self.residual, np.nan), []
@@ -103,6 +105,13 @@ class Assembly:
             z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
             beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * MAD * np.nanmedian(z)))
         return out
+
+    def _begun(self) -> BeamNoise:
+        """Return the noise of the readings before any is known, without those that are of something else."""
+        size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
+        with np.errstate(invalid="ignore"):
+            reach = np.sqrt(np.sum((self.poses * size) ** 2, axis=2)) / self.first.sd
+            return replace(self.first, valid=near(self.residual / self.first.sd, self.first.valid, reach))
 
     def refine(self, fitted: Sequence[Form], beam: BeamNoise, scan: ScanNoise) -> None:
         """Put in place of each fitted form's shape the one between those of the grid that explains most."""
@@ -146,7 +155,7 @@ class Assembly:
         Without the blocks of many columns, but for those that change whole scans.
         """
         project = self._projected(fitted)
-        beam = self.first
+        beam = self._begun()
         for _ in range(_ROUNDS):
             beam = refined(self.first, beam, lambda last: self.leftover(last, project), self.marks.seen, self.layout)
         narrow = max((free.span.stop for free in self.free if free.whole), default=self._fixed)

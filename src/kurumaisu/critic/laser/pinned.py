@@ -46,12 +46,14 @@ class _Free:
 class Pinned:
     """Settings of what acts on the mean, with the sds of what was fitted; where that was, and what it leaves.
 
-    assembly: the scans as they are seen with these effects, where any of them moves beams; left (k, b) [m]: of the
-    residual there; missed (k, b, n) [m]: what equations that are only nearly right may have wrong in it, 1 sd.
+    assembly: the scans as they are seen with these effects, where any of them moves beams; normal: the noise there, as
+    far as it was estimated anew; left (k, b) [m]: of the residual there; missed (k, b, n) [m]: what equations that are
+    only nearly right may have wrong in it, 1 sd.
     """
 
     settings: tuple[tuple[EffectSetting, dict[str, float]], ...]
     assembly: Assembly
+    normal: Normal
     left: FloatArray
     missed: FloatArray
 
@@ -69,7 +71,7 @@ def pinned(
     winner: a block that acts beside them, whose coefficients are integrated out; truth: known sd of the reference.
     """
     if not forms and winner is None:
-        return Pinned((), assembly, assembly.residual, np.empty((*assembly.residual.shape, 0)))
+        return Pinned((), assembly, normal, assembly.residual, np.empty((*assembly.residual.shape, 0)))
     at = [dict(setting.parameters) for setting in settings]
     block = _block(assembly, winner)
     # What is as large as a reading's own scatter has moved poses, and made outliers of readings, as much.
@@ -103,7 +105,7 @@ def pinned(
     for each, sd in zip(free, sds.tolist(), strict=True):
         out[each.index][each.parameter.name] = sd
     missed = FORM * np.nan_to_num(np.stack(signals, axis=-1)) if signals else np.empty((*left.shape, 0))
-    return Pinned(tuple(zip(_settings(forms, at), out, strict=True)), assembly, left, missed)
+    return Pinned(tuple(zip(_settings(forms, at), out, strict=True)), assembly, normal, left, missed)
 
 
 def _signals(

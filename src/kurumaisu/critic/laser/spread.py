@@ -20,7 +20,7 @@ from kurumaisu.critic.prior import log_prior, occam
 from kurumaisu.critic.story import Comparison
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray
 
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
 _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
@@ -36,7 +36,7 @@ _OVERLAP = 0.3  # cosine of two effects' changes of the statistics, from which t
 
 @dataclass(frozen=True)
 class Scatter:
-    """Effects on the scatter: a setting each, with the posterior, the log evidence, and sds of the parameters.
+    """Effects on the scatter: a setting each, with the posterior, the log evidence, and sds below and above parameters.
 
     rivals: posterior of effects that may act in its place.
     """
@@ -44,12 +44,16 @@ class Scatter:
     setting: EffectSetting
     p: float
     nats: float
-    sds: Mapping[str, float]
+    sds: Mapping[str, tuple[float, float]]
     rivals: Mapping[str, float]
 
 
 def _low(rough: Rough) -> float:
     return rough.low
+
+
+def _cost(fitted: tuple[list[Piece], float]) -> float:
+    return fitted[1]
 
 
 def _nats(piece: Piece) -> float:
@@ -66,13 +70,18 @@ class ScatterSearch:
     """Finds the effects that the statistics call for."""
 
     def __init__(
-        self, simulate: Simulator, measured: FloatArray, means: Sequence[str], ids: frozenset[str] | None = None
+        self,
+        simulate: Simulator,
+        measured: FloatArray,
+        means: Sequence[str],
+        ids: frozenset[str] | None = None,
+        heard: BoolArray | None = None,
     ) -> None:
         """Take the measured statistics; means: parameters, as id.name, that act on the mean and are not for here.
 
-        ids: the effects to look for; None for all.
+        ids: the effects to look for, heard: which of the statistics say anything; None for all.
         """
-        self._fit = ScatterFit(simulate, measured, means, ids)
+        self._fit = ScatterFit(simulate, measured, means, ids, heard)
         self._likeness = self._fit.likeness
 
     def run(self) -> list[Scatter]:
@@ -86,7 +95,7 @@ class ScatterSearch:
             new = self._step(pushes, chosen, gone)
             if new is None or new.nats < self._least(chosen, new):
                 break
-            chosen = self._settled(chosen, new, gone)
+            chosen = self._settled(pushes, chosen, new, gone)
         chosen = self._reweighed(self._polished(chosen))
         settings = [piece.setting for piece in chosen]
         return [
@@ -112,6 +121,9 @@ class ScatterSearch:
         units = self._likeness.units
         return bool(np.abs(units(self._likeness.measured) - units(numbers)).max() >= _QUIET)
 
+    def _heat(self, settings: Sequence[EffectSetting]) -> float:
+        return self._likeness.heat(self._fit.statistics(settings, (1, 2)))
+
     def _step(self, pushes: Sequence[Push], chosen: Sequence[Piece], gone: set[type[Mechanism]]) -> Piece | None:
         """Return the effect to add; None where there is too little."""
         beside = [piece.setting for piece in chosen]
@@ -133,7 +145,9 @@ class ScatterSearch:
         if (best is None or best.nats < self._least(chosen, best)) and self._off(at):
             tried = [*tried, *self._halved(chosen, without, here)]
             best = _weighed([max(same, key=_nats) for same in _by_effect(tried)]) if tried else None
-        return None if best is None or best.nats < 0 else best
+        if best is None or best.nats < 0:
+            return None
+        return _weighed([best, *best.rivals], self._heat([*beside, best.setting]))
 
     def _halved(self, chosen: Sequence[Piece], without: set[type[Mechanism]], here: float) -> Iterator[Piece]:
         """Yield rivals of the chosen effects, each fitted together with the one that was taken for it.
@@ -159,7 +173,9 @@ class ScatterSearch:
             beside = [other.setting for other in others]
             without = self._fit.misfit(beside)
             tried = [self._fit.together([one], beside) for one in (piece, *rivals)]
-            out[i] = _weighed([_valued(one, without - misfit) for (one,), misfit in tried])
+            valued = [_valued(one, without - misfit) for (one,), misfit in tried]
+            heat = self._heat([*beside, max(valued, key=_nats).setting])
+            out[i] = _weighed(valued, heat)
         swapped = any(one.effect is not other.effect for one, other in zip(out, chosen, strict=True))
         return self._polished(out) if swapped else out
 
@@ -168,14 +184,18 @@ class ScatterSearch:
         left = (_LEFT * piece.nats * self._fit.overlap(piece, new) ** 2 for piece in chosen)
         return max(_ENOUGH, *(min(_MOST_LEFT, nats) for nats in left)) if chosen else _ENOUGH
 
-    def _settled(self, chosen: Sequence[Piece], new: Piece, gone: set[type[Mechanism]]) -> list[Piece]:
+    def _settled(
+        self, pushes: Sequence[Push], chosen: Sequence[Piece], new: Piece, gone: set[type[Mechanism]]
+    ) -> list[Piece]:
         """Return the pieces with a new one, fitted together with those like it; what it makes superfluous is gone."""
         like = [piece for piece in chosen if self._fit.overlap(piece, new) > _OVERLAP]
         rest = [piece for piece in chosen if piece not in like]
         if not like:
             return [*chosen, new]
         beside = [piece.setting for piece in rest]
-        group, cost = self._fit.together([*like, new], beside)
+        group, cost = min(
+            [self._fit.together([*like, new], beside), *self._other_way(pushes, like, new, beside)], key=_cost
+        )
         for old in like:
             fewer, more = self._fit.together([piece for piece in group if piece.effect is not old.effect], beside)
             z = np.sqrt(max(2 * (more - cost), 0.0))
@@ -186,6 +206,28 @@ class ScatterSearch:
             else:
                 group = [replace(piece, nats=nats) if piece.effect is old.effect else piece for piece in group]
         return [*rest, *group]
+
+    def _other_way(
+        self, pushes: Sequence[Push], like: Sequence[Piece], new: Piece, beside: Sequence[EffectSetting]
+    ) -> Iterator[tuple[list[Piece], float]]:
+        """Yield fits of an effect and a new one as if the new one had come first, and their misfits.
+
+        Alone, one of several shapes had bent to do what the other does, too, from where no small step leads back.
+        """
+        for old in like:
+            first = next((rival for rival in old.rivals if rival.effect is new.effect), None)
+            others = [piece for piece in like if piece is not old]
+            known = (*beside, *(piece.setting for piece in others))
+            if first is None or len(old.free) < 2:
+                continue
+            own = [push for push in pushes if push.effect is old.effect]
+            start = self._fit.rough(own, self._fit.statistics((*known, first.setting), (1, 2)))
+            piece, _ = self._fit.alone(start, (*known, first.setting))
+            both = (
+                replace(old, setting=piece.setting, free=piece.free),
+                replace(new, setting=first.setting, free=first.free),
+            )
+            yield self._fit.together([*others, *both], beside)
 
     def _polished(self, chosen: Sequence[Piece]) -> list[Piece]:
         """Return all pieces fitted together, without weak ones that stood in for wrong sizes of others."""
@@ -213,9 +255,15 @@ def _valued(piece: Piece, gain: float) -> Piece:
     return replace(piece, nats=gain - cost + log_prior(1, count) - log_prior(0, count))
 
 
-def _weighed(tried: Sequence[Piece]) -> Piece:
-    """Return the likeliest of some pieces with its posterior, and the others as its rivals with theirs."""
-    total = logsumexp([0.0, *(piece.nats for piece in tried)])
-    every = [replace(piece, p=float(np.exp(piece.nats - total)), rivals=()) for piece in tried]
-    best = max(every, key=lambda piece: piece.nats)
+def _weighed(tried: Sequence[Piece], heat: float = 1.0) -> Piece:
+    """Return the likeliest of some pieces with its posterior, and the others as its rivals with theirs.
+
+    heat: by how much what the likeliest leaves is more than chance [1]; where none of them fits, odds between them are
+    worth as much less.
+    """
+    nats = np.array([piece.nats for piece in tried])
+    some = -np.expm1(-logsumexp([0.0, *nats]))
+    shares = some * np.exp(nats / heat - logsumexp(nats / heat))
+    every = [replace(piece, p=float(p), rivals=()) for piece, p in zip(tried, shares, strict=True)]
+    best = max(every, key=_nats)
     return replace(best, rivals=tuple(piece for piece in every if piece is not best))

@@ -14,9 +14,10 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.laser.likeness import Likeness
 from kurumaisu.critic.laser.simulated import Simulator
+from kurumaisu.critic.verdict import NORMAL90
 from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray
 
 _NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
 _SIZES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # in units of a parameter's scale, tried first
@@ -26,10 +27,11 @@ _FARTHEST = 3.0  # such a step, in units of the first difference
 _FINER = 0.5  # of one step's difference is the next one's
 _SETTLED = 0.3  # nats that another step must bring
 _FREE = 2.0  # nats that a further parameter must bring
+_PASSES = 2  # over an effect's further parameters: one may help only where another has been found
 _POOR = 15.0  # nats of misfit from which shapes of an effect are tried, too
-# Share of its size, 1 sd, by which another form of an effect that is empirical may pass for another size: all numbers
-# follow it together, so that many of them do not average it out. Two papers' tails or edges agree no better.
-_OTHER = 0.3
+# Factor, at 90 %, by which another form of an effect that is empirical may pass for another size: all numbers follow it
+# together, so that many of them do not average it out. What one counts for each edge, another counts for each beam.
+_OTHER = 2.0
 
 
 @dataclass(frozen=True)
@@ -75,17 +77,24 @@ class ScatterFit:
     """Fits effects to the statistics."""
 
     def __init__(
-        self, simulate: Simulator, measured: FloatArray, means: Sequence[str], ids: frozenset[str] | None = None
+        self,
+        simulate: Simulator,
+        measured: FloatArray,
+        means: Sequence[str],
+        ids: frozenset[str] | None = None,
+        heard: BoolArray | None = None,
     ) -> None:
         """Take the measured statistics; means: parameters, as id.name, that act on the mean and are not for here.
 
-        ids: the effects to look for; None for all.
+        ids: the effects to look for, heard: which of the statistics say anything; None for all.
         """
         self._ids = ids
         nulls = simulate.nulls(range(1000, 1000 + _NULLS))
         self._simulate, self._means = simulate, set(means)
         self._shapes: set[tuple[str, str]] = set()
-        self.likeness = Likeness(nulls, measured, simulate.counts())
+        self.likeness = Likeness(
+            nulls, measured, simulate.counts(), np.ones(len(measured), dtype=bool) if heard is None else heard
+        )
 
     def overlap(self, one: Piece, other: Piece) -> float:
         """Return the cosine of what two effects do to the statistics, whatever its sign."""
@@ -162,16 +171,29 @@ class ScatterFit:
         null = self._simulate.null(start.effect)
         setting = EffectSetting(start.effect.id, {**null, **start.values})
         (piece,), low = self.together([Piece(start.effect, setting, tuple(start.values), 0.0, 0.0)], beside)
-        for p in self._parameters(start.effect) if low > _POOR else ():
-            if p.name in piece.free:
-                continue
-            values = piece.setting.parameters
-            tried = [EffectSetting(start.effect.id, {**values, p.name: value}) for value in _sizes(p)]
-            misfits = [self.misfit((*beside, each)) for each in tried]
-            if min(misfits) < low - _FREE:
-                better = replace(piece, setting=tried[int(np.argmin(misfits))], free=(*piece.free, p.name))
-                (piece,), low = self.together([better], beside)
+        for _ in range(_PASSES):
+            known = piece.free
+            for p in self._parameters(start.effect):
+                if p.name not in piece.free and low > _POOR:
+                    piece, low = self._with(p, piece, low, beside)
+            if piece.free == known:
+                break
         return piece, low
+
+    def _with(self, p: Parameter, piece: Piece, low: float, beside: Sequence[EffectSetting]) -> tuple[Piece, float]:
+        """Return an effect with a further parameter fitted, where that helps, and its misfit; low: without it."""
+        name, values = piece.setting.id, piece.setting.parameters
+        tried = [EffectSetting(name, {**values, p.name: value}) for value in _sizes(p)]
+        misfits = [self.misfit((*beside, each)) for each in tried]
+        more = replace(piece, setting=tried[int(np.argmin(misfits))], free=(*piece.free, p.name))
+        if min(misfits) < low - _FREE:
+            (better,), least = self.together([more], beside)
+        elif (name, p.name) in self._shapes:
+            # A wider burst of fewer readings: neither of both helps alone.
+            (better,), least = self.together([replace(more, setting=piece.setting)], beside)
+        else:
+            return piece, low
+        return (better, least) if least < low - _FREE else (piece, low)
 
     def together(self, pieces: Sequence[Piece], beside: Sequence[EffectSetting]) -> tuple[list[Piece], float]:
         """Return effects fitted together beside others, and the misfit."""
@@ -205,8 +227,8 @@ class ScatterFit:
                 break
         return at(x), low
 
-    def errors(self, piece: Piece, every: Sequence[EffectSetting]) -> dict[str, float]:
-        """Return sds of the parameters that were fitted, from how the statistics follow each.
+    def errors(self, piece: Piece, every: Sequence[EffectSetting]) -> dict[str, tuple[float, float]]:
+        """Return sds below and above the parameters that were fitted, from how the statistics follow each.
 
         The effect's other parameters are in doubt, too, fitted or not: as far as is usual. So is its form.
         """
@@ -237,10 +259,19 @@ class ScatterFit:
         prior = np.array([1.0 if p.name in usual else 1e-4 for p in parameters])
         inverse = np.linalg.inv((j * scale).T @ (j * scale) + np.diag(prior))
         sds = np.sqrt(np.diag(inverse)) * scale
-        other = _OTHER if piece.effect.empirical else 0.0
-        form = [other * abs(setting.parameters[p.name] - p.null) * (p.name not in shapes) for p in parameters]
-        sds = np.hypot(sds, form)
-        return {p.name: float(sd) for p, sd in zip(parameters, sds, strict=True) if p.name in piece.free}
+        form = np.array([_of_form(piece, p) if p.name not in shapes else (0.0, 0.0) for p in parameters])
+        both = np.hypot(sds[:, np.newaxis], form).tolist()
+        return {p.name: (low, high) for p, (low, high) in zip(parameters, both, strict=True) if p.name in piece.free}
+
+
+def _of_form(piece: Piece, p: Parameter) -> tuple[float, float]:
+    """Return the sds below and above a parameter by which another form passes for another size.
+
+    What cannot change its sign is off by a factor either way, of anything else as much of its size.
+    """
+    size = abs(piece.setting.parameters[p.name] - p.null) * piece.effect.empirical / NORMAL90
+    below = (1 - 1 / _OTHER) * size
+    return below, (_OTHER - 1) * size if p.lower >= p.null else below
 
 
 def _step(p: Parameter, value: float) -> float:

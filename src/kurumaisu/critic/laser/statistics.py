@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from kurumaisu.critic.laser.deviations import ELSEWHERE, near
 from kurumaisu.critic.laser.noise import ScanNoise
 from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
 _FAR = 6.0  # deviations of an outlier
-_ELSEWHERE = (
-    25.0  # deviations that hardly any noise reaches, however heavy its tails: it is a reading of something else
-)
 _COMMON = 0.005  # [m] plausible common mode of a scan, when it is read off one scan alone
 _CELL = 0.5  # [m] of the map in which errors are averaged
 _GRID = 1e-3  # [m] to which readings are rounded before their values are counted
@@ -63,6 +61,7 @@ class Statistics:
         inverse = np.linalg.inv(inner)
         self._solve = (inverse @ weighed.transpose(0, 2, 1)).astype(np.float32)  # half the memory, twice as fast
         self._fitted = (self._basis / self._sd[:, :, np.newaxis]).astype(np.float32)
+        self._reach = np.sqrt(np.sum((self._basis * self._size[:, np.newaxis, :]) ** 2, axis=2)) / self._sd
         self._common_sd = _common_sd(inner, inverse, self._size)
 
     def pose_errors(self, rng: np.random.Generator) -> FloatArray:
@@ -85,7 +84,7 @@ class Statistics:
             both = inside[:, lag:] & inside[:, :-lag]
             out.append(float(np.mean(z[:, lag:][both] * z[:, :-lag][both])) / power)
         size = np.abs(left[inside])
-        out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > _ELSEWHERE)]
+        out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > ELSEWHERE)]
         far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
         out.append(_share((far[:, 1:] & far[:, :-1])[inside[:, 1:]]))
         out += [_log(float(np.mean(common**2))), float(common[1:] @ common[:-1]) / float(common @ common)]
@@ -97,32 +96,37 @@ class Statistics:
 
     def names(self) -> list[str]:
         """Return what a reader calls the numbers, in their order."""
-        return [name for name, _ in self._told()]
+        return [name for name, *_ in self._told()]
 
     def counts(self) -> BoolArray:
         """Return which of the numbers are roots of counts."""
-        return np.array([count for _, count in self._told()])
+        return np.array([count for _, count, _ in self._told()])
 
-    def _told(self) -> list[tuple[str, bool]]:
+    def of_errors(self) -> BoolArray:
+        """Return which of the numbers follow how far readings are off their mean."""
+        return np.array([off for *_, off in self._told()])
+
+    def _told(self) -> list[tuple[str, bool, bool]]:
+        """Return the numbers' names, whether each is a root of a count, and whether it follows readings' errors."""
         groups = [
             f"reflectance {at}" if kind == "return" else f"{kind} {int(at) + 1} of 4"
             for kind, at in (name.split() for name in self._groups.names)
         ]
         return [
-            *((f"spread, {name}", False) for name in groups),
-            *((f"correlation of beams {lag} apart", False) for lag in (1, 2, 4)),
-            *((f"readings more than {far:g} sd off", True) for far in (3, 4.5, _FAR, _ELSEWHERE)),
-            (f"neighbours more than {_FAR:g} sd off", True),
-            ("spread of whole scans", False),
-            ("correlation of whole scans", False),
-            ("spread of the beams' means", False),
-            ("spread of the places' means", False),
-            *((f"missing readings, {name}", True) for name in groups),
-            ("readings without return", True),
-            ("readings inside jumps", True),
-            ("different values", False),
-            ("readings of the least value", True),
-            ("readings of the greatest value", True),
+            *((f"spread, {name}", False, True) for name in groups),
+            *((f"correlation of beams {lag} apart", False, True) for lag in (1, 2, 4)),
+            *((f"readings more than {far:g} sd off", True, True) for far in (3, 4.5, _FAR, ELSEWHERE)),
+            (f"neighbours more than {_FAR:g} sd off", True, True),
+            ("spread of whole scans", False, True),
+            ("correlation of whole scans", False, True),
+            ("spread of the beams' means", False, True),
+            ("spread of the places' means", False, True),
+            *((f"missing readings, {name}", True, False) for name in groups),
+            ("readings without return", True, True),
+            ("readings inside jumps", True, True),
+            ("different values", False, False),
+            ("readings of the least value", True, True),
+            ("readings of the greatest value", True, True),
         ]
 
     def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -133,7 +137,7 @@ class Statistics:
         z = error / self._sd
         known = self._trust & np.isfinite(z)
         fitted = np.zeros_like(z)
-        inside = known
+        inside = near(z, known, self._reach)
         coefficients = np.zeros(self._size.shape)
         for _ in range(_ROUNDS):
             filled = np.where(inside, np.nan_to_num(z), fitted).astype(np.float32)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.laser import pictures, rivals, still
+from kurumaisu.critic.laser.blocked import told
 from kurumaisu.critic.laser.estimates import estimates_of, of_block, settings_of, with_scatter
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
@@ -26,13 +27,13 @@ from kurumaisu.critic.laser.unknowns import unknowns
 from kurumaisu.critic.laser.whole_scans import beyond, with_whole_scans
 from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.smooth_alike import FORM
 from kurumaisu.critic.story import Comparison
 from kurumaisu.critic.verdict import Cause, NextExperiment, Unknown
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
-_MISSED = 0.15  # of what varies by effects on the mean: their equations may miss as much, and whole scans are off by it
 _SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
 Progress = Callable[[str], None]
 
@@ -84,10 +85,13 @@ def criticise(
     progress("laser: fitting what acts")
     fit = pinned(assembly, normal, made.fit.forms, settings_of(assembly, made.fit), made.winner, recording.truth)
     progress("laser: weighing effects on the scatter")
-    scatter, comparison = _scatter(assembly, normal, fit, ids)
-    seen = assembly.common_mode(normal, recording.truth, made.fit.forms)
-    scatter = with_whole_scans(scatter, seen, normal.scan_noise, recording, ids)
-    scatter = beyond(scatter, _MISSED * _spread_of(assembly, normal, made))
+    scatter, comparison = _scatter(assembly, fit, ids, strange=made.curve)
+    if not made.curve:
+        # Seen anew, scans have no forms to project out; where they were not, effects may have moved them all together.
+        again = fit.assembly is not assembly
+        seen = fit.assembly.common_mode(fit.normal, recording.truth, () if again else made.fit.forms)
+        scatter = with_whole_scans(scatter, seen, fit.normal.scan_noise, recording, ids)
+        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made))
     finding = _finding(assembly, normal, made, fit, scatter)
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
@@ -117,6 +121,11 @@ class _Made:
         """The search's result with blocks in the running."""
         return self.weighed.found
 
+    @property
+    def curve(self) -> bool:
+        """Whether a curve acts, which is in no catalogue."""
+        return self.winner is not None and self.winner.free.basis is not None
+
     def parts(self) -> list[Part]:
         """Return what acts, one by one."""
         out, start = [], 0
@@ -141,17 +150,22 @@ def _with(winner: Rival, normal: Normal) -> tuple[Fitted, Rival, FloatArray, Flo
 
 
 def _scatter(
-    assembly: Assembly, normal: Normal, fit: Pinned, ids: frozenset[str] | None
+    assembly: Assembly, fit: Pinned, ids: frozenset[str] | None, *, strange: bool
 ) -> tuple[list[Scatter], tuple[Comparison, ...]]:
-    """Return the effects on how readings scatter about the best fit of their mean, and what they mend."""
+    """Return the effects on how readings scatter about the best fit of their mean, and what they mend.
+
+    strange: something that is in no catalogue acts on the mean. A curve misses steps and edges of it, nobody can say
+    how far, so that errors about it say nothing of scatter.
+    """
     rows = fit.assembly.smooth_rows(_SCATTERED)
     few = fit.assembly.thinned(rows)
-    statistics = Statistics(few, normal.scan_noise)
+    statistics = Statistics(few, fit.normal.scan_noise)
     means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
     measured = few.shots.measured
     seen = statistics.of(measured, np.where(np.isfinite(measured), fit.left[rows], np.nan))
-    search = ScatterSearch(Simulator(few, statistics, fit.missed[rows]), seen, sorted(means), ids)
+    heard = ~statistics.of_errors() | (not strange)
+    search = ScatterSearch(Simulator(few, statistics, fit.missed[rows]), seen, sorted(means), ids, heard)
     found = search.run()
     return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
@@ -168,20 +182,20 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
         settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
+    curve = made.winner is not None and made.curve and made.winner.free.id in matters
+    gains = {name: _gain(made, name) for name in settings if found.p.get(name, 0.0) >= NAMED}
+    # A curve is what one covariate shows of a thing nobody knows: what it leaves may be as much, and looks like others.
+    least = made.winner.belief.nats if made.winner is not None and curve else -np.inf
     causes = tuple(
-        Cause(name, min(found.p[name], 1.0), estimates[name], _gain(made, name))
-        for name in settings
-        if found.p.get(name, 0.0) >= NAMED
+        Cause(name, min(found.p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
     )
-    curve = made.winner is not None and made.winner.free.basis is not None and made.winner.free.id in matters
-    unknown = tuple(unknowns(made.weighed, normal.gram)) if curve else ()
+    unknown = tuple(told(assembly.blocked, assembly.shots.measured, assembly.shots.laser.bearings))
+    unknown += tuple(unknowns(made.weighed, normal.gram)) if curve else ()
     groups = () if curve else _confused(assembly, normal, made, causes)
     confounded = tuple(group for group in groups if matters & set(group))
     causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
     small = tuple(name for name in sizes if name not in matters and found.p.get(name, 0.0) >= NAMED)
     details = (_noise_told(assembly, normal), *lacking(assembly), *_told(sizes, small))
-    if made.winner is not None and curve:
-        scatter = [each for each in scatter if each.nats > rivals.LEFT * made.winner.belief.nats]
     causes, added = with_scatter(causes, settings, scatter)
     confounded += tuple(group for group in map(_set_of, scatter) if group)
     return LaserFinding(causes, confounded, unknown, added, details, small=small)
@@ -246,9 +260,8 @@ def _spread_of(assembly: Assembly, normal: Normal, made: _Made) -> float:
 
 def _gain(made: _Made, name: str) -> float:
     """Return the log evidence of the best set over the best one without an effect [nat]."""
-    curve = made.winner is not None and made.winner.free.basis is not None
     # A curve that does not lead by enough is out of the running here, too, as it is where p comes from.
-    rivals = [rival for rival in made.weighed.rivals if curve or rival.free.basis is None]
+    rivals = [rival for rival in made.weighed.rivals if made.curve or rival.free.basis is None]
     sets = [(fit.ids, fit.score) for fit in made.found.fits]
     sets += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in rivals]
     own = max((worth for ids, worth in sets if name in ids), default=-np.inf)

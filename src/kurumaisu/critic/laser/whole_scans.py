@@ -60,7 +60,8 @@ def with_whole_scans(
             whole.size.name: min(noise.common_sd, whole.size.upper),
             whole.memory.name: min(max(rho, whole.memory.lower), whole.memory.upper),
         }
-        sds = {whole.size.name: noise.common_sd * seen.log_sd, whole.memory.name: rho * -np.log(rho) * seen.log_tau}
+        size_sd, memory_sd = noise.common_sd * seen.log_sd, float(rho * -np.log(rho) * seen.log_tau)
+        sds = {whole.size.name: (size_sd, size_sd), whole.memory.name: (memory_sd, memory_sd)}
         rest = [each for each in out if each is not known]
         out = [*rest, Scatter(EffectSetting(whole.id, values), p, max(nats, known.nats if known else nats), sds, {})]
     return out
