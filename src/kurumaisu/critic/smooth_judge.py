@@ -18,6 +18,7 @@ from kurumaisu.critic.smooth_search import Rivalry, compare, no_rivals
 
 _ALARM = 0.01  # share of null draws with as much evidence above which a curve is not believed
 _HOPELESS = 100.0  # [nat] behind the catalogue, when simulated, that no other effects beside a curve make good
+_SLOW = 1.0  # [s] noise that is forgotten sooner can draw no curve over a place or a time, nor take one up
 _HINT = 0.0  # [nat] of lead, where slow noise is not believed, from which the noise is estimated about a curve
 
 
@@ -40,8 +41,9 @@ def hinted(problem: Problem, found: Naming) -> Extension | None:
     """Return the best set with a curve if one may well act, for an estimate of the noise about it."""
     if not _asked(problem) or not found.enough:
         return None
-    quick = replace(problem.noise, slow_v=0.0, slow_lateral=0.0, slow_w=0.0)
-    easy = problem.changed(noise=quick)
+    easy = problem
+    if problem.noise.slow_tau >= _SLOW:
+        easy = problem.changed(noise=replace(problem.noise, slow_v=0.0, slow_lateral=0.0, slow_w=0.0))
     rivalry = compare(easy, found)
     return _extension(easy, rivalry) if rivalry.lead > _HINT else None
 
