@@ -10,6 +10,7 @@ from kurumaisu.critic.laser.likeness import Likeness
 from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
+from kurumaisu.critic.laser.spread_fit import ScatterFit
 from kurumaisu.critic.laser.verdicts import size_of
 from kurumaisu.critic.laser.whole_scans import beyond, with_whole_scans
 from kurumaisu.critic.recording import Recording, Run, Series
@@ -50,7 +51,9 @@ def test_two_effects_act_together_though_each_explains_nearly_all_alone():
     ids = frozenset({"laser.range_noise", "laser.beam_bias"})
     simulate = _Powers()
     means = ["laser.beam_bias.amplitude", "laser.beam_bias.phase", "laser.range_noise.slope"]
-    found = {each.setting.id: each for each in ScatterSearch(simulate, simulate(truth, 5), means, ids).run()}
+    found = {
+        each.setting.id: each for each in ScatterSearch(ScatterFit(simulate, simulate(truth, 5), means, ids)).run()
+    }
     assert set(found) == ids
     assert found["laser.range_noise"].setting.parameters["share"] == pytest.approx(0.6, abs=0.1)
 

@@ -59,14 +59,14 @@ def test_what_is_likeliest_alone_is_weighed_again_in_company():
     )
     truth = [at("laser.quantisation", step=0.01), at("laser.beam_correlation", rho=0.3)]
     ids = frozenset({"laser.quantisation", "laser.beam_correlation", "laser.incidence_noise"})
-    found = ScatterSearch(simulate, simulate(truth, 5), (), ids).run()
+    found = ScatterSearch(ScatterFit(simulate, simulate(truth, 5), (), ids)).run()
     assert {each.setting.id for each in found} == {setting.id for setting in truth}
 
 
 def test_it_is_not_certain_which_of_two_alike_acts():
     simulate = _Linear({"laser.quantisation.step": (1.0,) * 5, "laser.incidence_noise.gain": (1.0,) * 5})
     ids = frozenset({"laser.quantisation", "laser.incidence_noise"})
-    (found,) = ScatterSearch(simulate, simulate([at("laser.quantisation", step=0.01)], 5), (), ids).run()
+    (found,) = ScatterSearch(ScatterFit(simulate, simulate([at("laser.quantisation", step=0.01)], 5), (), ids)).run()
     assert found.p < 0.9
     assert sum(found.rivals.values()) + found.p == pytest.approx(1.0, abs=1e-6)
 
@@ -107,7 +107,7 @@ def test_another_form_may_pass_for_another_size_however_many_numbers_follow_it(n
     """A grid is a grid, but outliers come in many ways."""
     simulate = _Linear({f"{name}.{parameter}": (9.0, 9.0, 9.0, 9.0, 9.0)})
     truth = [at(name, **{parameter: size})]
-    (found,) = ScatterSearch(simulate, simulate(truth, 5), (), frozenset({name})).run()
+    (found,) = ScatterSearch(ScatterFit(simulate, simulate(truth, 5), (), frozenset({name}))).run()
     below, above = found.sds[parameter]
     assert least < below < most
     assert above > 1.5 * below or name == "laser.quantisation", "a factor of two either way"
@@ -197,7 +197,7 @@ def test_what_came_while_another_was_fitted_ill_goes_when_that_is_mended():
     )
     truth = at("laser.quantisation", step=0.01)
     stale = at("laser.beam_correlation", rho=0.001)
-    search = ScatterSearch(simulate, simulate([truth], 5), (), frozenset({truth.id, stale.id}))
+    search = ScatterSearch(ScatterFit(simulate, simulate([truth], 5), (), frozenset({truth.id, stale.id})))
     pieces = [
         Piece(effects.by_id(truth.id), truth, ("step",), 1.0, 700.0),
         Piece(effects.by_id(stale.id), stale, ("rho",), 1.0, 53.0),

@@ -13,6 +13,7 @@ from kurumaisu.critic.laser.columns import Column, Form, Marks
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.spread import ScatterSearch
+from kurumaisu.critic.laser.spread_fit import ScatterFit
 from kurumaisu.critic.laser.standing import held, steadied
 from kurumaisu.critic.laser.verdicts import criticise
 from kurumaisu.critic.recording import Series
@@ -110,7 +111,7 @@ def test_effects_on_the_same_numbers_are_fitted_together():
         effects_at("laser.beam_bias", sd=0.0015),
     ]
     ids = frozenset({"laser.quantisation", "laser.beam_bias", "laser.range_noise"})
-    found = ScatterSearch(simulate, simulate(truth, 5), (), ids).run()
+    found = ScatterSearch(ScatterFit(simulate, simulate(truth, 5), (), ids)).run()
     sizes = {each.setting.id: each.setting.parameters for each in found}
     assert set(sizes) == {"laser.quantisation", "laser.beam_bias"}
     assert sizes["laser.quantisation"]["step"] == pytest.approx(0.006, rel=0.1)

@@ -14,13 +14,12 @@ import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu import effects
-from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.laser.spread_fit import Piece, Push, Rough, ScatterFit
 from kurumaisu.critic.prior import log_prior, occam
 from kurumaisu.critic.story import Comparison
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import FloatArray
 
 _QUIET = 3.5  # sds that some statistic must be off by before any effect is tried
 _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
@@ -69,19 +68,8 @@ def _by_effect(pieces: Sequence[Piece]) -> list[list[Piece]]:
 class ScatterSearch:
     """Finds the effects that the statistics call for."""
 
-    def __init__(
-        self,
-        simulate: Simulator,
-        measured: FloatArray,
-        means: Sequence[str],
-        ids: frozenset[str] | None = None,
-        heard: BoolArray | None = None,
-    ) -> None:
-        """Take the measured statistics; means: parameters, as id.name, that act on the mean and are not for here.
-
-        ids: the effects to look for, heard: which of the statistics say anything; None for all.
-        """
-        self._fit = ScatterFit(simulate, measured, means, ids, heard)
+    def __init__(self, fit: ScatterFit) -> None:
+        self._fit = fit
         self._likeness = self._fit.likeness
 
     def run(self) -> list[Scatter]:

@@ -20,6 +20,7 @@ from kurumaisu.critic.laser.search import Fitted, Found, Search
 from kurumaisu.critic.laser.shots import gather, missing
 from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
+from kurumaisu.critic.laser.spread_fit import ScatterFit
 from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.supply import every_id, supplier
 from kurumaisu.critic.laser.twins import Groups, joined, twins
@@ -165,7 +166,8 @@ def _scatter(
     measured = few.shots.measured
     seen = statistics.of(measured, np.where(np.isfinite(measured), fit.left[rows], np.nan))
     heard = ~statistics.of_errors() | (not strange)
-    search = ScatterSearch(Simulator(few, statistics, fit.missed[rows]), seen, sorted(means), ids, heard)
+    simulate = Simulator(few, statistics, fit.missed[rows])
+    search = ScatterSearch(ScatterFit(simulate, seen, sorted(means), ids, heard))
     found = search.run()
     return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
