@@ -64,9 +64,15 @@ def test_what_may_not_act_at_all_is_in_no_set():
 
 
 def test_what_half_the_catalogue_could_do_is_no_set():
-    anything = [(0.1, f"a {name}") for name in "bcdefghijk"]
-    assert confounded(posterior(*anything)) == ()
+    anything = [(0.098, f"a {name}") for name in "bcdefghijk"]
+    assert confounded(posterior(*anything, (0.02, "a"))) == ()
     assert confounded(posterior(*((0.2, names) for _, names in anything[:5]))) == (("b", "c", "d", "e", "f"),)
+
+
+def test_what_acts_beyond_doubt_is_a_set_however_many_could_do_it():
+    """A turn at one rate that is off by a fifth has a dozen explanations, and nothing is none of them."""
+    anything = [(0.1, f"a {name}") for name in "bcdefghijk"]
+    assert confounded(posterior(*anything)) == (tuple("bcdefghijk"),)
 
 
 def drive(v, w):

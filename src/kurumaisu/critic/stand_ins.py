@@ -9,7 +9,8 @@ from kurumaisu.critic.evidence import Fit
 from kurumaisu.types import FloatArray
 
 NAMED = 0.9  # posterior from which a cause is named
-_MOST = 7  # members of a set: more is no answer, and a chance leaving that everything explains a little
+_MOST = 7  # members of a set: more may be a chance leaving that everything explains a little
+_CHANCE = 1e-3  # posterior of nothing in its place below which a set may have more members
 RIVAL = 0.05  # posterior from which an effect counts as a rival of another
 
 
@@ -39,8 +40,15 @@ def confounded(posterior: Posterior) -> tuple[tuple[str, ...], ...]:
             group = _with_others(posterior, name, group)
         meeting = [other for other in merged if other & group]
         merged = [other for other in merged if not other & group] + [group.union(*meeting)]
-    told = (group for group in merged if 1 < len(group) <= _MOST and posterior.any_of(group) >= NAMED)
-    return tuple(tuple(sorted(group)) for group in told)
+    told = (group for group in merged if len(group) > 1 and posterior.any_of(group) >= NAMED)
+    return tuple(tuple(sorted(group)) for group in told if len(group) <= _MOST or _needed(posterior, group))
+
+
+def _needed(posterior: Posterior, group: set[str]) -> bool:
+    """Tell whether it is no chance leaving that a group explains: what has none of it is out of the question."""
+    rest = posterior.ranked[0].ids - group
+    without = (w for w, fit in zip(posterior.weights, posterior.ranked, strict=True) if fit.ids <= rest)
+    return bool(sum(without) < _CHANCE)
 
 
 def _alone(posterior: Posterior, name: str) -> set[str]:
