@@ -83,10 +83,12 @@ def test_scans_of_another_fan_begin_the_window_of_scans_anew():
     first, second = Fan(-2.0, 0.1, 40, 0.0, 0.1), Fan(-2.0, 0.05, 80, 0.0, 0.1)
     for t in range(3):
         window.add("pose", float(t), (0.0, 0.0, 0.0))
-        window.add_scan(float(t), first, np.ones(40))
+        window.see(first)
+        window.add("scan", float(t), np.ones(40))
     assert window.run("window", Faults()).fan == first
-    window.add_scan(3.0, second, np.ones(80))
-    window.add_scan(4.0, second, np.ones(80))
+    for t in (3.0, 4.0):
+        window.see(second)
+        window.add("scan", t, np.ones(80))
     run = window.run("window", Faults())
     assert run.fan == second
     assert run.scan.values.shape == (2, 80)

@@ -50,7 +50,7 @@ def test_errors_act_along_the_way(late, size, rates):
 
 
 def test_noise_of_the_motion_is_white_under_an_exact_reference():
-    """Along the chord it was not: one in eight such drives was told of a curve or a slope that nobody had put in."""
+    """Along the chord it was not, and drives were told of curves and slopes that nobody had put in."""
     rng = np.random.default_rng(3)
     tau, sd_v, sd_w = 0.3, 0.04, 0.08
     count = round(120.0 / STEP)

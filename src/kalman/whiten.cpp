@@ -62,7 +62,9 @@ struct Jacobians {
   Matrix3 from, to, motion, late, rolling;
 };
 
-Jacobians jacobians(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::RowVectorXd& way) {
+using Way = Eigen::Matrix<double, 1, Track::Ways::ColsAtCompileTime>;
+
+Jacobians jacobians(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Way& way) {
   const double c = std::cos(a.z());
   const double s = std::sin(a.z());
   const Eigen::Vector3d world = b - a;

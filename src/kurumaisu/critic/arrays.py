@@ -13,7 +13,7 @@ from kurumaisu.critic import pipeline
 from kurumaisu.critic.checks import check_run
 from kurumaisu.critic.clean import Faults, Table, clean
 from kurumaisu.critic.explain import Criticism
-from kurumaisu.critic.meta import Meta
+from kurumaisu.critic.meta import Meta, recording_of_meta
 from kurumaisu.critic.read_csv import OPTIONAL, QUERY, REQUIRED, check_queries
 from kurumaisu.critic.reading import require_use, split
 from kurumaisu.critic.recording import Recording, Run, Series, run_of_parts
@@ -59,18 +59,7 @@ def recording_of(name: str, runs: Mapping[str, Tables], meta: Meta) -> Recording
         check_run(run, meta.laser, faults)
     require_use(name, made, meta, faults)
     train, test = split(f"{name}: meta", meta, list(runs), partly=False)
-    return Recording(
-        name=name,
-        runs=tuple(made),
-        train=train,
-        test=test,
-        model=meta.model,
-        world=meta.world,
-        laser=meta.laser,
-        truth=meta.truth,
-        problems=tuple(faults.notes),
-        invalid=tuple(faults.invalid),
-    )
+    return recording_of_meta(name, made, meta, faults, train=train, test=test)
 
 
 def run_of(name: str, tables: Tables, faults: Faults) -> Run:

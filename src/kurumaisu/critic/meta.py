@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from kurumaisu import settings
-from kurumaisu.critic.recording import LaserMount
+from kurumaisu.critic.clean import Faults
+from kurumaisu.critic.recording import LaserMount, Recording, Run
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 
@@ -23,6 +25,24 @@ class Meta:
     train: tuple[str, ...] = ()
     test: tuple[str, ...] = ()
     topics: dict[str, str] = field(default_factory=dict)
+
+
+def recording_of_meta(
+    name: str, runs: Sequence[Run], meta: Meta, faults: Faults, *, train: tuple[str, ...], test: tuple[str, ...]
+) -> Recording:
+    """Return runs with what meta.yaml says of them; train, test: names of runs; faults: what was found wrong."""
+    return Recording(
+        name=name,
+        runs=tuple(runs),
+        train=train,
+        test=test,
+        model=meta.model,
+        world=meta.world,
+        laser=meta.laser,
+        truth=meta.truth,
+        problems=tuple(faults.notes),
+        invalid=tuple(faults.invalid),
+    )
 
 
 def read_meta(path: Path) -> Meta:

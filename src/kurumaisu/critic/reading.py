@@ -9,7 +9,7 @@ from pathlib import Path
 
 from kurumaisu.critic.checks import check_run, usable
 from kurumaisu.critic.clean import Faults
-from kurumaisu.critic.meta import Meta, read_meta
+from kurumaisu.critic.meta import Meta, read_meta, recording_of_meta
 from kurumaisu.critic.read_bag import PutAside, read_bag_run, resolve
 from kurumaisu.critic.read_csv import QUERY, is_csv_run, read_csv_run, read_queries
 from kurumaisu.critic.read_rawlog import is_rawlog, rawlog_name, read_rawlog_run
@@ -41,18 +41,8 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
         runs.append(run)
     require_use(path, runs, meta, faults)
     train, test = split(meta_file, meta, [run.name for run in runs], partly=bool(wanted))
-    return Recording(
-        name=path.resolve().name if path.is_dir() else path.resolve().stem,
-        runs=tuple(runs),
-        train=train,
-        test=test,
-        model=meta.model,
-        world=meta.world,
-        laser=laser,
-        truth=meta.truth,
-        problems=tuple(faults.notes),
-        invalid=tuple(faults.invalid),
-    )
+    name = path.resolve().name if path.is_dir() else path.resolve().stem
+    return recording_of_meta(name, runs, replace(meta, laser=laser), faults, train=train, test=test)
 
 
 def sources(path: Path) -> list[Path]:

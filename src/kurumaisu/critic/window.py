@@ -53,12 +53,11 @@ class Window:
         while len(rows) * (_OVERHEAD + values.nbytes) > self._limit:
             rows.popleft()
 
-    def add_scan(self, t: float, fan: Fan, ranges: FloatArray) -> None:
-        """Take a scan begun at t [s]; one of another fan, as after a driver's restart, forgets those before it."""
+    def see(self, fan: Fan) -> None:
+        """Take scans of a fan from now on: another one than before, as after a driver's restart, forgets theirs."""
         if fan != self._fan:
             self._rows["scan"].clear()
             self._fan = fan
-        self.add("scan", t, ranges)
 
     def add_received(self, part: str, t: float, row: Sequence[float] | FloatArray) -> None:
         """Take a row without a stamp, received at t [s].

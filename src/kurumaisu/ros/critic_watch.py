@@ -20,7 +20,7 @@ from sensor_msgs.msg import BatteryState, LaserScan, Temperature
 from kurumaisu.critic import messages
 from kurumaisu.critic.checks import check_run, usable
 from kurumaisu.critic.clean import Faults
-from kurumaisu.critic.meta import Meta, read_meta
+from kurumaisu.critic.meta import Meta, read_meta, recording_of_meta
 from kurumaisu.critic.options import add_effects, whole_number
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.results import causes
@@ -112,9 +112,9 @@ class CriticWatch:
         row, stamp = _row(part, message), _stamp(message)
         with self._lock:
             if part == "scan":
-                fan, ranges, _ = row
-                self._window.add_scan(rospy.get_time() if stamp is None else stamp, fan, ranges)
-            elif stamp is None:
+                fan, row, _ = row
+                self._window.see(fan)
+            if stamp is None:
                 self._window.add_received(part, float(rospy.get_time()), row)
             else:
                 self._window.add(part, stamp, row)
@@ -130,17 +130,7 @@ class CriticWatch:
         if not usable(run):
             return None
         check_run(run, meta.laser, faults)
-        return Recording(
-            "window",
-            (run,),
-            ("window",),
-            model=meta.model,
-            world=meta.world,
-            laser=meta.laser,
-            truth=meta.truth,
-            problems=tuple(faults.notes),
-            invalid=tuple(faults.invalid),
-        )
+        return recording_of_meta("window", (run,), meta, faults, train=("window",), test=())
 
     def _publish(self) -> None:
         with self._lock:
