@@ -4,6 +4,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from kurumaisu.bench.hidden import base_case
 from kurumaisu.bench.hidden.motion import Fault, Form
@@ -78,3 +79,23 @@ def test_what_is_otherwise_from_a_moment_on_is_no_matter_of_place():
     verdict = criticised(lambda r, t: replace(r, v=np.where(t > 1.5 * SPAN, 0.88, 1.0) * r.v))
     assert [(one.channel, one.covariate) for one in verdict.unknown] == [("base.v", "recording_time")]
     assert not verdict.causes
+
+
+def test_a_clock_that_runs_on_from_run_to_run_is_named():
+    """By the last run the reference is a tenth of a second early: before what was asked of the chair."""
+    rng = np.random.default_rng(4)
+    recording = base_case.recording("clocks", base_case.draw_drives("rich", USUAL, rng, seconds=SPAN, rate=10.0), [])
+    scale, runs = -4e-4, []
+    for i, run in enumerate(recording.runs):
+        begun = 100.0 * i
+        moved = {
+            part: replace(series, t=(series.t + begun) * (1 + scale * (part == "pose")))
+            for part in ("command", "voltage", "pose")
+            if (series := getattr(run, part)) is not None
+        }
+        runs.append(replace(run, **moved))
+    verdict = pipeline.criticise(replace(recording, runs=tuple(runs)), MODEL, lambda _: None).verdict
+    assert [cause.id for cause in verdict.causes] == ["base.clock_scale"]
+    told = verdict.causes[0].parameters
+    assert told["through"].estimate == 1.0
+    assert told["scale"].estimate == pytest.approx(scale, rel=0.15)

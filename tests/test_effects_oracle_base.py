@@ -131,7 +131,7 @@ def test_a_fast_clock_sees_slow_rates():
     """The same poses, at other times: rates are what somebody with that clock makes of two of them."""
     scale, times = 0.05, np.array([2.0, 2.5])
     poses = np.array([circle(t) for t in times])
-    seen = make("base.clock_scale", {"scale": scale}).apply(
+    seen = make("base.clock_scale", {"scale": scale, "through": 0.0}).apply(
         effects.Reference(times, poses, np.tile([0.5, 0.0, 0.4], (2, 1)))
     )
     np.testing.assert_array_equal(seen.poses, poses)

@@ -27,9 +27,12 @@ def test_reference_effects():
     np.testing.assert_allclose(ahead.rates, [0.5, 0.04, 0.4])
     np.testing.assert_allclose(beside.poses, [0.9, 2.0, np.pi / 2])
     np.testing.assert_allclose(beside.rates, [0.46, 0.0, 0.4])
-    late = see("base.clock_scale", {"scale": 0.01})
+    late = see("base.clock_scale", {"scale": 0.01, "through": 0.0})
     assert late.times == pytest.approx(10.1)
     np.testing.assert_allclose(late.rates, TRUTH.rates / 1.01)
+    afterwards = effects.Reference(TRUTH.times, TRUTH.poses, TRUTH.rates, start=4.0)
+    assert see("base.clock_scale", {"scale": 0.01, "through": 0.0}, afterwards).times == pytest.approx(10.06)
+    assert see("base.clock_scale", {"scale": 0.01, "through": 1.0}, afterwards).times == pytest.approx(10.1)
 
 
 REFERENCE = [effect for effect in effects.BASE if issubclass(effect, effects.ReferenceEffect)]
@@ -39,11 +42,11 @@ REFERENCE = [effect for effect in effects.BASE if issubclass(effect, effects.Ref
 def test_reference_effects_are_absent_at_their_null_and_have_no_state(effect):
     rng = np.random.default_rng(7)
     many = effects.Reference(np.arange(5.0), rng.standard_normal((5, 3)), rng.standard_normal((5, 3)))
-    (parameter,) = effect.parameters
-    same = see(effect.id, {parameter.name: parameter.null}, many)
-    changed = see(effect.id, {parameter.name: parameter.scale}, many)
+    nulls = {parameter.name: parameter.null for parameter in effect.parameters}
+    acting = {**nulls, effect.parameters[0].name: effect.parameters[0].scale}
+    same, changed = see(effect.id, nulls, many), see(effect.id, acting, many)
     one = effects.Reference(many.times[3], many.poses[3], many.rates[3])
-    changed_one = see(effect.id, {parameter.name: parameter.scale}, one)
+    changed_one = see(effect.id, acting, one)
     for field in ("times", "poses", "rates"):
         np.testing.assert_allclose(getattr(same, field), getattr(many, field), atol=1e-15)
         np.testing.assert_allclose(getattr(changed_one, field), getattr(changed, field)[3])
@@ -85,7 +88,7 @@ def test_slip_in_the_simulator_is_the_arc_of_a_turned_speed(tmp_path):
 
 def test_a_marker_is_seen_and_does_not_move_the_chair(tmp_path):
     marker = "{id: base.marker_x, parameters: {x: 0.1}}"
-    clock = "{id: base.clock_scale, parameters: {scale: 0.01}}"
+    clock = "{id: base.clock_scale, parameters: {scale: 0.01, through: 0.0}}"
     last = run(tmp_path, f"{marker}, {clock}", command(0.5, 0.0), 2.0)
     np.testing.assert_allclose(last.pose, [0.0, 1.0, np.pi / 2], atol=1e-9)
     np.testing.assert_allclose(last.reference.poses, [0.0, 1.1, np.pi / 2], atol=1e-9)

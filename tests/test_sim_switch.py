@@ -188,7 +188,7 @@ def test_time_begins_when_an_effect_is_switched_on(world):
     it.switch(
         (
             EffectSetting("base.battery_sag", {"sag": 0.1, "through": 0.0}),
-            EffectSetting("base.clock_scale", {"scale": 0.1}),
+            EffectSetting("base.clock_scale", {"scale": 0.1, "through": 0.0}),
         )
     )
     rows = drive(it, AHEAD, 100)[0]

@@ -13,6 +13,7 @@ import numpy as np
 from kurumaisu import _core, geometry
 from kurumaisu._core import AxisInverse
 from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.signs import meant
 from kurumaisu.critic.ways import ways
 from kurumaisu.effects import LATE
 from kurumaisu.errors import Error
@@ -203,7 +204,7 @@ def driven(run: Run) -> bool:
 def _inputs(run: Run, model: Model) -> tuple[str, FloatArray, FloatArray, FloatArray]:
     """Return the source and its samples t, v, w, each held until the next: voltages, else commands, else odometry."""
     if run.voltage is not None:
-        return ("voltage", *from_voltages(run.voltage, run.command, model))
+        return ("voltage", *from_voltages(run, model))
     if run.command is not None:
         return "command", run.command.t, run.command.column("v"), run.command.column("w")
     if run.odom is not None:
@@ -211,18 +212,15 @@ def _inputs(run: Run, model: Model) -> tuple[str, FloatArray, FloatArray, FloatA
     raise Error(f"{run.name}: has neither voltages nor commands nor odometry")
 
 
-def from_voltages(voltage: Series, command: Series | None, model: Model) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return t [s] and the rates v, w that voltages stand for, all (n,); a command tells the signs meant."""
-    rates = []
-    for law, volts, rate in ((model.translation, "v_f", "v"), (model.steering, "v_s", "w")):
-        sign = np.full(len(voltage.t), np.nan)
-        if rate in voltage.columns:  # the very rates that the voltages stand for
-            sign = np.sign(voltage.column(rate))
-        elif command is not None:
-            held = np.searchsorted(command.t, voltage.t, side="right") - 1
-            sign = np.where(held >= 0, np.sign(command.column(rate)[np.maximum(held, 0)]), 0.0)
-        rates.append(AxisInverse(law).rates(voltage.column(volts), sign))
-    return voltage.t, rates[0], rates[1]
+def from_voltages(run: Run, model: Model) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return t [s] and the rates v, w that a run's voltages stand for, all (n,)."""
+    assert run.voltage is not None
+    signs = meant(run.voltage, run.command, run.pose, model)
+    v, w = (
+        AxisInverse(law).rates(run.voltage.column(volts), signs[:, i])
+        for i, (law, volts) in enumerate(((model.translation, "v_f"), (model.steering, "v_s")))
+    )
+    return run.voltage.t, v, w
 
 
 def _from_odometry(odom: Series) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -3,10 +3,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic import excitation, explain, gain, next_experiment, noise, predict, sanity, smooth_explain, worth
+from kurumaisu.critic import (
+    early,
+    excitation,
+    explain,
+    gain,
+    next_experiment,
+    noise,
+    predict,
+    sanity,
+    smooth_explain,
+    worth,
+)
 from kurumaisu.critic.decide import Decision, Progress, decide, scatter
 from kurumaisu.critic.drive import Drive, driven, prepare
 from kurumaisu.critic.evidence import Problem
@@ -61,6 +73,8 @@ def criticise(
     with aside(recording, model, model_file, ids) as scans_say:
         whole = timed(recording)
         base, extension = _criticise_base(whole, model, progress, ids) if moved else (None, _UNDRIVEN)
+        if base is not None and base.verdict.verdict == "invalid_data":
+            return base
         scans = scans_say(progress)
     found = base or explain.undriven(recording, model)
     scans, settings = from_base_link(
@@ -107,19 +121,23 @@ def _criticise_base(
     recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None
 ) -> tuple[Criticism, worth.Extension]:
     drives = _drives(recording, model)
-    train = [drives[name] for name in recording.train if name in drives]
-    test = [drives[name] for name in recording.test if name in drives]
-
     progress("estimating the noise")
-    if all(drive.source == "odom" for drive in train):
+    if all(drives[name].source == "odom" for name in recording.train if name in drives):
         ids = beside_odometry(ids)
-    rough = Problem(train, model, noise.START, ids=ids)
-    empty = rough.fit((), {})
-    first = rough.changed(noise=scatter(rough, empty, recording.truth, project=True).estimate().noise)
+    rough, first = _begun(recording, model, drives, ids)
+    by = early.lead(first, progress)
+    if by > early.taste([run for run in recording.runs if run.name in drives]):
+        return explain.invalid(recording, model, [early.words(by)]), _UNDRIVEN
+    if by > 0:
+        recording = replace(recording, problems=(*recording.problems, f"{early.words(by)}: so it is judged"))
+        drives = {name: early.mended(drive, by) for name, drive in drives.items()}
+        rough, first = _begun(recording, model, drives, ids)
+    train = list(first.drives)
+    test = [drives[name] for name in recording.test if name in drives]
     made = decide(first, recording.truth, progress)
 
     progress("measuring the gain on drives held out")
-    baseline = scatter(rough, empty, recording.truth, project=False).estimate(made.problem.noise).noise
+    baseline = scatter(rough, rough.fit((), {}), recording.truth, project=False).estimate(made.problem.noise).noise
     withheld = [drives[run.name] for run in recording.runs if run.name in drives and _withheld(recording, run)]
     names = {drive.name for drive in withheld}
     whole = [drive for drive in test if drive.name not in names]
@@ -142,6 +160,15 @@ def _criticise_base(
         return tuple(made.refit(others).settings) if again else forecast.settings
 
     return judged, worth.Extension(forecast, (), refit)
+
+
+def _begun(
+    recording: Recording, model: Model, drives: Mapping[str, Drive], ids: frozenset[str] | None
+) -> tuple[Problem, Problem]:
+    """Return the problem of the drives to fit, with any noise and with a first estimate of theirs."""
+    rough = Problem([drives[name] for name in recording.train if name in drives], model, noise.START, ids=ids)
+    left = scatter(rough, rough.fit((), {}), recording.truth, project=True)
+    return rough, rough.changed(noise=left.estimate().noise)
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:

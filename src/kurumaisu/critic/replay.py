@@ -106,9 +106,12 @@ def seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> Float
         below, share = drive.places
         low, high = poses.take(below, axis=0), poses.take(below + 1, axis=0)
         return np.asarray(low + share[:, None] * (high - low))
-    times = GRID * np.arange(len(poses))  # since the start: a clock that runs fast is right at the start
-    measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses)))
-    return geometry.interpolate(drive.start + measured.times, measured.poses, drive.times)
+    # A clock that runs fast is right at the start, of the drive or of the first one.
+    started = drive.known.get(effects.RECORDING_TIME)
+    start = 0.0 if started is None else float(started[0])
+    times = start + GRID * np.arange(len(poses))
+    measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses), start))
+    return geometry.interpolate(drive.start + (measured.times - start), measured.poses, drive.times)
 
 
 def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:

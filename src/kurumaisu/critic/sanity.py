@@ -72,17 +72,18 @@ def _of_run(run: Run, model: Model) -> list[str]:
     found = sanity_pose.course(run.pose)
     pose = _mended(run.pose, found)
     inputs = [(name, part, rates) for name, part in _inputs(run) if (rates := _rates(part, pose)) is not None]
-    known, lawful = [], True
+    known, lawful, follows = [], True, dict[str, FloatArray]()
     for name, _, rates in inputs:
         asked = rates[0] if name != "voltage" else _from_volts(run, rates[1], model)
         plain = sanity_input.compare(asked, rates[1], name)
         match = sanity_law.match(run, name, plain, rates[1], model) if name != "odometry" else plain
         known.append((name, match, _number(*rates)))
+        follows[name] = plain.correlation
         lawful &= match is plain
     words = _one(sanity_pose.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
     words += [*sanity_jumps.words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
     words += [*_one(sanity_pose.folded(run.pose)), *_one(sanity_stamps.words(run.pose))]
-    told = [line for name, part, rates in inputs for line in _against(name, part, pose, rates, model)]
+    told = [line for name, part, rates in inputs for line in _against(name, part, pose, rates, model, follows[name])]
     for name, match, number in known:
         told += [*match.words, *sanity_input.sign_and_unit(match, number, name)]
     # Of poses that are mirrored every input seems to have the wrong sign; by another law some voltages have.
@@ -100,9 +101,11 @@ def _inputs(run: Run) -> list[tuple[str, Series]]:
     return [(name, part) for name, part in parts if part is not None and len(part.t) > 1]
 
 
-def _against(name: str, part: Series, pose: Series, rates: tuple[Rates, Rates], model: Model) -> list[str]:
-    """Return what is wrong with poses in the light of an input, or with the input itself."""
-    words = sanity_volts.words(part, rates[1], model) if name == "voltage" else []
+def _against(
+    name: str, part: Series, pose: Series, rates: tuple[Rates, Rates], model: Model, follows: FloatArray
+) -> list[str]:
+    """Return what is wrong with poses in the light of an input, or with the input itself; follows: as volts have it."""
+    words = sanity_volts.words(part, rates[1], model, follows) if name == "voltage" else []
     times = sanity_rows.repeats(pose, rates[1])
     words += [sanity_rows.held(times)] if times > _REPEATS or _SOME_TWICE[0] < times < _SOME_TWICE[1] else []
     for check in (
@@ -114,8 +117,7 @@ def _against(name: str, part: Series, pose: Series, rates: tuple[Rates, Rates], 
 
 
 def _from_volts(run: Run, driven: Rates, model: Model) -> Rates:
-    assert run.voltage is not None
-    t, v, w = from_voltages(run.voltage, run.command, model)
+    t, v, w = from_voltages(run, model)
     return sanity_rates.of_input(t, np.column_stack([v, w]), driven.t)
 
 

@@ -16,6 +16,7 @@ from kurumaisu.types import FloatArray
 _MOST = 30.0  # [V] no joystick input of a wheelchair takes more
 _LAGS = np.arange(0.0, 1.6, 0.1)  # [s]
 _ALIKE = 0.6  # least correlation of the voltage with the one expected
+_FOLLOWS = 0.5  # correlation of the rates with those that the voltages ask for, from which no sign is wrong
 _NAMES = ("v_f", "v_s")
 
 
@@ -28,8 +29,12 @@ class _Line:
     correlation: float
 
 
-def words(voltage: Series, driven: Rates, model: Model) -> list[str]:
-    """Return what is wrong with unit or zero of the voltages, in words; driven: what the chair made of them."""
+def words(voltage: Series, driven: Rates, model: Model, follows: FloatArray) -> list[str]:
+    """Return what is wrong with unit or zero of the voltages, in words; driven: what the chair made of them.
+
+    follows (2,): correlation of that with what the voltages ask for. Where two rates answer to one voltage, that of a
+    rate which lags, or of a mean, may have the other sign.
+    """
     given = of_input(voltage.t, voltage.values[:, :2], driven.t)
     laws = model.translation, model.steering
     told = []
@@ -39,7 +44,7 @@ def words(voltage: Series, driven: Rates, model: Model) -> list[str]:
             np.isfinite(driven.values[:, i]), law.volts(np.where(abs(rates) < 0.02, 0.0, rates)), np.nan
         )
         line = _line(given.values[:, i], expected)
-        found = _wrong(_NAMES[i], voltage.values[:, i], line, model.reference_voltage)
+        found = _wrong(_NAMES[i], voltage.values[:, i], line, model.reference_voltage, bool(follows[i] > _FOLLOWS))
         if found is not None:
             told.append(found)
     return told
@@ -61,7 +66,7 @@ def _line(given: FloatArray, expected: FloatArray) -> _Line:
     return best
 
 
-def _wrong(name: str, raw: FloatArray, line: _Line, reference: float) -> str | None:
+def _wrong(name: str, raw: FloatArray, line: _Line, reference: float, follows: bool) -> str | None:
     largest = float(np.abs(raw).max())
     known = abs(line.correlation) > _ALIKE
     measured = (
@@ -75,7 +80,7 @@ def _wrong(name: str, raw: FloatArray, line: _Line, reference: float) -> str | N
         if abs(line.offset) < 300 or not known:
             return f"{name} looks like mV, not V: {measured}; try {name} / 1000"
         return f"{name} looks like mV, reference voltage included: {measured}; try ({name} - {line.offset:.0f}) / 1000"
-    if line.correlation < -_ALIKE:
+    if line.correlation < -_ALIKE and not follows:
         alike = f"correlation {line.correlation:.2f} with the voltage expected"
         return (
             f"{name} has the wrong sign ({'forward speed' if name == _NAMES[0] else 'yaw rate'}): {alike}; try -{name}"

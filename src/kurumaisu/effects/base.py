@@ -82,11 +82,15 @@ class Motion:
 
 @dataclass(frozen=True)
 class Reference:
-    """What a reference measures: times (...) [s], poses (..., 3) in the map, rates (..., 3) forward, leftward, yaw."""
+    """What a reference measures: times (...) [s], poses (..., 3) in the map, rates (..., 3) forward, leftward, yaw.
+
+    start: when the drive began [s], if its times go on from those of the drives before it.
+    """
 
     times: FloatArray
     poses: FloatArray
     rates: FloatArray
+    start: float = 0.0
 
 
 @dataclass(frozen=True)
