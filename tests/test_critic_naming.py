@@ -75,6 +75,28 @@ def test_what_acts_beyond_doubt_is_a_set_however_many_could_do_it():
     assert confounded(posterior(*anything)) == (tuple("bcdefghijk"),)
 
 
+def test_two_pairs_of_twins_are_two_sets():
+    """Each of a pair acts beside either of the other: what one of them could be says nothing of the other pair."""
+    twins = posterior(*((0.25, f"{one} {other}") for one in "ab" for other in "cd"))
+    assert confounded(twins) == (("a", "b"), ("c", "d"))
+
+
+def test_what_may_act_beside_a_set_is_no_member_of_it():
+    """Whether b acts is open, and which of c and d does: b is in no place of theirs, and they are in none of its."""
+    beside = posterior((0.35, "b c"), (0.3, "b d"), (0.2, "c"), (0.15, "d"))
+    assert confounded(beside) == (("c", "d"),)
+
+
+def test_a_set_has_what_is_left_out_together_more_often_than_one_time_in_twenty():
+    assert confounded(posterior((0.85, "b"), (0.05, "c"), (0.035, "d"), (0.035, "e"), (0.03, "f"))) == (tuple("bcdef"),)
+
+
+def test_what_only_curves_leave_uncertain_is_in_a_set_with_what_could_stand_in():
+    sets = posterior((0.93, "b"), (0.07, "c"))
+    assert confounded(sets) == ()
+    assert confounded(sets, {"b": 0.88, "c": 0.06}) == (("b", "c"),)
+
+
 def drive(v, w):
     """Return a drive with rates (n,) held for 0.5 s each and poses at 10 Hz."""
     rates = [np.repeat(np.asarray(rate, dtype=float), 50) for rate in (v, w)]
