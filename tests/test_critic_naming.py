@@ -212,6 +212,23 @@ def test_what_is_certain_or_confirmed_is_kept():
     assert pruned(confirmed, gain(0.2), lambda _: gain(0.3)) == (confirmed, gain(0.2))
 
 
+@pytest.mark.parametrize(("told", "without", "best"), [(True, 0.2, ""), (False, 0.2, "a"), (False, -0.1, "")])
+def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, without, best):
+    """It took all their probability; where nobody would be told of it, they are weighed by themselves."""
+    monkeypatch.setattr("kurumaisu.critic.smooth_explain.told", lambda *_: told)
+    twins = [SimpleNamespace(**vars(fit_of(name, 40.0)), log_likelihood=44.0, terms=()) for name in "ab"]
+    nothing = SimpleNamespace(**vars(fit_of("", 0.0)), log_likelihood=0.0, terms=())
+    found = Naming((*twins, nothing), {"a": 0.0, "b": 0.0}, (), 0.0)
+    curved = Beyond(Rivalry((), 5.0, {}, {}, 0.0), SimpleNamespace(), 0.0)
+    made = Decision(SimpleNamespace(), found, Growth(0.0, 0.0, NOISE), curved)
+    other, worth = pruned(made, gain(-0.1), lambda one: gain(without if one.beyond.extension is None else -0.1))
+    assert (other is made) is (best == "")
+    assert worth == gain(0.2 if best else -0.1)
+    if best:
+        assert other.found.confounded == (("a", "b"),)
+        assert other.found.p["a"] == pytest.approx(0.5, abs=0.01)
+
+
 @pytest.mark.parametrize("seed", [2, 17])
 def test_another_steering_law_is_neither_a_unit_nor_a_sign(seed):
     """By the other law of V_s the chair hardly turns, and more like the volts' steps than like the rates asked for."""
