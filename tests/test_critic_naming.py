@@ -26,7 +26,7 @@ from kurumaisu.critic.noise import Growth, Noise, Scatter, whitener
 from kurumaisu.critic.pruned import pruned
 from kurumaisu.critic.scan import Screen
 from kurumaisu.critic.smooth import Belief
-from kurumaisu.critic.smooth_alike import Likeness
+from kurumaisu.critic.smooth_alike import FORM, Likeness
 from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.critic.smooth_judge import Beyond, undecided
 from kurumaisu.critic.smooth_search import Rivalry
@@ -167,7 +167,21 @@ def test_a_curve_speaks_for_the_effect_that_it_draws(understeering, channel, cov
     assert set(found) == ({"base.understeer"} if drawn else set())
     if drawn:  # the larger the effect, the more its equation may be off
         assert 3.0 < found["base.understeer"] < 0.05 * best.log_likelihood - 0.05 * nothing.log_likelihood
-        assert Likeness(problem, best, designs).drawn(best, curve, belief) == {}
+
+
+@pytest.mark.parametrize(
+    ("channel", "covariate", "mends"), [("w_gain", "abs_v", True), ("w_gain", "time", False), ("v", "time", False)]
+)
+def test_a_curve_beside_an_effect_may_be_what_its_equation_lacks(understeering, channel, covariate, mends):
+    """Over what the effect follows it is no more than the same curve in the place of the effect would be."""
+    problem, best, nothing = understeering
+    designs = Designs(problem, best)
+    (curve,) = (c for c in designs.about(best).curves if (c.channel, c.basis.covariate) == (channel, covariate))
+    found = Likeness(problem, best, designs).drawn(best, curve, Belief(0.0, 0.04 * np.eye(curve.basis.size)))
+    assert set(found) == ({"base.understeer"} if mends else set())
+    if mends:
+        signal = 2 * (best.log_likelihood - nothing.log_likelihood)
+        assert found["base.understeer"] == pytest.approx(0.5 * FORM**2 * signal, rel=0.05)
 
 
 def fit_of(names, score):
