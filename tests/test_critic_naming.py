@@ -177,8 +177,9 @@ def test_a_curve_beside_an_effect_may_be_what_its_equation_lacks(understeering, 
     problem, best, nothing = understeering
     designs = Designs(problem, best)
     (curve,) = (c for c in designs.about(best).curves if (c.channel, c.basis.covariate) == (channel, covariate))
-    found = Likeness(problem, best, designs).drawn(best, curve, Belief(0.0, 0.04 * np.eye(curve.basis.size)))
+    found = Likeness(problem, best, designs).mended(best, curve)
     assert set(found) == ({"base.understeer"} if mends else set())
+    assert Likeness(problem, best, designs).mended(nothing, curve) == {}
     if mends:
         signal = 2 * (best.log_likelihood - nothing.log_likelihood)
         assert found["base.understeer"] == pytest.approx(0.5 * FORM**2 * signal, rel=0.05)

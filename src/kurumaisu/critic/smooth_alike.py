@@ -26,13 +26,12 @@ class Likeness:
         self._signals = {name: signal_of(problem, best, name) for name in sorted(best.ids)}
 
     def drawn(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
-        """Return what this curve draws of the best fit's effects, beside another fit that lacks them, or beside them.
+        """Return what this curve draws of the best fit's effects, beside another fit that lacks them.
 
-        By effect: evidence [nat] by which the curve may be better for nothing but the form of the equation.
+        By effect, of which there is one at most: evidence [nat] by which the curve may be better for nothing but the
+        form of the equation.
         """
         missing = self._best.ids - fit.ids
-        if not missing:
-            return self._mended(fit, curve)
         # Of several, one may hide what another does: then a small whole has large parts.
         if len(missing) != 1 or fit.ids - self._best.ids:
             return {}
@@ -62,12 +61,14 @@ class Likeness:
         better = 0.5 * float(y @ free @ np.linalg.lstsq(free, y, rcond=None)[0]) - already
         return {name: nats for name, nats in found.items() if better < nats + _CHANCE}
 
-    def _mended(self, fit: Fit, curve: Curve) -> dict[str, float]:
+    def mended(self, fit: Fit, curve: Curve) -> dict[str, float]:
         """Return the effect of a fit of which a curve beside it may be what its equation lacks, as drawn does.
 
         One that is a curve over what it follows: it could draw all that the effect does. Of several, which hide one
         another, none.
         """
+        if not self._best.ids <= fit.ids:
+            return {}
         own = _span(self._finer(fit, curve))
         signals = {name: signal_of(self._problem, fit, name) for name in sorted(self._best.ids)}
         found = {

@@ -88,6 +88,8 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
         share = float(np.exp(rival.worth - total))
         asked = (rival.worth - total) / doubt > np.log(_SHARE)
         draws = likeness.drawn(rival.fit, rival.curve, rival.belief) if asked else {}
+        if asked and rival.worth - ceiling > BEYOND:  # else it is no news, and nobody asks whose form it mends
+            draws = draws or likeness.mended(rival.fit, rival.curve)
         drawn = {name for name, nats in draws.items() if rival.worth - ceiling < BEYOND + nats}
         wins = not drawn and rival.worth - ceiling > BEYOND and share > _SHARE
         part = likeness.part_of(rival.fit, rival.curve) if wins else set()
