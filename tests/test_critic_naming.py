@@ -26,7 +26,7 @@ from kurumaisu.critic.noise import Growth, Noise, Scatter, whitener
 from kurumaisu.critic.pruned import pruned
 from kurumaisu.critic.scan import Screen
 from kurumaisu.critic.smooth import Belief
-from kurumaisu.critic.smooth_alike import Likeness
+from kurumaisu.critic.smooth_alike import FORM, Likeness
 from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.critic.smooth_judge import Beyond, undecided
 from kurumaisu.critic.smooth_search import Rivalry
@@ -73,6 +73,28 @@ def test_what_acts_beyond_doubt_is_a_set_however_many_could_do_it():
     """A turn at one rate that is off by a fifth has a dozen explanations, and nothing is none of them."""
     anything = [(0.1, f"a {name}") for name in "bcdefghijk"]
     assert confounded(posterior(*anything)) == (tuple("bcdefghijk"),)
+
+
+def test_two_pairs_of_twins_are_two_sets():
+    """Each of a pair acts beside either of the other: what one of them could be says nothing of the other pair."""
+    twins = posterior(*((0.25, f"{one} {other}") for one in "ab" for other in "cd"))
+    assert confounded(twins) == (("a", "b"), ("c", "d"))
+
+
+def test_what_may_act_beside_a_set_is_no_member_of_it():
+    """Whether b acts is open, and which of c and d does: b is in no place of theirs, and they are in none of its."""
+    beside = posterior((0.35, "b c"), (0.3, "b d"), (0.2, "c"), (0.15, "d"))
+    assert confounded(beside) == (("c", "d"),)
+
+
+def test_a_set_has_what_is_left_out_together_more_often_than_one_time_in_twenty():
+    assert confounded(posterior((0.85, "b"), (0.05, "c"), (0.035, "d"), (0.035, "e"), (0.03, "f"))) == (tuple("bcdef"),)
+
+
+def test_what_only_curves_leave_uncertain_is_in_a_set_with_what_could_stand_in():
+    sets = posterior((0.93, "b"), (0.07, "c"))
+    assert confounded(sets) == ()
+    assert confounded(sets, {"b": 0.88, "c": 0.06}) == (("b", "c"),)
 
 
 def drive(v, w):
@@ -145,7 +167,22 @@ def test_a_curve_speaks_for_the_effect_that_it_draws(understeering, channel, cov
     assert set(found) == ({"base.understeer"} if drawn else set())
     if drawn:  # the larger the effect, the more its equation may be off
         assert 3.0 < found["base.understeer"] < 0.05 * best.log_likelihood - 0.05 * nothing.log_likelihood
-        assert Likeness(problem, best, designs).drawn(best, curve, belief) == {}
+
+
+@pytest.mark.parametrize(
+    ("channel", "covariate", "mends"), [("w_gain", "abs_v", True), ("w_gain", "time", False), ("v", "time", False)]
+)
+def test_a_curve_beside_an_effect_may_be_what_its_equation_lacks(understeering, channel, covariate, mends):
+    """Over what the effect follows it is no more than the same curve in the place of the effect would be."""
+    problem, best, nothing = understeering
+    designs = Designs(problem, best)
+    (curve,) = (c for c in designs.about(best).curves if (c.channel, c.basis.covariate) == (channel, covariate))
+    found = Likeness(problem, best, designs).mended(best, curve)
+    assert set(found) == ({"base.understeer"} if mends else set())
+    assert Likeness(problem, best, designs).mended(nothing, curve) == {}
+    if mends:
+        signal = 2 * (best.log_likelihood - nothing.log_likelihood)
+        assert found["base.understeer"] == pytest.approx(0.5 * FORM**2 * signal, rel=0.05)
 
 
 def fit_of(names, score):
@@ -188,6 +225,23 @@ def test_what_is_certain_or_confirmed_is_kept():
     assert pruned(certain, gain(-0.1), lambda _: gain(0.2)) == (certain, gain(-0.1))
     confirmed = decision({"a": 1.0, "b": 0.7}, fit_of("a b", 50.0), fit_of("a", 49.0))
     assert pruned(confirmed, gain(0.2), lambda _: gain(0.3)) == (confirmed, gain(0.2))
+
+
+@pytest.mark.parametrize(("told", "without", "best"), [(True, 0.2, ""), (False, 0.2, "a"), (False, -0.1, "")])
+def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, without, best):
+    """It took all their probability; where nobody would be told of it, they are weighed by themselves."""
+    monkeypatch.setattr("kurumaisu.critic.smooth_explain.told", lambda *_: told)
+    twins = [SimpleNamespace(**vars(fit_of(name, 40.0)), log_likelihood=44.0, terms=()) for name in "ab"]
+    nothing = SimpleNamespace(**vars(fit_of("", 0.0)), log_likelihood=0.0, terms=())
+    found = Naming((*twins, nothing), {"a": 0.0, "b": 0.0}, (), 0.0)
+    curved = Beyond(Rivalry((), 5.0, {}, {}, 0.0), SimpleNamespace(), 0.0)
+    made = Decision(SimpleNamespace(), found, Growth(0.0, 0.0, NOISE), curved)
+    other, worth = pruned(made, gain(-0.1), lambda one: gain(without if one.beyond.extension is None else -0.1))
+    assert (other is made) is (best == "")
+    assert worth == gain(0.2 if best else -0.1)
+    if best:
+        assert other.found.confounded == (("a", "b"),)
+        assert other.found.p["a"] == pytest.approx(0.5, abs=0.01)
 
 
 @pytest.mark.parametrize("seed", [2, 17])

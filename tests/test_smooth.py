@@ -129,6 +129,23 @@ def test_what_the_catalogue_explains_is_left_to_it():
     assert false_alarm(problem, blind) == 0.0
 
 
+def test_a_curve_has_to_beat_those_that_speak_for_an_effect(monkeypatch):
+    """Where the best curve is an effect in another form, what is next to it is no news from outside the catalogue."""
+    case = hidden.make(hidden.KINDS["gully"], 20.0, 1001, seconds=40.0, runs=2)
+    problem = Problem(drives_of(case.recording), hidden.MODEL, hidden.USUAL)
+    found = Naming((problem.fit_candidates((), {}),), {"base.gain_w": 0.0}, (), 1.0)
+    first = compare(problem, found).rivals[0].curve.id
+
+    def drawn(_self, _fit, curve, _belief):
+        return {"base.gain_w": 1e3} if curve.id == first else {}
+
+    monkeypatch.setattr(Likeness, "drawn", drawn)
+    rivalry = compare(problem, found)
+    assert rivalry.lead < 0
+    assert rivalry.winner is None
+    assert rivalry.p_effects["base.gain_w"] > 0.99
+
+
 @pytest.fixture(scope="module")
 def slipping():
     """Return a problem of a chair that slips beyond a threshold, and the two effects that draw it, fitted."""

@@ -30,7 +30,7 @@ def believed(found: Naming, odds: Mapping[str, float]) -> tuple[dict[str, float]
     odds: log odds of each. What speaks against an effect is believed: nothing is likelier than not for being in doubt.
     """
     shares = {name: float(expit(log if log <= 0 else _doubted(found, name, log))) for name, log in odds.items()}
-    return shares, confounded(Posterior(found.fits, weights(found)))
+    return shares, confounded(Posterior(found.fits, weights(found)), shares)
 
 
 def _doubted(found: Naming, name: str, odds: float) -> float:

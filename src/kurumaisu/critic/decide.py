@@ -8,7 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic import coarse, doubtful, gain, naming, noise, predict_doubt, replay, smooth_fit, smooth_judge
+from kurumaisu.critic import (
+    coarse,
+    doubtful,
+    gain,
+    naming,
+    noise,
+    predict_doubt,
+    replay,
+    smooth_fit,
+    smooth_judge,
+    smooth_search,
+)
 from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
@@ -75,6 +86,14 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
             break
     settled = made.found if made.beyond.extension is not None else doubtful.left_out(made.found)
     return made if settled is made.found else replace(made, found=settled)
+
+
+def uncurved(made: Decision) -> Decision:
+    """Return what acts if nothing outside the catalogue does."""
+    found, beyond = made.found, smooth_judge.Beyond(smooth_search.no_rivals(made.found), None, 1.0)
+    p, still_open = coarse.believed(found, beyond.rivalry.odds)
+    found = doubtful.left_out(weighed_anew(replace(found, confounded=still_open), p))
+    return replace(made, found=found, beyond=beyond)
 
 
 def _by_noise(first: Problem, made: Decision, truth: Truth) -> float:

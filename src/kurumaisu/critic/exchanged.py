@@ -13,7 +13,7 @@ import numpy as np
 
 from kurumaisu.critic.catalogue import Candidate, Key
 from kurumaisu.critic.evidence import Fit, log_posterior
-from kurumaisu.critic.stand_ins import RIVAL
+from kurumaisu.critic.stand_ins import MEMBER
 
 _MOST = 8  # sets that are tried, the likeliest first: of a long recording, each takes a second
 
@@ -23,7 +23,7 @@ def exchanges(ranked: Sequence[Fit], of: int) -> list[tuple[frozenset[Candidate]
 
     of: effects that could show.
     """
-    likely = [fit for fit in ranked if log_posterior(fit, of) > log_posterior(ranked[0], of) + np.log(RIVAL)]
+    likely = [fit for fit in ranked if log_posterior(fit, of) > log_posterior(ranked[0], of) + np.log(MEMBER)]
     known = {fit.candidates for fit in ranked}
     found: dict[frozenset[Candidate], Mapping[Key, float]] = {}
     for fit in likely:

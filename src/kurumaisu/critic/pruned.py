@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Effects that nobody is sure of are left out where data held out refuse them, so that they spoil no certain one."""
+"""What data held out refuse is left out, so that it spoils nothing certain: effects nobody is sure of, and curves."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 
-from kurumaisu.critic.decide import Decision
+from kurumaisu.critic import smooth_explain
+from kurumaisu.critic.decide import Decision, uncurved
 from kurumaisu.critic.evidence import Fit
 from kurumaisu.critic.material import confirmed
 from kurumaisu.critic.verdict import Gain
@@ -15,10 +16,15 @@ _TRIED = 2  # smaller sets, the likeliest first: each is fitted to all folds
 
 
 def pruned(made: Decision, worth: Gain | None, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain | None]:
-    """Return a decision with what it is worth, or that of a smaller set which keeps what is named and is confirmed."""
+    """Return a decision with what it is worth, or that of what is confirmed in its place.
+
+    That is a smaller set which keeps what is named, or, for a curve of which nobody would be told, the catalogue's own.
+    """
     found = made.found
-    if worth is None or made.beyond.extension is not None:
+    if worth is None:
         return made, worth
+    if made.beyond.extension is not None:
+        return (made, worth) if smooth_explain.told(made, worth) else _uncurved(made, worth, measure)
     if confirmed(worth, found.nats(found.best)):
         return made, worth
     smaller = [fit for fit in found.fits if fit.ids and set(found.named) <= fit.ids < found.best.ids]
@@ -28,6 +34,15 @@ def pruned(made: Decision, worth: Gain | None, measure: Callable[[Decision], Gai
         if confirmed(gained, found.nats(fit)):
             return other, gained
     return made, worth
+
+
+def _uncurved(made: Decision, worth: Gain, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain]:
+    """Return what acts if no curve does, where that is confirmed: a curve that is not must not hide it."""
+    other = uncurved(made)
+    if not other.something:
+        return made, worth
+    gained = measure(other)
+    return (other, gained) if confirmed(gained, other.found.nats(other.found.best)) else (made, worth)
 
 
 def _with(made: Decision, fit: Fit) -> Decision:

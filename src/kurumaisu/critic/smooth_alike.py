@@ -46,13 +46,40 @@ class Likeness:
             for name, signal in signals.items()
             if _correlation(drawn, signal) > _ALIKE
         }
-        if isinstance(curve.basis, Jump):
-            # No other form of an equation jumps: what a jump explains beyond it, and beyond chance, is no form.
-            better = 0.5 * float(y @ free @ np.linalg.lstsq(free, y, rcond=None)[0]) - (
-                self._best.log_likelihood - fit.log_likelihood
-            )
-            found = {name: nats for name, nats in found.items() if better < nats + _CHANCE}
-        return found
+        return self._by_no_jump(found, fit, curve, self._best.log_likelihood - fit.log_likelihood)
+
+    def _by_no_jump(self, found: dict[str, float], fit: Fit, curve: Curve, already: float) -> dict[str, float]:
+        """Return those effects of which a curve is drawn though it jumps; already: what they explain of it [nat].
+
+        No other form of an equation jumps: what a jump explains beyond it, and beyond chance, is no form.
+        """
+        if not isinstance(curve.basis, Jump):
+            return found
+        y, own = taken_up(self._problem, fit)
+        free = self._designs.columns(fit, curve)
+        free = free - own @ (own.T @ free)
+        better = 0.5 * float(y @ free @ np.linalg.lstsq(free, y, rcond=None)[0]) - already
+        return {name: nats for name, nats in found.items() if better < nats + _CHANCE}
+
+    def mended(self, fit: Fit, curve: Curve) -> dict[str, float]:
+        """Return the effect of a fit of which a curve beside it may be what its equation lacks, as drawn does.
+
+        One that is a curve over what it follows: it could draw all that the effect does. Of several, which hide one
+        another, none.
+        """
+        if not self._best.ids <= fit.ids:
+            return {}
+        own = _span(self._finer(fit, curve))
+        signals = {name: signal_of(self._problem, fit, name) for name in sorted(self._best.ids)}
+        found = {
+            name: 0.5 * float(FORM**2 * signal @ signal)
+            for name, signal in signals.items()
+            if _norm(own.T @ signal) > _ALIKE * _norm(signal)
+        }
+        return self._by_no_jump(found, fit, curve, 0.0) if len(found) == 1 else {}
+
+    def _finer(self, fit: Fit, curve: Curve) -> FloatArray:
+        return columns(self._problem, fit.settings, [replace(curve, basis=curve.basis.finer())])
 
     def part_of(self, fit: Fit, curve: Curve) -> set[str]:
         """Return the effects of a fit that are themselves curves over what a curve beside them follows.
@@ -62,16 +89,14 @@ class Likeness:
         """
         if not fit.ids:
             return set()
-        finer = replace(curve, basis=curve.basis.finer())
-        free = columns(self._problem, fit.settings, [finer])
+        free = self._finer(fit, curve)
         rate = curve.channel.removesuffix("_gain")
         # A curve of factors may be one about another gain than 1, but for one over the rate itself: it holds the gain.
         if rate not in (curve.channel, curve.basis.covariate.removeprefix("abs_")):
             level = free[:, :1] if not len(curve.basis.knots) else free.sum(axis=1, keepdims=True)
             level = level / np.linalg.norm(level)
             free = free - level @ (level.T @ free)
-        left, sizes, _ = np.linalg.svd(free, full_matrices=False)
-        own = left[:, sizes > 1e-6 * max(sizes[0], 1e-12)]
+        own = _span(free)
         signals = {name: signal_of(self._problem, fit, name) for name in sorted(fit.ids)}
         return {name for name, signal in signals.items() if _norm(own.T @ signal) > _ALIKE * _norm(signal)}
 
@@ -85,6 +110,12 @@ def signal_of(problem: Problem, fit: Fit, name: str) -> FloatArray:
         ]
     )
     return problem.residual(fit.terms, null) - problem.residual(fit.terms, fit.values)
+
+
+def _span(free: FloatArray) -> FloatArray:
+    """Return orthonormal columns that span some."""
+    left, sizes, _ = np.linalg.svd(free, full_matrices=False)
+    return np.asarray(left[:, sizes > 1e-6 * max(sizes[0], 1e-12)])
 
 
 def _correlation(one: FloatArray, other: FloatArray) -> float:

@@ -45,13 +45,10 @@ def criticism(
     fit = curved.fit_candidates(extension.fit.candidates, extension.fit.start)
     inner = replace(found, fits=(fit, *found.fits), confounded=(), false_alarm=beyond.false_alarm)
     beside = explain.criticism(recording, replace(made, problem=curved, found=inner), worth, drives, proposal)
-    share = moved_share(problem, extension.settings, extension.fit.settings)
-    felt = felt_share(problem, extension.settings, extension.fit.settings)
-    nats = _nats(found, beyond)
-    gains = confirmed(worth, nats) or (nats >= STRONG and _nearer(worth, extension.curve.channel))
-    told = _told(extension, beyond, share)
-    if not gains or (share < MATERIAL and felt < FELT):
-        small = f"{told} It is too small to matter, or was not confirmed on data held out."
+    share, felt = _shares(made)
+    words = _told(extension, beyond, share)
+    if not _held(made, worth) or not _matters(share, felt):
+        small = f"{words} It is too small to matter, or was not confirmed on data held out."
         story = replace(beside.story, unexplained=(small, *beside.story.unexplained))
         kept = replace(beside, story=story, model=problem.model)
         return _unheld(kept, problem, made, worth) if share >= MATERIAL else kept
@@ -60,7 +57,7 @@ def criticism(
     story = replace(
         beside.story,
         headline=smooth_words.headline(extension),
-        details=(told, *beside.story.details),
+        details=(words, *beside.story.details),
         overlays=explain.overlays(recording, problem.model, extension.settings),
         misfits=(figure(problem, extension), *(beside.story.misfits if fit.ids else ())),
         rivals=tuple(_rivals(found, beyond)),
@@ -73,15 +70,43 @@ def _unheld(kept: Criticism, problem: Problem, made: Decision, worth: Gain | Non
 
     It follows more than one thing, or none that is known: the curves only say where to look, and extend nothing.
     """
-    found, beyond = made.found, made.beyond
-    best, extension = beyond.rivalry.rivals[0], beyond.extension
+    extension = made.beyond.extension
     assert extension is not None
-    if worth is None or found.nats(best.fit) + best.belief.nats < _NO_NOISE:
+    if worth is None or not _no_noise(made):
         return kept
-    curves = tuple(replace(one, p=min(one.p, _UNHELD)) for one in _unknowns(problem, beyond))
+    curves = tuple(replace(one, p=min(one.p, _UNHELD)) for one in _unknowns(problem, made.beyond))
     headline = f"{smooth_words.headline(extension)} That does not hold on data held out: it is not the whole of it."
     verdict = replace(kept.verdict, verdict="unknown", unknown=curves)
     return replace(kept, verdict=verdict, story=replace(kept.story, headline=headline))
+
+
+def told(made: Decision, worth: Gain | None) -> bool:
+    """Tell whether a curve is told of: it matters, and held on data held out, or what it draws cannot be noise."""
+    share, felt = _shares(made)
+    return (_held(made, worth) and _matters(share, felt)) or (_no_noise(made) and share >= MATERIAL)
+
+
+def _shares(made: Decision) -> tuple[float, float]:
+    """Return how far the curve moves the chair, and what it is beside the noise."""
+    extension = made.beyond.extension
+    assert extension is not None
+    settings, without = extension.settings, extension.fit.settings
+    return moved_share(made.problem, settings, without), felt_share(made.problem, settings, without)
+
+
+def _matters(share: float, felt: float) -> bool:
+    return share >= MATERIAL or felt >= FELT
+
+
+def _held(made: Decision, worth: Gain | None) -> bool:
+    assert made.beyond.extension is not None
+    nats = _nats(made.found, made.beyond)
+    return confirmed(worth, nats) or (nats >= STRONG and _nearer(worth, made.beyond.extension.curve.channel))
+
+
+def _no_noise(made: Decision) -> bool:
+    best = made.beyond.rivalry.rivals[0]
+    return made.found.nats(best.fit) + best.belief.nats >= _NO_NOISE
 
 
 def _nats(found: Naming, beyond: Beyond) -> float:

@@ -42,9 +42,9 @@ class Rivalry:
     """Result of the comparison.
 
     rivals: best first, but for those that draw an effect of the catalogue in another form, and so speak for that;
-    lead: of the best one over the best set without a curve [nat]; p: posterior of each curve by the id of its effect;
-    odds: log odds that each effect of the catalogue acts, with curves in the running, which a probability near 1 cannot
-    say; p_nothing: that there is neither.
+    lead: of the best one over the best set without a curve, or with one that so speaks for an effect [nat];
+    p: posterior of each curve by the id of its effect; odds: log odds that each effect of the catalogue acts, with
+    curves in the running, which a probability near 1 cannot say; p_nothing: that there is neither.
     """
 
     rivals: tuple[Rival, ...]
@@ -82,20 +82,24 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
     acting = [(float(w), fit.ids) for (fit, _), w in zip(bare, plain, strict=True)]
     likeness, ceiling = Likeness(problem, found.best, designs), float(plain.max())
     beyond: list[Rival] = []
+    own = ceiling  # of the catalogue, its effects in other forms included
     doubt = coarse.variance(found)
     for rival in rivals:
         share = float(np.exp(rival.worth - total))
         asked = (rival.worth - total) / doubt > np.log(_SHARE)
         draws = likeness.drawn(rival.fit, rival.curve, rival.belief) if asked else {}
+        if asked and rival.worth - ceiling > BEYOND:  # else it is no news, and nobody asks whose form it mends
+            draws = draws or likeness.mended(rival.fit, rival.curve)
         drawn = {name for name, nats in draws.items() if rival.worth - ceiling < BEYOND + nats}
         wins = not drawn and rival.worth - ceiling > BEYOND and share > _SHARE
         part = likeness.part_of(rival.fit, rival.curve) if wins else set()
         acting.append((rival.worth, (rival.fit.ids - part) | drawn))
         beyond += [] if drawn else [rival]
+        own = max(own, rival.worth) if drawn else own
     curves: dict[str, float] = {}
     for rival in beyond:
         curves[rival.curve.id] = curves.get(rival.curve.id, 0.0) + float(np.exp(rival.worth - total))
-    lead = beyond[0].worth - ceiling if beyond else -np.inf
+    lead = beyond[0].worth - own if beyond else -np.inf
     nothing = float(sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if not fit.ids))
     return Rivalry(tuple(beyond), lead, curves, _odds(acting, found.p), nothing)
 

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
 
 from kurumaisu.critic.evidence import Fit
 from kurumaisu.types import FloatArray
@@ -12,6 +14,11 @@ NAMED = 0.9  # posterior from which a cause is named
 _MOST = 7  # members of a set: more may be a chance leaving that everything explains a little
 _CHANCE = 1e-3  # posterior of nothing in its place below which a set may have more members
 RIVAL = 0.05  # posterior from which an effect counts as a rival of another
+# The same from which it is a member of a set, which has to hold the truth in 95 cases of 100: of several that each may
+# be left out, one acts more often than one of them by itself.
+MEMBER = 0.02
+_RATHER = 3.0  # ratio of odds from which one effect acts in the place of another rather than beside it
+_TINY = 1e-9  # posterior of what no set has
 
 
 class Posterior:
@@ -27,13 +34,28 @@ class Posterior:
         wanted = set(names)
         return float(sum(w for w, fit in zip(self.weights, self.ranked, strict=True) if fit.ids & wanted))
 
+    def instead(self, name: str, other: str) -> bool:
+        """Tell whether another effect acts rather in the place of one than beside it: by the ratio of their odds.
 
-def confounded(posterior: Posterior) -> tuple[tuple[str, ...], ...]:
-    """Return, for each uncertain effect of the best set, the set with those that could stand in, if one must act."""
+        Of two pairs of twins each is as likely with either of the other pair: it is in no place of that.
+        """
+        mine, its = (np.array([one in fit.ids for fit in self.ranked], dtype=np.bool_) for one in (name, other))
+        one, rest, both, none = (
+            float(self.weights[these].sum()) + _TINY for these in (mine & ~its, ~mine & its, mine & its, ~mine & ~its)
+        )
+        return one * rest > _RATHER * both * none
+
+
+def confounded(posterior: Posterior, p: Mapping[str, float] | None = None) -> tuple[tuple[str, ...], ...]:
+    """Return, for each uncertain effect of the best set, the set with those that could stand in, if one must act.
+
+    p: of each effect, where more is known of it than the sets say, such as what curves do.
+    """
     best = posterior.ranked[0]
+    p = posterior.p if p is None else p
     merged: list[set[str]] = []
     for name in sorted(best.ids):
-        if posterior.p[name] >= NAMED:
+        if p[name] >= NAMED:
             continue
         group = _alone(posterior, name)
         if posterior.any_of(group) < NAMED:
@@ -58,8 +80,9 @@ def _alone(posterior: Posterior, name: str) -> set[str]:
     group = {name}
     for fit, weight in zip(posterior.ranked, posterior.weights, strict=True):
         stands_in = name not in fit.ids and len(fit.ids & without) >= len(without) - 1
-        if stands_in and len(fit.ids) <= len(best.ids) and weight > RIVAL / 5:
-            group |= {other for other in fit.ids - best.ids if posterior.p[other] >= RIVAL}
+        if stands_in and len(fit.ids) <= len(best.ids) and weight > MEMBER / 5:
+            own = (other for other in fit.ids - best.ids if posterior.instead(name, other))
+            group |= {other for other in own if posterior.p[other] >= MEMBER}
     return group
 
 
@@ -70,5 +93,7 @@ def _with_others(posterior: Posterior, name: str, group: set[str]) -> set[str]:
         if posterior.any_of(group) >= NAMED:
             break
         if name not in fit.ids:
-            group = group | (fit.ids - certain)
+            best = posterior.ranked[0].ids
+            own = {other for other in fit.ids - certain if other not in best and posterior.instead(name, other)}
+            group = group | own
     return group
