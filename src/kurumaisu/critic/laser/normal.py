@@ -15,6 +15,7 @@ from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, near, refined
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate, marginal, whitened
+from kurumaisu.critic.laser.path import Sight
 from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, rows_of
 from kurumaisu.critic.laser.sought import moved, stands
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
@@ -54,7 +55,7 @@ class Assembly:
         self.blocked = blocked(shots.measured, self.marks.base)
         self.first = self._trust()
         for i in range(_SHIFTS):
-            found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._errors())
+            found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._sights())
             self._linearise(found, roughly=i < _SHIFTS - 1)
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base) & ~self.blocked
@@ -86,22 +87,20 @@ class Assembly:
         sure = np.array([not self.kinked[self.shots.run[k]][hat.rows].any() for k, hat in enumerate(self.hats)])
         return sure if sure.mean() >= _SURE else np.ones_like(sure)
 
-    def _errors(self) -> list[FloatArray]:
-        """Return the errors of the poses (q, 3) under each scan, by that scan alone, within what is plausible."""
+    def _sights(self) -> list[Sight]:
+        """Return what each scan alone says of the errors of its poses, within what is plausible."""
         size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
         beam = self._begun()
-        out: list[FloatArray] = []
+        out: list[Sight] = []
         for _ in range(2):  # without outliers in the second round
             left, out = np.full_like(self.residual, np.nan), []
             for k, gram in enumerate(self.grams(beam)):
                 own, shared, _ = self._rows(k, None)
-                sizes = np.concatenate([np.tile(size, own.shape[1] // 3), [_BROAD.common_sd], size])[
-                    : gram.own + gram.shared
-                ]
-                lead = len(sizes)
+                lead = gram.own + gram.shared
+                sizes = np.concatenate([np.tile(size, gram.own // 3), [_BROAD.common_sd], size])[:lead]
                 errors = np.linalg.solve(gram.matrix[:lead, :lead] + np.diag(sizes**-2), gram.matrix[:lead, -1])
                 left[k] = self.residual[k] - np.hstack([own, shared]) @ errors
-                out.append(errors[: gram.own].reshape(-1, 3) if gram.own else errors[np.newaxis, 1:4])
+                out.append(_sight(gram, self.hats[k].rows))
             z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
             beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * MAD * np.nanmedian(z)))
         return out
@@ -282,6 +281,14 @@ class Assembly:
                 moved.append(predict(self.shots, (), seen, 0))
             out.append((moved[1] - moved[0]) / (len(signs) * _MOVE[axis]))
         return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
+
+
+def _sight(gram: Gram, rows: slice) -> Sight:
+    """Return what a scan says of its poses, its common mode integrated out; rows: of the track, that it rests on."""
+    common, poses = gram.own, np.arange(gram.own) if gram.own else np.arange(1, 4)
+    beside = gram.matrix[poses, common] / (gram.matrix[common, common] + _BROAD.common_sd**-2)
+    inner = gram.matrix[np.ix_(poses, poses)] - np.outer(beside, gram.matrix[common, poses])
+    return Sight(rows, inner, gram.matrix[poses, -1] - beside * gram.matrix[common, -1])
 
 
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:
