@@ -13,7 +13,7 @@ from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic import pipeline, sanity_jumps
 from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, whitened
-from kurumaisu.critic.laser.path import Sight, likeliest
+from kurumaisu.critic.laser.path import Sight, likeliest, steady
 from kurumaisu.critic.laser.standing import steadied
 from kurumaisu.critic.laser.verdicts import criticise
 from kurumaisu.critic.recording import Series
@@ -189,6 +189,26 @@ def test_a_path_has_the_rates_of_the_truth_and_shows_where_they_jump(step):
     near = np.abs(np.flatnonzero(jumps)[:, np.newaxis] - turns).min(axis=1)
     assert jumps.sum() < 6 * len(turns)
     assert np.mean(near <= round(0.2 / step)) > 0.8
+
+
+def test_motion_tells_errors_that_differ_from_pose_to_pose_unless_the_rates_jump():
+    rng = np.random.default_rng(6)
+    times = 0.05 * np.arange(100)
+    rates = np.where(times < 2.5, 0.4, -0.4)
+    truth = np.cumsum(np.outer(rates, [0.05, 0.0, 0.1]), axis=0)
+    reference = truth + np.array([0.01, 0.01, 0.005]) * rng.standard_normal(truth.shape)
+    scans = [slice(i, i + 3) for i in (10, 30, 48, 70)]
+    made = steady(times, reference, truth, scans)
+    for known, rows in zip(made, scans, strict=True):
+        errors = (truth - reference)[rows].ravel()
+        off = known.rows @ errors - known.left
+        if rows.start == 48:
+            assert 1 < np.abs(off).max() < 3  # a jump of many usual changes, in units that it has widened itself
+        else:
+            np.testing.assert_allclose(off, 0, atol=1e-9)
+            assert np.abs(known.left).max() > 3  # of the reference's errors much is told
+    fewer = steady(times, reference, truth, [slice(10, 12)])
+    assert fewer[0].rows.shape == (0, 6)
 
 
 def test_a_pose_that_is_known_stays_and_pauses_say_nothing_of_rates():

@@ -68,11 +68,50 @@ def likeliest(
         whole, aim = band.copy(), target.copy()
         terms.put(whole, aim, weights)
         out = reference + solveh_banded(whole, aim, check_finite=False).reshape(count, 3)
-        unit = terms.of(out) / terms.sd
-        moves = np.mean(unit[:, :2] ** 2, axis=1)[:, np.newaxis]
-        square = np.hstack([moves, moves, unit[:, 2:] ** 2])
-        weights = (_JUMPY + 1) / (_JUMPY + square)
+        weights = _weights(terms.of(out) / terms.sd)
     return out, terms.seldom(out, held)
+
+
+@dataclass(frozen=True)
+class Steady:
+    """What the motion says of the errors of the poses under a scan: rows (m, 3 q), and what is left of them (m,).
+
+    In units in which each has a variance of 1.
+    """
+
+    rows: FloatArray
+    left: FloatArray
+
+
+def steady(times: FloatArray, reference: FloatArray, path: FloatArray, scans: Sequence[slice]) -> list[Steady]:
+    """Return how far errors of the poses under each scan can differ from one to the next, the chair moving as it does.
+
+    path (n, 3): the likeliest one; scans: the rows of the poses that each rests on. Where rates jump, they say less;
+    where they always change by more than they usually do anywhere, too.
+    """
+    parts = [_Changes(times[rows], reference[rows]) for rows in scans]
+    units = [terms.of(path[rows]) / terms.sd for terms, rows in zip(parts, scans, strict=True)]
+    every = np.concatenate([np.empty((0, 3)), *units])
+    usual = np.maximum(1.4826 * np.median(np.abs(every), axis=0), 1.0) if len(every) else np.ones(3)
+    return [
+        _steady(terms, usual, unit / usual, reference[rows])
+        for terms, unit, rows in zip(parts, units, scans, strict=True)
+    ]
+
+
+def _steady(terms: _Changes, usual: FloatArray, unit: FloatArray, reference: FloatArray) -> Steady:
+    precision = np.sqrt(_weights(unit)) / (usual * terms.sd)
+    out = np.zeros((len(terms.rows), 3, len(reference), 3))
+    for axis in range(3):
+        for i, part in zip((-1, 0, 1), terms.parts, strict=True):
+            out[range(len(part)), axis, terms.rows + i, axis] = precision[:, axis] * part
+    return Steady(out.reshape(-1, reference.size), -(precision * terms.of(reference)).ravel())
+
+
+def _weights(unit: FloatArray) -> FloatArray:
+    """Return how much changes of the rates (m, 3), in sds, count; those of a position's axes jump together."""
+    moves = np.mean(unit[:, :2] ** 2, axis=1)[:, np.newaxis]
+    return np.asarray((_JUMPY + 1) / (_JUMPY + np.hstack([moves, moves, unit[:, 2:] ** 2])))
 
 
 class _Changes:
@@ -84,14 +123,14 @@ class _Changes:
         moves = (np.minimum(before, after) > _BRIEF) & (np.maximum(before, after) < _PAUSE)
         self.rows = np.flatnonzero(moves) + 1  # of the pose between
         before, after = before[moves], after[moves]
-        self._parts = np.stack([1 / before, -1 / before - 1 / after, 1 / after])  # of three poses
+        self.parts = np.stack([1 / before, -1 / before - 1 / after, 1 / after])  # of three poses
         self.sd = _WANDER * np.sqrt(0.5 * (before + after))[:, np.newaxis]
         self._reference = self.of(reference)
         self._lasts = 0.25 * np.maximum(before, after)
 
     def of(self, poses: FloatArray) -> FloatArray:
         """Return the changes (m, 3) [m/s, m/s, rad/s] along a path (n, 3)."""
-        before, at, after = self._parts[:, :, np.newaxis]
+        before, at, after = self.parts[:, :, np.newaxis]
         return np.asarray(before * poses[self.rows - 1] + at * poses[self.rows] + after * poses[self.rows + 1])
 
     def put(self, band: FloatArray, target: FloatArray, weights: FloatArray) -> None:
@@ -101,9 +140,9 @@ class _Changes:
         for axis in range(3):
             columns = 3 * (self.rows - 1) + axis  # each but once, of the first of the three poses
             for i in range(3):
-                target[columns + 3 * i] -= precision[:, axis] * self._parts[i] * self._reference[:, axis]
+                target[columns + 3 * i] -= precision[:, axis] * self.parts[i] * self._reference[:, axis]
                 for j in range(i, 3):
-                    part = precision[:, axis] * self._parts[i] * self._parts[j]
+                    part = precision[:, axis] * self.parts[i] * self.parts[j]
                     band[last - 3 * (j - i), columns + 3 * j] += part
 
     def seldom(self, poses: FloatArray, held: BoolArray) -> BoolArray:
