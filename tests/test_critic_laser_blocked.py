@@ -34,6 +34,16 @@ def test_a_beam_is_blocked_if_it_reads_the_same_while_walls_come_and_go(reads, w
     assert blocked(measured, wall).tolist() == [expected]
 
 
+def test_readings_that_are_cut_off_are_nothing_that_rides_there():
+    """Some walls are just before the end of what such a laser reads: not all of its readings are the same."""
+    rng = np.random.default_rng(2)
+    walls = rng.uniform(2.35, 3.5, (40, 200))
+    walls[:, :100] = rng.uniform(1.0, 3.5, (40, 100))
+    measured = np.round(np.minimum(walls + 0.002 * rng.standard_normal(walls.shape), 2.4), 3)
+    assert np.mean(measured == 2.4) > 0.5
+    assert not blocked(measured, walls).any()
+
+
 def test_where_beams_are_blocked_is_told_the_widest_first():
     beams = np.zeros(30, dtype=bool)
     beams[[2, 10, 11, 12]] = True

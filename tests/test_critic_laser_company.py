@@ -6,7 +6,7 @@ import pytest
 
 from kurumaisu import effects
 from kurumaisu.critic.laser.columns import Column, Form
-from kurumaisu.critic.laser.likeness import Likeness
+from kurumaisu.critic.laser.likeness import Kinds, Likeness
 from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
@@ -14,6 +14,7 @@ from kurumaisu.critic.laser.spread_fit import ScatterFit
 from kurumaisu.critic.laser.verdicts import size_of
 from kurumaisu.critic.laser.whole_scans import beyond, with_whole_scans
 from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.verdict import NORMAL90
 from kurumaisu.params import EffectSetting
 
 
@@ -22,8 +23,9 @@ class _Powers:
 
     sd = np.linspace(1.0, 1.5, 10)
 
-    def counts(self):
-        return np.zeros(11, dtype=bool)
+    def kinds(self):
+        none = np.zeros(11, dtype=bool)
+        return Kinds(none, none)
 
     def null(self, effect):
         return {p.name: p.null for p in effect.parameters}
@@ -60,7 +62,12 @@ def test_two_effects_act_together_though_each_explains_nearly_all_alone():
 
 def test_numbers_that_nothing_explains_yet_do_not_bend_what_explains_others():
     nulls = np.random.default_rng(1).standard_normal((50, 3))
-    likeness = Likeness(nulls, np.array([80.0, 5.0, 5.0]), np.zeros(3, dtype=bool), np.ones(3, dtype=bool))
+    likeness = Likeness(
+        nulls,
+        np.array([80.0, 5.0, 5.0]),
+        Kinds(np.zeros(3, dtype=bool), np.zeros(3, dtype=bool)),
+        np.ones(3, dtype=bool),
+    )
     right, bent = np.array([0.0, 5.0, 5.0]), np.array([2.0, 17.0, 17.0])
     assert likeness.cost(right) < likeness.cost(bent)
     step = likeness.step(right, np.array([[2.0, 12.0, 12.0]]))
@@ -70,7 +77,9 @@ def test_numbers_that_nothing_explains_yet_do_not_bend_what_explains_others():
 def test_a_tenth_more_readings_beyond_three_deviations_matters_to_nobody():
     """So many come with a spread that differs by less than anyone minds."""
     nulls = np.array([24.0, 1.2]) + 0.1 * np.random.default_rng(1).standard_normal((50, 2))
-    likeness = Likeness(nulls, np.array([25.2, 1.2]), np.ones(2, dtype=bool), np.ones(2, dtype=bool))
+    likeness = Likeness(
+        nulls, np.array([25.2, 1.2]), Kinds(np.ones(2, dtype=bool), np.zeros(2, dtype=bool)), np.ones(2, dtype=bool)
+    )
     many, few = likeness.units(likeness.measured + np.array([0.0, 3.0]))
     assert many < 0.9
     assert few > 2.9
@@ -137,6 +146,18 @@ def _recording():
     stamps = 0.1 * np.arange(50)
     scan = Series(stamps, np.ones((50, 2)), ("r0", "r1"))
     return Recording("scans", (Run("a", scan=scan),), train=("a",))
+
+
+def test_what_is_known_by_its_log_has_the_interval_of_its_log():
+    noise, vague = ScanNoise(0.005, 0.005, 4e-4, 0.05), CommonMode(20.0, 0.3, 1.5)
+    (found,) = with_whole_scans([], vague, noise, _recording(), None)
+    for name, ends in (
+        ("sd", 4e-4 * np.exp(NORMAL90 * 0.3 * np.array([-1, 1]))),
+        ("rho", np.exp(-0.1 / (0.05 * np.exp(NORMAL90 * 1.5 * np.array([-1, 1]))))),
+    ):
+        below, above = found.sds[name]
+        value = found.setting.parameters[name]
+        np.testing.assert_allclose([value - NORMAL90 * below, value + NORMAL90 * above], ends, rtol=1e-6)
 
 
 def test_a_common_mode_that_all_scans_show_is_named_unless_something_may_stand_in_for_it():

@@ -68,3 +68,15 @@ def test_a_cause_far_out_of_the_noise_leaves_no_scatter(tmp_path, name, size):
     (told,) = (cause.parameters for cause in seen.causes)
     first = next(iter(told.values()))
     assert first.lo90 < size < first.hi90
+
+
+def test_where_readings_are_cut_off_is_known_to_a_step_of_them(tmp_path):
+    data = recording(tmp_path, None, 0.0, 4, scans=30)
+    run = data.runs[0]
+    cut = np.minimum(run.scan.values, 2.437)
+    data = replace(data, runs=(replace(run, scan=replace(run.scan, values=cut)),))
+    seen = criticise(data, MODEL, lambda _: None, frozenset({"laser.saturation", "laser.dropout"}))
+    (cause,) = seen.causes
+    told = cause.parameters["inverse_far"]
+    assert told.lo90 < 1 / 2.437 < told.hi90
+    assert told.hi90 - told.lo90 < 0.005 / 2.437**2

@@ -8,6 +8,7 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu import effects
+from kurumaisu.critic.laser.likeness import Kinds
 from kurumaisu.critic.laser.noise import ScanNoise
 from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.shots import gather
@@ -26,8 +27,9 @@ class _Linear:
 
     marks: dict[str, tuple[float, ...]]
 
-    def counts(self):
-        return np.zeros(5, dtype=bool)
+    def kinds(self):
+        none = np.zeros(5, dtype=bool)
+        return Kinds(none, none)
 
     def null(self, effect):
         return {p.name: p.null for p in effect.parameters}

@@ -10,11 +10,13 @@ from laser_scene import recording
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.laser.columns import Column, Form, Marks
+from kurumaisu.critic.laser.likeness import Kinds
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.spread import ScatterSearch
 from kurumaisu.critic.laser.spread_fit import ScatterFit
 from kurumaisu.critic.laser.standing import held, steadied
+from kurumaisu.critic.laser.trust import hats
 from kurumaisu.critic.laser.verdicts import criticise
 from kurumaisu.critic.recording import Series
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -43,6 +45,19 @@ def test_stands_are_found_whatever_their_jitter_happens_to_be():
         places = np.repeat(rng.uniform(-1, 1, (4, 3)), 20, axis=0)
         still = steadied(times, places + 3e-4 * rng.standard_normal(places.shape))
         assert len(np.unique(still, axis=0)) == 4, seed
+
+
+def test_a_scan_rests_on_the_poses_of_when_its_beams_leave(tmp_path):
+    shots = gather(recording(tmp_path, None, 0.0, 1, scans=10), MODEL)
+    for delay in (0.0, 0.3):
+        late = replace(shots, own=(EffectSetting("laser.latency", {"delay": delay}),))
+        for scan in (3, 8):
+            hat = hats(late, scan)
+            times = shots.stamps[scan] - delay + shots.said
+            knots = shots.tracks[shots.run[scan]].times[hat.rows]
+            assert knots[0] <= times[0]
+            assert knots[-1] >= times[-1]
+            np.testing.assert_allclose(hat.weights @ knots, times, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -88,8 +103,9 @@ def test_a_delay_is_measured_where_it_acts(tmp_path, monkeypatch):
 class _Three:
     """Numbers that follow two effects: a spread that both raise, and one number each."""
 
-    def counts(self):
-        return np.zeros(3, dtype=bool)
+    def kinds(self):
+        none = np.zeros(3, dtype=bool)
+        return Kinds(none, none)
 
     def null(self, effect):
         return {p.name: p.null for p in effect.parameters}

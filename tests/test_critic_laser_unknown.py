@@ -13,7 +13,8 @@ from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic import pipeline, sanity_jumps
 from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, whitened
-from kurumaisu.critic.laser.standing import kinks, smoothed, steadied
+from kurumaisu.critic.laser.path import Sight, likeliest, steady
+from kurumaisu.critic.laser.standing import steadied
 from kurumaisu.critic.laser.verdicts import criticise
 from kurumaisu.critic.recording import Series
 from kurumaisu.effects import Echoes
@@ -158,18 +159,65 @@ def test_poses_of_a_stand_are_one_and_those_of_a_drive_are_not():
     np.testing.assert_array_equal(steadied(times, driven), driven)
 
 
-def test_a_smooth_path_has_the_rates_of_the_truth_and_shows_its_kinks():
+def seen(times, truth, reference, sd, every):
+    """Sights of scans that rest on three poses each, and find them within sd."""
+    rng = np.random.default_rng(8)
+    inner = np.kron(np.eye(3), np.diag([sd**-2.0] * 3))
+    rows = [slice(i, i + 3) for i in range(0, len(times) - 3, every)]
+    errors = [(truth[r] - reference[r] + sd * rng.standard_normal((3, 3))).ravel() for r in rows]
+    return [Sight(r, inner, inner @ error) for r, error in zip(rows, errors, strict=True)]
+
+
+@pytest.mark.parametrize("step", [0.05, 0.02])
+def test_a_path_has_the_rates_of_the_truth_and_shows_where_they_jump(step):
     rng = np.random.default_rng(4)
-    times = 0.05 * np.arange(200)
-    yaw = np.where(times < 5, 0.0, 0.5 * (times - 5))
-    poses = np.column_stack([0.2 * times, 0.0 * times, yaw]) + 0.001 * rng.standard_normal((200, 3))
-    smooth = smoothed(times, poses, np.ones(200))
-    rates = np.diff(smooth[:, 0]) / 0.05
-    assert np.std(rates[10:-10]) < 0.2 * np.std(np.diff(poses[:, 0]) / 0.05)
-    assert rates[10:-10].mean() == pytest.approx(0.2, abs=0.005)
-    found = np.flatnonzero(kinks(poses, smooth, np.ones(200, dtype=bool)))
-    assert np.any(np.abs(found - 100) <= 2)
-    assert len(found) < 12
+    times = step * np.arange(round(20 / step))
+    rates = 0.4 * np.where(times % 4 < 2, 1.0, -1.0)  # a chair that drives to and fro
+    x = np.cumsum(rates) * step
+    truth = np.column_stack([x, 0.0 * x, 2 * x])
+    reference = truth + np.array([0.01, 0.01, 0.005]) * rng.standard_normal(truth.shape)
+    known = seen(times, truth, reference, 0.001, round(0.2 / step))
+    path, jumps = likeliest(times, reference, known, np.zeros(len(times), dtype=bool), np.zeros_like(truth))
+    under = np.concatenate([np.arange(sight.rows.start, sight.rows.stop - 1) for sight in known])
+    under = under[~(jumps[under] | jumps[under + 1]) & (under > 5) & (under < len(times) - 6)]
+    found, right = (np.diff(poses, axis=0)[under] / step for poses in (path, truth))
+    for axis in (0, 2):  # neither too small, as where no rate may jump, nor noisy, as those of the reference
+        assert np.sum(found[:, axis] * right[:, axis]) / np.sum(right[:, axis] ** 2) == pytest.approx(1, abs=0.01)
+        noise = (np.diff(reference, axis=0) / step)[under, axis] - right[:, axis]
+        assert np.std(found[:, axis] - right[:, axis]) < 0.2 * np.std(noise)
+    turns = np.flatnonzero(np.diff(rates)) + 1
+    near = np.abs(np.flatnonzero(jumps)[:, np.newaxis] - turns).min(axis=1)
+    assert jumps.sum() < 6 * len(turns)
+    assert np.mean(near <= round(0.2 / step)) > 0.8
+
+
+def test_motion_tells_errors_that_differ_from_pose_to_pose_unless_the_rates_jump():
+    rng = np.random.default_rng(6)
+    times = 0.05 * np.arange(100)
+    rates = np.where(times < 2.5, 0.4, -0.4)
+    truth = np.cumsum(np.outer(rates, [0.05, 0.0, 0.1]), axis=0)
+    reference = truth + np.array([0.01, 0.01, 0.005]) * rng.standard_normal(truth.shape)
+    scans = [slice(i, i + 3) for i in (10, 30, 48, 70)]
+    made = steady(times, reference, truth, scans)
+    for known, rows in zip(made, scans, strict=True):
+        errors = (truth - reference)[rows].ravel()
+        off = known.rows @ errors - known.left
+        if rows.start == 48:
+            assert 1 < np.abs(off).max() < 3  # a jump of many usual changes, in units that it has widened itself
+        else:
+            np.testing.assert_allclose(off, 0, atol=1e-9)
+            assert np.abs(known.left).max() > 3  # of the reference's errors much is told
+    fewer = steady(times, reference, truth, [slice(10, 12)])
+    assert fewer[0].rows.shape == (0, 6)
+
+
+def test_a_pose_that_is_known_stays_and_pauses_say_nothing_of_rates():
+    times = np.r_[0.1 * np.arange(20), 60 + 0.1 * np.arange(20)]
+    places = np.repeat([[0.0, 0.0, 0.0], [1.5, 0.5, 1.0]], 20, axis=0)
+    errors = np.repeat([[0.003, 0.0, 0.001], [0.0, -0.002, 0.0]], 20, axis=0)
+    path, jumps = likeliest(times, places, [], np.ones(40, dtype=bool), errors)
+    np.testing.assert_allclose(path, places + errors, atol=1e-6)
+    assert not jumps.any()
 
 
 @pytest.mark.parametrize(("pause", "jumps"), [(0.0, True), (60.0, False)])

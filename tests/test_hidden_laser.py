@@ -189,3 +189,22 @@ def test_an_offset_is_no_twin_of_a_temperature_that_has_the_offset_in_it(tmp_pat
     case = make(Ask("single", ("laser.offset",), 30.0, regime="clean", design="room", family="laser"), 5, tmp_path)
     assert case.truth.z_rival > 0.1
     assert ("laser.temperature",) not in case.truth.accepted
+
+
+def test_a_truth_is_told_only_of_what_a_catalogue_has_a_word_for(tmp_path):
+    """Of a contaminated normal there is no t, of a footprint's width no gain; offsets of beams have no mirror."""
+    for name, plain, other in (
+        ("laser.heavy_tails", {"inverse_nu"}, set()),
+        ("laser.incidence_noise", {"gain"}, set()),
+        ("laser.beam_bias", {"amplitude"}, {"sd"}),
+        ("laser.range_noise", {"share"}, {"share"}),
+    ):
+        told = [set(LASER[name].called({"size": 0.1, "seed": 1.0}, form)) for form in ("plain", "other")]
+        assert told == [plain, other]
+    found = make(Ask("single", ("laser.mixed_pixels",), family="laser", form="plain", design="room"), 3, tmp_path)
+    values = found.null.runs[0].scan.values
+    seen = np.where(np.isfinite(values), values, np.nan)  # nothing is mixed with no return
+    beside = np.abs(np.diff(seen, axis=1)) > 0.3
+    mixed = (found.recording.runs[0].scan.values != values)[:, 1:-1]
+    share = mixed[beside[:, 1:] | beside[:, :-1]].mean()
+    assert share == pytest.approx(found.truth.parameters["laser.mixed_pixels"]["probability"], rel=0.2)

@@ -143,7 +143,7 @@ def rms(signal: FloatArray) -> float:
 
 def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backdrop) -> Truth:
     ids = tuple(sizes)
-    parameters = {name: LASER[name].names(sizes[name]) for name in ids}
+    parameters = {name: LASER[name].called(sizes[name], ask.form) for name in ids}
     odd = {name: _odd(name, scale, sizes[name], ask.form) for name in ids if LASER[name].by != "mean"}
     means = [name for name in ids if name not in odd]
     truth = Truth(ask.kind, ids, parameters, background=backdrop.ids, accepted=(ids,) if ids else ())

@@ -22,6 +22,9 @@ class HiddenLaser:
 
     by: 'mean' where a size is scaled to a z of the mean readings, else 'typical': sizes as they occur, since a
     hundred thousand readings show changes of their spread that matter to nobody; moving: shows only while driving.
+    names: of form plain; other_names: of form other, where it has other parameters. Another equation's number is the
+    truth of a catalogue's parameter only if both say the same about the readings, at some range or angle at least: an
+    interval of a gain cannot hold the width of a footprint.
     """
 
     plain: Form
@@ -33,6 +36,7 @@ class HiddenLaser:
     by: str = "mean"
     moving: bool = False
     around: tuple[float, float] = (0.6, 2.5)  # of the typical size, what occurs
+    other_names: Names | None = None
 
     def draw(self, rng: np.random.Generator) -> Sizes:
         """Return sizes: typical ones for z to scale, or ones that occur."""
@@ -40,6 +44,10 @@ class HiddenLaser:
         if self.by != "mean":
             size *= float(np.exp(rng.uniform(*np.log(self.around))))
         return {"size": size * (float(rng.choice([-1.0, 1.0])) if self.signed else 1.0), **self.extra(rng)}
+
+    def called(self, sizes: Sizes, form: str) -> Sizes:
+        """Return what a catalogue would call the sizes, of those that it has a word for."""
+        return (self.other_names if form == "other" and self.other_names else self.names)(sizes)
 
     def fault(self, sizes: Sizes, form: str) -> Fault:
         """Return the fault of these sizes; form: plain or other."""
@@ -52,6 +60,15 @@ def _as(name: str) -> Names:
 
 def _between(name: str, low: float, high: float) -> Extra:
     return lambda rng: {name: float(rng.uniform(low, high))}
+
+
+def _nothing(_: Sizes) -> Sizes:
+    return {}
+
+
+def _of_both_sides(sizes: Sizes) -> Sizes:
+    """Return the share of the beams beside a jump: only those before it are mixed here."""
+    return {"probability": 0.5 * sizes["size"]}
 
 
 def _seed(rng: np.random.Generator) -> Sizes:
@@ -90,13 +107,18 @@ LASER: dict[str, HiddenLaser] = {
     ),
     "laser.incidence_bias": HiddenLaser(*_of("bias", lf.incidence_bias, lf.footprint_bias), 0.003, True, _as("k")),
     "laser.incidence_noise": HiddenLaser(
-        *_of("sd", lf.incidence_noise, lf.footprint_noise), 0.6, False, _as("gain"), by="typical"
+        *_of("sd", lf.incidence_noise, lf.footprint_noise),
+        0.6,
+        False,
+        _as("gain"),
+        by="typical",
+        other_names=_nothing,  # the size is then a footprint's width, whose noise grows with the range, too
     ),
     "laser.reflectance": HiddenLaser(
         *_of("bias", lf.reflectance), 0.02, True, lambda s: {"bias": s["size"]}, lambda _: {"noise": 0.0}
     ),
     "laser.mixed_pixels": HiddenLaser(
-        *_of("outlier", lo.mixed_pixels, lo.weighted_pixels), 0.35, False, _as("probability"), _seed, by="typical"
+        *_of("outlier", lo.mixed_pixels, lo.weighted_pixels), 0.35, False, _of_both_sides, _seed, by="typical"
     ),
     "laser.beam_bias": HiddenLaser(
         *_of("bias", lf.mirror, lf.beam_offsets),
@@ -104,6 +126,7 @@ LASER: dict[str, HiddenLaser] = {
         False,
         lambda s: {"amplitude": s["size"]},
         lambda rng: {"phase": float(rng.uniform(-np.pi, np.pi)), **_seed(rng)},
+        other_names=_as("sd"),  # of offsets that follow no mirror
     ),
     "laser.common_mode": HiddenLaser(
         *_of("unit", lf.common_mode),
@@ -117,7 +140,13 @@ LASER: dict[str, HiddenLaser] = {
         *_of("unit", lf.beam_correlation, lf.smeared), 0.3, False, _as("rho"), by="typical"
     ),
     "laser.heavy_tails": HiddenLaser(
-        *_of("unit", lf.student, lf.contaminated), 0.15, False, _as("inverse_nu"), _seed, by="typical"
+        *_of("unit", lf.student, lf.contaminated),
+        0.15,
+        False,
+        _as("inverse_nu"),
+        _seed,
+        by="typical",
+        other_names=_nothing,  # the size is then a share of wild readings: no t has their tails
     ),
     "laser.dropout": HiddenLaser(
         *_of("outlier", lo.dropout),

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kurumaisu.critic.laser.trust import piles
 from kurumaisu.critic.laser.unknowns import CHANNEL
 from kurumaisu.critic.verdict import Unknown
 from kurumaisu.types import BoolArray, FloatArray
@@ -24,7 +25,9 @@ def blocked(measured: FloatArray, expected: FloatArray) -> BoolArray:
 
     What is the same to the last digit is no distance: readings have been cut off there.
     """
-    seen = np.isfinite(measured) & np.isfinite(expected)
+    low, high = piles(measured)
+    with np.errstate(invalid="ignore"):
+        seen = np.isfinite(expected) & (measured > low) & (measured < high)
     out = np.zeros(measured.shape[1], dtype=bool)
     for beam in np.flatnonzero(seen.sum(axis=0) >= _MANY):
         here, walls = measured[seen[:, beam], beam], expected[seen[:, beam], beam]

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import solve_triangular
 
@@ -19,18 +21,27 @@ _DAMPED = 0.02  # share by which the curvature is raised: other draws make the s
 _FORM = 0.1  # share of what an effect does to a number, by which a real effect of that name may do more or less
 
 
+@dataclass(frozen=True)
+class Kinds:
+    """Which numbers (m,) are roots of counts, of the same sd, few or many; and which are places, alike in any form."""
+
+    counts: BoolArray
+    places: BoolArray
+
+
 class Likeness:
     """Normal numbers about those of a simulation, with the covariance of the model's own."""
 
-    def __init__(self, nulls: FloatArray, measured: FloatArray, counts: BoolArray, heard: BoolArray) -> None:
-        """Take numbers of simulations of the model as it is (n, m), the measured ones (m,), which are roots of counts.
+    def __init__(self, nulls: FloatArray, measured: FloatArray, kinds: Kinds, heard: BoolArray) -> None:
+        """Take numbers of simulations of the model as it is (n, m), and the measured ones (m,).
 
-        The latter have the same sd, few or many. heard: numbers that say anything.
+        kinds: of which they are; heard: numbers that say anything.
         """
+        self._places = kinds.places
         self.offset, self.measured = nulls.mean(axis=0), measured
         spread = nulls.std(axis=0)
         count_sd = np.hypot(np.maximum(spread, _COUNT), _TAILS * np.abs(self.offset))
-        self.sd = np.where(counts, count_sd, np.hypot(spread, _MATTERS))
+        self.sd = np.where(kinds.counts, count_sd, np.hypot(spread, _MATTERS))
         self.sd = np.where(heard, self.sd, _SILENT)
         unit = (nulls - self.offset) / self.sd
         half = 0.5 * (unit.T @ unit / len(nulls) + np.eye(len(measured)))  # few draws leave correlations uncertain
@@ -70,5 +81,5 @@ class Likeness:
 
     def _root(self, numbers: FloatArray) -> FloatArray:
         """Return the root of the covariance where effects made such numbers: their real form may do more or less."""
-        slack = _FORM * np.minimum(np.abs(self.units(numbers)), self._most)
+        slack = np.where(self._places, 0.0, _FORM * np.minimum(np.abs(self.units(numbers)), self._most))
         return np.asarray(np.linalg.cholesky(self._covariance + np.diag(slack**2)))

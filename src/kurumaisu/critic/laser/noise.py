@@ -19,7 +19,8 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 _FLOOR = 1e-6  # [m, rad] below which no sd counts
 # Of position [m], heading [rad], common mode [m] and its time constant [s]: what is usual, the sd of its log, bounds.
 _USUAL = np.array([0.005, 0.005, 2e-4, 1.0])
-_SPREAD = np.array([2.0, 2.0, 1.0, 1.0])
+# A common mode may be of each scan alone, at 30 ms, or last for ten seconds.
+_SPREAD = np.array([2.0, 2.0, 1.0, 2.0])
 _LOW, _HIGH = np.array([1e-5, 1e-5, 1e-6, 0.01]), np.array([0.3, 0.3, 0.1, 10.0])
 _APART = 0.2  # in logs, to see how surely each is known
 

@@ -15,6 +15,7 @@ from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, near, refined
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate, marginal, whitened
+from kurumaisu.critic.laser.path import Sight, Steady, steady
 from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, rows_of
 from kurumaisu.critic.laser.sought import moved, stands
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
@@ -51,11 +52,13 @@ class Assembly:
         self.kinked = [np.zeros(len(track.times), dtype=bool) for track in shots.tracks]
         self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
         self._linearise(shots, roughly=True)
+        self.motion: list[Steady] | None = None
         self.blocked = blocked(shots.measured, self.marks.base)
         self.first = self._trust()
         for i in range(_SHIFTS):
-            found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._errors())
+            found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._sights())
             self._linearise(found, roughly=i < _SHIFTS - 1)
+        self.motion = self._motion()
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base) & ~self.blocked
         self.forms, fixed = self.marks.forms(ids)
@@ -86,22 +89,23 @@ class Assembly:
         sure = np.array([not self.kinked[self.shots.run[k]][hat.rows].any() for k, hat in enumerate(self.hats)])
         return sure if sure.mean() >= _SURE else np.ones_like(sure)
 
-    def _errors(self) -> list[FloatArray]:
-        """Return the errors of the poses (q, 3) under each scan, by that scan alone, within what is plausible."""
+    def _sights(self) -> list[Sight]:
+        """Return what each scan alone says of the errors of its poses, within what is plausible."""
         size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
         beam = self._begun()
-        out: list[FloatArray] = []
+        out: list[Sight] = []
         for _ in range(2):  # without outliers in the second round
             left, out = np.full_like(self.residual, np.nan), []
             for k, gram in enumerate(self.grams(beam)):
                 own, shared, _ = self._rows(k, None)
-                sizes = np.concatenate([np.tile(size, own.shape[1] // 3), [_BROAD.common_sd], size])[
-                    : gram.own + gram.shared
-                ]
-                lead = len(sizes)
+                lead = gram.own + gram.shared
+                sizes = np.concatenate([np.tile(size, gram.own // 3), [_BROAD.common_sd], size])[:lead]
                 errors = np.linalg.solve(gram.matrix[:lead, :lead] + np.diag(sizes**-2), gram.matrix[:lead, -1])
                 left[k] = self.residual[k] - np.hstack([own, shared]) @ errors
-                out.append(errors[: gram.own].reshape(-1, 3) if gram.own else errors[np.newaxis, 1:4])
+                # What nothing fits as well as its noise allows, says less by as much.
+                z = np.abs(left[k] / self.first.sd[k])[beam.valid[k]]
+                width = max(MAD * float(np.median(z)), 1.0) if len(z) else 1.0
+                out.append(_sight(gram, self.hats[k].rows, width))
             z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
             beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * MAD * np.nanmedian(z)))
         return out
@@ -145,6 +149,7 @@ class Assembly:
         out.columns = np.empty((*out.shots.measured.shape, 0), dtype=np.float32)
         out.hats = [self.hats[row] for row in rows]
         out.layout = Layout(self.layout.times[rows], self.layout.run[rows], self.layout.stand[rows])
+        out.motion = None if self.motion is None else [self.motion[row] for row in rows]
         out.residual, out.poses, out.geometry = self.residual[rows], self.poses[rows], self.geometry[rows]
         out.first = BeamNoise(self.first.sd[rows], self.first.rho, self.first.valid[rows])
         return out
@@ -212,7 +217,7 @@ class Assembly:
         for k in range(len(self.residual)):
             own, shared, last = self._rows(k, np.arange(count))
             rows = whitened(np.hstack([own, shared, last]), beam.valid[k], beam.sd[k], beam.rho)
-            grams.append(Gram(rows.T @ rows, own.shape[1], shared.shape[1]))
+            grams.append(self._gram(k, rows, own.shape[1], shared.shape[1]))
             products = crossed(rows, beam.valid[k], beam.sd[k], beam.rho, inner)
             lead = own.shape[1] + shared.shape[1]
             parts.append(products[:, :lead])
@@ -225,8 +230,29 @@ class Assembly:
         for k in range(len(self.residual)):
             own, shared, common = self._rows(k, columns)
             rows = whitened(np.hstack([own, shared, common]), beam.valid[k], beam.sd[k], beam.rho)
-            out.append(Gram(rows.T @ rows, own.shape[1], shared.shape[1]))
+            out.append(self._gram(k, rows, own.shape[1], shared.shape[1]))
         return out
+
+    def _gram(self, k: int, rows: FloatArray, own: int, shared: int) -> Gram:
+        """Return the normal equations of a scan, of its readings and of how the chair moved."""
+        matrix = rows.T @ rows
+        if own and self.motion is not None:
+            steady = self.motion[k]
+            matrix[:own, :own] += steady.rows.T @ steady.rows
+            matrix[:own, -1] += steady.rows.T @ steady.left
+            matrix[-1, :own] = matrix[:own, -1]
+            matrix[-1, -1] += steady.left @ steady.left
+        return Gram(matrix, own, shared)
+
+    def _motion(self) -> list[Steady]:
+        """Return what the chair's motion says of the errors of the poses under each scan."""
+        out: dict[int, Steady] = {}
+        for i, (track, first) in enumerate(zip(self.shots.tracks, self.tracks, strict=True)):
+            own = np.flatnonzero((self.shots.run == i) & (self.layout.stand < 0)).tolist()
+            made = steady(track.times, first.poses, track.poses, [self.hats[k].rows for k in own])
+            out |= dict(zip(own, made, strict=True))
+        none = Steady(np.empty((0, 0)), np.empty(0))
+        return [out.get(k, none) for k in range(len(self.hats))]
 
     def leftover(self, beam: BeamNoise, columns: IntArray) -> FloatArray:
         """Return what some columns, the poses and the common modes leave of the residual (k, b) [m]."""
@@ -282,6 +308,18 @@ class Assembly:
                 moved.append(predict(self.shots, (), seen, 0))
             out.append((moved[1] - moved[0]) / (len(signs) * _MOVE[axis]))
         return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
+
+
+def _sight(gram: Gram, rows: slice, width: float) -> Sight:
+    """Return what a scan says of its poses, its common mode integrated out.
+
+    rows: of the track, that it rests on; width: of what it leaves, in deviations.
+    """
+    common, poses = gram.own, np.arange(gram.own) if gram.own else np.arange(1, 4)
+    matrix = gram.matrix / width**2
+    beside = matrix[poses, common] / (matrix[common, common] + _BROAD.common_sd**-2)
+    inner = matrix[np.ix_(poses, poses)] - np.outer(beside, matrix[common, poses])
+    return Sight(rows, inner, matrix[poses, -1] - beside * matrix[common, -1])
 
 
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:

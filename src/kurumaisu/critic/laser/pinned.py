@@ -155,7 +155,8 @@ def _doubt(
     """Return what other forms of what acts may shift each parameter by, in standard deviations.
 
     Nobody can refuse a form that differs by FORM of what the effect does. At which range or angle a size counts is the
-    form's choice, so its own size is in doubt by all of it; of others, what is like their own marks passes for them.
+    form's choice, so its own size is in doubt by all of it; what only shapes it, a wavelength say, by the share that
+    goes one of the ways in which a form may differ; of others, what is like their own marks passes for them.
     parts: how the mean follows each parameter, which effects are empirical, and what these do.
     """
     slopes, guessed, signals = parts
@@ -166,8 +167,8 @@ def _doubt(
     count = len(free)
     alike = (gram / np.outer(norms, norms))[:count, count:]
     own = np.array([[each.index == i for i in guessed] for each in free])
-    share = np.where(own, FORM, FORM / np.sqrt(_WAYS))
-    return np.asarray(np.sqrt(np.sum((share * alike * norms[count:]) ** 2, axis=1)))
+    share = np.where(own, alike**2 + (1 - alike**2) / _WAYS, alike**2 / _WAYS)
+    return np.asarray(FORM * np.sqrt(share @ norms[count:] ** 2))
 
 
 def _settings(forms: Sequence[Form], at: Sequence[dict[str, float]]) -> list[EffectSetting]:

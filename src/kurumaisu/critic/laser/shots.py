@@ -189,12 +189,7 @@ def look(
     for effect in effects.build_world(every, np.random.default_rng([seed, 1])):
         segments = effect.apply(segments)
     rays = Rays(replace(shots.walls, segments=segments))
-    mount = np.array([shots.laser.mount.x, shots.laser.mount.y, shots.laser.mount.yaw])
-    flat = np.zeros(shots.laser.beams)
-    beams = [
-        chain.aim(Beams(stamp, stamp + shots.said, mount, shots.laser.mount.z, shots.laser.bearings, flat))
-        for stamp in shots.stamps.tolist()
-    ]
+    beams = [chain.aim(_said(shots, stamp)) for stamp in shots.stamps.tolist()]
     poses = poses_at(shots, np.array([each.times for each in beams]))
     if shift is not None:
         poses = poses + shift
@@ -207,6 +202,19 @@ def look(
     level = level.reshape(shape)
     ranges = np.array([slanted(row, each) for row, each in zip(level, beams, strict=True)])
     return Look(ranges, level, angles, returns.reshape(shape), tuple(beams), placed)
+
+
+def fired(shots: Shots, scan: int) -> FloatArray:
+    """Return when the beams (b,) [s] of a scan leave by the model, its own effects at work."""
+    chain = effects.build_laser(shots.own, np.random.default_rng(0))
+    return chain.aim(_said(shots, float(shots.stamps[scan]))).times
+
+
+def _said(shots: Shots, stamp: float) -> Beams:
+    """Return the beams of a scan as its message says."""
+    place = shots.laser.mount
+    mount = np.array([place.x, place.y, place.yaw])
+    return Beams(stamp, stamp + shots.said, mount, place.z, shots.laser.bearings, np.zeros(shots.laser.beams))
 
 
 def poses_at(shots: Shots, times: FloatArray) -> FloatArray:

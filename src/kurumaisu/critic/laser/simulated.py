@@ -8,12 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from kurumaisu import effects
+from kurumaisu.critic.laser.likeness import Kinds
 from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.shots import own_with, read
 from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import FloatArray
 
 
 class Simulator:
@@ -25,9 +26,9 @@ class Simulator:
         self._statistics = statistics
         self._missed = missed
 
-    def counts(self) -> BoolArray:
-        """Return which of the statistics are roots of counts."""
-        return self._statistics.counts()
+    def kinds(self) -> Kinds:
+        """Return of which kinds the statistics are."""
+        return self._statistics.kinds()
 
     def null(self, effect: type[Mechanism]) -> dict[str, float]:
         """Return an effect's parameters in the model as it is."""

@@ -9,43 +9,48 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu.critic.laser.noise import Layout
+from kurumaisu.critic.laser.path import DOUBT, Sight, likeliest
 from kurumaisu.critic.laser.shots import Shots, Track
-from kurumaisu.critic.laser.standing import kinks, smoothed
 from kurumaisu.critic.laser.trust import Hats
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-_UNSEEN = 0.2  # weight of a pose that no scan has moved, among others
-
 
 def moved(
-    shots: Shots, reference: Sequence[Track], hats: Sequence[Hats], layout: Layout, errors: Sequence[FloatArray]
+    shots: Shots, reference: Sequence[Track], hats: Sequence[Hats], layout: Layout, sights: Sequence[Sight]
 ) -> tuple[Shots, list[BoolArray]]:
-    """Return the shots on moved tracks, and for each track which of its poses lie beside a smooth path.
+    """Return the shots on moved tracks, and for each track at which of its poses the chair's rates jump.
 
-    reference: the tracks as measured, which the shots may have left already; errors (q, 3): of the poses under each
-    scan, as of the reference's own.
+    reference: the tracks as measured, which the shots may have left already; sights: what each scan says of the errors
+    of its poses, as of the reference's own.
     """
-    tracks = [replace(track, poses=track.poses.copy()) for track in shots.tracks]
-    sums = [np.zeros((*track.poses.shape[:1], 4)) for track in tracks]
-    for k, some in enumerate(errors):
-        rows = _alike(reference[shots.run[k]], hats[k], stood=bool(layout.stand[k] >= 0))
-        sums[shots.run[k]][rows, :3] += some
-        sums[shots.run[k]][rows, 3] += 1
-    mean, kinked = [], []
-    for track, first, total in zip(tracks, reference, sums, strict=True):
-        seen = total[:, 3] > 0
-        found = first.poses + total[:, :3] / np.maximum(total[:, 3:], 1)
-        track.poses[:] = smoothed(track.times, found, np.where(seen, 1.0, _UNSEEN))
-        mean.append(track.poses - first.poses)
-        kinked.append(kinks(found, track.poses, seen))
+    tracks, kinked = [], []
+    for i, (track, first) in enumerate(zip(shots.tracks, reference, strict=True)):
+        own = [k for k in range(len(hats)) if shots.run[k] == i]
+        rested = np.r_[False, (first.poses[1:] == first.poses[:-1]).all(axis=1), False]
+        held, errors = rested[1:] | rested[:-1], np.zeros_like(first.poses)
+        for stand in np.unique(layout.stand[own]).tolist() if own else ():
+            if stand >= 0:
+                those = [sights[k] for k in own if layout.stand[k] == stand]
+                rows = _alike(first, those[0])
+                held[rows], errors[rows] = True, _together(those)
+        free = [sights[k] for k in own if layout.stand[k] < 0]
+        poses, jumps = likeliest(track.times, first.poses, free, held, errors)
+        tracks.append(replace(track, poses=poses))
+        kinked.append(jumps)
+    mean = [track.poses - first.poses for track, first in zip(tracks, reference, strict=True)]
     shift = [hat.weights @ mean[shots.run[k]][hat.rows] for k, hat in enumerate(hats)]
     return replace(shots, tracks=tuple(tracks), shift=np.array(shift)), kinked
 
 
-def _alike(track: Track, hat: Hats, *, stood: bool) -> IntArray:
-    """Return the rows of the track that share the errors of a scan: its own, or all of its stand."""
-    rows = np.arange(len(track.times))[hat.rows]
-    return np.flatnonzero((track.poses == track.poses[rows[0]]).all(axis=1)) if stood else rows
+def _alike(track: Track, sight: Sight) -> IntArray:
+    """Return the rows of the track that share the one error of a stand."""
+    return np.flatnonzero((track.poses == track.poses[sight.rows.start]).all(axis=1))
+
+
+def _together(sights: Sequence[Sight]) -> FloatArray:
+    """Return the error (3,) of the one pose that all of some scans rest on."""
+    inner = np.sum([sight.inner for sight in sights], axis=0) + np.diag(DOUBT**-2)
+    return np.asarray(np.linalg.solve(inner, np.sum([sight.outer for sight in sights], axis=0)))
 
 
 def stands(shots: Shots) -> IntArray:

@@ -93,7 +93,7 @@ class ScatterFit:
         self._simulate, self._means = simulate, set(means)
         self._shapes: set[tuple[str, str]] = set()
         self.likeness = Likeness(
-            nulls, measured, simulate.counts(), np.ones(len(measured), dtype=bool) if heard is None else heard
+            nulls, measured, simulate.kinds(), np.ones(len(measured), dtype=bool) if heard is None else heard
         )
 
     def overlap(self, one: Piece, other: Piece) -> float:

@@ -5,17 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import FloatArray
 
 _PAUSE = 5.0  # [s] without a pose, after which the chair may stand elsewhere
 _APART = 1e-3  # [s] from the middle of a pause, at which the stand before ends and the next one begins
 _STEP = 8.0  # sds of the poses' jitter that lie between two of them where the chair stands
 _SPREAD = 2.2  # sds of the jitter, itself known to a third from few poses, that poses of one place scatter by
 _FEWEST = 5  # poses of a stand
-_WINDOW = 0.25  # [s] on each side, over which a chair's path is smooth
-_LEAST = 2.01  # poses on each side, however seldom they are taken
-_MISS = 4.0  # usual misses of a smooth path
-_MOST = 30  # likewise, however often
 
 
 def steadied(times: FloatArray, poses: FloatArray) -> FloatArray:
@@ -52,19 +48,6 @@ def held(times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
     return every[order], np.concatenate([poses, poses[late], poses[early + 1]])[order]
 
 
-def kinks(sought: FloatArray, smooth: FloatArray, seen: BoolArray) -> BoolArray:
-    """Return which poses (n,) a smooth path misses by more than most: rates jump there, and are not known.
-
-    sought (n, 3): as the scans have them; seen (n,): where they do.
-    """
-    off = np.abs(sought - smooth)
-    moved = seen & (off > 0).any(axis=1)
-    if moved.sum() < _FEWEST:
-        return np.zeros(len(seen), dtype=bool)
-    usual = np.maximum(1.4826 * np.median(off[moved], axis=0), 1e-6)
-    return np.asarray(moved & (off > _MISS * usual).any(axis=1))
-
-
 def _stands(poses: FloatArray, jitter: FloatArray) -> bool:
     """Tell whether poses scatter as much as their jitter, and no more."""
     return bool((poses.std(axis=0) <= _SPREAD * jitter).all())
@@ -73,26 +56,3 @@ def _stands(poses: FloatArray, jitter: FloatArray) -> bool:
 def _jitter(poses: FloatArray) -> FloatArray:
     """Return the sd (3,) of errors that differ from pose to pose, by third differences: motion hardly has any."""
     return np.asarray(1.4826 * np.median(np.abs(np.diff(poses, n=3, axis=0)), axis=0) / np.sqrt(20))
-
-
-def smoothed(times: FloatArray, poses: FloatArray, trust: FloatArray) -> FloatArray:
-    """Return poses (n, 3) by a parabola through those around each, where the chair moves; trust (n,): their weights.
-
-    Rates taken from single poses would have the poses' errors in them, and so agree with any residual that has, too.
-    """
-    reach = max(_WINDOW, _LEAST * float(np.median(np.diff(times)))) if len(times) > 1 else _WINDOW
-    half = int(np.clip(np.ceil(reach / max(float(np.median(np.diff(times))), 1e-6)), 1, _MOST)) if len(times) > 1 else 1
-    index = np.arange(len(times))[:, np.newaxis] + np.arange(-half, half + 1)
-    inside = (index >= 0) & (index < len(times))
-    index = np.clip(index, 0, len(times) - 1)
-    t = times[index] - times[:, np.newaxis]
-    weights = trust[index] * (inside & (np.abs(t) <= reach))
-    powers = np.stack([np.ones_like(t), t / reach, (t / reach) ** 2], axis=-1)
-    inner = np.einsum("ni,nia,nib->nab", weights, powers, powers)
-    outer = np.einsum("ni,nia,nic->nac", weights, powers, poses[index])
-    out = np.linalg.solve(inner + 1e-9 * np.eye(3), outer)[:, 0]
-    same = np.zeros(len(times), dtype=bool)
-    same[1:] = (poses[1:] == poses[:-1]).all(axis=1)
-    few = (weights > 0).sum(axis=1) < 4
-    keep = same | np.r_[same[1:], False] | few
-    return np.asarray(np.where(keep[:, np.newaxis], poses, out))

@@ -9,14 +9,18 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from kurumaisu.critic.laser.deviations import ELSEWHERE, near
+from kurumaisu.critic.laser.likeness import Kinds
 from kurumaisu.critic.laser.noise import ScanNoise
 from kurumaisu.critic.laser.normal import Assembly
+from kurumaisu.critic.laser.trust import piles
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
 _FAR = 6.0  # deviations of an outlier
 _COMMON = 0.005  # [m] plausible common mode of a scan, when it is read off one scan alone
 _CELL = 0.5  # [m] of the map in which errors are averaged
+_PILE = 0.05  # [m] of the place of a pile, counted as one: it is known to a step of the readings, which is a fiftieth
+_PLACES = 2  # numbers, the last ones, that are such places
 _GRID = 1e-3  # [m] to which readings are rounded before their values are counted
 _OBLIQUE = np.radians(80.0)  # [rad] beyond which no reading counts
 _SQUARE = np.radians(60.0)  # [rad] within which a wall beside a jump hardly moves with an error of the heading
@@ -47,6 +51,7 @@ class Statistics:
         self._base = assembly.marks.base
         self._sd = assembly.first.sd
         self._trust = assembly.geometry
+        self._farthest = assembly.shots.laser.range_max
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
         self._jumps = _jumps(seen.ranges, seen.incidence)
@@ -92,15 +97,16 @@ class Statistics:
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
         out.append(_share(_mixed(readings) & self._jumps & ~_lasting(readings, self._stand)))
-        return np.array([*out, *_values(readings[self._trust])])
+        return np.array([*out, *_values(readings[self._trust]), *self._piles(readings[self._trust])])
 
     def names(self) -> list[str]:
         """Return what a reader calls the numbers, in their order."""
         return [name for name, *_ in self._told()]
 
-    def counts(self) -> BoolArray:
-        """Return which of the numbers are roots of counts."""
-        return np.array([count for _, count, _ in self._told()])
+    def kinds(self) -> Kinds:
+        """Return which of the numbers are roots of counts, and which are places of piles."""
+        counts = np.array([count for _, count, _ in self._told()])
+        return Kinds(counts, np.arange(len(counts)) >= len(counts) - _PLACES)
 
     def of_errors(self) -> BoolArray:
         """Return which of the numbers follow how far readings are off their mean."""
@@ -127,7 +133,14 @@ class Statistics:
             ("different values", False, False),
             ("readings of the least value", True, True),
             ("readings of the greatest value", True, True),
+            ("least value at which readings pile up", False, False),
+            ("greatest value at which readings pile up", False, False),
         ]
+
+    def _piles(self, readings: FloatArray) -> list[float]:
+        """Return the ends at which readings are cut off, in units in which a step of them matters to nobody."""
+        low, high = piles(readings)
+        return [max(low, 0.0) / _PILE, min(high, self._farthest) / _PILE]
 
     def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what poses and common mode leave of the errors (k, b), in deviations, and the common modes (k,) [m].

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.laser.shots import Look, Shots
+from kurumaisu.critic.laser.shots import Look, Shots, fired
 from kurumaisu.types import BoolArray, FloatArray
 
 _KINK = 1e-4  # departure from a straight wall, where 1/r(i+1) + 1/r(i-1) = 2 cos(increment) / r(i), relative to 1/r
@@ -43,12 +43,12 @@ def trusted_place(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
 
 def trusted(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
     """Return (k, b) which readings may speak about the mean, outliers aside."""
-    low, high = _ends(shots.measured)
+    low, high = piles(shots.measured)
     inside = (base > low + _GATE) & (base < high - _GATE)
     return np.asarray(trusted_place(shots, seen, base) & inside & np.isfinite(shots.measured))
 
 
-def _ends(readings: FloatArray) -> tuple[float, float]:
+def piles(readings: FloatArray) -> tuple[float, float]:
     """Return the least and the greatest reading [m] where readings pile up there, as if cut off; else infinite ones."""
     values = readings[np.isfinite(readings)]
     ends = []
@@ -68,10 +68,11 @@ class Hats:
 
 
 def hats(shots: Shots, scan: int) -> Hats:
-    """Return on which reference poses a scan rests."""
+    """Return on which reference poses a scan rests: those around the times at which its beams leave by the model."""
     track = shots.tracks[shots.run[scan]]
-    times = shots.stamps[scan] + shots.said
-    first = max(int(np.searchsorted(track.times, times[0], side="right")) - 1, 0)
-    rows = slice(first, min(int(np.searchsorted(track.times, times[-1])), len(track.times) - 1) + 1)
+    times = fired(shots, scan)
+    last = len(track.times) - 1
+    first = min(max(int(np.searchsorted(track.times, times.min(), side="right")) - 1, 0), last)
+    rows = slice(first, min(max(int(np.searchsorted(track.times, times.max())), first), last) + 1)
     knots = track.times[rows]
     return Hats(rows, np.stack([np.interp(times, knots, unit) for unit in np.eye(len(knots))], axis=-1))

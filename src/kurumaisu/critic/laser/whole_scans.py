@@ -16,6 +16,7 @@ from kurumaisu.critic.laser.spread import Scatter
 from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.prior import log_prior
 from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.verdict import NORMAL90
 from kurumaisu.effects import Echoes, Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
@@ -60,11 +61,19 @@ def with_whole_scans(
             whole.size.name: min(noise.common_sd, whole.size.upper),
             whole.memory.name: min(max(rho, whole.memory.lower), whole.memory.upper),
         }
-        size_sd, memory_sd = noise.common_sd * seen.log_sd, float(rho * -np.log(rho) * seen.log_tau)
-        sds = {whole.size.name: (size_sd, size_sd), whole.memory.name: (memory_sd, memory_sd)}
+        logs = NORMAL90 * np.array([-1.0, 1.0])
+        sizes = noise.common_sd * np.exp(logs * seen.log_sd)
+        memories = np.exp(-_period(recording) / (noise.common_tau * np.exp(logs * seen.log_tau)))
+        sds = {whole.size.name: _reach(noise.common_sd, sizes), whole.memory.name: _reach(rho, memories)}
         rest = [each for each in out if each is not known]
         out = [*rest, Scatter(EffectSetting(whole.id, values), p, max(nats, known.nats if known else nats), sds, {})]
     return out
+
+
+def _reach(value: float, ends: FloatArray) -> tuple[float, float]:
+    """Return sds below and above a value with which its 90 % interval has these ends: its log is normal, it is not."""
+    below, above = (np.abs(ends - value) / NORMAL90).tolist()
+    return below, above
 
 
 def beyond(scatter: Sequence[Scatter], least: float) -> list[Scatter]:
