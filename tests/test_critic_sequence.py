@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What changes from run to run follows the time since the first one began, whatever the clocks of the runs."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -99,3 +100,16 @@ def test_a_clock_that_runs_on_from_run_to_run_is_named():
     told = verdict.causes[0].parameters
     assert told["through"].estimate == 1.0
     assert told["scale"].estimate == pytest.approx(scale, rel=0.15)
+
+
+def test_a_caster_that_wobbles_with_the_way_is_told_by_its_girth():
+    def wobble(r, _):
+        way = np.cumsum(np.abs(r.v)) * float(np.median(np.diff(r.t)))
+        return replace(r, w=r.w + np.where(r.v != 0, 0.03 * np.sin(2 * np.pi * way / 1.1), 0.0))
+
+    verdict = criticised(wobble)
+    assert [(one.channel, one.covariate) for one in verdict.unknown] == [("base.w", "distance")]
+    told = re.match(r"periodic, period (\S+) m", verdict.unknown[0].shape)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(1.1, rel=0.05)
+    assert not verdict.causes

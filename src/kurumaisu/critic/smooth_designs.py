@@ -13,6 +13,7 @@ from kurumaisu.types import FloatArray
 # Share of the rates by which another fit may differ. Effects that make up for each other, such as a gain of -0.6 and a
 # dead zone, leave rates over which no step of the true ones is a step.
 _NEAR = 0.1
+_RESTS = 0.02  # share of the time in which the chair may rest by one and not by the other: curves act while it moves
 
 
 class Designs:
@@ -49,4 +50,5 @@ class Designs:
 
 def _near(one: FloatArray, other: FloatArray) -> bool:
     apart, size = (np.sqrt(np.mean(rates**2, axis=1)) for rates in (one - other, other))
-    return bool(np.all(apart <= _NEAR * size))
+    moves, moved = ((rates != 0).any(axis=0) for rates in (one, other))
+    return bool(np.all(apart <= _NEAR * size) and np.mean(moves != moved) <= _RESTS)

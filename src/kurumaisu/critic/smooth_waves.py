@@ -17,11 +17,12 @@ from kurumaisu.types import FloatArray
 _SHORTEST, _LONGEST = 0.3, 3.0  # [m] girths of casters and drive wheels, and more
 _TURNS = 3.0  # of the wheel in all drives, at least: fewer are a slope or a carpet
 _MOST = 150  # periods
+_WAVING = ("v_gain", "w")  # a wheel out of round takes a share of the way, a bent caster turns the chair
 _AT_ONCE = 16  # of them: more leave the processor's cache
 
 
 def girth(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, int] | None:
-    """Return the period [m] of waves of the forward speed that explain most beside effects, and out of how many.
+    """Return the period [m] of waves of either rate that explain most beside effects, and out of how many.
 
     None where the drives are too short for any.
     """
@@ -32,17 +33,18 @@ def girth(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, i
         return None
     low, high = max(1 / _LONGEST, _TURNS / longest), 1 / _SHORTEST
     waves = np.linspace(low, high, int(np.clip(2 * longest * (high - low), 2, _MOST)))
-    gram, pull = np.zeros((len(waves), 2, 2)), np.zeros((len(waves), 2))
+    gram, pull = np.zeros((len(_WAVING), len(waves), 2, 2)), np.zeros((len(_WAVING), len(waves), 2))
     for drive, motion, way in zip(problem.drives, motions, ways, strict=True):
         sensitivity = Sensitivity(drive, motion)
-        along = [sensitivity.increments("v_gain", some) for some in _waved(way, waves)]
         left = (drive.measured - problem.simulated(drive, settings)).reshape(-1, 1)
-        white = problem.whitened(drive, np.column_stack([left, *along]))
-        both = white[:, 1:].reshape(len(white), -1, 2)
-        gram += np.einsum("nki,nkj->kij", both, both)
-        pull += np.einsum("nki,n->ki", both, white[:, 0])
-    gained = np.einsum("ki,ki->k", pull, np.linalg.solve(gram + 1e-9 * np.eye(2), pull[..., None])[..., 0])
-    return float(1 / waves[int(np.argmax(gained))]), len(waves)
+        for channel, of_gram, of_pull in zip(_WAVING, gram, pull, strict=True):
+            along = [sensitivity.increments(channel, some) for some in _waved(way, waves)]
+            white = problem.whitened(drive, np.column_stack([left, *along]))
+            both = white[:, 1:].reshape(len(white), -1, 2)
+            of_gram += np.einsum("nki,nkj->kij", both, both)
+            of_pull += np.einsum("nki,n->ki", both, white[:, 0])
+    gained = np.einsum("cki,cki->ck", pull, np.linalg.solve(gram + 1e-9 * np.eye(2), pull[..., None])[..., 0])
+    return float(1 / waves[int(np.argmax(gained.max(axis=0)))]), gained.size
 
 
 def _waved(way: FloatArray, waves: FloatArray) -> Iterator[FloatArray]:
