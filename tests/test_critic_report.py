@@ -22,8 +22,8 @@ from kurumaisu.critic.pictures import comparison_picture, misfit_picture, overla
 from kurumaisu.critic.report import write_report
 from kurumaisu.critic.results import summary, table
 from kurumaisu.critic.story import Bins, Comparison, Moments, Overlay
-from kurumaisu.critic.verdict import Cause, Estimate, Verdict
-from kurumaisu.critic.words import grouped, named, wrong
+from kurumaisu.critic.verdict import Cause, Estimate, Verdict, grouped
+from kurumaisu.critic.words import named, wrong
 
 NOWHERE = ["", "", "", ""]  # a mean is of no single moment
 NBSP = "\N{NO-BREAK SPACE}"
@@ -185,6 +185,15 @@ def test_the_terminal_is_told_the_verdict_and_what_to_drive_next():
     assert "  position after 5 s: rms error 83.1 -> 41.2 mm" in lines
     assert lines[-1] == "drive next: critic experiment spin_both_ways (20 s)."
     assert "drive next" not in summary(outcome(), 200)
+
+
+def test_the_terminal_is_told_what_was_mended_in_the_data_once_for_all_runs():
+    problems = ("run_1: rows are repeated: 7", "run_2: rows are repeated: 4", "run_1: a note that is told anyway")
+    told = replace(full_verdict(), problems=problems)
+    lines = summary(outcome(verdict=told, details=("run_1: a note that is told anyway",)), 200).splitlines()
+    assert [line for line in lines if line.startswith("  data:")] == [
+        "  data: run_1: rows are repeated: 7 (and 1 more like it)"
+    ]
 
 
 def test_lines_are_wrapped_between_words_and_indented():

@@ -60,8 +60,13 @@ def period(runs: Sequence[Run]) -> float:
 
 
 def words(by: float) -> str:
-    """Return what was found, in words."""
-    return f"the motion comes {by:.3f} s before what asks for it; try t of the reference pose {by:+.3f} s"
+    """Return what is wrong with the clocks, in words."""
+    return f"all runs: the motion comes {by:.3f} s before what asks for it; try t of the reference pose {by:+.3f} s"
+
+
+def note(by: float) -> str:
+    """Return what was mended, in words."""
+    return f"all runs: the motion comes {by:.3f} s before what asks for it: judged with the pose's stamps {by:+.3f} s"
 
 
 def _later(problem: Problem, by: float) -> Problem:

@@ -129,7 +129,7 @@ def _criticise_base(
     if by > early.taste([run for run in recording.runs if run.name in drives]):
         return explain.invalid(recording, model, [early.words(by)]), _UNDRIVEN
     if by > 0:
-        recording = replace(recording, problems=(*recording.problems, f"{early.words(by)}: so it is judged"))
+        recording = replace(recording, problems=(*recording.problems, early.note(by)))
         drives = {name: early.mended(drive, by) for name, drive in drives.items()}
         rough, first = _begun(recording, model, drives, ids)
     train = list(first.drives)

@@ -9,11 +9,10 @@ from pathlib import Path
 import jinja2
 
 from kurumaisu import effects
-from kurumaisu.critic import words
 from kurumaisu.critic.digits import MINUS, bare, odds, quantities
 from kurumaisu.critic.pictures import comparison_picture, misfit_picture, overlay_picture, thinned
 from kurumaisu.critic.story import Story
-from kurumaisu.critic.verdict import Verdict
+from kurumaisu.critic.verdict import Verdict, grouped
 from kurumaisu.errors import Error
 
 LABELS = {
@@ -49,7 +48,7 @@ def write_report(path: Path, verdict: Verdict, story: Story) -> None:
             undrawn=len(runs) - len(drawn),
             restart=max((overlay.restart for overlay in drawn), default=0.0),
             misfits=misfits + [comparison_picture(each, f"numbers{i}") for i, each in enumerate(story.comparisons)],
-            problems=words.grouped(verdict.problems),
+            problems=grouped(verdict.problems),
         )
     )
     try:

@@ -13,7 +13,7 @@ from pathlib import Path
 from kurumaisu.critic.digits import bare, quantities
 from kurumaisu.critic.display import cells, cut, printable
 from kurumaisu.critic.job import Outcome
-from kurumaisu.critic.verdict import Gain, Verdict, to_json
+from kurumaisu.critic.verdict import Gain, Verdict, grouped, to_json
 from kurumaisu.errors import Error
 
 _NARROWEST = 12  # cells of a recording's name in a table
@@ -40,6 +40,8 @@ def summary(outcome: Outcome, width: int) -> str:
     verdict = outcome.verdict
     assert verdict is not None
     lines = [f"verdict: {verdict.verdict}", outcome.headline, *(f"  {detail}" for detail in outcome.details)]
+    for _, said in grouped([problem for problem in verdict.problems if problem not in outcome.details]):
+        lines.append(f"  data: {said[0]}{f' (and {len(said) - 1} more like it)' if len(said) > 1 else ''}")
     if verdict.gain is not None:
         lines += _gain(verdict.gain)
     lines += [f"drive next: {outcome.next_drive}"] if outcome.next_drive else []

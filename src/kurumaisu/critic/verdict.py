@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -231,3 +231,13 @@ def _members(content: Any) -> list[tuple[str, Any]]:
     if isinstance(content, dict):
         return list(content.items())
     return [(str(i), item) for i, item in enumerate(content)] if isinstance(content, list) else []
+
+
+def grouped(problems: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Return problems that differ only in their runs and numbers under one heading, with what each says."""
+    groups: dict[str, list[str]] = {}
+    for problem in problems:
+        where, _, what = problem.partition(": ")
+        kind = what.partition(": ")[0]
+        groups.setdefault(kind or where, []).append(problem)
+    return list(groups.items())

@@ -15,7 +15,7 @@ from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.material import HORIZON, MATERIAL
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.story import Rival
-from kurumaisu.critic.verdict import Cause, Estimate, Verdict
+from kurumaisu.critic.verdict import Cause, Estimate, Verdict, grouped
 
 _MINUTE = 60.0  # [s]
 _CAUSES_TOLD = 4  # in a headline
@@ -47,16 +47,6 @@ def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[st
     if nearest is not None and found.p[nearest] >= naming.RIVAL:
         return f"Nothing can be named: noise explains these drives as well. The nearest suspect is {nearest}."
     return "Nothing is missing in the model that these drives could show."
-
-
-def grouped(problems: Sequence[str]) -> list[tuple[str, list[str]]]:
-    """Return problems that differ only in their runs and numbers under one heading, with what each says."""
-    groups: dict[str, list[str]] = {}
-    for problem in problems:
-        where, _, what = problem.partition(": ")
-        kind = what.partition(": ")[0]
-        groups.setdefault(kind or where, []).append(problem)
-    return list(groups.items())
 
 
 def wrong(problems: Sequence[str]) -> str:
