@@ -54,3 +54,13 @@ def test_what_a_chair_does_is_no_clock(cause: str) -> None:
     told = _verdict(_made(7, BASE[cause].fault(BASE[cause].draw(rng), "other")))
     assert not any("before what asks for it" in problem for problem in told.problems)
     assert cause in [named.id for named in told.causes] + [each for one in told.confounded for each in one]
+
+
+def test_an_input_of_one_row_has_no_period_of_its_own() -> None:
+    made = _made(5)
+    runs = []
+    for run in made.runs:
+        assert run.command is not None
+        one = replace(run.command, t=run.command.t[:1], values=run.command.values[:1])
+        runs.append(replace(run, command=one, voltage=None))
+    assert early.period(runs) == 0.1

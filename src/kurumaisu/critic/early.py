@@ -30,8 +30,8 @@ _LEAST = 2e-3  # [s] less is the rounding of stamps
 def lead(problem: Problem, progress: Progress) -> float:
     """Return by how much the motion comes before what asks for it [s], 0 where a chair may do what is seen."""
     alone = _cost(problem, 0.0)
-    tried = min(_TRIED, key=lambda by: _cost(problem, by))
-    if alone - _cost(problem, tried) < _HOPE:
+    cost, tried = min((_cost(problem, by), by) for by in _TRIED)
+    if alone - cost < _HOPE:
         return 0.0
     progress("asking whether the clocks agree")
     best = minimize_scalar(lambda by: _cost(problem, by), bounds=(0.0, min(2 * tried, _LONGEST)), method="bounded")
@@ -54,9 +54,10 @@ def taste(runs: Sequence[Run]) -> float:
 
 
 def period(runs: Sequence[Run]) -> float:
-    """Return the longest time between rows of poses or inputs [s], but no pause."""
+    """Return the longest time between rows of poses or inputs [s], but no pause; a single row is held throughout."""
     parts = [part for run in runs for part in (run.pose, run.voltage or run.command or run.odom)]
-    return min(max(float(np.median(np.diff(part.t))) for part in parts if part is not None), _PAUSE)
+    steps = [np.diff(part.t) for part in parts if part is not None]
+    return min(max(float(np.median(some)) if len(some) else _PAUSE for some in steps), _PAUSE)
 
 
 def words(by: float) -> str:
