@@ -2,22 +2,9 @@
 #include "base/odometry_report.h"
 
 #include <cmath>
-#include <sstream>
 
 namespace kurumaisu {
 namespace {
-
-std::string shown(double value) {
-  std::ostringstream out;
-  out << value;
-  return out.str();
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
 
 void addGyro(const Gyro& gyro, const GyroCounts& before, Report& report) {
   const GyroCounts& now = gyro.counts();

@@ -12,24 +12,24 @@ std::string shown(const Band& band) {
   return out.str();
 }
 
+const std::string& nameOf(const Drive& drive) {
+  const Arbiter& arbiter = drive.arbiter();
+  return arbiter.settings().inputs[*arbiter.last().input].name;
+}
+
+}  // namespace
+
 std::string shown(double value) {
   std::ostringstream out;
   out << value;
   return out.str();
 }
 
-const std::string& nameOf(const Drive& drive) {
-  const Arbiter& arbiter = drive.arbiter();
-  return arbiter.settings().inputs[*arbiter.last().input].name;
-}
-
-std::string joined(const std::vector<std::string>& names) {
+std::string joined(const std::vector<std::string>& words) {
   std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
   return text;
 }
-
-}  // namespace
 
 Tally tally(const Drive& drive) {
   return {drive.counts(), drive.arbiter().counts(), drive.speedCap().counts(),

@@ -26,6 +26,11 @@ struct Tally {
   std::uint64_t cut = 0;  ///< samples that the band of the voltages cut
 };
 
+std::string shown(double value);
+
+/// Words with a comma between each two.
+std::string joined(const std::vector<std::string>& words);
+
 Tally tally(const Drive& drive);
 
 /// Says between which voltages a law has two rates; empty for a law that is unambiguous.

@@ -21,7 +21,7 @@ namespace kurumaisu {
 namespace {
 
 constexpr double kLeastFit = 0.6;  // share of the first scan's readings that a map to go on from must explain
-constexpr int kLeastReadings = 3;  // fewer do not say where a scan was taken
+constexpr int kFewestReadings = 3;       // fewer do not say where a scan was taken
 constexpr double kOdometryPeriod = 0.1;  // [s] odometry may come in steps so far apart
 constexpr double kMostDistance = 1.0;    // [m] deviation of the pose to go on from
 constexpr double kMostAngle = 0.5;       // [rad]
@@ -196,7 +196,7 @@ class Mapper::Impl {
   /// Runs the filter, and lets the map grow, where it is time.
   Estimate filter(const Scan& scan, const Pose2D& matched) {
     const bool sees = std::count_if(scan.ranges.begin(), scan.ranges.end(),
-                                    [](float range) { return std::isfinite(range); }) >= kLeastReadings;
+                                    [](float range) { return std::isfinite(range); }) >= kFewestReadings;
     const bool grow = sees && reached(inserted_, matched, settings_.insert_distance, settings_.insert_angle);
     const bool late = settings_.localise_time > 0 && scan.stamp - localised_at_ > settings_.localise_time;
     const bool localise =
