@@ -75,7 +75,7 @@ def _next_order(problem: Problem, fit: Fit, name: str) -> float:
     """Return the share of a size by which the next order of the equation may shift it, 1 sd; 0 of what has none.
 
     Where the first order moves the chair by a share of the way or turn that is left, the next one does by that share
-    of the first, times a factor within -1 and 1.
+    of the first, times a factor within -1 and 1. What went to and fro is as much way as what went on.
     """
     if not effects.by_id(name).empirical:
         return 0.0
@@ -85,11 +85,21 @@ def _next_order(problem: Problem, fit: Fit, name: str) -> float:
         starts, stops = spans(drive, HORIZON)
         paths = [replay.path(drive, problem.model, some) for some in (fit.settings, without)]
         one, other = (geometry.between(path[starts], path[stops]) for path in paths)
-        d, *ways = (np.abs(np.column_stack([x[:, 0] + 1j * x[:, 1], x[:, 2]])) for x in (one - other, one, other))
-        m = np.minimum(*ways)
+        d = _amounts(one - other)
+        m = np.minimum(*(way[stops] - way[starts] for way in map(_travelled, paths)))
         changed, along, made = changed + (d**2).sum(axis=0), along + (d * m).sum(axis=0), made + (m**2).sum(axis=0)
     where = int(np.argmax(changed / np.maximum(made, 1e-12)))
     return float(min(changed[where] / max(along[where], 1e-12), 1.0) / np.sqrt(3))
+
+
+def _amounts(moves: FloatArray) -> FloatArray:
+    """Return how far (n, 3) moves go and turn, (n, 2)."""
+    return np.abs(np.column_stack([moves[:, 0] + 1j * moves[:, 1], moves[:, 2]]))
+
+
+def _travelled(path: FloatArray) -> FloatArray:
+    """Return how far a chair has gone and turned at each pose (n, 3) of its path, to and fro, (n, 2)."""
+    return np.vstack([np.zeros((1, 2)), np.cumsum(_amounts(np.diff(path, axis=0)), axis=0)])
 
 
 def ends_of(problem: Problem, fit: Fit, at: int, ridge: FloatArray, sd: float) -> tuple[float, float]:
