@@ -94,7 +94,7 @@ def _next_order(problem: Problem, fit: Fit, name: str) -> float:
 
 def _amounts(moves: FloatArray) -> FloatArray:
     """Return how far (n, 3) moves go and turn, (n, 2)."""
-    return np.abs(np.column_stack([moves[:, 0] + 1j * moves[:, 1], moves[:, 2]]))
+    return np.asarray(np.abs(np.column_stack([moves[:, 0] + 1j * moves[:, 1], moves[:, 2]])))
 
 
 def _travelled(path: FloatArray) -> FloatArray:

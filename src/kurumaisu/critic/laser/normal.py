@@ -10,15 +10,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
-from kurumaisu.critic.laser.blocked import blocked
+from kurumaisu.critic.laser.blocked import blocked, told
 from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, near, refined
+from kurumaisu.critic.laser.displaced import displaced
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate, marginal, whitened
 from kurumaisu.critic.laser.path import Sight, Steady, steady
 from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, rows_of
 from kurumaisu.critic.laser.sought import moved, stands
+from kurumaisu.critic.laser.strangers import strangers
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
+from kurumaisu.critic.verdict import Unknown
 from kurumaisu.geometry import compose
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -54,13 +57,20 @@ class Assembly:
         self._linearise(shots, roughly=True)
         self.motion: list[Steady] | None = None
         self.blocked = blocked(shots.measured, self.marks.base)
+        self.displaced = displaced(shots.measured, self.marks.base, self._hits())
+        self.mapped = (
+            ~self.blocked & ~self.displaced.readings
+        )  # readings (k, b) of what the map has, as far as is known
+        others = np.where(self.mapped, shots.measured, np.nan)
+        self.strangers = strangers(others, self.marks.base, shots.laser.bearings)
+        self.mapped &= ~self.strangers.readings
         self.first = self._trust()
         for i in range(_SHIFTS):
             found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._sights())
             self._linearise(found, roughly=i < _SHIFTS - 1)
         self.motion = self._motion()
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
-        self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base) & ~self.blocked
+        self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base) & self.mapped
         self.forms, fixed = self.marks.forms(ids)
         self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
         self.columns = np.concatenate([fixed, more], axis=2)
@@ -82,7 +92,27 @@ class Assembly:
         one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
         sd = np.maximum(np.nan_to_num(one), _LEAST)  # a beam that meets nothing has none
         smooth = self._on_smooth_path()[:, np.newaxis]
-        return BeamNoise(sd, 0.0, trusted(self.shots, self.marks.seen, self.marks.base) & smooth & ~self.blocked)
+        trust = trusted(self.shots, self.marks.seen, self.marks.base)
+        return BeamNoise(sd, 0.0, trust & smooth & self.mapped)
+
+    def told(self) -> list[Unknown]:
+        """Return what stands where the map has it not, rides with the chair, or comes and goes."""
+        riding = told(self.blocked, self.shots.measured, self.shots.laser.bearings)
+        staying = list(self.displaced.told())
+        known = {each.covariate for each in staying}
+        return [*riding, *staying, *(each for each in self.strangers.told() if each.covariate not in known)]
+
+    @property
+    def strange(self) -> bool:
+        """Whether things are there that the map does not have: how far others scatter by them, nobody can say."""
+        return bool(self.displaced.readings.any()) or self.strangers.many
+
+    def _hits(self) -> FloatArray:
+        """Return where (k, b, 2) [m] the beams meet the map."""
+        poses, bearings = self.origins()
+        angles = poses[:, :, 2] + bearings
+        way = self.marks.base[:, :, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        return np.asarray(poses[:, :, :2] + way)
 
     def _on_smooth_path(self) -> BoolArray:
         """Return which scans (k,) lie where the chair's path is smooth; all where that is seldom."""

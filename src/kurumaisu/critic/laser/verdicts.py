@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.laser import pictures, rivals, still
-from kurumaisu.critic.laser.blocked import told
 from kurumaisu.critic.laser.estimates import estimates_of, of_block, settings_of, with_scatter
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
@@ -86,8 +85,8 @@ def criticise(
     progress("laser: fitting what acts")
     fit = pinned(assembly, normal, made.fit.forms, settings_of(assembly, made.fit), made.winner, recording.truth)
     progress("laser: weighing effects on the scatter")
-    scatter, comparison = _scatter(assembly, fit, ids, strange=made.curve)
-    if not made.curve:
+    scatter, comparison = ([], ()) if assembly.strange else _scatter(assembly, fit, ids, strange=made.curve)
+    if not made.curve and not assembly.strange:
         # Seen anew, scans have no forms to project out; where they were not, effects may have moved them all together.
         again = fit.assembly is not assembly
         seen = fit.assembly.common_mode(fit.normal, recording.truth, () if again else made.fit.forms)
@@ -191,7 +190,7 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     causes = tuple(
         Cause(name, min(found.p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
     )
-    unknown = tuple(told(assembly.blocked, assembly.shots.measured, assembly.shots.laser.bearings))
+    unknown = tuple(assembly.told())
     unknown += tuple(unknowns(made.weighed, normal.gram)) if curve else ()
     groups = () if curve else _confused(assembly, normal, made, causes)
     confounded = tuple(group for group in groups if matters & set(group))
