@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, precision, sizes
+from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, own_sizes, precision
 from kurumaisu.types import BoolArray, FloatArray
 
 _FLOOR = 1e-7  # [m] below which no sd of the beams' offsets counts
@@ -51,9 +51,9 @@ def without_beams(
     grams: Sequence[Gram], cross: Crossed, layout: Layout, noise: ScanNoise, beam_sd: float
 ) -> FloatArray:
     """Return normal equations as noise.marginal, with an offset of sd beam_sd [m] of each beam integrated out too."""
-    size, beams = sizes(noise), len(cross.inner)
-    scans, stands = len(grams), int(layout.stand.max(initial=-1)) + 1
-    shared = scans + 3 * stands
+    size, beams = own_sizes(noise), len(cross.inner)
+    prior = precision(layout, noise)[0]
+    scans, shared = len(grams), len(prior)
     common = cross.common.shape[1]
     inner = np.zeros((shared + beams, shared + beams))
     outer = np.zeros((shared + beams, common))
@@ -63,7 +63,7 @@ def without_beams(
     taken: list[tuple[FloatArray, FloatArray]] = []
     for k, gram in enumerate(grams):
         own, lead = gram.own, gram.shared
-        index = [k, *(scans + 3 * layout.stand[k] + i for i in range(lead - 1))]
+        index = [k, *(scans + 3 * layout.places[k] + i for i in range(lead - 1))]
         rest, beside = gram.matrix[own : own + lead, own:], cross.own[k][:, own:]
         if own:
             part, columns = _of_own(gram, cross.own[k], size)
@@ -79,7 +79,7 @@ def without_beams(
         outer[shared:] -= parts.T @ columns
         total -= columns.T @ columns
     inner[:shared, shared:] = inner[shared:, :shared].T
-    inner[:shared, :shared] += precision(layout, noise, np.tile(size**-2, stands))[0]
+    inner[:shared, :shared] += prior
     inner[range(shared, len(inner)), range(shared, len(inner))] += max(beam_sd, _FLOOR) ** -2
     return np.asarray(total - outer.T @ cho_solve(cho_factor(inner), outer))
 

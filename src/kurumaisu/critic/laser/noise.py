@@ -8,20 +8,24 @@ so many independent ones makes a critic certain of effects that are not there.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import block_diag, cho_factor, cho_solve
 from scipy.optimize import minimize
 
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _FLOOR = 1e-6  # [m, rad] below which no sd counts
-# Of position [m], heading [rad], common mode [m] and its time constant [s]: what is usual, the sd of its log, bounds.
-_USUAL = np.array([0.005, 0.005, 2e-4, 1.0])
+# Of position [m], heading [rad], common mode [m], its time constant [s], the share of the poses' errors that lasts and
+# how long [s]: what is usual, the sd of its log, bounds.
+_USUAL = np.array([0.005, 0.005, 2e-4, 1.0, 0.05, 5.0])
 # A common mode may be of each scan alone, at 30 ms, or last for ten seconds.
-_SPREAD = np.array([2.0, 2.0, 1.0, 2.0])
-_LOW, _HIGH = np.array([1e-5, 1e-5, 1e-6, 0.01]), np.array([0.3, 0.3, 0.1, 10.0])
+_SPREAD = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 1.0])
+_LOW, _HIGH = np.array([1e-5, 1e-5, 1e-6, 0.01, 1e-4, 1.0]), np.array([0.3, 0.3, 0.1, 10.0, 0.98, 60.0])
+_STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that last are one
+_STRETCHES = 100  # at most
 _APART = 0.2  # in logs, to see how surely each is known
 
 
@@ -30,13 +34,16 @@ class ScanNoise:
     """Errors that the readings of a scan share.
 
     position_sd [m], heading_sd [rad]: of a reference pose; common_sd [m]: of the offset of a scan, whose correlation
-    with the next one falls off with a time constant common_tau [s].
+    with the next one falls off with a time constant common_tau [s]; lasting: share of the poses' variance that falls
+    off with lasting_tau [s], as of a reference that wanders: the rest is each pose's own.
     """
 
     position_sd: float
     heading_sd: float
     common_sd: float
     common_tau: float
+    lasting: float = 0.0
+    lasting_tau: float = 5.0
 
 
 @dataclass(frozen=True)
@@ -47,14 +54,39 @@ class Layout:
     run: IntArray
     stand: IntArray
 
+    @cached_property
+    def places(self) -> IntArray:
+        """Which error of a pose that several scans share each scan (k,) has: its stand's, then its stretch's."""
+        return np.asarray(np.where(self.stand >= 0, self.stand, self._stands + self._stretches[1]))
+
+    @cached_property
+    def _stretches(self) -> tuple[FloatArray, IntArray]:
+        """Run and middle [s] (m, 2) of all stretches, and of which each scan (k,) is."""
+        length = max(_STRETCH, float(np.ptp(self.times)) / _STRETCHES)
+        found, of = np.unique(np.column_stack([self.run, np.floor(self.times / length)]), axis=0, return_inverse=True)
+        return np.column_stack([found[:, 0], length * (found[:, 1] + 0.5)]), of.ravel()
+
+    def kept(self, noise: ScanNoise) -> tuple[FloatArray, float]:
+        """Return the precision of the errors of stands and stretches, x, y, yaw in turn, and its log determinant."""
+        lasting = np.maximum(np.sqrt(noise.lasting) * sizes(noise), _FLOOR) ** -2
+        runs, middles = self._stretches[0].T
+        along, log_det = autoregressive(middles, runs, noise.lasting_tau)
+        stands = np.diag(np.tile(sizes(noise) ** -2, self._stands))
+        logs = self._stands * np.log(sizes(noise) ** -2).sum() + 3 * log_det + len(middles) * np.log(lasting).sum()
+        return block_diag(stands, np.kron(along, np.diag(lasting))), float(logs)
+
+    @property
+    def _stands(self) -> int:
+        return int(self.stand.max(initial=-1)) + 1
+
 
 @dataclass(frozen=True)
 class Gram:
     """Normal equations of one scan, whitened within the scan.
 
     own: number of leading columns, for the errors of its own reference poses, x, y, yaw in turn; shared: of those that
-    follow, one for its common mode and, where it belongs to a stand, three for the error of that pose; the rest are
-    common to all scans.
+    follow, one for its common mode and three for the error of its stand's pose or, where asked for, of its stretch; the
+    rest are common to all scans.
     """
 
     matrix: FloatArray
@@ -80,10 +112,11 @@ def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[F
 
     The latter is that of the covariance, relative to independent readings.
     """
-    size = sizes(noise)
-    scans, stands = len(grams), int(layout.stand.max(initial=-1)) + 1
+    size = own_sizes(noise)
+    prior, prior_log_det = precision(layout, noise)
+    scans = len(grams)
     common = len(grams[0].matrix) - grams[0].own - grams[0].shared
-    inner = np.zeros((scans + 3 * stands, scans + 3 * stands))
+    inner = np.zeros_like(prior)
     cross = np.zeros((len(inner), common))
     total = np.zeros((common, common))
     log_det = 0.0
@@ -93,10 +126,9 @@ def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[F
         lead = grams[rows[0]].shared
         total += rest[:, lead:, lead:].sum(axis=0)
         for k, part in zip(rows, rest, strict=True):
-            index = [k, *(scans + 3 * layout.stand[k] + i for i in range(lead - 1))]
+            index = [k, *(scans + 3 * layout.places[k] + i for i in range(lead - 1))]
             inner[np.ix_(index, index)] += part[:lead, :lead]
             cross[index] += part[:lead, lead:]
-    prior, prior_log_det = precision(layout, noise, np.tile(size**-2, stands))
     factor = cho_factor(inner + prior)
     log_det += 2 * float(np.log(np.diag(factor[0])).sum()) - prior_log_det
     return total - cross.T @ cho_solve(factor, cross), log_det
@@ -105,6 +137,11 @@ def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[F
 def sizes(noise: ScanNoise) -> FloatArray:
     """Return the sds (3,) of a reference pose."""
     return np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], _FLOOR)
+
+
+def own_sizes(noise: ScanNoise) -> FloatArray:
+    """Return the sds (3,) of what of a reference pose's error is its own."""
+    return np.asarray(np.sqrt(1 - noise.lasting) * sizes(noise))
 
 
 def _alike(grams: Sequence[Gram]) -> list[list[int]]:
@@ -126,22 +163,24 @@ def _without_own(matrices: FloatArray, own: int, size: FloatArray) -> tuple[Floa
     return rest, float(np.linalg.slogdet(inner)[1].sum())
 
 
-def precision(layout: Layout, noise: ScanNoise, stands: FloatArray) -> tuple[FloatArray, float]:
-    """Return the precision of common modes, autoregressive within a run, and stands; and its log determinant."""
-    n = len(layout.times)
+def precision(layout: Layout, noise: ScanNoise) -> tuple[FloatArray, float]:
+    """Return the precision of common modes, autoregressive within a run, and kept errors; and its log determinant."""
     sd = max(noise.common_sd, _FLOOR)
-    out = np.zeros((n + len(stands), n + len(stands)))
-    out[range(n, len(out)), range(n, len(out))] = stands
-    gap = np.diff(layout.times)
-    rho = np.where(np.diff(layout.run) == 0, np.exp(-np.abs(gap) / noise.common_tau), 0.0)
-    innovation = np.concatenate([[1.0], 1 - rho**2])  # variances, in sd^2
-    innovation = np.maximum(innovation, 1e-9)
+    common, log_det = autoregressive(layout.times, layout.run, noise.common_tau)
+    kept, more = layout.kept(noise)
+    return block_diag(common / sd**2, kept), log_det - 2 * len(common) * float(np.log(sd)) + more
+
+
+def autoregressive(times: FloatArray, run: IntArray | FloatArray, tau: float) -> tuple[FloatArray, float]:
+    """Return the precision (n, n) of unit errors that fall off with tau [s] within a run, and its log determinant."""
+    n = len(times)
+    rho = np.where(np.diff(run) == 0, np.exp(-np.abs(np.diff(times)) / tau), 0.0)
+    innovation = np.maximum(np.concatenate([[1.0], 1 - rho**2]), 1e-9)  # variances
     diagonal = 1 / innovation
     diagonal[:-1] += rho**2 / innovation[1:]
-    out[range(n), range(n)] = diagonal / sd**2
-    out[range(n - 1), range(1, n)] = out[range(1, n), range(n - 1)] = -rho / innovation[1:] / sd**2
-    log_det = -float(np.log(innovation).sum()) - 2 * n * np.log(sd) + float(np.log(stands).sum())
-    return out, log_det
+    out = np.diag(diagonal)
+    out[range(n - 1), range(1, n)] = out[range(1, n), range(n - 1)] = -rho / innovation[1:]
+    return out, -float(np.log(innovation).sum())
 
 
 @dataclass(frozen=True)
@@ -179,7 +218,7 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
     start = np.log(_USUAL)
     if truth is not None:
         start[:2] = np.log(np.maximum(truth, 1e-5))
-    return _likeliest(_Likelihood(grams, layout, project), start, np.arange(0 if truth is None else 2, 4))
+    return _likeliest(_Likelihood(grams, layout, project), start, np.arange(0 if truth is None else 2, 6))
 
 
 def common_mode(
@@ -193,7 +232,7 @@ def common_mode(
 
     def cost(x: FloatArray) -> float:
         sd, tau = (np.array([noise.common_sd, noise.common_tau]) * np.exp(x)).tolist()
-        far = (np.log([sd, tau]) - np.log(_USUAL[2:])) / _SPREAD[2:]
+        far = (np.log([sd, tau]) - np.log(_USUAL[2:4])) / _SPREAD[2:4]
         return likelihood(replace(noise, common_sd=sd, common_tau=tau)) + 0.5 * float(far @ far)
 
     one, other = _APART * np.eye(2)
@@ -201,11 +240,11 @@ def common_mode(
     bent = [cost(x) + cost(-x) - 2 * here for x in (one, other)]
     mixed = 0.25 * (cost(one + other) + cost(-one - other) - cost(one - other) - cost(other - one))
     values, vectors = np.linalg.eigh(np.array([[bent[0], mixed], [mixed, bent[1]]]) / _APART**2)
-    values = np.maximum(values, 1 / np.max(_SPREAD[2:]) ** 2)  # no less is known than before the data
+    values = np.maximum(values, 1 / np.max(_SPREAD[2:4]) ** 2)  # no less is known than before the data
     sds = np.sqrt(np.diag(vectors @ np.diag(1 / values) @ vectors.T))
     none = replace(noise, common_sd=_FLOOR)
     if truth is None:  # errors of the reference may then stand in for it
-        start = np.log([none.position_sd, none.heading_sd, none.common_sd, none.common_tau])
+        start = np.log(np.maximum(astuple(none), _LOW))
         none = _likeliest(likelihood, start, np.arange(2))
     return CommonMode(likelihood(none) - here - 0.5 * float(np.log(values).sum()), float(sds[0]), float(sds[1]))
 

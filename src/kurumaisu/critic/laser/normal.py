@@ -20,7 +20,7 @@ from kurumaisu.critic.laser.path import Sight, Steady, steady
 from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, rows_of
 from kurumaisu.critic.laser.sought import moved, stands
 from kurumaisu.critic.laser.strangers import strangers
-from kurumaisu.critic.laser.trust import hats, trusted, trusted_place
+from kurumaisu.critic.laser.trust import hats, piles, trusted, trusted_place
 from kurumaisu.critic.verdict import Unknown
 from kurumaisu.geometry import compose
 from kurumaisu.params import EffectSetting
@@ -57,11 +57,14 @@ class Assembly:
         self._linearise(shots, roughly=True)
         self.motion: list[Steady] | None = None
         self.blocked = blocked(shots.measured, self.marks.base)
-        self.displaced = displaced(shots.measured, self.marks.base, self._hits())
+        low, high = piles(shots.measured)  # of what is cut off nobody knows where it is
+        with np.errstate(invalid="ignore"):
+            somewhere = np.where((shots.measured > low) & (shots.measured < high), shots.measured, np.nan)
+        self.displaced = displaced(somewhere, self.marks.base, self._hits())
         self.mapped = (
             ~self.blocked & ~self.displaced.readings
         )  # readings (k, b) of what the map has, as far as is known
-        others = np.where(self.mapped, shots.measured, np.nan)
+        others = np.where(self.mapped, somewhere, np.nan)
         self.strangers = strangers(others, self.marks.base, shots.laser.bearings)
         self.mapped &= ~self.strangers.readings
         self.first = self._trust()
@@ -156,7 +159,7 @@ class Assembly:
                     continue  # with this shape some beams meet nothing
                 self.columns[:, :, form.span] = some
                 use = np.concatenate([np.arange(other.span.start, other.span.stop) for other in fitted])
-                gram = marginal(self.grams(beam, use), self.layout, scan)[0]
+                gram = marginal(self.grams(beam, use, lasting=True), self.layout, scan)[0]
                 gain = float(gram[:-1, -1] @ _solve(gram[:-1, :-1], gram[:-1, -1]))
                 if gain > best:
                     best, at, columns = gain, shape, some
@@ -210,7 +213,7 @@ class Assembly:
         fitted: forms that act, with their shapes.
         """
         project = self._projected(fitted)
-        grams = self.grams(normal.beam_noise, project)
+        grams = self.grams(normal.beam_noise, project, lasting=True)
         return common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise)
 
     def full(self, normal: Normal) -> Normal:
@@ -245,7 +248,7 @@ class Assembly:
         inner, common = np.zeros((beams, beams)), np.zeros((beams, count + 1))
         grams, parts = [], []
         for k in range(len(self.residual)):
-            own, shared, last = self._rows(k, np.arange(count))
+            own, shared, last = self._rows(k, np.arange(count), lasting=True)
             rows = whitened(np.hstack([own, shared, last]), beam.valid[k], beam.sd[k], beam.rho)
             grams.append(self._gram(k, rows, own.shape[1], shared.shape[1]))
             products = crossed(rows, beam.valid[k], beam.sd[k], beam.rho, inner)
@@ -254,11 +257,14 @@ class Assembly:
             common += products[:, lead:]
         return grams, Crossed(tuple(parts), common, inner)
 
-    def grams(self, beam: BeamNoise, columns: IntArray | None = None) -> list[Gram]:
-        """Return the normal equations of each scan; columns: which of all, None for all."""
+    def grams(self, beam: BeamNoise, columns: IntArray | None = None, *, lasting: bool = False) -> list[Gram]:
+        """Return the normal equations of each scan; columns: which of all, None for all.
+
+        lasting: with the error of the poses that a stretch of the way shares.
+        """
         out = []
         for k in range(len(self.residual)):
-            own, shared, common = self._rows(k, columns)
+            own, shared, common = self._rows(k, columns, lasting=lasting)
             rows = whitened(np.hstack([own, shared, common]), beam.valid[k], beam.sd[k], beam.rho)
             out.append(self._gram(k, rows, own.shape[1], shared.shape[1]))
         return out
@@ -306,7 +312,9 @@ class Assembly:
             by_id.setdefault(form.id, []).append(form)
         return [chosen.get(name, forms[len(forms) // 2]) for name, forms in by_id.items()]
 
-    def _rows(self, k: int, columns: IntArray | None) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _rows(
+        self, k: int, columns: IntArray | None, *, lasting: bool = False
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         poses = self.poses[k]
         one = np.ones((poses.shape[0], 1))
         common = self.columns[k] if columns is None else self.columns[k][:, columns]
@@ -314,7 +322,7 @@ class Assembly:
         if self.layout.stand[k] >= 0:
             return np.empty((len(one), 0)), np.hstack([one, poses]), last
         own = (self.hats[k].weights[:, :, np.newaxis] * poses[:, np.newaxis, :]).reshape(len(one), -1)
-        return own, one, last
+        return own, np.hstack([one, poses]) if lasting else one, last
 
     def random_columns(self, k: int) -> FloatArray:
         """Return (b, q) what the readings of a scan do by its common mode and by errors of its reference poses."""

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A reference that wanders errs alike for seconds: so many scans are not so many independent witnesses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from laser_scene import recording
+
+from kurumaisu.critic.laser.normal import Assembly
+from kurumaisu.critic.laser.shots import gather
+from kurumaisu.critic.laser.verdicts import criticise
+from kurumaisu.params import load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+SDS = np.array([0.006, 0.006, 0.004])
+
+
+def wandering(data, share, tau, seed):
+    """Return a recording whose reference errs by SDS, a share of the variance of which lasts for tau [s]."""
+    rng = np.random.default_rng(seed)
+    run = data.runs[0]
+    steps = len(run.pose.t)
+    rho = np.exp(-float(np.median(np.diff(run.pose.t))) / tau)
+    slow = rng.standard_normal((steps, 3))
+    for i in range(1, steps):
+        slow[i] = rho * slow[i - 1] + np.sqrt(1 - rho**2) * slow[i]
+    values = run.pose.values.copy()
+    values[:, :3] += SDS * (np.sqrt(share) * slow + np.sqrt(1 - share) * rng.standard_normal((steps, 3)))
+    return replace(data, runs=(replace(run, pose=replace(run.pose, values=values)),), truth=(SDS[0], SDS[2]))
+
+
+@pytest.mark.parametrize(("share", "low", "high"), [(0.0, 0.0, 0.1), (0.6, 0.12, 0.95)])
+def test_how_much_of_the_references_errors_lasts_is_seen(tmp_path, share, low, high):
+    data = wandering(recording(tmp_path, None, 0.0, 13, scans=150), share, 4.0, 13)
+    noise = Assembly(gather(data, MODEL)).settle(data.truth).scan_noise
+    assert low <= noise.lasting <= high
+
+
+@pytest.mark.parametrize("seed", [11, 13, 14])
+def test_a_reference_that_wanders_is_no_mounting(tmp_path, seed):
+    data = wandering(recording(tmp_path, None, 0.0, seed, scans=150), 0.6, 4.0, seed)
+    finding = criticise(data, MODEL, lambda _: None)
+    assert (finding.causes, finding.confounded, finding.unknown) == ((), (), ())
