@@ -185,7 +185,7 @@ def hopeless_alone(problem: Problem, rough: Candidate, empty: Fit, fit: Fit) -> 
     sizes = [term for term in rough.terms if not term.fixed and not term.shape]
     if not all(term.rough for term in sizes):
         return False
-    hope = problem.hope(rough, empty.terms, empty.values) * problem.comb_share * len(sizes)
+    hope = max(problem.hope(rough, empty.terms, empty.values), 0.0) * problem.comb_share * len(sizes)
     return empty.log_likelihood + _HOPES * hope < fit.log_likelihood - _HOPELESS
 
 
