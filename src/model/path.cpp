@@ -78,7 +78,7 @@ KURUMAISU_WIDE void integrate(const Pose2D& start, const Steps& steps, double* p
   Pose2D pose = start;
   for (std::size_t at = 0; at < steps.n; at += kLane) {
     const std::size_t count = std::min(kLane, steps.n - at);
-    Lane v{}, w{}, dt{}, heading{}, x, y;
+    Lane v{}, w{}, dt{}, heading{}, x{}, y{};
     bool plain = count == kLane;
     double theta = pose.theta;
     for (std::size_t i = 0; i < count; ++i) {
