@@ -12,7 +12,7 @@
 #include "contact/bindings.h"
 #include "kalman/whiten.h"
 #include "model/laser_error.h"
-#include "model/unicycle.h"
+#include "model/path.h"
 #include "model/voltage_law.h"
 
 namespace py = pybind11;
@@ -35,10 +35,18 @@ Array ratesAlong(k::AxisInverse& inverse, const Array& volts, const Array& sign)
   const double* volt = volts.data();
   const double* meant = sign.data();
   double* rate = out.mutable_data();
+  bool ambiguous = false;
   for (py::ssize_t i = 0; i < volts.size(); ++i) {
+    const auto before = inverse.memory();
+    if (i > 0 && volt[i] == volt[i - 1] && meant[i] == meant[i - 1]) {  // held, as most are: so is the answer
+      rate[i] = rate[i - 1];
+      inverse.recall({before.last_sign, before.ambiguous_samples + (ambiguous ? 1 : 0)});
+      continue;
+    }
     const double s = meant[i];
     const auto commanded = std::isnan(s) ? std::nullopt : std::optional<int>((s > 0) - (s < 0));
     rate[i] = inverse.rate(volt[i], commanded);
+    ambiguous = inverse.ambiguousSamples() != before.ambiguous_samples;
   }
   return out;
 }
@@ -47,18 +55,9 @@ Array integrate(const Array& v, const Array& w, const Array& dt, const std::arra
   requireSameSize(v, w, "v and w");
   requireSameSize(v, dt, "v and dt");
   Array out({v.size() + 1, static_cast<py::ssize_t>(3)});
-  k::Pose2D pose{start[0], start[1], start[2]};
-  auto poses = out.mutable_unchecked<2>();
-  const auto forward = v.unchecked<1>();
-  const auto turning = w.unchecked<1>();
-  const auto held = dt.unchecked<1>();
-  for (py::ssize_t i = 0;; ++i) {
-    poses(i, 0) = pose.x;
-    poses(i, 1) = pose.y;
-    poses(i, 2) = pose.theta;
-    if (i == v.size()) return out;
-    pose = k::advance(pose, forward(i), turning(i), held(i));
-  }
+  k::integrate({start[0], start[1], start[2]},
+               {v.data(), w.data(), dt.data(), static_cast<std::size_t>(v.size())}, out.mutable_data());
+  return out;
 }
 
 void bindModel(py::module_& m) {

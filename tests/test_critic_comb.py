@@ -57,6 +57,21 @@ def test_steps_are_found_although_smooth_effects_together_draw_their_mean():
     assert found.best.start[STEP, "step"] == pytest.approx(case.truth.parameters[STEP]["step"], rel=3e-3)
 
 
+@pytest.mark.parametrize(("step", "gain", "hopeless"), [(0.0367, 0.0, False), (0.02, 0.3, True)])
+def test_a_comb_is_not_fitted_alone_where_something_else_explains_far_more(step, gain, hopeless):
+    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
+    faults = [BASE[STEP].fault({"size": step}, "plain"), BASE["base.gain_w"].fault({"size": gain}, "plain")]
+    data = base_case.recording("steps", drives, faults)
+    ids = frozenset({STEP, "base.gain_w"})
+    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=ids)
+    empty, fits = problem.fit_candidates((), {}), {one: problem.fit_candidates([one], {}) for one in problem.candidates}
+    best = max(fits.values(), key=lambda fit: fit.score)
+    steps = [one for one in problem.candidates if one.id == STEP]
+    given_up = [one for one in steps if naming.hopeless_alone(problem, one, empty, best)]
+    assert (given_up == steps) == hopeless
+    assert all(fits[one].log_likelihood < best.log_likelihood - 100 for one in given_up)
+
+
 def replayed(start, settings):
     """The way driven after a command of 0.6 m/s at a time within a step of the grid, of a chair without noise."""
     command = Series(np.array([0.0, start]), np.array([[0.0, 0.0], [0.6, 0.0]]), ("v", "w"))

@@ -53,6 +53,20 @@ def test_a_drive_against_the_differential_equation():
     np.testing.assert_allclose(integrate(v, w, dt, [0.3, -0.2, 1.0])[-1], pose, atol=1e-9)
 
 
+@pytest.mark.parametrize("heading", [0.0, -2.0, 1e3, 99_999.9, -3e7])
+@pytest.mark.parametrize("fastest", [0.5, 5.0, 90.0])
+def test_a_drive_is_the_sum_of_its_steps(heading, fastest):
+    """However many steps are taken at once, however far the chair has turned, and through turns of half a step."""
+    rng = np.random.default_rng(2)
+    v, w, dt = rng.uniform(-1, 1, 83), rng.uniform(-fastest, fastest, 83), rng.uniform(0.009, 0.011, 83)
+    before = np.cumsum(np.append(heading, w * dt))
+    middle, chord = before[:-1] + 0.5 * w * dt, v * dt * np.sinc(0.5 * w * dt / np.pi)
+    way = np.cumsum(np.stack([chord * np.cos(middle), chord * np.sin(middle)], axis=1), axis=0)
+    poses = integrate(v, w, dt, [0.0, 0.0, heading])
+    np.testing.assert_array_equal(poses[:, 2], before)
+    np.testing.assert_allclose(poses[1:, :2], way, rtol=0.0, atol=1e-14)
+
+
 @pytest.mark.parametrize(("name", "axis"), AXES)
 @given(rate=st.floats(-3.0, 3.0))
 @example(rate=0.0)
@@ -76,6 +90,16 @@ def test_every_voltage_has_one_rate_and_it_answers_to_the_voltage(name, axis, vo
         assert np.isfinite(rate)
         if rate != 0:
             assert it.volts(float(rate)) == pytest.approx(volts, abs=1e-8)
+
+
+def test_volts_that_are_held_are_answered_as_one_by_one():
+    inverse, alone = (AxisInverse(law("published", "steering")) for _ in range(2))
+    volts = np.repeat([0.05, -0.3, 0.05, 0.0, 0.05, 0.05, np.nan], 3)
+    signs = np.repeat([1.0, np.nan, np.nan, 0.0, 0.0, -1.0, 1.0], 3)
+    one_by_one = [alone.rates(volts[i : i + 1], signs[i : i + 1])[0] for i in range(len(volts))]
+    np.testing.assert_array_equal(inverse.rates(volts, signs), one_by_one)
+    assert inverse.state == alone.state
+    assert inverse.ambiguous_samples == 12
 
 
 def test_the_last_unambiguous_sample_decides_without_a_sign():

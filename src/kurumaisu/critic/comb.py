@@ -30,6 +30,7 @@ _SIZES = 500  # at most
 _HALVINGS = 6  # of the way between two sizes: the narrowest teeth are that much closer than rates tell
 _FAINT = 0.2  # of the norm of its neighbour
 _BEST = 6  # that are tried
+_PRECISION = np.float32  # of what only first values come of: half the room and half the time
 
 
 Way = tuple[object, ...]  # an effect's parameter, with the form in which it acts
@@ -54,6 +55,7 @@ class Comb:
         self._model, self._walked = model, walked
         share = max(_TOTAL / len(drives), _LEAST)
         self._drives = [_begin(drive, share) for drive in drives[: int(_TOTAL / share)]]
+        self.share = sum(len(drive.times) for drive in drives) / sum(len(drive.times) for drive in self._drives)
         self._plain = [replay.motion(drive, model, ()) for drive in self._drives]
         self._columns: list[FloatArray] = []
         for drive, plain in zip(self._drives, self._plain, strict=True):
@@ -61,7 +63,7 @@ class Comb:
             held = csr_array((np.ones(len(cells)), (cells, cells // _CELLS)))
             sensitivity = Sensitivity(drive, plain)
             both = np.column_stack([sensitivity.increments(channel, held) for channel in ("v", "w")])
-            self._columns.append(whitened(drive, both, noise)[0])
+            self._columns.append(whitened(drive, both, noise)[0].astype(_PRECISION))
         self._grams = [columns.T @ columns for columns in self._columns]
         self._squares: dict[Way, FloatArray] = {}
 
@@ -75,7 +77,8 @@ class Comb:
             return []
         if key not in self._squares:
             self._squares[key] = self._products(changes)[0]
-        pull = np.concatenate([c.T @ r[: len(c)] for c, r in zip(self._columns, residual, strict=False)])
+        left = (r[: len(c)].astype(_PRECISION) for c, r in zip(self._columns, residual, strict=False))
+        pull = np.concatenate([c.T @ r for c, r in zip(self._columns, left, strict=True)])
         gained = changes @ pull - 0.5 * self._squares[key]
         peaks = np.flatnonzero((gained >= np.append(gained[1:], -np.inf)) & (gained >= np.append(-np.inf, gained[:-1])))
         best = peaks[np.argsort(-gained[peaks])][:_BEST]
@@ -110,7 +113,7 @@ class Comb:
         squares, between = np.zeros(len(changes)), np.zeros(max(len(changes) - 1, 0))
         for gram, own in zip(self._grams, self._parts(changes), strict=True):
             use = np.flatnonzero(own.any(axis=0))
-            loud = own[:, use]
+            loud = own[:, use].astype(_PRECISION)
             seen = loud @ gram[np.ix_(use, use)]
             squares += np.einsum("kb,kb->k", seen, loud)
             between += np.einsum("kb,kb->k", seen[:-1], loud[1:])

@@ -225,6 +225,11 @@ class Problem:
         starts = [self._comb.starts(term, form, residual) for term in rough.terms if term.rough]
         return max((found[0].nats for found in starts if found), default=0.0)
 
+    @property
+    def comb_share(self) -> float:
+        """Return how many times longer the drives are than what the combs of likely values see of them."""
+        return self._comb.share
+
     @cached_property
     def _comb(self) -> Comb:
         return Comb(self.drives, self.model, self.noise, self._walked)

@@ -22,6 +22,8 @@ _REFITS = 10  # sets refitted after each scan
 _RIVALS = 2  # likely sets besides the best one from which others are looked for
 _CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
 _ROUNDS = 8  # scans at most
+_HOPES = 3.0  # times what lines promise at most, about nothing, that something with a comb of likely values explains
+_HOPELESS = 100.0  # [nat] behind the best set that nothing makes good
 _STUCK = 0.5  # [nat] by which a fit must be beaten by mere first values to be made again
 NULLS = 2000  # draws of the null calibration
 
@@ -169,9 +171,22 @@ def _neighbours(
             yield fit.candidates | {other}, kept
     for other in problem.candidates:
         if other.rough and other.id not in fit.ids:
-            yield frozenset({other}), {}
+            if not hopeless_alone(problem, other, nothing.centre, fit):
+                yield frozenset({other}), {}
             yield fit.candidates | {other}, kept
     yield from _combs(problem, screen, fit)
+
+
+def hopeless_alone(problem: Problem, rough: Candidate, empty: Fit, fit: Fit) -> bool:
+    """Tell whether something rough, even if it explains several times what its best tooth promises, is far behind.
+
+    Nobody asks what is thousands of nats behind, but to find that out would take as long as any other fit.
+    """
+    sizes = [term for term in rough.terms if not term.fixed and not term.shape]
+    if not all(term.rough for term in sizes):
+        return False
+    hope = max(problem.hope(rough, empty.terms, empty.values), 0.0) * problem.comb_share * len(sizes)
+    return empty.log_likelihood + _HOPES * hope < fit.log_likelihood - _HOPELESS
 
 
 def _combs(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:

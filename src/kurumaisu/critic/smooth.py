@@ -175,5 +175,6 @@ def _axes(gram: FloatArray, priors: Sequence[FloatArray] | FloatArray) -> tuple[
 def _nats(sizes: FloatArray, c: FloatArray) -> FloatArray:
     """Return the log evidence for each of _SIZES, (..., sizes); sizes, c (..., k): gram and b along own axes."""
     spread = 1 + _SIZES[:, None] ** 2 * sizes[..., None, :]
-    gained = (c**2)[..., None, :] * (_SIZES[:, None] ** 2 / spread)
-    return np.asarray(0.5 * (gained - np.log(spread)).sum(axis=-1))
+    weights, squares = _SIZES[:, None] ** 2 / spread, c**2
+    gained = squares @ weights.T if sizes.ndim == 1 else (weights @ squares[..., None])[..., 0]
+    return np.asarray(0.5 * (gained - np.log(spread).sum(axis=-1)))

@@ -17,6 +17,7 @@ from kurumaisu.critic.smooth_fit import Extension, extend
 from kurumaisu.critic.smooth_search import Rivalry, compare, no_rivals
 
 _ALARM = 0.01  # share of null draws with as much evidence above which a curve is not believed
+_NEVER = float(np.log(1e3 / 1e-7))  # [nat] that no draw has of the curves, of which there are hundreds
 _HOPELESS = 100.0  # [nat] behind the catalogue, when simulated, that no other effects beside a curve make good
 _SLOW = 1.0  # [s] noise that is forgotten sooner can draw no curve over a place or a time, nor take one up
 _HINT = 0.0  # [nat] of lead, where slow noise is not believed, from which the noise is estimated about a curve
@@ -96,8 +97,13 @@ def _holds(problem: Problem, found: Naming, extension: Extension, behind: float)
 
 
 def false_alarm(problem: Problem, rivalry: Rivalry) -> float:
-    """Return how often noise alone gives some curve, beside the same effects, the evidence of the best one."""
+    """Return how often noise alone gives some curve, beside the same effects, the evidence of the best one.
+
+    Evidence is a ratio of densities, whose mean over draws of noise is 1: of them, exp(-x) at most have x nats.
+    """
     best = rivalry.rivals[0]
+    if best.belief.nats > _NEVER:
+        return 0.0
     design = Design(problem, best.fit.settings)
     drawn = null_evidence(design, beside(problem, best.fit, design.columns)[1], naming.NULLS)
     return float(np.mean(drawn >= best.belief.nats))

@@ -37,12 +37,15 @@ def girth(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, i
     for drive, motion, way in zip(problem.drives, motions, ways, strict=True):
         sensitivity = Sensitivity(drive, motion)
         left = (drive.measured - problem.simulated(drive, settings)).reshape(-1, 1)
-        for channel, of_gram, of_pull in zip(_WAVING, gram, pull, strict=True):
-            along = [sensitivity.increments(channel, some) for some in _waved(way, waves)]
-            white = problem.whitened(drive, np.column_stack([left, *along]))
-            both = white[:, 1:].reshape(len(white), -1, 2)
-            of_gram += np.einsum("nki,nkj->kij", both, both)
-            of_pull += np.einsum("nki,n->ki", both, white[:, 0])
+        white = problem.whitened(drive, left)[:, 0]
+        at = 0
+        for some in _waved(way, waves):
+            here = slice(at, at + some.shape[1] // 2)
+            at = here.stop
+            for channel, of_gram, of_pull in zip(_WAVING, gram, pull, strict=True):
+                both = problem.whitened(drive, sensitivity.increments(channel, some)).reshape(len(white), -1, 2)
+                of_gram[here] += np.einsum("nki,nkj->kij", both, both)
+                of_pull[here] += np.einsum("nki,n->ki", both, white)
     gained = np.einsum("cki,cki->ck", pull, np.linalg.solve(gram + 1e-9 * np.eye(2), pull[..., None])[..., 0])
     return float(1 / waves[int(np.argmax(gained.max(axis=0)))]), gained.size
 

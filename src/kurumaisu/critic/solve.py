@@ -14,6 +14,7 @@ from kurumaisu.types import BoolArray, FloatArray
 
 _ROUNDS = 25
 _ENOUGH = 0.01  # [nat] less to gain ends the search
+_SAME_SLOPES = 0.1  # [nat] a step that gains less, half a standard deviation at most, leaves the slopes as they were
 _DAMPING = (1e-4, 0.3, 8.0, 1e6)  # at first, on success, on failure, at last
 
 
@@ -72,10 +73,11 @@ def least_squares(problem: Linear, terms: Sequence[Term], start: FloatArray) -> 
             break
         gained = cost - cost_at(tried, left)
         values, damping = tried, damping * _DAMPING[1]
-        residual, slopes = _linearised(problem, terms, values)
-        cost = cost_at(values, residual)
+        residual, cost = left, cost - gained
         if gained < _ENOUGH:
             break
+        if gained > _SAME_SLOPES:
+            residual, slopes = _linearised(problem, terms, values)
     return Solution(values, _sds(slopes, tight, lower == upper) * np.abs(unit), cost, residual, slopes)
 
 
