@@ -73,9 +73,15 @@ def test_what_lags_but_is_no_slower_is_hardly_a_load():
     assert lag > float(prior.occam_plane(np.array(weak)))
 
 
-def test_a_slope_may_climb_in_any_direction():
-    cost, z = cost_of("base.slope", {"size": 0.03, "bearing": 2.5})
-    assert cost == pytest.approx(float(prior.occam_plane(np.array(z))), abs=1e-6)
+@pytest.mark.parametrize(
+    ("name", "sizes"),
+    [("base.slope", {"size": 0.03, "bearing": 2.5}), ("base.accel_limit", {"size": 0.3, "ratio": 1.0})],
+)
+def test_what_has_a_direction_or_two_peculiarities_has_no_proportion(name, sizes):
+    """A slope climbs in any direction, and one axis may be ramped without the other."""
+    cost, z = cost_of(name, sizes)
+    ways = 1 if name == "base.slope" else 3
+    assert cost == pytest.approx(float(prior.occam_plane(np.array(z))) + np.log(ways), abs=0.02)
 
 
 def test_one_effect_that_does_what_two_do_is_fitted_though_lines_tell_little_of_it(monkeypatch):

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu._core import Whitener
 from kurumaisu.critic import replay, solve
 from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalogue, roughened, settings_of, showing
@@ -240,7 +241,7 @@ class Problem:
             cost += sum(_shape_cost(terms[i], solution, i) for i in own if terms[i].shape)
             size = self._amplitudes(terms, solution, loud)
             ways = _ROUGH_WAYS if candidate.rough else 0.0
-            size -= _proportion(terms, solution, loud)
+            size -= 0.0 if effects.by_id(candidate.id).separable else _proportion(terms, solution, loud)
             cost += max(ways + size, _teeth(terms, solution, loud))
         if len(free) > 1:
             unit = solution.slopes[:, free] / np.maximum(np.linalg.norm(solution.slopes[:, free], axis=0), 1e-9)
@@ -327,7 +328,8 @@ def _proportion(terms: Sequence[Term], solution: solve.Solution, loud: Sequence[
     tight = np.array([terms[i].step if terms[i].shape else 0.0 for i in free])
     slopes = solution.slopes[:, free]
     inside = [free.index(i) for i in use]
-    spread = covariance(slopes.T @ slopes + np.diag(tight**2))[np.ix_(inside, inside)]
+    whole = slopes.T @ slopes + np.diag(np.square(tight).astype(np.float64))
+    spread = covariance(whole)[np.ix_(inside, inside)]
     spread = spread * np.outer(step[inside], step[inside])
     own = slopes[:, inside] / step[inside]
     sizes = np.array([(solution.values[i] - terms[i].null) / terms[i].parameter.scale for i in use])
