@@ -94,7 +94,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
         screen = Screen(problem, centre) if centre is not empty else nothing
     for _ in range(_ROUNDS):
         guesses = screen.guesses()
-        near = _promising(guesses, len(centre.candidates), centre.log_likelihood - empty.log_likelihood)
+        near = _promising(guesses, centre, centre.log_likelihood - empty.log_likelihood)
         best = try_sets((guess.chosen, guess.start) for guess in near)
         if best is centre:  # the last word is by fits: could others stand in, and does each have to be there?
             alone: list[tuple[Chosen, Mapping[Key, float]]] = [
@@ -121,8 +121,8 @@ def _ranked(fits: Mapping[Chosen, Fit], of: int) -> list[Fit]:
     return sorted(fits.values(), key=lambda fit: -log_posterior(fit, of))
 
 
-def _promising(guesses: Sequence[Guess], size: int, explained: float) -> list[Guess]:
-    """Return the guesses that are worth a refit; size: effects in the best set; explained: what it explains [nat].
+def _promising(guesses: Sequence[Guess], about: Fit, explained: float) -> list[Guess]:
+    """Return the guesses that are worth a refit, of those about a fit; explained: what that explains [nat].
 
     Lines about two effects tell little of one that does what both do: it has the more to gain by a refit, and without
     one it would never be known that fewer suffice.
@@ -130,8 +130,10 @@ def _promising(guesses: Sequence[Guess], size: int, explained: float) -> list[Gu
     best = guesses[0].score
     close = [guess for guess in guesses[:_REFITS] if guess.score > best - _CLOSE]
     far = best - max(_CLOSE, _BENT * explained)
+    size = len(about.candidates)
     fewer = [guess for guess in guesses[len(close) :] if len(guess.chosen) < size and guess.score > far]
-    return close + fewer[:_FEWER]
+    # Parts of the fit's set are tried anyway.
+    return close + [guess for guess in fewer if not guess.chosen < about.candidates][:_FEWER]
 
 
 def _beside_rivals(
