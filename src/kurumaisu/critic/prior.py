@@ -54,21 +54,26 @@ def in_proportion(sizes: FloatArray, spread: FloatArray, gram: FloatArray) -> fl
     alike. sizes (2,), spread (2, 2) of the fit, gram (2, 2) of the columns: in units of the usual sizes, with those
     signs that belong together; of the second only one sign is possible. Averaged over where the fit may be.
     """
-    x, y = np.meshgrid(_PLACES, _PLACES)
-    weight = np.exp(-0.5 * (x**2 + y**2))
-    n = sizes[:, None] + np.linalg.cholesky(spread + 1e-12 * np.diag(np.diag(spread))) @ np.stack(
-        [x.ravel(), y.ravel()]
-    )
-    square = np.maximum(np.sum(n**2, axis=0), 1e-18)
-    both, width = (n > 0).all(axis=0), float(np.log(_PROPORTION))
-    log = np.log(np.where(both, n[1], 1.0) / np.where(both, n[0], 1.0))
-    # A density over the angle in these units, from one over the log of the ratio.
-    usual = np.exp(-0.5 * (log / width) ** 2) / (np.sqrt(2 * np.pi) * width) * square / np.where(both, n[0] * n[1], 1.0)
-    density = (1 - _ANY) * np.where(both, usual, 0.0) + _ANY / np.pi * (n[1] > 0)
+    values, vectors = np.linalg.eigh(spread)
+    x, y = (one.ravel() for one in np.meshgrid(_PLACES, _PLACES))
+    n = sizes[:, None] + (vectors * np.sqrt(np.maximum(values, 0.0))) @ np.stack([x, y])
     # The same over the angle in whitened space, of which occam_plane has 1 / (2 pi).
-    turned = np.einsum("in,ij,jn->n", n, gram, n) / (np.sqrt(max(float(np.linalg.det(gram)), 1e-18)) * square)
-    mean = float(np.sum(weight.ravel() * density * turned) / np.sum(weight))
-    return float(np.log(max(2 * np.pi * mean, 1e-6)))
+    root = float(np.sqrt(max(np.linalg.det(gram), 1e-18)))
+    turned = np.einsum("in,ij,jn->n", n, gram, n) / (root * np.maximum(np.sum(n**2, axis=0), 1e-18))
+    weight = np.exp(-0.5 * (x**2 + y**2))
+    mean = float(np.sum(weight * _over_angle(n) * turned) / np.sum(weight))
+    z = float(np.sqrt(sizes @ gram @ sizes))
+    known = float(occam_plane(np.array(z)) - occam(z, sides=1))  # no proportion says more than the direction does
+    return min(float(np.log(max(2 * np.pi * mean, 1e-6))), known)
+
+
+def _over_angle(n: FloatArray) -> FloatArray:
+    """Return the density (k,) over the angle of two sizes (2, k) in units of the usual ones."""
+    both, width = (n > 0).all(axis=0), float(np.log(_PROPORTION))
+    one, other = np.where(both, n, 1.0)
+    usual = np.exp(-0.5 * (np.log(other / one) / width) ** 2) / (np.sqrt(2 * np.pi) * width)
+    usual = usual * (one**2 + other**2) / (one * other)  # of the log of their ratio
+    return np.asarray((1 - _ANY) * np.where(both, usual, 0.0) + _ANY / np.pi * (n[1] > 0))
 
 
 @cache
