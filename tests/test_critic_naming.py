@@ -88,7 +88,8 @@ def test_what_may_act_beside_a_set_is_no_member_of_it():
 
 
 def test_a_set_has_what_is_left_out_together_more_often_than_one_time_in_twenty():
-    assert confounded(posterior((0.85, "b"), (0.05, "c"), (0.035, "d"), (0.035, "e"), (0.03, "f"))) == (tuple("bcdef"),)
+    assert confounded(posterior((0.85, "b"), (0.05, "c"), (0.035, "d"), (0.035, "e"), (0.03, "f"))) == (tuple("bcde"),)
+    assert confounded(posterior((0.5, "b"), (0.46, "c"), (0.021, "d"), (0.019, "e"))) == (("b", "c"),)
 
 
 def test_what_only_curves_leave_uncertain_is_in_a_set_with_what_could_stand_in():

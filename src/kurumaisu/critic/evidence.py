@@ -9,13 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu._core import Whitener
 from kurumaisu.critic import replay, solve
 from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalogue, roughened, settings_of, showing
 from kurumaisu.critic.comb import Comb, Walked
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.noise import Noise, whitener
-from kurumaisu.critic.prior import Z_USUAL, log_prior, occam, occam_plane
+from kurumaisu.critic.prior import Z_USUAL, in_proportion, log_prior, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
@@ -245,6 +246,7 @@ class Problem:
             cost += sum(_shape_cost(terms[i], solution, i) for i in own if terms[i].shape)
             size = self._amplitudes(terms, solution, loud)
             ways = _ROUGH_WAYS if candidate.rough else 0.0
+            size -= 0.0 if effects.by_id(candidate.id).separable else _proportion(terms, solution, loud)
             cost += max(ways + size, _teeth(terms, solution, loud))
         if len(free) > 1:
             unit = solution.slopes[:, free] / np.maximum(np.linalg.norm(solution.slopes[:, free], axis=0), 1e-9)
@@ -313,6 +315,30 @@ def covariance(gram: FloatArray) -> FloatArray:
     A weak prior of 1000 steps keeps it finite where the data do not determine a parameter at all.
     """
     return np.asarray(np.linalg.inv(gram + 1e-6 * np.eye(len(gram))))
+
+
+def _proportion(terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> float:
+    """Return what two amplitudes of one cause cost less for being in their usual proportion, in nats.
+
+    Of a quantity that has a direction, such as a slope, either sign of both is possible, and every direction as likely.
+    """
+    bounds = [(terms[i].parameter.lower, terms[i].parameter.upper) for i in loud]
+    natural = [terms[i].null in ends for i, ends in zip(loud, bounds, strict=True)]
+    if len(loud) != 2 or not any(natural):
+        return 0.0
+    order = sorted(range(2), key=lambda k: natural[k])  # the second has one sign only
+    use = [loud[k] for k in order]
+    free = [i for i, term in enumerate(terms) if not term.fixed]
+    step = np.array([terms[i].step for i in free])
+    tight = np.array([terms[i].step if terms[i].shape else 0.0 for i in free])
+    slopes = solution.slopes[:, free]
+    inside = [free.index(i) for i in use]
+    whole = slopes.T @ slopes + np.diag(np.square(tight).astype(np.float64))
+    spread = covariance(whole)[np.ix_(inside, inside)]
+    spread = spread * np.outer(step[inside], step[inside])
+    own = slopes[:, inside] / step[inside]
+    sizes = np.array([(solution.values[i] - terms[i].null) / terms[i].parameter.scale for i in use])
+    return in_proportion(sizes, spread, own.T @ own)
 
 
 def _teeth(terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> float:

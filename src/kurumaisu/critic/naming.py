@@ -19,6 +19,8 @@ from kurumaisu.types import FloatArray
 
 NAMED, RIVAL = stand_ins.NAMED, stand_ins.RIVAL
 _REFITS = 10  # sets refitted after each scan
+_FEWER = 4  # of fewer effects than the best set has, besides
+_BENT = 0.05  # share of what a set explains by which lines may be off for one effect that does what two do
 _RIVALS = 2  # likely sets besides the best one from which others are looked for
 _CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
 _ROUNDS = 8  # scans at most
@@ -94,7 +96,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
         screen = Screen(problem, centre) if centre is not empty else nothing
     for _ in range(_ROUNDS):
         guesses = screen.guesses()
-        near = [guess for guess in guesses[:_REFITS] if guess.score > guesses[0].score - _CLOSE]
+        near = _promising(guesses, centre, centre.log_likelihood - empty.log_likelihood)
         best = try_sets((guess.chosen, guess.start) for guess in near)
         if best is centre:  # the last word is by fits: could others stand in, and does each have to be there?
             alone: list[tuple[Chosen, Mapping[Key, float]]] = [
@@ -119,6 +121,21 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
 
 def _ranked(fits: Mapping[Chosen, Fit], of: int) -> list[Fit]:
     return sorted(fits.values(), key=lambda fit: -log_posterior(fit, of))
+
+
+def _promising(guesses: Sequence[Guess], about: Fit, explained: float) -> list[Guess]:
+    """Return the guesses that are worth a refit, of those about a fit; explained: what that explains [nat].
+
+    Lines about two effects tell little of one that does what both do: it has the more to gain by a refit, and without
+    one it would never be known that fewer suffice.
+    """
+    best = guesses[0].score
+    close = [guess for guess in guesses[:_REFITS] if guess.score > best - _CLOSE]
+    far = best - max(_CLOSE, _BENT * explained)
+    size = len(about.candidates)
+    fewer = [guess for guess in guesses[len(close) :] if len(guess.chosen) < size and guess.score > far]
+    # Parts of the fit's set are tried anyway.
+    return close + [guess for guess in fewer if not guess.chosen < about.candidates][:_FEWER]
 
 
 def _beside_rivals(

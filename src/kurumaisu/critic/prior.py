@@ -14,6 +14,9 @@ from kurumaisu.types import FloatArray
 # broad Gaussian instead, "none" is over-confident. Beyond 50 little is left, for what is wrong beyond doubt.
 Z_LOW, Z_USUAL, Z_HIGH = 3.0, 50.0, 5000.0
 _USUAL = 0.9  # share of the prior up to Z_USUAL
+# Factor, 1 sd, by which the sizes of one cause may be out of their usual proportion, and what may be in any.
+_PROPORTION, _ANY = 2.0, 0.1
+_PLACES = np.linspace(-3.0, 3.0, 13)  # [sd] about a fit, at which proportions are weighed
 # Odds of one more effect at work, shared by all that the drives could show: half of all chairs have none.
 _MORE = 0.7
 
@@ -42,6 +45,35 @@ def occam_plane(z: FloatArray) -> FloatArray:
     """Return what two amplitudes that show with |z| together cost, every direction being as likely, elementwise."""
     grid, costs = _table(2)
     return np.asarray(np.interp(np.abs(z), grid, costs))
+
+
+def in_proportion(sizes: FloatArray, spread: FloatArray, gram: FloatArray) -> float:
+    """Return by how much less two amplitudes of one cause cost than occam_plane says, in nats.
+
+    What makes both makes them larger together, so they are likely in their usual proportion, not in every direction
+    alike. sizes (2,), spread (2, 2) of the fit, gram (2, 2) of the columns: in units of the usual sizes, with those
+    signs that belong together; of the second only one sign is possible. Averaged over where the fit may be.
+    """
+    values, vectors = np.linalg.eigh(spread)
+    x, y = (one.ravel() for one in np.meshgrid(_PLACES, _PLACES))
+    n = sizes[:, None] + (vectors * np.sqrt(np.maximum(values, 0.0))) @ np.stack([x, y])
+    # The same over the angle in whitened space, of which occam_plane has 1 / (2 pi).
+    root = float(np.sqrt(max(np.linalg.det(gram), 1e-18)))
+    turned = np.einsum("in,ij,jn->n", n, gram, n) / (root * np.maximum(np.sum(n**2, axis=0), 1e-18))
+    weight = np.exp(-0.5 * (x**2 + y**2))
+    mean = float(np.sum(weight * _over_angle(n) * turned) / np.sum(weight))
+    z = float(np.sqrt(sizes @ gram @ sizes))
+    known = float(occam_plane(np.array(z)) - occam(z, sides=1))  # no proportion says more than the direction does
+    return min(float(np.log(max(2 * np.pi * mean, 1e-6))), known)
+
+
+def _over_angle(n: FloatArray) -> FloatArray:
+    """Return the density (k,) over the angle of two sizes (2, k) in units of the usual ones."""
+    both, width = (n > 0).all(axis=0), float(np.log(_PROPORTION))
+    one, other = np.where(both, n, 1.0)
+    usual = np.exp(-0.5 * (np.log(other / one) / width) ** 2) / (np.sqrt(2 * np.pi) * width)
+    usual = usual * (one**2 + other**2) / (one * other)  # of the log of their ratio
+    return np.asarray((1 - _ANY) * np.where(both, usual, 0.0) + _ANY / np.pi * (n[1] > 0))
 
 
 @cache

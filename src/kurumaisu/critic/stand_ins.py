@@ -17,6 +17,7 @@ RIVAL = 0.05  # posterior from which an effect counts as a rival of another
 # The same from which it is a member of a set, which has to hold the truth in 95 cases of 100: of several that each may
 # be left out, one acts more often than one of them by itself.
 MEMBER = 0.02
+_LEFT_OUT = 0.05  # posterior of all that a set may be without
 _RATHER = 3.0  # ratio of odds from which one effect acts in the place of another rather than beside it
 _TINY = 1e-9  # posterior of what no set has
 
@@ -63,7 +64,16 @@ def confounded(posterior: Posterior, p: Mapping[str, float] | None = None) -> tu
         meeting = [other for other in merged if other & group]
         merged = [other for other in merged if not other & group] + [group.union(*meeting)]
     told = (group for group in merged if len(group) > 1 and posterior.any_of(group) >= NAMED)
-    return tuple(tuple(sorted(group)) for group in told if len(group) <= _MOST or _needed(posterior, group))
+    kept = [group for group in told if len(group) <= _MOST or _needed(posterior, group)]
+    return tuple(tuple(sorted(_likeliest(posterior, group))) for group in kept)
+
+
+def _likeliest(posterior: Posterior, group: set[str]) -> set[str]:
+    """Return a set without those of its members that all together act less than once in twenty, two at least."""
+    ordered = sorted(group, key=lambda name: (posterior.p[name], name))
+    left_out = np.cumsum([posterior.p[name] for name in ordered])
+    few = min(int(np.searchsorted(left_out, _LEFT_OUT, side="right")), len(ordered) - 2)
+    return set(ordered[few:])
 
 
 def _needed(posterior: Posterior, group: set[str]) -> bool:
