@@ -11,11 +11,12 @@ from laser_scene import recording
 from kurumaisu.critic.laser.columns import Form
 from kurumaisu.critic.laser.free import Free
 from kurumaisu.critic.laser.normal import Assembly
+from kurumaisu.critic.laser.pictures import Part
 from kurumaisu.critic.laser.pinned import pinned
 from kurumaisu.critic.laser.rivals import Rival
 from kurumaisu.critic.laser.search import Fitted
 from kurumaisu.critic.laser.shots import gather
-from kurumaisu.critic.laser.verdicts import _gain, criticise
+from kurumaisu.critic.laser.verdicts import _gain, _spread_of, criticise
 from kurumaisu.critic.smooth import Belief
 from kurumaisu.critic.smooth_alike import FORM
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -80,3 +81,13 @@ def test_where_readings_are_cut_off_is_known_to_a_step_of_them(tmp_path):
     told = cause.parameters["inverse_far"]
     assert told.lo90 < 1 / 2.437 < told.hi90
     assert told.hi90 - told.lo90 < 0.005 / 2.437**2
+
+
+@pytest.mark.parametrize(("name", "spread"), [("laser.mount_x", 0.0), ("laser.quadratic", 0.005), ("a.map", 0.005)])
+def test_only_equations_that_are_nearly_right_may_have_scans_off_together(name, spread):
+    """Where a laser sits is geometry, which nobody may draw otherwise; a square of the range or walls are not."""
+    columns = np.ones((2, 4, 1)) * [[[1.0], [3.0], [1.0], [3.0]]]
+    made = SimpleNamespace(parts=lambda: [Part(name, slice(0, 1), np.array([0.005]))])
+    assembly = SimpleNamespace(columns=columns, free=[SimpleNamespace(id="a.map")])
+    normal = SimpleNamespace(beam_noise=SimpleNamespace(valid=np.ones((2, 4), dtype=bool)))
+    assert _spread_of(assembly, normal, made) == pytest.approx(spread)

@@ -8,14 +8,15 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu import effects
+from kurumaisu.critic.laser.deviations import _repeated, grid_step
 from kurumaisu.critic.laser.likeness import Kinds
-from kurumaisu.critic.laser.noise import ScanNoise
+from kurumaisu.critic.laser.noise import Layout, ScanNoise
 from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.laser.spread import ScatterSearch, _weighed
 from kurumaisu.critic.laser.spread_fit import Piece, ScatterFit
-from kurumaisu.critic.laser.statistics import Statistics, _lasting, _mixed
+from kurumaisu.critic.laser.statistics import Statistics, _lasting, _mixed, _spacing
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -205,3 +206,75 @@ def test_what_came_while_another_was_fitted_ill_goes_when_that_is_mended():
         Piece(effects.by_id(stale.id), stale, ("rho",), 1.0, 53.0),
     ]
     assert [piece.setting.id for piece in search._polished(pieces)] == [truth.id]
+
+
+def _pieces(*pieces):
+    return [Piece(effects.by_id(setting.id), setting, free, 1.0, nats) for setting, free, nats in pieces]
+
+
+def test_a_probability_is_that_in_the_company_found_last():
+    """What has next to nothing to do beside the others is gone, however certain it was when it came."""
+    simulate = _Linear(
+        {
+            "laser.quantisation.step": (3.0, 3.0, 3.0, 3.0, 0.0),
+            "laser.incidence_noise.gain": (2.9, 3.1, 3.0, 3.0, 0.4),
+            "laser.beam_correlation.rho": (0.0, 0.0, 0.0, 0.0, 4.0),
+        }
+    )
+    truth = [at("laser.quantisation", step=0.01), at("laser.beam_correlation", rho=0.3)]
+    stale = at("laser.incidence_noise", gain=0.01)
+    ids = frozenset({stale.id, *(each.id for each in truth)})
+    search = ScatterSearch(ScatterFit(simulate, simulate(truth, 5), (), ids))
+    pieces = _pieces((truth[0], ("step",), 90.0), (truth[1], ("rho",), 60.0), (stale, ("gain",), 66.0))
+    weighed = {piece.setting.id: piece.p for piece in search._reweighed(pieces)}
+    assert weighed["laser.incidence_noise"] < 0.5
+    assert weighed["laser.quantisation"] > 0.99
+    assert {piece.setting.id for piece in search._certain(pieces)} == {setting.id for setting in truth}
+
+
+def test_what_bent_before_its_company_was_known_begins_anew():
+    """Lost oblique beams did what noise does: beside the noise they are lost anywhere."""
+    simulate = _Linear(
+        {
+            "laser.dropout.probability": (9.0, 9.0, 0.0, 0.0, 0.0),
+            "laser.dropout.oblique": (0.0, -2.0, 4.0, 4.0, 0.0),
+            "laser.incidence_noise.gain": (0.0, 0.0, 4.0, 4.0, 0.0),
+        }
+    )
+    truth = [at("laser.dropout", probability=0.05), at("laser.incidence_noise", gain=0.5)]
+    fit = ScatterFit(simulate, simulate(truth, 5), (), frozenset(each.id for each in truth))
+    bent = at("laser.dropout", probability=0.03, oblique=0.1)
+    pieces = _pieces((bent, ("probability", "oblique"), 90.0), (truth[1], ("gain",), 60.0))
+    lost, noise = ScatterSearch(fit)._straightened(list(fit.pushes()), pieces)
+    assert lost.free == ("probability",)
+    assert lost.setting.parameters["oblique"] == 0.0
+    assert lost.setting.parameters["probability"] == pytest.approx(0.05, rel=0.1)
+    assert noise is pieces[1]
+
+
+@pytest.mark.parametrize("grid", [0.001, 0.012])
+def test_scans_of_one_stand_on_a_coarse_grid_say_less_than_as_many_independent_ones(grid):
+    scans, beams, noise = 20, 4000, 0.0025
+    rng = np.random.default_rng(3)
+    walls = rng.uniform(1.0, 2.0, beams)
+    readings = grid * np.rint((walls + noise * rng.standard_normal((scans, beams))) / grid)
+    error = readings - walls
+    sd = np.full((scans, 1), error.std())
+    one, other = (
+        Layout(np.arange(scans) * 0.1, np.zeros(scans, dtype=int), np.full(scans, stand)) for stand in (0, -1)
+    )
+    factor = _repeated(grid_step(readings), np.full((scans, 1), noise), sd, one)
+    assert np.sqrt(scans) * error.mean(axis=0).std() / error.std() == pytest.approx(float(factor[0, 0]), rel=0.08)
+    assert (factor[0, 0] > 1.3) == (grid > 0.01)
+    assert (_repeated(grid, np.full((scans, 1), noise), sd, other) == 1.0).all(), "under way every scan is rounded anew"
+
+
+@pytest.mark.parametrize("step", [0.001, 0.0118])
+def test_the_step_of_a_grid_is_known_whatever_is_read_of_something_else(step):
+    rng = np.random.default_rng(4)
+    walls = rng.uniform(1.0, 3.0, 20000)
+    walls[::50] = rng.uniform(0.1, 3.9, 400)
+    readings = np.round(step * np.rint(walls / step), 3)
+    readings[::77] = np.nan
+    assert _spacing(readings) == pytest.approx(step, rel=0.01)
+    assert _spacing(np.full(3, np.nan)) == 0.001

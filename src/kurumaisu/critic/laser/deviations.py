@@ -19,6 +19,7 @@ MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
 _BINS = 6  # of the range, and of the incidence, in which the deviation is estimated
 _JOLT = 4.0  # sds among scans from which one of them does not count
 _TOLERATED = 0.1  # share by which a scan may always be noisier than the middle one
+_MILLIMETRE = 1e-3  # [m]
 _MANY = 10  # readings of a beam, and beams, from which their offsets are estimated
 
 
@@ -44,9 +45,14 @@ def near(z: FloatArray, known: BoolArray, reach: FloatArray) -> BoolArray:
 
 
 def refined(
-    first: BeamNoise, beam: BeamNoise, leftover: Callable[[BeamNoise], FloatArray], seen: Look, layout: Layout
+    first: BeamNoise,
+    beam: BeamNoise,
+    leftover: Callable[[BeamNoise], FloatArray],
+    seen: Look,
+    layout: Layout,
+    grid: float,
 ) -> BeamNoise:
-    """Return the noise of the readings once more; first: before any was known; beam: the last.
+    """Return the noise of the readings once more; first: before any was known; beam: the last; grid: their step [m].
 
     leftover: returns what is left of the residual (k, b) [m], with a noise that says which readings count.
     """
@@ -63,7 +69,26 @@ def refined(
     a, b = z[:, 1:][both], z[:, :-1][both]
     rho = float(np.clip(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9), 0.0, 0.95))
     kept = np.where(beam.valid & (np.abs(z) < OUTLIER), left, np.nan)
+    sd = sd * _repeated(grid, first.sd, sd, layout)
     return replace(beam, sd=sd, rho=rho, valid=valid, own_sd=_own_sd(kept, sd))
+
+
+def grid_step(measured: FloatArray) -> float:
+    """Return the usual step [m] between the values that readings have, to a millimetre."""
+    values = np.unique(np.rint(measured[np.isfinite(measured)] / _MILLIMETRE))
+    return _MILLIMETRE * float(np.median(np.diff(values))) if len(values) > 1 else _MILLIMETRE
+
+
+def _repeated(grid: float, noise: FloatArray, sd: FloatArray, layout: Layout) -> FloatArray:
+    """Return by what factor (k, b) readings say less than as many independent ones: a stand rounds them all alike.
+
+    Noise of deviation `noise` (k, b) [m] blurs a grid of step `grid` [m] to a sine of amplitude grid / pi
+    exp(-2 (pi noise / grid)^2), the first of its harmonics; sd (k, b) [m]: of readings, rounded.
+    """
+    kept = 0.5 * (grid / np.pi * np.exp(-2 * (np.pi * noise / grid) ** 2)) ** 2
+    _, stand, count = np.unique(layout.stand, return_inverse=True, return_counts=True)
+    more = np.where(layout.stand >= 0, count[stand] - 1, 0)[:, np.newaxis]
+    return np.asarray(np.sqrt(1 + more * kept / sd**2))
 
 
 def _jolted(z: FloatArray, first: BeamNoise, layout: Layout) -> BoolArray:

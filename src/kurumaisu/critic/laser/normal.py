@@ -12,7 +12,7 @@ import numpy as np
 from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.blocked import blocked, told
 from kurumaisu.critic.laser.columns import Form, Marks
-from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, near, refined
+from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, grid_step, near, refined
 from kurumaisu.critic.laser.displaced import displaced
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate, marginal, whitened
@@ -194,8 +194,9 @@ class Assembly:
         """
         project = self._projected(fitted)
         beam = self._begun()
+        seen, layout, grid = self.marks.seen, self.layout, grid_step(self.shots.measured)
         for _ in range(_ROUNDS):
-            beam = refined(self.first, beam, lambda last: self.leftover(last, project), self.marks.seen, self.layout)
+            beam = refined(self.first, beam, lambda last: self.leftover(last, project), seen, layout, grid)
         narrow = max((free.span.stop for free in self.free if free.whole), default=self._fixed)
         grams, cross = self._crossed(beam, narrow)
         scan = estimate(grams, self.layout, truth, project)

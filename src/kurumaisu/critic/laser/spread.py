@@ -59,6 +59,15 @@ def _nats(piece: Piece) -> float:
     return piece.nats
 
 
+def _but(pieces: Sequence[Piece], one: Piece) -> list[Piece]:
+    return [piece for piece in pieces if piece.effect is not one.effect]
+
+
+def _of_any(piece: Piece) -> float:
+    """Return the evidence [nat] that a piece or one of its rivals acts."""
+    return float(logsumexp([piece.nats, *(rival.nats for rival in piece.rivals)]))
+
+
 def _by_effect(pieces: Sequence[Piece]) -> list[list[Piece]]:
     """Return the pieces of each effect."""
     effects_there = dict.fromkeys(piece.effect for piece in pieces)
@@ -83,8 +92,8 @@ class ScatterSearch:
             new = self._step(pushes, chosen, gone)
             if new is None or new.nats < self._least(chosen, new):
                 break
-            chosen = self._settled(pushes, chosen, new, gone)
-        chosen = self._reweighed(self._polished(chosen))
+            chosen = self._straightened(pushes, self._settled(pushes, chosen, new, gone))
+        chosen = self._certain(self._polished(chosen))
         settings = [piece.setting for piece in chosen]
         return [
             Scatter(
@@ -149,23 +158,61 @@ class ScatterSearch:
                     new, misfit = self._fit.halves(piece, rival, beside)
                     yield _valued(new, here - misfit)
 
+    def _straightened(self, pushes: Sequence[Push], chosen: Sequence[Piece]) -> list[Piece]:
+        """Return the pieces, those of several parameters begun anew with the plainest where that is better.
+
+        Before the others were known, its further parameters may have bent to do what they do: beams that are lost where
+        they meet walls obliquely, say, hide that these are read noisily. No small step leads back from there.
+        """
+        out = list(chosen)
+        for i, old in enumerate(chosen):
+            beside = [piece.setting for piece in out if piece.effect is not old.effect]
+            if len(old.free) < 2 or not beside:
+                continue
+            own = [push for push in pushes if push.effect is old.effect]
+            plain = self._fit.plain(self._fit.rough(own, self._fit.statistics(beside, (1, 2))))
+            (new,), cost = self._fit.together([plain], beside)
+            if cost + new.price < self._fit.misfit([*beside, old.setting]) + old.price:
+                out[i] = replace(old, setting=new.setting, free=new.free)
+        return out
+
+    def _certain(self, chosen: Sequence[Piece]) -> list[Piece]:
+        """Return the pieces weighed in the company that is there last, without those that it makes superfluous."""
+        if len(chosen) < 2:
+            return list(chosen)
+        known = {piece.effect: piece.rivals for piece in chosen}
+        while True:
+            weighed = self._reweighed(chosen)
+            weak = [piece for piece in weighed if _of_any(piece) < self._least(_but(weighed, piece), piece)]
+            if not weak or len(weighed) < 2:
+                return weighed
+            left = [replace(one, rivals=known.get(one.effect, ())) for one in _but(weighed, min(weak, key=_nats))]
+            chosen = self._polished(left)
+
     def _reweighed(self, chosen: Sequence[Piece]) -> list[Piece]:
-        """Return the pieces, each weighed against its rivals beside all others, which were not known when it came."""
+        """Return the pieces, each weighed against its rivals and none beside all others, not known when it came.
+
+        Where the whole does not fit, evidence for another part of it is worth as much less, that it acts, too.
+        """
         out = list(chosen)
         for i, piece in enumerate(chosen):
-            others = [other for other in out if other.effect is not piece.effect]
+            others = _but(out, piece)
             there = {other.effect for other in others}
-            rivals = [rival for rival in piece.rivals if rival.effect not in there]
-            if not others or not rivals:
-                continue
             beside = [other.setting for other in others]
-            without = self._fit.misfit(beside)
+            without = self._without(piece, others)
+            rivals = [rival for rival in piece.rivals if rival.effect not in there]
             tried = [self._fit.together([one], beside) for one in (piece, *rivals)]
             valued = [_valued(one, without - misfit) for (one,), misfit in tried]
             heat = self._heat([*beside, max(valued, key=_nats).setting])
-            out[i] = _weighed(valued, heat)
+            out[i] = _weighed(valued, heat, heat)
         swapped = any(one.effect is not other.effect for one, other in zip(out, chosen, strict=True))
         return self._polished(out) if swapped else out
+
+    def _without(self, piece: Piece, others: Sequence[Piece]) -> float:
+        """Return the misfit of the others without a piece, those like it fitted to what it would leave them."""
+        like = [other for other in others if self._fit.overlap(other, piece) > _OVERLAP]
+        rest = [other.setting for other in others if other not in like]
+        return self._fit.together(like, rest)[1] if like else self._fit.misfit(rest)
 
     def _least(self, chosen: Sequence[Piece], new: Piece) -> float:
         """Return the evidence from which an effect is taken beside others [nat]: they may act in another form."""
@@ -243,14 +290,14 @@ def _valued(piece: Piece, gain: float) -> Piece:
     return replace(piece, nats=gain - cost + log_prior(1, count) - log_prior(0, count))
 
 
-def _weighed(tried: Sequence[Piece], heat: float = 1.0) -> Piece:
+def _weighed(tried: Sequence[Piece], heat: float = 1.0, doubt: float = 1.0) -> Piece:
     """Return the likeliest of some pieces with its posterior, and the others as its rivals with theirs.
 
     heat: by how much what the likeliest leaves is more than chance [1]; where none of them fits, odds between them are
-    worth as much less.
+    worth as much less. doubt: likewise, of the odds that any of them acts.
     """
     nats = np.array([piece.nats for piece in tried])
-    some = -np.expm1(-logsumexp([0.0, *nats]))
+    some = -np.expm1(-logsumexp([0.0, *(nats / doubt)]))
     shares = some * np.exp(nats / heat - logsumexp(nats / heat))
     every = [replace(piece, p=float(p), rivals=()) for piece, p in zip(tried, shares, strict=True)]
     best = max(every, key=_nats)

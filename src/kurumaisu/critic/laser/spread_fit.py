@@ -91,6 +91,7 @@ class ScatterFit:
         self._ids = ids
         nulls = simulate.nulls(range(1000, 1000 + _NULLS))
         self._simulate, self._means = simulate, set(means)
+        self._known: dict[tuple[object, ...], FloatArray] = {}
         self._shapes: set[tuple[str, str]] = set()
         self.likeness = Likeness(
             nulls, measured, simulate.kinds(), np.ones(len(measured), dtype=bool) if heard is None else heard
@@ -106,13 +107,13 @@ class ScatterFit:
 
     def pushes(self) -> Iterator[Push]:
         """Yield what each parameter alone does to the statistics, at some values, the largest last."""
-        plain = self._simulate((), 1)
+        plain = self._numbers((), 1)
         for effect in self.candidates(set()):
             null = self._simulate.null(effect)
             for p in self._parameters(effect):
                 found: list[Push] = []
                 for value in sorted(_sizes(p), key=lambda value: -abs(value - p.null)):
-                    moved = self._simulate((EffectSetting(effect.id, {**null, p.name: value}),), 1)
+                    moved = self._numbers((EffectSetting(effect.id, {**null, p.name: value}),), 1)
                     if np.array_equal(moved, plain):
                         break  # it only shapes what others do, or does nothing when it is smaller
                     found.append(Push(effect, p.name, value, moved - plain))
@@ -132,7 +133,14 @@ class ScatterFit:
 
     def statistics(self, settings: Sequence[EffectSetting], seeds: Sequence[int]) -> FloatArray:
         """Return the statistics of simulations with effects, the mean over seeds."""
-        return np.asarray(np.mean([self._simulate(settings, seed) for seed in seeds], axis=0))
+        return np.asarray(np.mean([self._numbers(settings, seed) for seed in seeds], axis=0))
+
+    def _numbers(self, settings: Sequence[EffectSetting], seed: int) -> FloatArray:
+        """Return the statistics of a simulation, which is made once."""
+        key = (seed, *((setting.id, *setting.parameters.items()) for setting in settings))
+        if key not in self._known:
+            self._known[key] = self._simulate(settings, seed)
+        return self._known[key]
 
     def misfit(self, settings: Sequence[EffectSetting]) -> float:
         """Return how ill simulations with effects agree with what was measured [nat]."""
@@ -166,11 +174,14 @@ class ScatterFit:
         (_, new), misfit = self.together(pair, beside)
         return new, misfit
 
+    def plain(self, start: Rough) -> Piece:
+        """Return an effect of such sizes, nothing fitted yet."""
+        setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.values})
+        return Piece(start.effect, setting, tuple(start.values), 0.0, 0.0)
+
     def alone(self, start: Rough, beside: Sequence[EffectSetting]) -> tuple[Piece, float]:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
-        null = self._simulate.null(start.effect)
-        setting = EffectSetting(start.effect.id, {**null, **start.values})
-        (piece,), low = self.together([Piece(start.effect, setting, tuple(start.values), 0.0, 0.0)], beside)
+        (piece,), low = self.together([self.plain(start)], beside)
         for _ in range(_PASSES):
             known = piece.free
             for p in self._parameters(start.effect):

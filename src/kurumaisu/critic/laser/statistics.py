@@ -20,8 +20,9 @@ _FAR = 6.0  # deviations of an outlier
 _COMMON = 0.005  # [m] plausible common mode of a scan, when it is read off one scan alone
 _CELL = 0.5  # [m] of the map in which errors are averaged
 _PILE = 0.05  # [m] of the place of a pile, counted as one: it is known to a step of the readings, which is a fiftieth
-_PLACES = 2  # numbers, the last ones, that are such places
+_PLACES = 3  # numbers, the last ones, that are such places, or the step of a grid
 _GRID = 1e-3  # [m] to which readings are rounded before their values are counted
+_AMID = (0.1, 0.9)  # quantiles of readings between which walls are everywhere
 _OBLIQUE = np.radians(80.0)  # [rad] beyond which no reading counts
 _SQUARE = np.radians(60.0)  # [rad] within which a wall beside a jump hardly moves with an error of the heading
 _JUMP = 0.15  # [m] between the two sides of an edge, at least
@@ -97,7 +98,8 @@ class Statistics:
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
         out.append(_share(_mixed(readings) & self._jumps & ~_lasting(readings, self._stand)))
-        return np.array([*out, *_values(readings[self._trust]), *self._piles(readings[self._trust])])
+        said = readings[self._trust]
+        return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(said)])
 
     def names(self) -> list[str]:
         """Return what a reader calls the numbers, in their order."""
@@ -133,6 +135,7 @@ class Statistics:
             ("different values", False, False),
             ("readings of the least value", True, True),
             ("readings of the greatest value", True, True),
+            ("step between values", False, False),
             ("least value at which readings pile up", False, False),
             ("greatest value at which readings pile up", False, False),
         ]
@@ -279,6 +282,16 @@ def _values(readings: FloatArray) -> list[float]:
         return [0.0, 0.0, 0.0]
     counts = np.bincount(steps - steps.min())
     return [_log(np.count_nonzero(counts)), _root(int(counts[0])), _root(int(counts[-1]))]
+
+
+def _spacing(readings: FloatArray) -> float:
+    """Return the mean step [m] between values amid the readings, where every value of their grid occurs."""
+    known = readings[np.isfinite(readings)]
+    if not len(known):
+        return _GRID
+    low, high = np.quantile(known, _AMID)
+    steps = np.unique(np.rint(known[(known >= low) & (known <= high)] / _GRID))
+    return _GRID * float(np.ptp(steps)) / (len(steps) - 1) if len(steps) > 1 else _GRID
 
 
 def _share(hits: BoolArray) -> float:

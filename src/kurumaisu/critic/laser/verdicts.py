@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu.critic.laser import pictures, rivals, still
 from kurumaisu.critic.laser.estimates import estimates_of, of_block, settings_of, with_scatter
 from kurumaisu.critic.laser.lacking import lacking
@@ -253,9 +254,10 @@ def size_of(change: FloatArray) -> float:
 
 
 def _spread_of(assembly: Assembly, normal: Normal, made: _Made) -> float:
-    """Return by how much [m] what acts on the mean moves some readings more than others."""
-    valid = normal.beam_noise.valid
-    moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in made.parts()]
+    """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others."""
+    valid, blocks = normal.beam_noise.valid, {free.id for free in assembly.free}
+    parts = [part for part in made.parts() if part.id in blocks or effects.by_id(part.id).empirical]
+    moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in parts]
     return float(np.std(sum(moved))) if moved else 0.0
 
 
