@@ -114,8 +114,16 @@ def _elsewhere(s: Sight, rng: np.random.Generator) -> Sight:
     return replace(s, walls=place(rng, s.walls.reshape(-1, 2).mean(axis=0)))
 
 
+def _rebuilt(s: Sight, rng: np.random.Generator) -> Sight:
+    """Move all walls that run along y."""
+    upright = s.walls[:, 0] == s.walls[:, 2]
+    by = rng.uniform(0.5, 1.0) * rng.choice([-1, 1])
+    return replace(s, walls=s.walls + np.where(upright[:, np.newaxis], [by, 0.0, by, 0.0], 0.0))
+
+
 SPOILT: dict[str, tuple[_Spoil, str]] = {
     "another building": (_elsewhere, "do not belong together"),
+    "map before the house was rebuilt": (_rebuilt, "map"),
     "map shifted": (_walls(lambda p, r: p + r.uniform(1.0, 4.0, 2) * r.choice([-1, 1], 2)), "shifted"),
     "map turned": (_walls(_turned), "turned"),
     "map mirrored": (_walls(lambda p, _: p * [1, -1]), "mirrored"),

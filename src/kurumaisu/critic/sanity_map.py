@@ -10,6 +10,8 @@ import numpy as np
 
 from kurumaisu import geometry
 from kurumaisu._core import Scene
+from kurumaisu.critic.laser.displaced import FEW, elsewhere
+from kurumaisu.critic.laser.trust import piles
 from kurumaisu.critic.recording import LaserMount, Series
 from kurumaisu.critic.sanity_fit import nearest_maps
 from kurumaisu.types import FloatArray
@@ -23,6 +25,7 @@ _WIN = 0.15  # share by which another reading of the data must agree better
 _AGREES = 0.6  # least share for a reading that is said
 _ASIDE = np.radians(12.0)  # a smaller turn is an error of the mounting or of the poses, not of the data
 _MOVED = 0.75  # least share for a map that was moved
+_MANY = 6  # readings of a place, at least, which says whether there is something else
 _SHIFTS = np.setdiff1d(np.arange(-30.0, 30.5, 0.5), [0.0])  # [s]
 
 
@@ -50,9 +53,15 @@ def words(scan: Series, pose: Series, laser: LaserMount, segments: FloatArray, m
     found = max(_readings(check, view), key=lambda pair: pair[0], default=(0.0, ""))
     if found[0] < max(_AGREES, plain + _WIN):
         found = max(found, _moved(check, view, segments), key=lambda pair: pair[0])
-    if plain > _HALF and found[0] < plain + _WIN:
-        return None
     share = f"as given {plain:.0%} of the readings are where the map has a wall"
+    if plain > _HALF and found[0] < plain + _WIN:
+        other = check.elsewhere(view)
+        if other < FEW:
+            return None
+        return (
+            f"scans and map do not belong together: {share}, and {other:.0%} are, wherever they are taken from, of "
+            f"something that the map does not have: another place, or a map of another day?"
+        )
     if found[0] > max(_AGREES, plain + _WIN):
         return f"{found[1]}; {share}, then {found[0]:.0%}"
     return (
@@ -95,6 +104,18 @@ class _Check:
         """Return that share per scan, taken from given origins (k, 3)."""
         expected = np.stack([self.scene.cast(origin, view.bearings, _FAR) for origin in origins])
         return agree(view.ranges, expected)
+
+    def elsewhere(self, view: _View) -> float:
+        """Return the share of the readings that are, from wherever they are taken, of something else than the map's."""
+        origins = self.origins(view.times)
+        expected = np.stack([self.scene.cast(origin, view.bearings, _FAR) for origin in origins])
+        angles = origins[:, 2:3] + view.bearings
+        way = expected[:, :, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        low, high = piles(view.ranges)
+        with np.errstate(invalid="ignore"):
+            ranges = np.where((view.ranges > low) & (view.ranges < high), view.ranges, np.nan)
+        found, _ = elsewhere(ranges, expected, origins[:, np.newaxis, :2] + way, many=_MANY, either=True)
+        return float(found.sum() / max(np.isfinite(ranges).sum(), 1))
 
     def points(self, view: _View) -> FloatArray:
         """Return where the readings end in the map's frame, (n, 2) [m]."""

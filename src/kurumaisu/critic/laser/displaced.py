@@ -10,14 +10,14 @@ import numpy as np
 
 from kurumaisu.critic.laser.unknowns import CHANNEL
 from kurumaisu.critic.verdict import Unknown
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _CELL = 0.5  # [m] of the map
 _FAR = 0.25  # [m] off: no wall of the catalogue is moved so far, and an error of the mounting moves all walls
 _MANY = 20  # readings of a cell, at least
 _SCANS = 4  # of which they are, at least
 _NEARLY_ALL = 0.8  # share of a cell's readings that are far off, to one side
-_FEW = 0.25  # share of all readings that such cells may have: of more, it is the map or the reference that is wrong
+FEW = 0.25  # share of all readings that such cells may have: of more, it is the map or the reference that is wrong
 _WELL = 0.05  # [m] that the median reading elsewhere may be off
 _LEAST = 0.002  # share of all readings below which they tell nothing
 _COVARIATES = ("hit x", "hit y")
@@ -50,29 +50,39 @@ def displaced(measured: FloatArray, expected: FloatArray, hits: FloatArray) -> D
     measured, expected (k, b) [m], NaN where there is none; hits (k, b, 2) [m]: what beams meet by the map.
     """
     off = measured - expected
+    readings, bad = elsewhere(measured, expected, hits)
+    none = Displaced(np.zeros_like(readings), np.zeros(2), np.zeros(2), 0.0)
+    seen = np.isfinite(off)
+    share = float(readings.sum() / max(seen.sum(), 1))
+    if not _LEAST <= share <= FEW or abs(float(np.median(off[seen & ~readings]))) > _WELL:
+        return none
+    inside = hits[readings]
+    ends = np.maximum(bad.min(axis=0) * _CELL, inside.min(axis=0)), inside.max(axis=0)
+    # What is expected there is of something else, whether or not it is read, and nobody knows how far it goes on.
+    whole = np.isfinite(expected)
+    near = {(x + i, y + j) for x, y in bad.tolist() for i in (-1, 0, 1) for j in (-1, 0, 1)}
+    whole[whole] = [tuple(cell) in near for cell in np.floor(hits[whole] / _CELL).astype(np.int64).tolist()]
+    return Displaced(whole, *ends, float(np.median(off[readings])))
+
+
+def elsewhere(
+    measured: FloatArray, expected: FloatArray, hits: FloatArray, *, many: int = _MANY, either: bool = False
+) -> tuple[BoolArray, IntArray]:
+    """Return which readings (k, b) are expected in cells where nearly all are of something else, and the cells (n, 2).
+
+    many: readings of such a cell, at least; either: a wall that was moved is farther from one side, nearer from the
+    other; other arguments as of displaced.
+    """
+    off = measured - expected
     seen = np.isfinite(off)
     side = np.where(np.abs(np.nan_to_num(off)) > _FAR, np.sign(np.nan_to_num(off)), 0.0)
-    none = Displaced(np.zeros_like(seen), np.zeros(2), np.zeros(2), 0.0)
-    if not seen.any() or not side[seen].any():
-        return none
     cells, index = np.unique(np.floor(hits[seen] / _CELL).astype(np.int64), axis=0, return_inverse=True)
     index = index.ravel()
     counts = np.bincount(index, minlength=len(cells))
     pairs = np.unique(np.column_stack([index, np.nonzero(seen)[0]]), axis=0)
     scans = np.bincount(pairs[:, 0], minlength=len(cells))
-    sides = np.abs(np.bincount(index, side[seen], minlength=len(cells)))
-    bad = (counts >= _MANY) & (scans >= _SCANS) & (sides >= _NEARLY_ALL * counts)
+    sides = np.abs(np.bincount(index, np.abs(side[seen]) if either else side[seen], minlength=len(cells)))
+    bad = (counts >= many) & (scans >= _SCANS) & (sides >= _NEARLY_ALL * counts)
     readings = seen.copy()
     readings[seen] = bad[index]
-    share = float(readings.sum() / seen.sum())
-    rest = off[seen & ~readings]
-    if not _LEAST <= share <= _FEW or abs(float(np.median(rest))) > _WELL:
-        return none
-    low, high = cells[bad].min(axis=0) * _CELL, (cells[bad].max(axis=0) + 1) * _CELL
-    inside = hits[readings]
-    ends = np.maximum(low, inside.min(axis=0)), np.minimum(high, inside.max(axis=0))
-    # What is expected there is of something else, whether or not it is read, and nobody knows how far it goes on.
-    whole = np.isfinite(expected)
-    near = {(x + i, y + j) for x, y in cells[bad].tolist() for i in (-1, 0, 1) for j in (-1, 0, 1)}
-    whole[whole] = [tuple(cell) in near for cell in np.floor(hits[whole] / _CELL).astype(np.int64).tolist()]
-    return Displaced(whole, *ends, float(np.median(off[readings])))
+    return readings, cells[bad]
