@@ -24,8 +24,10 @@ _USUAL = np.array([0.005, 0.005, 2e-4, 1.0, 0.05, 5.0])
 # A common mode may be of each scan alone, at 30 ms, or last for ten seconds.
 _SPREAD = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 1.0])
 _LOW, _HIGH = np.array([1e-5, 1e-5, 1e-6, 0.01, 1e-4, 1.0]), np.array([0.3, 0.3, 0.1, 10.0, 0.98, 60.0])
+_NONE = 0.003  # share that lasts of a reference that does not wander, as far as can be seen
+_TRIED = (0.05, 0.2, 0.6)  # shares, one of which must be likelier
 _STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that last are one
-_STRETCHES = 100  # at most
+_STRETCHES = 40  # at most: where scans are so far apart, what lasts less long hardly counts
 _APART = 0.2  # in logs, to see how surely each is known
 
 
@@ -215,10 +217,17 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
 
     The last common column is the residual. truth: known sd of the reference, else it is estimated too.
     """
-    start = np.log(_USUAL)
+    likelihood, start, known = _Likelihood(grams, layout, project), np.log(_USUAL), 0
     if truth is not None:
-        start[:2] = np.log(np.maximum(truth, 1e-5))
-    return _likeliest(_Likelihood(grams, layout, project), start, np.arange(0 if truth is None else 2, 6))
+        start[:2], known = np.log(np.maximum(truth, 1e-5)), 2
+    none = np.where(np.arange(6) == 4, np.log(_NONE), start)
+    found = _likeliest(likelihood, none, np.arange(known, 4))
+    here = likelihood(found)
+    lasting = min(_TRIED, key=lambda share: likelihood(replace(found, lasting=share)))
+    if likelihood(replace(found, lasting=lasting)) > here:
+        return found
+    begun = np.log(astuple(replace(found, lasting=lasting)))
+    return _likeliest(likelihood, start, np.arange(known, 6), begun[known:])
 
 
 def common_mode(
@@ -249,8 +258,10 @@ def common_mode(
     return CommonMode(likelihood(none) - here - 0.5 * float(np.log(values).sum()), float(sds[0]), float(sds[1]))
 
 
-def _likeliest(likelihood: _Likelihood, start: FloatArray, free: IntArray) -> ScanNoise:
-    """Return the noise with some of its logs fitted, the others as they are."""
+def _likeliest(
+    likelihood: _Likelihood, start: FloatArray, free: IntArray, begin: FloatArray | None = None
+) -> ScanNoise:
+    """Return the noise with some of its logs fitted, from `begin` or `start` on, the others as they are."""
 
     def noise_at(values: FloatArray) -> ScanNoise:
         every = start.copy()
@@ -261,7 +272,7 @@ def _likeliest(likelihood: _Likelihood, start: FloatArray, free: IntArray) -> Sc
         distance = (values - start[free]) / _SPREAD[free]
         return likelihood(noise_at(values)) + 0.5 * float(distance @ distance)
 
-    at = start[free]
+    at = start[free] if begin is None else begin
     for step in (1.0, 0.3):  # a second start from the end of the first: it may stop early on a ridge
         simplex = np.vstack([at, at + step * np.eye(len(at))])
         options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 100, "initial_simplex": simplex}
