@@ -27,7 +27,7 @@ _LOW, _HIGH = np.array([1e-5, 1e-5, 1e-6, 0.01, 1e-4, 1.0]), np.array([0.3, 0.3,
 _NONE = 0.003  # share that lasts of a reference that does not wander, as far as can be seen
 _TRIED = (0.05, 0.2, 0.6)  # shares, one of which must be likelier
 _STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that last are one
-_STRETCHES = 40  # at most: where scans are so far apart, what lasts less long hardly counts
+_STRETCHES = 40  # at most, and one more for each run: where scans are so far apart, what lasts less long hardly counts
 _APART = 0.2  # in logs, to see how surely each is known
 
 
@@ -64,7 +64,8 @@ class Layout:
     @cached_property
     def _stretches(self) -> tuple[FloatArray, IntArray]:
         """Run and middle [s] (m, 2) of all stretches, and of which each scan (k,) is."""
-        length = max(_STRETCH, float(np.ptp(self.times)) / _STRETCHES)
+        driven = sum(float(np.ptp(self.times[self.run == run])) for run in np.unique(self.run))
+        length = max(_STRETCH, driven / _STRETCHES)
         found, of = np.unique(np.column_stack([self.run, np.floor(self.times / length)]), axis=0, return_inverse=True)
         return np.column_stack([found[:, 0], length * (found[:, 1] + 0.5)]), of.ravel()
 
