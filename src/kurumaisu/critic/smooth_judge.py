@@ -99,9 +99,12 @@ def _holds(problem: Problem, found: Naming, extension: Extension, behind: float)
 def false_alarm(problem: Problem, rivalry: Rivalry) -> float:
     """Return how often noise alone gives some curve, beside the same effects, the evidence of the best one.
 
-    Evidence is a ratio of densities, whose mean over draws of noise is 1: of them, exp(-x) at most have x nats.
+    Evidence is a ratio of densities, whose mean over draws of noise is 1: of them, exp(-x) at most have x nats. More
+    than all that is left is no evidence, but columns of which rounding makes something.
     """
     best = rivalry.rivals[0]
+    if best.belief.nats > -best.fit.log_likelihood:
+        return 1.0
     if best.belief.nats > _NEVER:
         return 0.0
     design = Design(problem, best.fit.settings)

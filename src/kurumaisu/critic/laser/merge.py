@@ -11,6 +11,7 @@ from kurumaisu.critic.verdict import Kind
 from kurumaisu.critic.words import named
 
 _NOTHING_SAID = "none"
+_PLACES = {"hit x": "x of the walls", "hit y": "y of the walls"}
 _TOLD = 4  # ids in a sentence; the verdict has them all
 
 
@@ -76,7 +77,8 @@ def headline(finding: LaserFinding) -> str:
     """Return what the scans say in a sentence; empty when they say nothing."""
     if finding.unknown:
         first = finding.unknown[0]
-        return f"Something that is not in the catalogue changes the ranges with the {first.covariate}: {first.shape}."
+        over = _PLACES.get(first.covariate, first.covariate)
+        return f"Ranges are off over the {over} in a way that is not in the catalogue: {first.shape}."
     if finding.causes:
         return named(finding.causes)
     if finding.confounded:
