@@ -8,16 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "model/wide.h"
+
 namespace kurumaisu {
 namespace {
-
-// Compiled for machines that take two, four or eight numbers at once; the sums are the same.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define KURUMAISU_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define KURUMAISU_WIDE
-#endif
-#define KURUMAISU_INLINE inline __attribute__((always_inline))
 
 using Matrix3 = Eigen::Matrix3d;
 
