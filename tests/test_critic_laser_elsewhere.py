@@ -111,7 +111,7 @@ def test_somebody_who_walks_by_is_unknown_and_is_not_taken_for_light_of_others(t
 def test_a_wall_that_is_not_where_the_map_has_it_is_unknown(tmp_path):
     data = recording(tmp_path, "laser.mount_x", 0.05, 12, scans=30)
     assembly = Assembly(gather(data, MODEL))
-    hits, base = assembly._hits(), assembly.marks.base
+    hits, base = assembly.hits(), assembly.marks.base
     part = np.isfinite(base) & (hits[:, :, 0] > np.nanquantile(hits[:, :, 0], 0.93))
     assert assembly.mapped.all()
 

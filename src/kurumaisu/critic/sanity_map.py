@@ -11,7 +11,7 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu._core import Scene
 from kurumaisu.critic.laser.displaced import FEW, elsewhere
-from kurumaisu.critic.laser.trust import piles
+from kurumaisu.critic.laser.trust import uncut
 from kurumaisu.critic.recording import LaserMount, Series
 from kurumaisu.critic.sanity_fit import nearest_maps
 from kurumaisu.types import FloatArray
@@ -102,29 +102,29 @@ class _Check:
 
     def per_scan(self, origins: FloatArray, view: _View) -> FloatArray:
         """Return that share per scan, taken from given origins (k, 3)."""
-        expected = np.stack([self.scene.cast(origin, view.bearings, _FAR) for origin in origins])
-        return agree(view.ranges, expected)
+        return agree(view.ranges, self._expected(origins, view))
 
     def elsewhere(self, view: _View) -> float:
         """Return the share of the readings that are, from wherever they are taken, of something else than the map's."""
         origins = self.origins(view.times)
-        expected = np.stack([self.scene.cast(origin, view.bearings, _FAR) for origin in origins])
-        angles = origins[:, 2:3] + view.bearings
-        way = expected[:, :, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        low, high = piles(view.ranges)
-        with np.errstate(invalid="ignore"):
-            ranges = np.where((view.ranges > low) & (view.ranges < high), view.ranges, np.nan)
-        found, _ = elsewhere(ranges, expected, origins[:, np.newaxis, :2] + way, many=_MANY, either=True)
+        ranges, expected = uncut(view.ranges), self._expected(origins, view)
+        found, _ = elsewhere(ranges, expected, _ends(origins, view, expected), many=_MANY, either=True)
         return float(found.sum() / max(np.isfinite(ranges).sum(), 1))
+
+    def _expected(self, origins: FloatArray, view: _View) -> FloatArray:
+        """Return the ranges (k, b) [m] to the map's walls from origins (k, 3)."""
+        return np.stack([self.scene.cast(origin, view.bearings, _FAR) for origin in origins])
 
     def points(self, view: _View) -> FloatArray:
         """Return where the readings end in the map's frame, (n, 2) [m]."""
-        origin = self.origins(view.times)
-        angle = origin[:, 2:3] + view.bearings[None, :]
-        x = origin[:, 0:1] + view.ranges * np.cos(angle)
-        y = origin[:, 1:2] + view.ranges * np.sin(angle)
-        known = np.isfinite(view.ranges)
-        return np.column_stack([x[known], y[known]])
+        return np.asarray(_ends(self.origins(view.times), view, view.ranges)[np.isfinite(view.ranges)])
+
+
+def _ends(origins: FloatArray, view: _View, ranges: FloatArray) -> FloatArray:
+    """Return where beams of such ranges (k, b) [m] from origins (k, 3) end in the map's frame, (k, b, 2) [m]."""
+    angles = origins[:, 2:3] + view.bearings
+    way = ranges[:, :, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    return np.asarray(origins[:, np.newaxis, :2] + way)
 
 
 def agree(measured: FloatArray, expected: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kurumaisu.critic.laser.trust import piles
+from kurumaisu.critic.laser.trust import uncut
 from kurumaisu.critic.laser.unknowns import CHANNEL
 from kurumaisu.critic.verdict import Unknown
 from kurumaisu.types import BoolArray, FloatArray
@@ -25,9 +25,7 @@ def blocked(measured: FloatArray, expected: FloatArray) -> BoolArray:
 
     What is the same to the last digit is no distance: readings have been cut off there.
     """
-    low, high = piles(measured)
-    with np.errstate(invalid="ignore"):
-        seen = np.isfinite(expected) & (measured > low) & (measured < high)
+    seen = np.isfinite(expected) & np.isfinite(uncut(measured))
     out = np.zeros(measured.shape[1], dtype=bool)
     for beam in np.flatnonzero(seen.sum(axis=0) >= _MANY):
         here, walls = measured[seen[:, beam], beam], expected[seen[:, beam], beam]

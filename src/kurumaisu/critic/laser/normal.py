@@ -17,12 +17,11 @@ from kurumaisu.critic.laser.displaced import displaced
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate, marginal, whitened
 from kurumaisu.critic.laser.path import Sight, Steady, steady
-from kurumaisu.critic.laser.shots import Shots, look, own_with, poses_at, predict, rows_of
+from kurumaisu.critic.laser.shots import Shots, look, own_with, predict, rows_of
 from kurumaisu.critic.laser.sought import moved, stands
 from kurumaisu.critic.laser.strangers import strangers
-from kurumaisu.critic.laser.trust import hats, piles, trusted, trusted_place
+from kurumaisu.critic.laser.trust import hats, trusted, trusted_place, uncut
 from kurumaisu.critic.verdict import Unknown
-from kurumaisu.geometry import compose
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -57,13 +56,10 @@ class Assembly:
         self._linearise(shots, roughly=True)
         self.motion: list[Steady] | None = None
         self.blocked = blocked(shots.measured, self.marks.base)
-        low, high = piles(shots.measured)  # of what is cut off nobody knows where it is
-        with np.errstate(invalid="ignore"):
-            somewhere = np.where((shots.measured > low) & (shots.measured < high), shots.measured, np.nan)
-        self.displaced = displaced(somewhere, self.marks.base, self._hits())
-        self.mapped = (
-            ~self.blocked & ~self.displaced.readings
-        )  # readings (k, b) of what the map has, as far as is known
+        somewhere = uncut(shots.measured)
+        self.displaced = displaced(somewhere, self.marks.base, self.hits())
+        # Which readings (k, b) are of what the map has, as far as is known.
+        self.mapped = ~self.blocked & ~self.displaced.readings
         others = np.where(self.mapped, somewhere, np.nan)
         self.strangers = strangers(others, self.marks.base, shots.laser.bearings)
         self.mapped &= ~self.strangers.readings
@@ -110,7 +106,7 @@ class Assembly:
         """Whether things are there that the map does not have: how far others scatter by them, nobody can say."""
         return bool(self.displaced.readings.any()) or self.strangers.many
 
-    def _hits(self) -> FloatArray:
+    def hits(self) -> FloatArray:
         """Return where (k, b, 2) [m] the beams meet the map."""
         poses, bearings = self.origins()
         angles = poses[:, :, 2] + bearings
@@ -332,10 +328,8 @@ class Assembly:
 
     def origins(self) -> tuple[FloatArray, FloatArray]:
         """Return poses (k, b, 3) of the laser and bearings (k, b) [rad] at which beams leave it, by the model."""
-        beams = self.marks.seen.beams
-        poses = poses_at(self.shots, np.array([each.times for each in beams]))
-        mounts = np.array([each.mount for each in beams])[:, np.newaxis, :]
-        return compose(poses, mounts), np.array([each.bearings for each in beams])
+        seen = self.marks.seen
+        return seen.origins, np.array([each.bearings for each in seen.beams])
 
     def _by_pose(self, signs: Sequence[float]) -> FloatArray:
         """Return the change (k, b, 3) of the mean readings per metre and radian of the pose."""

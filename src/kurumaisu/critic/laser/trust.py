@@ -59,6 +59,13 @@ def piles(readings: FloatArray) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
+def uncut(readings: FloatArray) -> FloatArray:
+    """Return readings [m] without those cut off, of which nobody knows where they are: NaN in their place."""
+    low, high = piles(readings)
+    with np.errstate(invalid="ignore"):
+        return np.where((readings > low) & (readings < high), readings, np.nan)
+
+
 @dataclass(frozen=True)
 class Hats:
     """The q reference poses around a scan: rows of its track, and (b, q) the weight of each in each beam's pose."""
