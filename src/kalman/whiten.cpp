@@ -8,47 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "kalman/ou_step.h"
 #include "model/wide.h"
 
 namespace kurumaisu {
 namespace {
 
 using Matrix3 = Eigen::Matrix3d;
-
-/// Discrete Ornstein-Uhlenbeck process of unit variance over dt, with its integral over the interval and its lateness:
-/// the integral of u (t / dt - 1/2), which tells whether it acted late or early in the interval.
-struct OuStep {
-  double decay;         ///< u' = decay u + noise
-  double reach;         ///< integral = reach u + noise [s]
-  double late;          ///< lateness = late u + noise [s]; less than 0
-  double var_u;         ///< of the noise in u'
-  double var_integral;  ///< of the noise in the integral [s^2]
-  double var_late;      ///< of the noise in the lateness [s^2]
-  double cov;           ///< between those in u' and the integral [s]
-  double cov_late;      ///< between those in u' and the lateness [s]
-  double cov_both;      ///< between those in the integral and the lateness [s^2]
-};
-
-OuStep ouStep(double dt, double tau) {
-  const double x = dt / tau;
-  const double decay = std::exp(-x);
-  const double lost = -std::expm1(-x);
-  // For small x the closed form cancels to nothing; its series does not.
-  const double spread =
-      x < 1e-2 ? 2.0 / 3.0 * x * x * x - 0.5 * x * x * x * x : 2.0 * x - 4.0 * lost - std::expm1(-2.0 * x);
-  const double late = x < 1e-2 ? x * x * (x / 24.0 - 1.0 / 12.0) : (lost - x * decay) / x - 0.5 * lost;
-  const double lateness =
-      x < 1e-2 ? x * x * x * (1.0 / 60.0 - x / 144.0) : 2.0 * (x / 12.0 + (0.5 + 1.0 / x) * late);
-  return {decay,
-          tau * lost,
-          tau * late,
-          -std::expm1(-2.0 * x),
-          tau * tau * spread,
-          tau * tau * (lateness - late * late),
-          tau * lost * lost,
-          -tau * late * (1.0 + decay),
-          -tau * tau * late * lost};
-}
 
 /// Partial derivatives of one body increment by its two end poses, by the integrated rate errors and by their lateness,
 /// and by such errors that act on this increment alone.
