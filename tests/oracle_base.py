@@ -271,12 +271,14 @@ def dac_zero_f(p, v_f, v_s, _signs):
 
 @_volts("base.dac_zero_s")
 def dac_zero_s(p, v_f, v_s, signs):
-    """With rests, whoever is told to turn to one side by volts that stand for the other does not turn."""
+    """With rests, whoever is told to turn to one side by volts that stand for the other, or to go straight, does not."""
 
     def shifted(v, sign):
         v += p["offset"]
-        if p["rests"] < 0.5 or (not sign > 0 and not sign < 0):
+        if p["rests"] < 0.5 or math.isnan(sign):
             return v
+        if sign == 0:
+            return 0.0
         side = _LAWS["steering"]["positive" if sign > 0 else "negative"]
         return 0.0 if (v - side["intercept"]) / side["slope"] * sign < 0 else v
 

@@ -31,7 +31,8 @@ class DacZeroS(VoltageEffect):
     """V_s plus a constant.
 
     By equation (2) as printed, a voltage beyond the branch that was meant lies on the other one: the chair turns to
-    the wrong side, and fast. rests: 1 where it does not turn at all then.
+    the wrong side, and fast; and so does V_s = 0 of a chair that was to go straight, with an offset beyond the end of a
+    branch. rests: 1 where it does not turn at all then.
     """
 
     id = "base.dac_zero_s"
@@ -39,7 +40,7 @@ class DacZeroS(VoltageEffect):
     parameters = (*_OFFSET, Parameter("rests", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0))
     forms = ({"rests": 0.0}, {"rests": 1.0})
     sentence = "the steering voltage is off by a constant"
-    formula = "V_s + offset; with rests = 1, 0 where that is beyond the branch meant"
+    formula = "V_s + offset; with rests = 1, 0 where that is beyond the branch meant, or no turn is"
     source = "offset error of any D/A converter; 2-20 mV"
     shows_in = Rate.W
     follows = Follows.W
@@ -53,4 +54,4 @@ class DacZeroS(VoltageEffect):
         slope = np.where(volts.sign_w < 0, law.negative.slope, law.positive.slope)
         intercept = np.where(volts.sign_w < 0, law.negative.intercept, law.positive.intercept)
         beyond = volts.sign_w * (v_s - intercept) / slope < 0  # False where the sign is unknown
-        return replace(volts, v_s=np.where(beyond, 0.0, v_s))
+        return replace(volts, v_s=np.where(beyond | (volts.sign_w == 0), 0.0, v_s))
