@@ -271,7 +271,7 @@ def dac_zero_f(p, v_f, v_s, _signs):
 
 @_volts("base.dac_zero_s")
 def dac_zero_s(p, v_f, v_s, signs):
-    """With rests, whoever is told to turn to one side by volts that stand for the other, or to go straight, does not."""
+    """With rests, nobody turns who is told to go straight, or to one side by volts that stand for the other."""
 
     def shifted(v, sign):
         v += p["offset"]
