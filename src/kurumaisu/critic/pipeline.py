@@ -56,9 +56,10 @@ def criticise(
 ) -> Criticism:
     """Return the criticism of a model by a recording whose runs have reference poses.
 
-    Without voltages the model is "velocity follows command", unless the recording names a model or assume_law says
-    that the robot has the model's voltage law. ids: the effects that may be named; None for all that are criticised.
-    slam: whether SLAM is run with both models on a run held out, which takes some seconds.
+    Without voltages a robot that is asked for more than the model's voltages can say has none: "velocity follows
+    command", unless the recording names a model or assume_law says that it has the model's voltage law. ids: the
+    effects that may be named; None for all that are criticised. slam: whether SLAM is run with both models on a run
+    held out, which takes some seconds.
     Raise Error when a run has no reference, or nothing that drove the robot.
     """
     model = model_of(recording, model_file, assume_law=assume_law)

@@ -13,7 +13,7 @@ import numpy as np
 
 from kurumaisu import effects, geometry
 from kurumaisu.critic.drive import GRID, Drive
-from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.recording import Recording, Series
 from kurumaisu.params import EffectSetting, Model, follow_commands, load_model
 from kurumaisu.sim import plant
 from kurumaisu.types import FloatArray
@@ -25,13 +25,28 @@ _UNUSED = np.random.default_rng(0)  # nothing is drawn: effects that draw are le
 def model_of(recording: Recording, model_file: Path, *, assume_law: bool) -> Model:
     """Return the model that a recording is compared with.
 
-    Without voltages it is "velocity follows command", unless the recording names a model or assume_law says that the
-    robot has the model's voltage law.
+    It is "velocity follows command" where no voltages were recorded and commands ask for more than those of the model
+    can say: that is a robot of another make. Else, and where the recording names a model or assume_law says that the
+    robot has the model's voltage law, commands become voltages by that law, and rates again: the same, until something
+    happens to the voltages.
     """
     model = load_model(model_file)
     if assume_law or recording.model is not None or any(run.voltage is not None for run in recording.runs):
         return model
-    return follow_commands(model)
+    return (
+        model if all(_sayable(model, run.command) for run in recording.runs if run.command) else follow_commands(model)
+    )
+
+
+def _sayable(model: Model, command: Series) -> bool:
+    """Tell whether all that is commanded lies within the model's voltages."""
+    axes = (("v", model.translation, model.voltages.translation), ("w", model.steering, model.voltages.steering))
+    for name, law, channel in axes:
+        rates = command.column(name)
+        volts = law.volts(rates[np.isfinite(rates)])
+        if ((volts < channel.min) | (volts > channel.max)).any():
+            return False
+    return True
 
 
 def extend(model: Model, settings: Sequence[EffectSetting]) -> Model:
