@@ -14,13 +14,13 @@ from kurumaisu.critic import (
     gain,
     naming,
     noise,
+    other_forms,
     predict_doubt,
     replay,
     smooth_fit,
     smooth_judge,
     smooth_search,
 )
-from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.prior import odds
@@ -29,8 +29,6 @@ from kurumaisu.critic.smooth_search import BEYOND
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-# Sizes of a cause, as shares of the one fitted, whose marks together stand for those of its other forms.
-_FORMS = (0.25, 0.5, 1.5, 2.0, 3.0)
 _REST = 1e-3  # [m/s], [rad/s] below which a chair rests: one that lags never quite does
 _ANEW = 1  # times at most that all is judged anew, because other effects act than those about which the noise was taken
 Progress = Callable[[str], None]
@@ -78,8 +76,10 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
         won = made.beyond.extension is not None and made.beyond.rivalry.winner is not None
         if won and made.beyond.rivalry.lead - _by_noise(first, made, truth) > BEYOND:
             return made
+        first = first.changed(missed=made.problem.missed)
     for _ in range(_ANEW + 1):
         made, before = _judged(first, found, None, truth, progress), found.best.ids
+        first = first.changed(missed=made.problem.missed)
         better = made.beyond.better
         found = made.found if better is None else replace(made.found, fits=(better, *made.found.fits))
         if found.best.ids == before:
@@ -132,6 +132,11 @@ def _judged(
         growth = strict.growth(strict.estimate(final.noise), odds(len(found.p)))
     problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
     again = naming.search(problem, progress, found.best)
+    if problem.missed is None:
+        missed, fit = other_forms.missed(problem, again)
+        if missed is not None:
+            problem = problem.changed(missed=missed)
+            again = naming.search(problem, progress, fit)
     beyond = smooth_judge.judge(problem, again, progress)
     p, still_open = coarse.believed(again, beyond.rivalry.odds)
     return Decision(problem, weighed_anew(replace(again, confounded=still_open), p), growth, beyond)
@@ -169,7 +174,7 @@ def scatter(
             return np.empty((rows, 0))
         if beside is None:
             own = problem.simulated_columns(drive, fit)
-            return np.column_stack([own, _other_forms(problem, drive, fit)]) if forms else own
+            return np.column_stack([own, other_forms.columns(problem, drive, fit)]) if forms else own
         return smooth_fit.simulated_columns(problem, drive, beside, finer=forms)
 
     projected = [columns(drive, left.size) for drive, left in zip(problem.drives, residuals, strict=True)]
@@ -181,19 +186,3 @@ def _resting(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> D
     """Return a drive that knows where the simulated chair rests although it is asked to move."""
     motion = replay.motion(drive, model, settings)
     return replace(drive, still=(np.abs(motion.v) < _REST) & (np.abs(motion.w) < _REST))
-
-
-def _other_forms(problem: Problem, drive: Drive, fit: Fit) -> FloatArray:
-    """Return what the increments of a drive would be more if each cause were of other sizes, (3 m, k).
-
-    A mark that is no multiple of the fitted one's is that of another form: a rounder corner, a longer tail.
-    """
-    here = problem.simulated(drive, fit.settings)
-    columns = [np.empty((here.size, 0))]
-    for i, term in enumerate(fit.terms):
-        for share in () if term.fixed or term.shape else _FORMS:
-            value = term.null + share * (fit.values[i] - term.null)
-            value = float(np.clip(value, term.parameter.lower, term.parameter.upper))
-            moved = settings_of(fit.terms, np.where(np.arange(len(fit.values)) == i, value, fit.values))
-            columns.append((problem.simulated(drive, moved) - here).reshape(-1, 1))
-    return np.column_stack(columns)

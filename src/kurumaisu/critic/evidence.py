@@ -15,6 +15,7 @@ from kurumaisu.critic import replay, solve
 from kurumaisu.critic.catalogue import Candidate, Key, Term, candidates, catalogue, roughened, settings_of, showing
 from kurumaisu.critic.comb import Comb, Walked
 from kurumaisu.critic.drive import Drive
+from kurumaisu.critic.missed import Missed, Muted
 from kurumaisu.critic.noise import Noise, whitener
 from kurumaisu.critic.prior import Z_USUAL, in_proportion, log_prior, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
@@ -73,26 +74,34 @@ class Problem:
         terms: tuple[Term, ...] | None = None,
         ids: frozenset[str] | None = None,
         known: replay.Increments | None = None,
+        missed: Missed | None = None,
     ) -> None:
         """Take terms: those that such drives can show, where somebody has found them out; ids: effects that may act.
 
-        known: of the same model.
+        known: of the same model; missed: what the equations of causes miss, which is noise, too.
         """
         self.drives = drives
         self.model = model
         self.noise = noise
         self._terms = terms
         self.ids = ids
+        self.missed = missed
         self._known = known or replay.Increments(model)
-        self._whiteners: dict[int, tuple[Drive, Whitener]] = {}
+        self._whiteners: dict[int, tuple[Drive, Whitener, Muted | None]] = {}
         self._walked: Walked = {}
 
     def changed(
-        self, *, drives: Sequence[Drive] | None = None, model: Model | None = None, noise: Noise | None = None
+        self,
+        *,
+        drives: Sequence[Drive] | None = None,
+        model: Model | None = None,
+        noise: Noise | None = None,
+        missed: Missed | None = None,
     ) -> Problem:
         """Return the problem, with the same terms, of other drives, another model or another noise."""
         known = None if model is not None else self._known
-        other = Problem(drives or self.drives, model or self.model, noise or self.noise, self.terms, self.ids, known)
+        new = drives or self.drives, model or self.model, noise or self.noise
+        other = Problem(*new, self.terms, self.ids, known, missed or self.missed)
         if drives is None:
             other._walked = self._walked
         return other
@@ -151,8 +160,16 @@ class Problem:
     def whitened(self, drive: Drive, columns: FloatArray) -> FloatArray:
         """Return columns (3 m, k) of one of the drives, whitened."""
         if id(drive) not in self._whiteners:
-            self._whiteners[id(drive)] = drive, whitener(drive, self.noise)
-        return self._whiteners[id(drive)][1].whiten(columns)
+            white = whitener(drive, self.noise)
+
+            def simulated(settings: tuple[EffectSetting, ...]) -> FloatArray:
+                return white.whiten(self.simulated(drive, settings).reshape(-1, 1))[:, 0]
+
+            muted = None if self.missed is None else Muted(self.missed.marks(simulated))
+            self._whiteners[id(drive)] = drive, white, muted
+        _, white, muted = self._whiteners[id(drive)]
+        columns = white.whiten(columns)
+        return columns if muted is None else muted.whiten(columns)
 
     def fit(self, ids: Iterable[str], start: Mapping[Key, float]) -> Fit:
         """Return the nonlinear fit of a set of effects with all their parameters; start: a first guess by term."""

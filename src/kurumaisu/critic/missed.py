@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the equations of causes may miss, as a part of the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kurumaisu.params import EffectSetting
+from kurumaisu.types import FloatArray
+
+Settings = tuple[EffectSetting, ...]
+
+
+@dataclass(frozen=True)
+class Missed:
+    """Marks by which a run may be off, each by a normal share of its own, but for what a fit does itself.
+
+    here: effects as they act; moved: effects as they would with another size or shape, with the sd of the share of what
+    that changes; near: effects as they would with a little more of each size or shape.
+    """
+
+    here: Settings
+    moved: tuple[tuple[Settings, float], ...]
+    near: tuple[Settings, ...]
+
+    def marks(self, whitened: Callable[[Settings], FloatArray]) -> FloatArray:
+        """Return what a share of 1 sd of each mark changes of a run, whitened, (rows, k); whitened: its increments."""
+        here = whitened(self.here)
+        own = np.column_stack([whitened(settings) - here for settings in self.near])
+        return beside(own, np.column_stack([sd * (whitened(settings) - here) for settings, sd in self.moved]))
+
+
+def beside(own: FloatArray, marks: FloatArray) -> FloatArray:
+    """Return what of marks (rows, k) columns (rows, n) cannot do."""
+    basis = np.linalg.qr(own)[0]
+    return np.asarray(marks - basis @ (basis.T @ marks))
+
+
+class Muted:
+    """Whitens on, what is white but for columns that may be off by a normal share, sd 1."""
+
+    def __init__(self, columns: FloatArray) -> None:
+        """Take whitened columns (rows, k)."""
+        directions, lengths, _ = np.linalg.svd(columns, full_matrices=False)
+        self._directions = directions
+        self._less = 1 - 1 / np.hypot(1.0, lengths)
+
+    def whiten(self, columns: FloatArray) -> FloatArray:
+        """Return columns (rows, n) with less of what may be off."""
+        along = self._directions.T @ columns
+        return np.asarray(columns - self._directions @ (self._less[:, np.newaxis] * along))

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What causes may do in other forms than the catalogue's: no real lag has one pole, no real limit a sharp corner.
+
+What an equation misses lies along other effects, so a strong cause of another form would bring false ones with it. So
+where that is likelier than an exact equation, what it may miss is noise: a Gaussian process whose directions are the
+marks of the same cause at other sizes (a sum of lags is a lag of more poles, a sum of dead zones a soft one).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kurumaisu.critic.catalogue import Term, settings_of
+from kurumaisu.critic.drive import Drive
+from kurumaisu.critic.evidence import Fit, Problem, log_posterior
+from kurumaisu.critic.missed import Missed, beside
+from kurumaisu.critic.naming import Naming
+from kurumaisu.types import FloatArray
+
+# Sizes of a cause, as shares of the one fitted, whose marks together stand for those of its other forms.
+_SIZES = (0.25, 0.5, 1.5, 2.0, 3.0)
+_MISSED = (0.05, 0.15)  # what an equation may miss, as a share of its signal's norm, 1 sd
+_LOUD = 15.0  # norm of a signal from which that could show
+_LEAST = 3.0  # [nat] by which it must be likelier than nothing
+_WEIGHED = 6  # sets, the best ones, besides parts of the best one
+_NEAR = 1.05  # times a size, which says what a fit does itself
+_BENT = 0.05  # share of a mark that a fit must not be able to do itself, else it is no other form
+
+
+def columns(problem: Problem, drive: Drive, fit: Fit) -> FloatArray:
+    """Return what the increments of a drive would be more if each cause were of other sizes, (3 m, k).
+
+    A mark that is no multiple of the fitted one's is that of another form: a rounder corner, a longer tail.
+    """
+    here = problem.simulated(drive, fit.settings)
+    moved = [problem.simulated(drive, settings_of(fit.terms, values)) for _, values in _marks(fit)]
+    return np.column_stack([np.empty((here.size, 0)), *((each - here).reshape(-1, 1) for each in moved)])
+
+
+def missed(problem: Problem, found: Naming) -> tuple[Missed | None, Fit]:
+    """Return what the causes of the likeliest set miss, where that is likelier than that they miss nothing; and it.
+
+    The likeliest with what it misses, that is: without, others are in it that draw the same.
+    """
+    known = {fit.candidates: fit for fit in reversed(found.fits)}
+
+    def worth(fit: Fit) -> tuple[float, Fit, Missed | None]:
+        gain, what = _missed(problem, fit)
+        return log_posterior(fit, len(found.p)) + gain, fit, what
+
+    best = max((worth(fit) for fit in found.fits[:_WEIGHED]), key=lambda one: one[0])
+    while len(best[1].candidates) > 1:
+        parts = [best[1].candidates - {one} for one in sorted(best[1].candidates, key=lambda one: one.id)]
+        fits = [known.get(part) or problem.fit_candidates(part, best[1].start) for part in parts]
+        fewer = max((worth(fit) for fit in fits), key=lambda one: one[0])
+        if fewer[0] <= best[0]:
+            break
+        best = fewer
+    return best[2], best[1]
+
+
+def _missed(problem: Problem, fit: Fit) -> tuple[float, Missed | None]:
+    """Return how much likelier the data are with what the equations of a set miss, in nats, and that; else 0, None."""
+    loud = _loudness(problem, fit)
+    marks = [(term, values) for term, values in _marks(fit) if loud.get(term.id, 0.0) >= _LOUD]
+    if not marks:
+        return 0.0, None
+    near = [values for _, values in _marks(fit, (_NEAR,))]
+    residual = problem.residual(fit.terms, fit.values)
+    own, white = (
+        np.column_stack([residual - problem.residual(fit.terms, values) for values in some])
+        for some in (near, [values for _, values in marks])
+    )
+    ends = np.cumsum([3 * len(drive.measured) for drive in problem.drives])[:-1]
+    split = zip(np.split(residual, ends), np.split(own, ends), np.split(white, ends), strict=True)
+    parts = [(left, beside(slopes, mark)) for left, slopes, mark in split]
+    lengths = np.sqrt(np.sum([np.sum(mark**2, axis=0) for _, mark in parts], axis=0))
+    bent = lengths > _BENT * np.linalg.norm(white, axis=0)
+    names = np.array([term.id for term, _ in marks])
+    many = np.array([np.sum(bent & (names == name)) for name in names])
+    signals = np.array([loud[name] for name in names])
+    shares = np.where(bent, signals / np.sqrt(np.maximum(many, 1)) / np.where(bent, lengths, 1.0), 0.0)
+    sds = [np.minimum(share * shares, 1.0) for share in _MISSED]
+    gains = [sum(_gain(left, sd * mark) for left, mark in parts) for sd in sds]
+    best = int(np.argmax(gains))
+    if gains[best] < _LEAST:
+        return 0.0, None
+    each = zip(marks, sds[best].tolist(), strict=True)
+    moved = tuple((settings_of(fit.terms, values), sd) for (_, values), sd in each if sd > 0)
+    return gains[best], Missed(fit.settings, moved, tuple(settings_of(fit.terms, values) for values in near))
+
+
+def _gain(left: FloatArray, marks: FloatArray) -> float:
+    """Return how much likelier white noise (rows,) is with marks (rows, k) by normal shares, sd 1, in nats."""
+    values, vectors = np.linalg.eigh(marks.T @ marks)
+    values, along = np.maximum(values, 0.0), vectors.T @ (marks.T @ left)
+    return 0.5 * float(np.sum(along**2 / (1 + values)) - np.sum(np.log1p(values)))
+
+
+def _marks(fit: Fit, shares: Sequence[float] = _SIZES) -> list[tuple[Term, FloatArray]]:
+    """Return each term of a fit that has a size, with values of the fit where that is another one."""
+    out = []
+    for i, term in enumerate(fit.terms):
+        for share in () if term.fixed else shares:
+            value = term.null + share * (fit.values[i] - term.null)
+            value = float(np.clip(value, term.parameter.lower, term.parameter.upper))
+            out.append((term, np.where(np.arange(len(fit.values)) == i, value, fit.values)))
+    return out
+
+
+def _loudness(problem: Problem, fit: Fit) -> dict[str, float]:
+    """Return the norm of each cause's signal beside the others, of those whose forms are smooth."""
+    here = problem.residual(fit.terms, fit.values)
+    out = {}
+    for candidate in fit.candidates:
+        if candidate.rough:
+            continue
+        own = np.array([term.id == candidate.id and not term.shape and not term.fixed for term in fit.terms])
+        null = np.where(own, [term.null for term in fit.terms], fit.values)
+        out[candidate.id] = float(np.linalg.norm(problem.residual(fit.terms, null) - here))
+    return out
