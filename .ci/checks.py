@@ -23,8 +23,12 @@ ROOT = sources.ROOT
 BUILD = ROOT / ".ws/build"
 XUNIT = BUILD / "test_results/kurumaisu"
 LOGS = ROOT / ".ws/log"
+LINKS = ROOT / ".ws/src/kurumaisu"  # the tree as the build sees it
 CTEST = "_ctest_kurumaisu_"
 TAIL = 60  # lines of a failed check's output that are shown
+# Test files of pytest that only compute, by how their names begin: to them it is all the same how long they take.
+SUMS = ("test_critic", "test_hidden", "test_smooth")
+NO_SUMS = {"test_critic_batch", "test_critic_refuse"}  # wait for processes
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,7 @@ class Check:
     timeout: float = 1800.0  # [s] against what hangs: a busy machine may take long
     slow: bool = False  # left out by --fast
     results: str = ""  # pattern of its result files
+    files: frozenset[str] = frozenset()  # test files of which each must have results, without suffix
     beside: bool = False  # needs no answer soon: runs beside the others, on what they leave of the cores
     crowd: bool = False  # may run beside its like
     reads: list[Path] = field(default_factory=list)  # if given: not run again until one of these changes
@@ -114,7 +119,10 @@ def _checks() -> list[Check]:
 
 
 def _tests(word: str) -> list[Check]:
-    """Return a check for each test program, run as ctest would; one that fails where CMake does not know the file."""
+    """Return a check for each test program, run as ctest would; one that fails where CMake does not know the file.
+
+    pytest is two: what only computes fills what nodes leave of the cores.
+    """
     listing = subprocess.run(
         ["ctest", "--show-only=json-v1"], cwd=BUILD, check=True, capture_output=True, text=True
     ).stdout
@@ -126,20 +134,37 @@ def _tests(word: str) -> list[Check]:
         command = commands.get(CTEST + (f"rostest_tests_{path.name}" if nodes else f"gtest_{path.stem}"), unknown)
         pattern = "ros*.xml" if nodes else f"gtest-{path.stem}.xml"
         checks.append(Check(path.name, command, slow=nodes, results=pattern, crowd=not nodes))
-    pytest = commands[f"{CTEST}pytest_unit"]
-    if word and word not in "pytest":
-        pytest = ["env", f"PYTEST_ADDOPTS=-k {word}", *pytest]
     # nodes wait more than they compute, which leaves the cores to what runs beside them: so pytest comes last
-    return [*checks, Check("pytest", pytest, timeout=3600, results="pytest-unit.xml")]
+    sums, waits = pytest_parts()
+    command = commands[f"{CTEST}pytest_unit"]
+    return [
+        _pytest("pytest sums", command, sums, word, beside=True),
+        *checks,
+        _pytest("pytest", command, waits, word),
+    ]
 
 
-def _pytest_files() -> set[str]:
-    return {path.stem for path in (ROOT / "tests").glob("test_*.py")}
+def pytest_parts() -> tuple[list[Path], list[Path]]:
+    """Return the test files of pytest that only compute, and all others."""
+    files = sorted((ROOT / "tests").glob("test_*.py"))
+    sums = [path for path in files if path.stem.startswith(SUMS) and path.stem not in NO_SUMS]
+    return sums, [path for path in files if path not in sums]
+
+
+def _pytest(name: str, command: list[str], files: list[Path], word: str, beside: bool = False) -> Check:
+    """Return a check of some of pytest's files; command: ctest's, for all of them."""
+    everything, output = f" {LINKS}/tests ", f"{name.replace(' ', '-')}.xml"
+    some = " ".join(["", *(f"{LINKS}/tests/{path.name}" for path in files), ""])
+    chosen = [part.replace(everything, some).replace("pytest-unit.xml", output) for part in command]
+    if word and word not in name:
+        chosen = ["env", f"PYTEST_ADDOPTS=-k {word}", *chosen]
+    stems = frozenset(path.stem for path in files)
+    return Check(name, chosen, timeout=3600, results=output, files=stems, beside=beside)
 
 
 def _holds(check: Check, word: str) -> bool:
     """Say whether a check consists of several files, one of which has the word in its name."""
-    return check.name == "pytest" and any(word in stem for stem in _pytest_files())
+    return any(word in stem for stem in check.files)
 
 
 def _run(check: Check, word: str, stop: Event) -> Counts:
@@ -180,9 +205,9 @@ def _judge(check: Check, word: str, problem: str) -> tuple[Counts, str]:
 
 def _silent(check: Check, word: str) -> list[str]:
     """Return the test files of pytest without any result: they must not look like success."""
-    if check.name != "pytest" or (word and word not in "pytest"):
+    if not check.files or (word and word not in check.name):
         return []
-    return sorted(_pytest_files() - results.classes(XUNIT / "pytest-unit.xml"))
+    return sorted(check.files - results.classes(XUNIT / check.results))
 
 
 def _execute(check: Check, log: Path, stop: Event) -> str:

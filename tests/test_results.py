@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The verdict of scripts/test: what is silent or broken must never look like success."""
 
+import re
+
+import checks
 import pytest
 import results
 from results import Counts
@@ -64,3 +67,14 @@ def test_names_the_modules_that_ran(tmp_path):
 def test_verdict_line():
     assert str(Counts(3, 0)) == "3 passed, 0 failed"
     assert str(Counts(3, 1) + Counts(skipped=2)) == "3 passed, 1 failed, 2 skipped"
+
+
+def test_what_only_computes_waits_for_nothing():
+    """It runs when nothing else wants the cores."""
+    sums, others = checks.pytest_parts()
+    assert len(sums) > 40
+    assert {path.stem for path in others} >= checks.NO_SUMS
+    for path in sums:
+        assert not re.search(
+            r"^(import|from) (subprocess|time|threading|socket|rospy)\b", path.read_text(), re.MULTILINE
+        ), path
