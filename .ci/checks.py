@@ -30,8 +30,17 @@ CTEST = "_ctest_kurumaisu_"
 BUILD_TESTS = "build tests"
 TAIL = 60  # lines of a failed check's output that are shown
 # Test files of pytest that only compute, by how their names begin: to them it is all the same how long they take.
-SUMS = ("test_critic", "test_hidden", "test_smooth")
-NO_SUMS = {"test_critic_batch", "test_critic_refuse"}  # wait for processes
+SUMS = (
+    "test_critic",
+    "test_design",
+    "test_effects",
+    "test_hidden",
+    "test_laser_effects",
+    "test_paper",
+    "test_physics",
+    "test_smooth",
+)
+NO_SUMS = {"test_critic_batch", "test_critic_refuse", "test_paper_ros"}  # wait for processes
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,9 @@ ROSTEST = """<testsuite tests="1"><testcase classname="rostest.runner.RosTest" n
 ROSTEST_DIED = """<testsuite tests="1"><testcase classname="rostest.runner.RosTest" name="testbase">
 <failure type="AssertionError">no results</failure></testcase></testsuite>"""
 NODE = """<testsuite tests="1"><testcase classname="__main__.Test" name="test_odom"/></testsuite>"""
+WAITS = re.compile(
+    r"^(import|from) (asyncio|kurumaisu\.bench\.processes|rospy|socket|subprocess|threading|time)\b", re.M
+)
 
 
 @pytest.mark.parametrize(
