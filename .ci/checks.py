@@ -88,20 +88,26 @@ def main() -> int:
 def _run_all(checks: list[Check], word: str) -> Counts:
     """Run the checks one after the other, but for those that run beside others."""
     total, beside, stop = Counts(), dict[str, Future[Counts]](), Event()
-    with ThreadPoolExecutor(1) as idle, ThreadPoolExecutor(os.cpu_count()) as several:
+
+    def after(check: Check) -> Counts:
+        """Run a check when what it waits for has ended."""
+        if check.after in beside:
+            beside[check.after].result()
+        return _run(check, word, stop)
+
+    # two: one of them alone often has work for one core only
+    with ThreadPoolExecutor(2) as idle, ThreadPoolExecutor(os.cpu_count()) as several:
         crowd = list[Future[Counts]]()
         try:
             for check in checks:
-                if check.after in beside:
-                    beside[check.after].result()
                 if check.beside:
-                    beside[check.name] = idle.submit(_run, check, word, stop)
+                    beside[check.name] = idle.submit(after, check)
                 elif check.crowd:
-                    crowd.append(several.submit(_run, check, word, stop))
+                    crowd.append(several.submit(after, check))
                 else:
                     total = sum((future.result() for future in crowd), total)
                     crowd.clear()
-                    total += _run(check, word, stop)
+                    total += after(check)
             return sum((future.result() for future in [*crowd, *beside.values()]), total)
         finally:
             stop.set()
@@ -120,7 +126,6 @@ def _checks() -> list[Check]:
         Check("catkin_lint", ["catkin_lint", "--offline", "--strict", "-W2", str(ROOT / ".ws/src")]),
         # scripts/setup --dev built the rest; there, too, a warning is an error.
         Check(BUILD_TESTS, ["bash", str(ROOT / ".ci/build_tests.bash")], beside=True),
-        Check("clang-tidy", ["python", str(ROOT / ".ci/tidy.py")], timeout=4200, beside=True),
         Check(
             "catkin build",
             ["bash", str(ROOT / ".ci/catkin_build.bash")],
@@ -129,6 +134,8 @@ def _checks() -> list[Check]:
             beside=True,
             reads=inside,
         ),
+        # what the tests include is known when they are built
+        Check("clang-tidy", ["python", str(ROOT / ".ci/tidy.py")], timeout=4200, beside=True, after=BUILD_TESTS),
     ]
 
 
