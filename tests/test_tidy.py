@@ -1,8 +1,42 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What .ci/tidy.py does in clang-tidy's stead where several sources are checked at once."""
 
+import re
+import shutil
+
 import pytest
+import sources
 import tidy
+
+DEFECTS = """#include <memory>
+namespace %s {
+int zero(int x) { int y = 0; if (x > 3) y = 1; return x / y; }
+int moved(std::unique_ptr<int> p) { auto q = std::move(p); return *p + *q; }
+}
+"""
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_at_once_as_much_is_found_as_alone(tmp_path, monkeypatch, apart):
+    """The analyzer, too, which leaves out what it takes for a header."""
+    monkeypatch.setattr(tidy, "BUILD", tmp_path / "build")
+    monkeypatch.setattr(tidy, "LINKS", tmp_path)
+    monkeypatch.setattr(tidy, "WHOLE", tmp_path / "whole")
+    (tmp_path / "src/base").mkdir(parents=True)
+    tidy.WHOLE.mkdir()
+    for folder in (tmp_path, tidy.WHOLE):
+        shutil.copy(sources.ROOT / ".clang-tidy", folder)
+    both = tuple(tmp_path / f"src/base/{name}.cpp" for name in ("one", "two"))
+    for path in both:
+        path.write_text(DEFECTS % ("same" if apart else path.stem))
+    unit = tidy.Unit(["-std=c++17"], (tmp_path / "build/kurumaisu/x.o",), tmp_path, both, apart)
+
+    def found(text):
+        return set(re.findall(r"(\w+\.cpp:\d+):\d+: error: .*\[(.*)\]", text))
+
+    alone = set.union(*(found(tidy._tidy(unit, path)) for path in both))
+    assert {check.split(",")[0] for _, check in alone} >= {"clang-analyzer-core.DivideZero", "bugprone-use-after-move"}
+    assert found(tidy._tidy(unit, tidy._whole(unit))) == alone
 
 
 @pytest.mark.parametrize(
