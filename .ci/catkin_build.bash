@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Builds with catkin-tools, devel and install space, in a workspace of its own: as usual as catkin_make.
+# Each source alone, unlike scripts/setup's build: so it must include all that it needs.
 # Debug: takes half the time, and sees what only an unoptimised build sees (assertions, missing definitions). No -g:
 # nobody looks for symbols here, and to write them is an eighth of the time.
 set -eu

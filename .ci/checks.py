@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import signal
@@ -14,6 +15,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 import results
 import sources
@@ -23,8 +25,22 @@ ROOT = sources.ROOT
 BUILD = ROOT / ".ws/build"
 XUNIT = BUILD / "test_results/kurumaisu"
 LOGS = ROOT / ".ws/log"
+LINKS = ROOT / ".ws/src/kurumaisu"  # the tree as the build sees it
 CTEST = "_ctest_kurumaisu_"
+BUILD_TESTS = "build tests"
 TAIL = 60  # lines of a failed check's output that are shown
+# Test files of pytest that only compute, by how their names begin: to them it is all the same how long they take.
+SUMS = (
+    "test_critic",
+    "test_design",
+    "test_effects",
+    "test_hidden",
+    "test_laser_effects",
+    "test_paper",
+    "test_physics",
+    "test_smooth",
+)
+NO_SUMS = {"test_critic_batch", "test_critic_refuse", "test_paper_ros"}  # wait for processes
 
 
 @dataclass(frozen=True)
@@ -33,11 +49,13 @@ class Check:
 
     name: str
     command: list[str]
-    timeout: float = 1800.0  # [s] against what hangs: a busy machine may take long
+    timeout: float = 1800.0  # [s] against what hangs: a busy machine may take long, and gives little to what is beside
     slow: bool = False  # left out by --fast
     results: str = ""  # pattern of its result files
+    files: frozenset[str] = frozenset()  # test files of which each must have results, without suffix
     beside: bool = False  # needs no answer soon: runs beside the others, on what they leave of the cores
     crowd: bool = False  # may run beside its like
+    after: str = ""  # name of a check beside the others that it waits for, if that is chosen, too
     reads: list[Path] = field(default_factory=list)  # if given: not run again until one of these changes
 
     def written(self) -> list[Path]:
@@ -69,20 +87,28 @@ def main() -> int:
 
 def _run_all(checks: list[Check], word: str) -> Counts:
     """Run the checks one after the other, but for those that run beside others."""
-    total, beside, stop = Counts(), list[Future[Counts]](), Event()
-    with ThreadPoolExecutor(1) as idle, ThreadPoolExecutor(os.cpu_count()) as several:
+    total, beside, stop = Counts(), dict[str, Future[Counts]](), Event()
+
+    def after(check: Check) -> Counts:
+        """Run a check when what it waits for has ended."""
+        if check.after in beside:
+            beside[check.after].result()
+        return _run(check, word, stop)
+
+    # two: one of them alone often has work for one core only
+    with ThreadPoolExecutor(2) as idle, ThreadPoolExecutor(os.cpu_count()) as several:
         crowd = list[Future[Counts]]()
         try:
             for check in checks:
                 if check.beside:
-                    beside.append(idle.submit(_run, check, word, stop))
+                    beside[check.name] = idle.submit(after, check)
                 elif check.crowd:
-                    crowd.append(several.submit(_run, check, word, stop))
+                    crowd.append(several.submit(after, check))
                 else:
                     total = sum((future.result() for future in crowd), total)
                     crowd.clear()
-                    total += _run(check, word, stop)
-            return sum((future.result() for future in [*crowd, *beside]), total)
+                    total += after(check)
+            return sum((future.result() for future in [*crowd, *beside.values()]), total)
         finally:
             stop.set()
 
@@ -94,14 +120,12 @@ def _checks() -> list[Check]:
     return [
         Check("ruff check", ["ruff", "check", *python]),
         Check("ruff format", ["ruff", "format", "--check", *python]),
-        Check("mypy", ["mypy"], beside=True),
+        Check("mypy", ["mypy"], timeout=4200, beside=True),
         Check("mypy .ci", ["mypy", "--config-file=", "--strict", *(str(p) for p in (ROOT / ".ci").glob("*.py"))]),
         Check("clang-format", ["clang-format", "--dry-run", "-Werror", *cpp]),
         Check("catkin_lint", ["catkin_lint", "--offline", "--strict", "-W2", str(ROOT / ".ws/src")]),
         # scripts/setup --dev built the rest; there, too, a warning is an error.
-        Check("build tests", ["bash", str(ROOT / ".ci/build_tests.bash")]),
-        Check("clang-tidy", ["python", str(ROOT / ".ci/tidy.py")], timeout=4200, beside=True),
-        Check("install space", ["bash", str(ROOT / ".ci/install_space.bash")]),
+        Check(BUILD_TESTS, ["bash", str(ROOT / ".ci/build_tests.bash")], timeout=4200, beside=True),
         Check(
             "catkin build",
             ["bash", str(ROOT / ".ci/catkin_build.bash")],
@@ -110,36 +134,65 @@ def _checks() -> list[Check]:
             beside=True,
             reads=inside,
         ),
+        # what the tests include is known when they are built
+        Check("clang-tidy", ["python", str(ROOT / ".ci/tidy.py")], timeout=4200, beside=True, after=BUILD_TESTS),
+        # make in the same folder, too
+        Check(
+            "install space",
+            ["bash", str(ROOT / ".ci/install_space.bash")],
+            timeout=4200,
+            beside=True,
+            after=BUILD_TESTS,
+        ),
     ]
 
 
 def _tests(word: str) -> list[Check]:
-    """Return a check for each test program, run as ctest would; one that fails where CMake does not know the file."""
+    """Return a check for each test program, run as ctest would; one that fails where CMake does not know the file.
+
+    Nodes come first: they need no test program, and wait more than they compute, which leaves the cores to what runs
+    beside them. pytest is two: what only computes is beside, too.
+    """
     listing = subprocess.run(
         ["ctest", "--show-only=json-v1"], cwd=BUILD, check=True, capture_output=True, text=True
     ).stdout
-    commands = {test["name"]: test["command"] for test in json.loads(listing)["tests"]}
-    checks = []
-    for path in [*sorted((ROOT / "tests").glob("test_*.cpp")), *sorted((ROOT / "tests").glob("*.test"))]:
-        nodes = path.suffix == ".test"
-        unknown = ["bash", "-c", f"echo tests/CMakeLists.txt does not run {path.name}; false"]
-        command = commands.get(CTEST + (f"rostest_tests_{path.name}" if nodes else f"gtest_{path.stem}"), unknown)
-        pattern = "ros*.xml" if nodes else f"gtest-{path.stem}.xml"
-        checks.append(Check(path.name, command, slow=nodes, results=pattern, crowd=not nodes))
-    pytest = commands[f"{CTEST}pytest_unit"]
-    if word and word not in "pytest":
-        pytest = ["env", f"PYTEST_ADDOPTS=-k {word}", *pytest]
-    # nodes wait more than they compute, which leaves the cores to what runs beside them: so pytest comes last
-    return [*checks, Check("pytest", pytest, timeout=3600, results="pytest-unit.xml")]
+    commands: dict[str, list[str]] = {test["name"]: test["command"] for test in json.loads(listing)["tests"]}
+
+    def known(name: str, path: Path) -> list[str]:
+        return commands.get(CTEST + name, ["bash", "-c", f"echo tests/CMakeLists.txt does not run {path.name}; false"])
+
+    sums, waits = pytest_parts()
+    whole = commands[f"{CTEST}pytest_unit"]
+    checks = [_pytest("pytest sums", whole, sums, word, beside=True)]
+    for path in sorted((ROOT / "tests").glob("*.test")):
+        checks.append(Check(path.name, known(f"rostest_tests_{path.name}", path), slow=True, results="ros*.xml"))
+    for path in sorted((ROOT / "tests").glob("test_*.cpp")):
+        command, pattern = known(f"gtest_{path.stem}", path), f"gtest-{path.stem}.xml"
+        checks.append(Check(path.name, command, results=pattern, crowd=True, after=BUILD_TESTS))
+    return [*checks, _pytest("pytest", whole, waits, word, after=BUILD_TESTS)]
 
 
-def _pytest_files() -> set[str]:
-    return {path.stem for path in (ROOT / "tests").glob("test_*.py")}
+def pytest_parts() -> tuple[list[Path], list[Path]]:
+    """Return the test files of pytest that only compute, and all others."""
+    files = sorted((ROOT / "tests").glob("test_*.py"))
+    sums = [path for path in files if path.stem.startswith(SUMS) and path.stem not in NO_SUMS]
+    return sums, [path for path in files if path not in sums]
+
+
+def _pytest(name: str, command: list[str], files: list[Path], word: str, **more: Any) -> Check:
+    """Return a check of some of pytest's files; command: ctest's, for all of them; more: as Check has it."""
+    everything, output = f" {LINKS}/tests ", f"{name.replace(' ', '-')}.xml"
+    some = " ".join(["", *(f"{LINKS}/tests/{path.name}" for path in files), ""])
+    chosen = [part.replace(everything, some).replace("pytest-unit.xml", output) for part in command]
+    if word and word not in name:
+        chosen = ["env", f"PYTEST_ADDOPTS=-k {word}", *chosen]
+    stems = frozenset(path.stem for path in files)
+    return Check(name, chosen, timeout=4200, results=output, files=stems, **more)
 
 
 def _holds(check: Check, word: str) -> bool:
     """Say whether a check consists of several files, one of which has the word in its name."""
-    return check.name == "pytest" and any(word in stem for stem in _pytest_files())
+    return any(word in stem for stem in check.files)
 
 
 def _run(check: Check, word: str, stop: Event) -> Counts:
@@ -180,9 +233,9 @@ def _judge(check: Check, word: str, problem: str) -> tuple[Counts, str]:
 
 def _silent(check: Check, word: str) -> list[str]:
     """Return the test files of pytest without any result: they must not look like success."""
-    if check.name != "pytest" or (word and word not in "pytest"):
+    if not check.files or (word and word not in check.name):
         return []
-    return sorted(_pytest_files() - results.classes(XUNIT / "pytest-unit.xml"))
+    return sorted(check.files - results.classes(XUNIT / check.results))
 
 
 def _execute(check: Check, log: Path, stop: Event) -> str:
@@ -198,6 +251,8 @@ def _execute(check: Check, log: Path, stop: Event) -> str:
             stderr=output,
             start_new_session=True,
         )
+        if check.beside:
+            _stand_back(process.pid)
         deadline = time.monotonic() + check.timeout
         try:
             while (status := process.poll()) is None:
@@ -208,6 +263,12 @@ def _execute(check: Check, log: Path, stop: Event) -> str:
         finally:
             _end(process)
     return f"exit status {status}" if status else ""
+
+
+def _stand_back(session: int) -> None:
+    """Give way to other sessions: where the kernel shares cores among sessions first, --idle means little to others."""
+    with contextlib.suppress(OSError):
+        Path(f"/proc/{session}/autogroup").write_text("10")  # a tenth of another's share: 19 would be next to nothing
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

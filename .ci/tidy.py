@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""clang-tidy on every C++ file of the build that, or whose headers, changed since it was last found clean."""
+"""clang-tidy on all that the build compiles and that, or whose headers, changed since it was last found clean.
+
+What a unity build compiles at once is checked at once, for most of the time goes into what the sources include; so are
+test programs that are compiled alike, each in a namespace of its own there, as their names may be the same. Where
+something is found there, each source is checked alone, too, as that says it best. Two of clang-tidy's checks look at
+sources that are checked alone only, misc-unused-using-decls and misc-unused-alias-decls: unused() does what they do.
+"""
 
 from __future__ import annotations
 
@@ -7,63 +13,154 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
+from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
 import sources
 
 BUILD = sources.ROOT / ".ws/build"
-CLEAN = sources.ROOT / ".ws/tidy"  # one empty file per clean state of a file
+LINKS = sources.ROOT / ".ws/src/kurumaisu"  # the tree as the build sees it
+CLEAN = sources.ROOT / ".ws/tidy"  # one empty file per clean state of a unit
+WHOLE = CLEAN / "whole"  # what is checked at once, in a tree of folders as src/ and tests/ are, with their settings
+
+
+TESTS = 8  # test programs that are checked at once
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What calls of the compiler with the same flags made of sources, all of one folder or nearly so."""
+
+    flags: list[str]  # of the compiler, but for what it reads and writes
+    made: tuple[Path, ...]  # the objects
+    directory: Path
+    sources: tuple[Path, ...]  # as the build sees them: links into the workspace
+    apart: bool = False  # each in a namespace of its own
+
+    @property
+    def name(self) -> str:
+        """Return a name that no other unit has."""
+        return "_".join(self.made[0].relative_to(BUILD / "kurumaisu").parts)
 
 
 def main() -> int:
     """Check the files, as many at once as there are cores; return 1 if any has findings."""
     CLEAN.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(WHOLE, ignore_errors=True)
     version = subprocess.run(["clang-tidy", "--version"], check=True, capture_output=True, text=True).stdout
     configs = [path for path in sources.files() if path.name == ".clang-tidy"]
-    commands = json.loads((BUILD / "compile_commands.json").read_text())
-    # a file that two targets compile is checked once
-    units = list({unit["file"]: unit for unit in commands if _ours(unit)}.values())
+    for path in configs:
+        copy = WHOLE / path.relative_to(sources.ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, copy)
+    units = _units()
+    files = {path.resolve() for unit in units for path in unit.sources}
     # what Python compiles by itself, against programs that are not ours to install, is in no target
     programs = {path for path in sources.files(".cpp") if not path.is_relative_to(sources.ROOT / "src/kurumaisu")}
-    missing = programs - {Path(unit["file"]).resolve() for unit in units}
+    missing = programs - files
     for path in sorted(missing):
         print(f"{path}: is in no target, so nothing compiles it")
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         findings = [text for text in pool.map(lambda unit: _check(unit, configs, version), units) if text]
-    print("\n".join(findings) or f"{len(units)} files")
+    print("\n".join(findings) or f"{len(files)} files")
     return 1 if findings or missing else 0
 
 
-def _ours(unit: dict[str, str]) -> bool:
-    path = Path(unit["file"]).resolve()
-    return path.is_relative_to(sources.ROOT) and not path.is_relative_to(sources.ROOT / ".ws")
+def _units() -> list[Unit]:
+    """Return what is compiled of this tree, each source once; the largest first, lest one core waits for it."""
+    units, seen = [], set[Path]()
+    for entry in json.loads((BUILD / "compile_commands.json").read_text()):
+        words, path = shlex.split(entry["command"]), Path(entry["file"])
+        first, here = next(i for i, word in enumerate(words) if word.startswith("-")), words.index("-o")
+        text = path.read_text() if path.is_relative_to(BUILD) else f'#include "{path}"'
+        all_of_it = [Path(name) for name in re.findall(r'^#include "(.*)"$', text, re.MULTILINE)]
+        ours = tuple(p for p in all_of_it if p.is_relative_to(LINKS) and p not in seen)
+        seen.update(ours)
+        if ours:
+            made = Path(entry["directory"]) / words[here + 1]
+            units.append(Unit(words[first:here], (made,), Path(entry["directory"]), ours))
+    return sorted(_together(units), key=lambda unit: -len(unit.sources))
 
 
-def _check(unit: dict[str, str], configs: list[Path], version: str) -> str:
+def _together(units: list[Unit]) -> list[Unit]:
+    """Return the units, of test programs several in one."""
+    others, alike = list[Unit](), defaultdict[tuple[str, ...], list[Unit]](list)
+    for unit in units:
+        test = len(unit.sources) == 1 and unit.sources[0].match("tests/test_*.cpp")
+        (alike[*unit.flags] if test else others).append(unit)
+    for tests in alike.values():
+        for some in (tests[i : i + TESTS] for i in range(0, len(tests), TESTS)):
+            made, files = (tuple(unit.made[0] for unit in some), tuple(unit.sources[0] for unit in some))
+            others.append(Unit(some[0].flags, made, some[0].directory, files, apart=True))
+    return others
+
+
+def _check(unit: Unit, configs: list[Path], version: str) -> str:
     """Return clang-tidy's findings, empty if there are none."""
-    state = sources.content_hash({*_dependencies(unit), *configs}, version, unit["command"])
+    state = sources.content_hash({*_dependencies(unit), *configs}, version, *unit.flags)
     if (CLEAN / state).exists():
         return ""
+    findings = ""
+    if len(unit.sources) > 1:
+        findings = "\n".join([line for path in unit.sources for line in unused(path)]) or _tidy(unit, _whole(unit))
+    if findings or len(unit.sources) == 1:
+        each = [text for path in unit.sources if (text := _tidy(unit, path))]
+        findings = "\n".join(each) or findings
+    if not findings:
+        (CLEAN / state).touch()
+    return findings
+
+
+def unused(path: Path) -> list[str]:
+    """Return a line for each name that a source takes from another namespace and does not use."""
+    text = re.sub(r'//.*|(?s:/\*.*?\*/)|"(\\.|[^"\\\n])*"', "", path.read_text())
+    taken = [*re.findall(r"^\s*using\s+[\w:]*::(\w+);", text, re.MULTILINE)]
+    taken += re.findall(r"^\s*namespace\s+(\w+)\s*=", text, re.MULTILINE)
+    used = re.sub(r"^\s*(using\s+[\w:]+;|namespace\s+\w+\s*=)", "", text, flags=re.MULTILINE)
+    return [f"{path}: {name} is not used" for name in taken if not re.search(rf"(?<!::)\b{name}\b", used)]
+
+
+def _whole(unit: Unit) -> Path:
+    """Write a file that includes all sources, where clang-tidy finds the settings of their folder."""
+    # by UnifiedSource in its name the analyzer knows that what this includes is no header
+    path = WHOLE / unit.sources[0].parent.relative_to(LINKS) / f"UnifiedSource_{unit.name}.cpp"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lines = [f'#include "{source}"  // NOLINT(bugprone-suspicious-include)' for source in unit.sources]
+    if unit.apart:
+        texts = (source.read_text() for source in unit.sources)
+        headers = dict.fromkeys(line for text in texts for line in re.findall(r"^#include .*$", text, re.MULTILINE))
+        lines = [*headers, *(f"namespace test_{i} {{\n{line}\n}}" for i, line in enumerate(lines))]
+    path.write_text("\n".join([*lines, ""]))
+    return path
+
+
+def _tidy(unit: Unit, path: Path) -> str:
+    """Return what clang-tidy finds in a file, compiled as the unit is, empty if there is nothing."""
     # Links into the workspace are kept: HeaderFilterRegex and clang then see the same paths as gcc does.
-    command = ["clang-tidy", "--quiet", "-p", str(BUILD), unit["file"]]
-    run = subprocess.run(command, check=False, capture_output=True, text=True)
-    if run.returncode != 0:
-        lines = [line for line in run.stdout.splitlines() if re.search(r": (error|warning): ", line)]
-        return "\n".join(dict.fromkeys(lines)) or run.stdout + run.stderr
-    (CLEAN / state).touch()
-    return ""
+    here = [f"-I{unit.sources[0].parent}"] if unit.apart else []  # where a test itself looks first
+    command = ["clang-tidy", "--quiet", str(path), "--", *unit.flags, *here]
+    run = subprocess.run(command, check=False, capture_output=True, text=True, cwd=unit.directory)
+    if run.returncode == 0:
+        return ""
+    lines = [line for line in run.stdout.splitlines() if re.search(r": (error|warning): ", line)]
+    return "\n".join(dict.fromkeys(lines)) or run.stdout + run.stderr
 
 
-def _dependencies(unit: dict[str, str]) -> set[Path]:
-    """Return the file and the headers of this tree that it includes, as gcc noted; else all headers."""
-    words = shlex.split(unit["command"])
-    depfile = Path(unit["directory"]) / f"{words[words.index('-o') + 1]}.d"
-    names = depfile.read_text().replace("\\\n", " ").split()[1:] if depfile.exists() else []
-    headers = {Path(name).resolve() for name in names} or set(sources.files(".h"))
-    return {p for p in headers if p.is_relative_to(sources.ROOT) and p.exists()} | {Path(unit["file"]).resolve()}
+def _dependencies(unit: Unit) -> set[Path]:
+    """Return the sources and the headers of this tree that they include, as gcc noted; else all headers."""
+    depfiles = [Path(f"{made}.d") for made in unit.made]
+    if all(path.exists() for path in depfiles):
+        names = [name for path in depfiles for name in path.read_text().replace("\\\n", " ").split()[1:]]
+        headers = {Path(name).resolve() for name in names}
+    else:
+        headers = set(sources.files(".h"))
+    mine = {p for p in headers if p.is_relative_to(sources.ROOT) and p.exists()}
+    return mine | {path.resolve() for path in unit.sources}
 
 
 if __name__ == "__main__":

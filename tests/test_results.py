@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The verdict of scripts/test: what is silent or broken must never look like success."""
 
+import re
+
+import checks
 import pytest
 import results
 from results import Counts
@@ -16,6 +19,9 @@ ROSTEST = """<testsuite tests="1"><testcase classname="rostest.runner.RosTest" n
 ROSTEST_DIED = """<testsuite tests="1"><testcase classname="rostest.runner.RosTest" name="testbase">
 <failure type="AssertionError">no results</failure></testcase></testsuite>"""
 NODE = """<testsuite tests="1"><testcase classname="__main__.Test" name="test_odom"/></testsuite>"""
+WAITS = re.compile(
+    r"^(import|from) (asyncio|kurumaisu\.bench\.processes|rospy|socket|subprocess|threading|time)\b", re.M
+)
 
 
 @pytest.mark.parametrize(
@@ -64,3 +70,14 @@ def test_names_the_modules_that_ran(tmp_path):
 def test_verdict_line():
     assert str(Counts(3, 0)) == "3 passed, 0 failed"
     assert str(Counts(3, 1) + Counts(skipped=2)) == "3 passed, 1 failed, 2 skipped"
+
+
+def test_what_only_computes_waits_for_nothing():
+    """It runs when nothing else wants the cores."""
+    sums, others = checks.pytest_parts()
+    assert len(sums) > 40
+    assert {path.stem for path in others} >= checks.NO_SUMS
+    for path in sums:
+        assert not re.search(
+            r"^(import|from) (subprocess|time|threading|socket|rospy)\b", path.read_text(), re.MULTILINE
+        ), path

@@ -13,10 +13,10 @@
 namespace kurumaisu {
 namespace {
 
-constexpr double kWarningPeriod = 1.0;      // [s] of throttled warnings
+constexpr double kGyroWarningPeriod = 1.0;  // [s] of throttled warnings
 constexpr std::size_t kAxes[] = {0, 1, 5};  // x, y, yaw of x, y, z, roll, pitch, yaw
 constexpr double kPlanar = 1.0e-3;          // of a quaternion's length that roll, pitch or scale may take
-constexpr std::uint32_t kQueue = 100;       // samples of a gyro that is much quicker than the loop
+constexpr std::uint32_t kGyroQueue = 100;   // samples of a gyro that is much quicker than the loop
 
 bool isPose(const geometry_msgs::Pose& pose) {
   const auto& q = pose.orientation;
@@ -41,9 +41,9 @@ bool isCovariance(const Eigen::Matrix3d& matrix) {
 
 /// Apart, because the macro counts as a handful of branches.
 void warnRefused(double age, const std::optional<YawRate>& yaw) {
-  ROS_WARN_THROTTLE(kWarningPeriod, "BASE_GYRO_REFUSED: imu: a sample %g s old with yaw rate %g rad/s, %s",
-                    age, yaw ? yaw->rate : NAN,
-                    yaw ? "not finite, out of order or of another time" : "no gyro");
+  ROS_WARN_THROTTLE(kGyroWarningPeriod,
+                    "BASE_GYRO_REFUSED: imu: a sample %g s old with yaw rate %g rad/s, %s", age,
+                    yaw ? yaw->rate : NAN, yaw ? "not finite, out of order or of another time" : "no gyro");
 }
 
 }  // namespace
@@ -61,14 +61,14 @@ OdometryInput::OdometryInput(ros::NodeHandle& nh, Drive& drive, const OdometrySe
   } else {
     axis_ = Eigen::Vector3d(0, 0, settings.imu->axis == Axis::kUp ? 1 : -1);
   }
-  imu_ = nh.subscribe("imu", kQueue, &OdometryInput::onImu, this, ros::TransportHints().tcpNoDelay());
+  imu_ = nh.subscribe("imu", kGyroQueue, &OdometryInput::onImu, this, ros::TransportHints().tcpNoDelay());
 }
 
 void OdometryInput::check() {
   const Gyro* gyro = drive_.reckoning().gyro();
   if (!gyro || gyro->counts().fallbacks == fallbacks_) return;
   fallbacks_ = gyro->counts().fallbacks;
-  ROS_WARN_THROTTLE(kWarningPeriod, "BASE_GYRO_LOST: imu: nothing for %g s: odometry is open loop",
+  ROS_WARN_THROTTLE(kGyroWarningPeriod, "BASE_GYRO_LOST: imu: nothing for %g s: odometry is open loop",
                     gyro->settings().timeout);
 }
 
@@ -102,7 +102,7 @@ std::optional<Eigen::Vector3d> OdometryInput::axisOf(const std::string& frame) {
     axis_frame_ = frame;
     return axis_;
   } catch (const tf2::TransformException& error) {
-    ROS_WARN_THROTTLE(kWarningPeriod, "BASE_GYRO_FRAME: imu: %s", error.what());
+    ROS_WARN_THROTTLE(kGyroWarningPeriod, "BASE_GYRO_FRAME: imu: %s", error.what());
     return std::nullopt;
   }
 }

@@ -8,7 +8,7 @@
 namespace kurumaisu {
 namespace {
 
-constexpr double kRounding = 1e-12;  // of rates [m/s, rad/s] and, as a share, of slopes
+constexpr double kRampRounding = 1e-12;  // of rates [m/s, rad/s] and, as a share, of slopes
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr int kMostPhases =
     32;  // a way has at most seven, and two more through rest; against an endless loop
@@ -54,7 +54,7 @@ Ramp::Phase Ramp::next(double target) const {
   const double goal = aim(target);
   const double missing = goal - rest();
   const double scale = 1 + std::abs(goal) + std::abs(rate_) + std::abs(rest());
-  if (std::abs(missing) <= kRounding * scale) {  // on the last curve: the slope goes to 0
+  if (std::abs(missing) <= kRampRounding * scale) {  // on the last curve: the slope goes to 0
     const double jerk = std::copysign(limits_.jerk, -slope_);
     Phase landing{jerk, std::abs(slope_) / limits_.jerk, 0, goal};
     const double zero =
@@ -72,7 +72,7 @@ Ramp::Phase Ramp::rise(double goal, double rate, double slope) const {
   const double most = rate < 0 ? limits_.deceleration : limits_.acceleration;
   const double jerk = limits_.jerk;
   Phase phase{jerk, -slope / jerk, 0, kNan};
-  if (slope >= most * (1 - kRounding) && slope <= most * (1 + kRounding)) {
+  if (slope >= most * (1 - kRampRounding) && slope <= most * (1 + kRampRounding)) {
     const double missing = goal - rate - slope * slope / (2 * jerk);
     phase = {0, missing / slope, slope, kNan};
   } else if (slope > most) {

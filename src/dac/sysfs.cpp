@@ -22,7 +22,7 @@ Fault faultOf(int code, const std::string& file) {
 }
 
 Descriptor openFolder(const std::string& folder) {
-  Descriptor fd(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  Descriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!fd) throw Fault("DAC_NO_PORT: " + folder + ": " + serial::systemError(errno));
   return fd;
 }

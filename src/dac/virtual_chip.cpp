@@ -22,8 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kSupply = 5;         // [V] the end of its range
-constexpr double kMillivolts = 1000;  // [1/V]
+constexpr double kSupply = 5;               // [V] the end of its range
+constexpr double kMillivoltsOfVolt = 1000;  // [1/V]
 
 const IioSettings& iioOf(const Device& device) {
   const auto* iio = std::get_if<IioSettings>(&device.back_end);
@@ -81,7 +81,7 @@ void VirtualChip::plug() {
   fs::create_directories(folder_);
   for (const Signal signal : kWriteOrder) {
     write(attribute(signal, "_raw"), std::to_string(outputs_.codes()[signal]));
-    write(attribute(signal, "_scale"), std::to_string(kMillivolts * kSupply / (1 << settings_.bits)));
+    write(attribute(signal, "_scale"), std::to_string(kMillivoltsOfVolt * kSupply / (1 << settings_.bits)));
     write(attribute(signal, "_powerdown"), "1");
   }
   watch_ = Descriptor(checked(inotify_init1(IN_NONBLOCK | IN_CLOEXEC), "inotify"));

@@ -14,7 +14,7 @@
 namespace kurumaisu::laser {
 namespace {
 
-constexpr double kSlice = 0.05;  // [s] between two looks whether to go on
+constexpr double kTcpSlice = 0.05;  // [s] between two looks whether to go on
 
 using Address = std::unique_ptr<addrinfo, decltype(&freeaddrinfo)>;
 
@@ -45,7 +45,7 @@ Tcp::Tcp(const std::string& address, int port, double timeout, const std::functi
   int code = connect(socket_.fd(), target->ai_addr, target->ai_addrlen) == 0 ? 0 : errno;
   if (code == EINPROGRESS) {
     for (const double until = steadyTime() + timeout;
-         !socket_.wait(POLLOUT, std::min(kSlice, until - steadyTime()));) {
+         !socket_.wait(POLLOUT, std::min(kTcpSlice, until - steadyTime()));) {
       if (interrupted()) throw LinkLost(name + "interrupted");
       if (steadyTime() >= until) throw LinkLost(name + "no answer in " + std::to_string(timeout) + " s");
     }

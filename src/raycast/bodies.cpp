@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "raycast/bodies.h"
 
-#include <limits>
 #include <utility>
+
+#include "raycast/infinity.h"
 
 namespace kurumaisu {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// About the middle of the outline's bounding box.
 Bodies::Cylinder enclose(const std::vector<Face>& faces) {

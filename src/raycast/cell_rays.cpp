@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "raycast/cell_rays.h"
 
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "raycast/infinity.h"
+
 namespace kurumaisu {
 namespace {
 
-constexpr double kFarthest = 1 << 30;  // cells
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kFarthestCell = 1 << 30;  // cells
 
-bool same(const Pose& a, const Pose& b) {
+bool samePose(const Pose& a, const Pose& b) {
   return a.x == b.x && a.y == b.y && a.z == b.z && a.heading == b.heading;
 }
 
@@ -45,7 +45,7 @@ void CellRays::setPoses(const std::vector<int>& things, const Pose* poses) {
   }
   for (std::size_t i = 0; i < things.size(); ++i) {
     Thing& thing = things_[static_cast<std::size_t>(things[i])];
-    if (same(thing.pose, poses[i])) continue;
+    if (samePose(thing.pose, poses[i])) continue;
     regions_.remove(thing.drawing, things[i]);
     thing.pose = poses[i];
     pencil_.draw(thing.outline, thing.pose, thing.drawing);
@@ -56,7 +56,7 @@ void CellRays::setPoses(const std::vector<int>& things, const Pose* poses) {
 void CellRays::require(const Viewpoint& from, double range_max) const {
   if (!(range_max > 0))
     throw std::invalid_argument("range_max must be positive, not " + std::to_string(range_max));
-  if (!(range_max * cells_per_metre_ < kFarthest))
+  if (!(range_max * cells_per_metre_ < kFarthestCell))
     throw std::invalid_argument("range_max of " + std::to_string(range_max) + " m is beyond 2^30 cells");
   if (!pencil_.numbered(from.pose, 0))
     throw std::invalid_argument("an origin is not finite, or beyond 2^30 cells");

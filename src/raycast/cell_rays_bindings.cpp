@@ -19,7 +19,7 @@ int add(CellRays& rays, const py::array& parents, const Array& places, const Arr
   return rays.add(outlineOf(parents, places, edges, parts), std::move(values), asInt(tree, "tree"));
 }
 
-void setPoses(CellRays& rays, const py::array& bodies, const Array& poses) {
+void setThingPoses(CellRays& rays, const py::array& bodies, const Array& poses) {
   const std::vector<int> which = integers(bodies, -1, "bodies");
   const std::vector<Pose> where = posesOf(poses, bodies.size(), "poses");
   const py::gil_scoped_release release;
@@ -38,7 +38,7 @@ void bindCellRays(py::module_& m) {
            py::arg("returns"), py::arg("tree"),
            "Number of a new thing in the map's origin; outlines as of Cells.add_walls; returns (p,): ranger "
            "return of each model.")
-      .def("set_poses", &setPoses, py::arg("bodies"), py::arg("poses"),
+      .def("set_poses", &setThingPoses, py::arg("bodies"), py::arg("poses"),
            "Put things (b,) to poses (b, 4): x, y, z [m], heading [rad] of their frames in the map.")
       .def("scan", &scan<CellRays>, py::arg("origins"), py::arg("trees"), py::arg("fans"),
            "Ranges [m] and ranger returns as of Arena.scan.")

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <utility>
 
+#include "raycast/infinity.h"
+
 namespace kurumaisu {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Slope to a rise [m] at a distance [m], which may be 0.
 double slopeTo(double rise, double distance) {

@@ -13,7 +13,7 @@ namespace kurumaisu {
 namespace {
 
 constexpr double kHalfTurn = 3.14159265358979323846;  // [rad]
-constexpr double kFarthest = 1 << 30;                 // cells
+constexpr double kFarthestDrawn = 1 << 30;            // cells
 constexpr double kMostCells = 1e8;                    // of all outlines: some hundred MB
 
 bool finite(const Pose& p) {
@@ -92,7 +92,7 @@ Pencil::Extent Pencil::measure(const Outline& outline) const {
 }
 
 bool Pencil::numbered(const Pose& at, double reach) const {
-  return finite(at) && (std::max(std::abs(at.x), std::abs(at.y)) + reach) * cells_per_metre_ < kFarthest;
+  return finite(at) && (std::max(std::abs(at.x), std::abs(at.y)) + reach) * cells_per_metre_ < kFarthestDrawn;
 }
 
 Pencil::Frame Pencil::attached(const Frame& frame, const Pose& pose) {

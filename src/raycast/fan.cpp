@@ -6,10 +6,11 @@
 #include <cmath>
 #include <limits>
 
+#include "raycast/infinity.h"
+
 namespace kurumaisu {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kEnd = 1e-9;  // [m] a ray that passes so near to a segment's end may also meet its neighbour
 constexpr std::size_t kBlock = 16;  // beams for each pair of sine and cosine
 constexpr double kWidest = 1.0;     // [rad] between two probes

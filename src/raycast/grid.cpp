@@ -15,7 +15,7 @@ constexpr double kMargin = 1e-6;  // of a cell's edge; rounding of a walk over t
 // were alike.
 constexpr double kCellsPerSegment = 16.0;
 constexpr double kFewestCells = 1 << 12;
-constexpr double kMostCells = 1 << 22;
+constexpr double kMostGridCells = 1 << 22;
 
 int clampCell(double position, int count) {
   return static_cast<int>(std::clamp(std::floor(position), 0.0, count - 1.0));
@@ -68,7 +68,7 @@ void Grid::measure(const std::vector<Segment>& segments) {
   const double thin = 1e-3 * span;  // a single straight wall still has an area
   const double area = std::max(right - left_, thin) * std::max(top - bottom_, thin);
   const double cells =
-      std::clamp(kCellsPerSegment * static_cast<double>(segments.size()), kFewestCells, kMostCells);
+      std::clamp(kCellsPerSegment * static_cast<double>(segments.size()), kFewestCells, kMostGridCells);
   cell_ = std::sqrt(area / cells);
   width_ = std::max(1, static_cast<int>(std::ceil((right - left_) / cell_)));
   height_ = std::max(1, static_cast<int>(std::ceil((top - bottom_) / cell_)));

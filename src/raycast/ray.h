@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "raycast/grid.h"
+#include "raycast/infinity.h"
 
 namespace kurumaisu {
 
@@ -42,7 +42,6 @@ inline double rangeToLine(const Ends& e) {
 /// The test is on which side of the ray each end lies. Neighbours compute the side of a shared end from the
 /// same numbers, so a ray cannot slip between them.
 inline double rangeTo(const Ray& ray, const Segment& s) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   constexpr double kOnWall = 1e-12;  // [m] rounding may put a wall that the origin is on this far behind it
   const Ends e = endsOf(ray, s);
   if ((e.side_a > 0 && e.side_b > 0) || (e.side_a < 0 && e.side_b < 0)) return kInfinity;

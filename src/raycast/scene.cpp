@@ -3,18 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "raycast/fan.h"
+#include "raycast/infinity.h"
 #include "raycast/ray.h"
 
 namespace kurumaisu {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<Segment> checked(std::vector<Segment> segments) {
   for (std::size_t i = 0; i < segments.size(); ++i) {

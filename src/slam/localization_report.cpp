@@ -4,10 +4,10 @@
 #include <cmath>
 #include <sstream>
 
+#include "slam/percent.h"
+
 namespace kurumaisu {
 namespace {
-
-std::string percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
 
 std::string lost(const Localizer::Estimate& estimate) {
   return "LOCALIZATION_LOST: the scan does not fit the map where the chair was believed to be; searched: " +

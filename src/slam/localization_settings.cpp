@@ -57,14 +57,16 @@ void visitSettings(LocalizerSettings& s, Visit&& visit) {
 }
 
 /// visitSettings() as a value that templates take.
-constexpr auto kVisit = [](LocalizerSettings& settings, auto&& visit) { visitSettings(settings, visit); };
+constexpr auto kVisitLocalizer = [](LocalizerSettings& settings, auto&& visit) {
+  visitSettings(settings, visit);
+};
 
 }  // namespace
 
-std::vector<std::string> localizerSettingNames() { return namesOf<LocalizerSettings>(kVisit); }
+std::vector<std::string> localizerSettingNames() { return namesOf<LocalizerSettings>(kVisitLocalizer); }
 
 LocalizerSettings makeLocalizerSettings(const ValueOf& value_of) {
-  const auto settings = made<LocalizerSettings>(kVisit, value_of);
+  const auto settings = made<LocalizerSettings>(kVisitLocalizer, value_of);
   if (settings.max_particles < settings.min_particles) {
     throw std::invalid_argument("max_particles: must be at least min_particles: " +
                                 std::to_string(settings.max_particles));

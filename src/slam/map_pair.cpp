@@ -11,10 +11,10 @@ namespace kurumaisu {
 namespace {
 
 // As map_saver has them: src/kurumaisu/map_file.py, which reads the pair back in a test of mapping_node.
-constexpr int kOccupiedAbove = 65;    // [%]
-constexpr double kFreeBelow = 19.6;   // [%]
-constexpr unsigned char kWall = 0;    // shades
-constexpr unsigned char kFree = 254;  // 255 would be as free
+constexpr int kOccupiedAbove = 65;         // [%]
+constexpr double kFreeBelow = 19.6;        // [%]
+constexpr unsigned char kWallShade = 0;    // shades
+constexpr unsigned char kFreeShade = 254;  // 255 would be as free
 constexpr unsigned char kUnknown = 205;
 
 std::string imageOf(const OccupancyGrid& grid) {
@@ -23,8 +23,8 @@ std::string imageOf(const OccupancyGrid& grid) {
   for (int y = grid.height - 1; y >= 0; --y) {
     for (int x = 0; x < grid.width; ++x) {
       const int cell = grid.cells[static_cast<std::size_t>(y) * grid.width + x];
-      out.put(static_cast<char>(cell > kOccupiedAbove            ? kWall
-                                : cell >= 0 && cell < kFreeBelow ? kFree
+      out.put(static_cast<char>(cell > kOccupiedAbove            ? kWallShade
+                                : cell >= 0 && cell < kFreeBelow ? kFreeShade
                                                                  : kUnknown));
     }
   }

@@ -12,6 +12,7 @@
 #include "slam/filter.h"
 #include "slam/matcher.h"
 #include "slam/motion.h"
+#include "slam/percent.h"
 #include "slam/pose.h"
 #include "slam/slip.h"
 #include "slam/start.h"
@@ -25,8 +26,6 @@ constexpr int kFewestReadings = 3;       // fewer do not say where a scan was ta
 constexpr double kOdometryPeriod = 0.1;  // [s] odometry may come in steps so far apart
 constexpr double kMostDistance = 1.0;    // [m] deviation of the pose to go on from
 constexpr double kMostAngle = 0.5;       // [rad]
-
-std::string percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
 
 Pose2D scaled(const Pose2D& rate, double duration) {
   return {rate.x * duration, rate.y * duration, rate.theta * duration};

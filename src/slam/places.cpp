@@ -16,7 +16,7 @@ constexpr double kSame = 0.3;       // [m] places nearer than this
 constexpr double kSameAngle = 0.2;  // [rad] and no more turned than this are one
 constexpr double kHeadStart = 5;    // log-odds of the place that was believed
 constexpr int kFirstRounds = 12;
-constexpr int kRounds = 4;
+constexpr int kPlaceRounds = 4;
 constexpr double kFitGain = 0.3;  // share of a scan in the mean of a place's fit
 
 }  // namespace
@@ -54,7 +54,7 @@ void Places::addDoubted(const Pose2D& pose, const Beams& beams) {
 void Places::update(const Gaussian& motion, const Beams& beams) {
   for (Place& place : places_) {
     place.pose = moved(place.pose, motion);
-    align(place, beams, kRounds);
+    align(place, beams, kPlaceRounds);
     const Fit fit = sensor_->look(beams, place.pose.mean);
     place.fit += kFitGain * (fit.share() - place.fit);
     place.log_weight += settings_->power * fit.log_likelihood;

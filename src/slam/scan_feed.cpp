@@ -7,13 +7,13 @@
 namespace kurumaisu {
 namespace {
 
-constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
-constexpr double kWorkLimit = 0.1;      // [s] of work in a row before scans that wait are skipped
-constexpr std::size_t kQueue = 100;     // scans that may wait
+constexpr double kSlowWarningPeriod = 5.0;  // [s] of throttled warnings
+constexpr double kWorkLimit = 0.1;          // [s] of work in a row before scans that wait are skipped
+constexpr std::size_t kQueue = 100;         // scans that may wait
 
 // Apart, because the macro counts as a handful of branches.
 void warnSlow(const std::string& prefix, std::uint64_t skipped) {
-  ROS_WARN_THROTTLE(kWarningPeriod, "%s_TOO_SLOW: scan: skipped, %lu so far", prefix.c_str(), skipped);
+  ROS_WARN_THROTTLE(kSlowWarningPeriod, "%s_TOO_SLOW: scan: skipped, %lu so far", prefix.c_str(), skipped);
 }
 
 }  // namespace

@@ -16,8 +16,8 @@ constexpr double kHit = 3;  // deviations up to which a reading belongs to a wal
 constexpr double kInTheWay = 0.5;
 constexpr double kThroughWall = 2;
 constexpr double kImpossible =
-    0.1;  // likelihood of a reading through a wall, as a share of one from anywhere
-constexpr double kConverged = 1e-4;  // [m, rad] a step this small is the last
+    0.1;                            // likelihood of a reading through a wall, as a share of one from anywhere
+constexpr double kLastStep = 1e-4;  // [m, rad] a step this small is the last
 
 /// Places of base's frame in the grid's cells.
 struct Cells {
@@ -150,7 +150,7 @@ Aligned Sensor::align(const Beams& beams, const Pose2D& start, const Eigen::Matr
     const Eigen::Vector3d step = -information.inverse() * gradient;
     if (!step.allFinite()) return {start, prior};
     pose = {pose.x + step(0), pose.y + step(1), pose.theta + step(2)};
-    if (step.norm() < kConverged) break;
+    if (step.norm() < kLastStep) break;
   }
   return {compose(field_->mapFromGrid(), pose), turn * information * turn.transpose()};
 }

@@ -46,12 +46,12 @@ void visitSettings(MapperSettings& s, Visit&& visit) {
 }
 
 /// visitSettings() as a value that templates take.
-constexpr auto kVisit = [](MapperSettings& settings, auto&& visit) { visitSettings(settings, visit); };
+constexpr auto kVisitMapper = [](MapperSettings& settings, auto&& visit) { visitSettings(settings, visit); };
 
 }  // namespace
 
-std::vector<std::string> settingNames() { return namesOf<MapperSettings>(kVisit); }
+std::vector<std::string> settingNames() { return namesOf<MapperSettings>(kVisitMapper); }
 
-MapperSettings makeSettings(const ValueOf& value_of) { return made<MapperSettings>(kVisit, value_of); }
+MapperSettings makeSettings(const ValueOf& value_of) { return made<MapperSettings>(kVisitMapper, value_of); }
 
 }  // namespace kurumaisu

@@ -12,16 +12,16 @@
 namespace kurumaisu {
 namespace {
 
-constexpr int kBeams = 120;          // weighed
+constexpr int kStartBeams = 120;     // weighed
 constexpr double kWidth = 2.5;       // deviations to each side that are tried
 constexpr double kStep = 0.1;        // [m] between places tried
 constexpr double kAngleStep = 0.05;  // [rad]
 constexpr std::size_t kBest = 8;     // of them are aligned
-constexpr int kRounds = 10;
+constexpr int kStartRounds = 10;
 constexpr double kFloor = 0.01;  // [m, rad] deviation that is left at least
 
 ReadingSettings readings(const MapperSettings& s) {
-  return {kBeams,
+  return {kStartBeams,
           s.range,
           0,
           s.resolution,
@@ -74,7 +74,7 @@ Start findStart(const OccupancyGrid& map, const Scan& scan, const Gaussian& beli
   const Eigen::Matrix3d prior = believed.covariance.inverse();
   Start best{believed, -1};
   for (const Tried& each : tried(sensor, beams, believed)) {
-    const Aligned aligned = sensor.align(beams, each.pose, prior, kRounds);
+    const Aligned aligned = sensor.align(beams, each.pose, prior, kStartRounds);
     const double fit = sensor.look(beams, aligned.pose).share();
     if (fit > best.fit) best = {{aligned.pose, aligned.information.inverse()}, fit};
   }

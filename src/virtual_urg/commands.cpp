@@ -8,6 +8,7 @@
 #include "scip/code.h"
 #include "virtual_urg/frames.h"
 #include "virtual_urg/settings.h"
+#include "virtual_urg/statuses.h"
 
 namespace kurumaisu::virtual_urg {
 namespace {
@@ -15,12 +16,10 @@ namespace {
 constexpr std::size_t kLabelLength = 17;  // ; and 16 letters
 constexpr std::size_t kClockWidth = 4;    // characters
 
-constexpr const char* kGood = "00";
 constexpr const char* kTooFew = "0C";
 constexpr const char* kUnknown = "0E";
 constexpr const char* kAdjusting = "0A";  // ASSUMPTION: C-42-03320B says that it refuses, not how
 constexpr const char* kLaserOff = "10";
-constexpr const char* kBroken = "50";
 
 /// Characters after the two of the name; all others are unknown.
 constexpr std::array<std::pair<const char*, std::size_t>, 17> kArguments{{{"VV", 0},

@@ -24,7 +24,7 @@ void require(bool holds, const std::string& what) {
   if (!holds) throw std::invalid_argument(what);
 }
 
-Model checked(Model model) {
+Model checkedModel(Model model) {
   const scip::Parameters parameters = parametersOf(model.parameters);
   const auto& bauds = model.bauds;
   require(model.end_step >= parameters.last && model.end_step < kMostSteps,
@@ -55,7 +55,9 @@ bool isGood(std::string_view answer, std::size_t echo) {
 }  // namespace
 
 Device::State::State(Model kind, std::vector<Fault> all)
-    : model(checked(std::move(kind))), parameters(parametersOf(model.parameters)), faults(std::move(all)) {}
+    : model(checkedModel(std::move(kind))),
+      parameters(parametersOf(model.parameters)),
+      faults(std::move(all)) {}
 
 std::uint32_t Device::State::clockAt(double time) const {
   const double total = clock.start + (time - clock_zero) * kMilliseconds * (1 + clock.drift) + kClockSlack;

@@ -12,7 +12,7 @@ namespace kurumaisu::virtual_urg {
 namespace {
 
 constexpr std::size_t kLineLength = 64;    // characters of data
-constexpr std::size_t kClockWidth = 4;     // characters
+constexpr std::size_t kStampWidth = 4;     // characters
 constexpr std::size_t kDistanceWidth = 3;  // of a beam with intensity
 constexpr double kMillimetres = 1000;
 constexpr int kMost = (1 << 18) - 1;  // in three characters
@@ -129,7 +129,7 @@ std::string scanBody(const scip::Request& request, std::uint32_t clock, const St
     data += encoded(steps.distances[step], width);
     if (intense) data += encoded(steps.intensities[step], kDistanceWidth);
   }
-  std::string body = summed(scip::encode(clock, kClockWidth));
+  std::string body = summed(scip::encode(clock, kStampWidth));
   for (std::size_t at = 0; at < data.size(); at += kLineLength)
     body += summed(std::string_view(data).substr(at, kLineLength));
   return body;

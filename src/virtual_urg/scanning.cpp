@@ -4,6 +4,7 @@
 
 #include "virtual_urg/damage.h"
 #include "virtual_urg/state.h"
+#include "virtual_urg/statuses.h"
 
 namespace kurumaisu::virtual_urg {
 namespace {
@@ -11,10 +12,8 @@ namespace {
 constexpr int kPlayFrom = 20;        // scans that DB lets pass before its part begins
 constexpr int kTrouble = 50;         // from this status on the hardware is in trouble
 constexpr double kDribble = 0.8;     // of a turn
-constexpr const char* kGood = "00";  // of a single scan
 constexpr const char* kData = "99";  // of a stream's
 constexpr const char* kVerifying = "21";
-constexpr const char* kBroken = "50";
 constexpr const char* kResumed = "98";
 
 /// Status of trouble, of which II tells.

@@ -17,8 +17,6 @@
 namespace kurumaisu::virtual_urg {
 namespace {
 
-constexpr double kNever = Outbox::kNever;
-
 /// Waits so long [s] for one of the descriptors.
 template <std::size_t N>
 void pollFor(std::array<pollfd, N>& descriptors, double seconds) {
@@ -51,7 +49,7 @@ void Server::serve() {
   while (!stopping_) {
     const double now = steadyTime();
     if (now >= back_at_) {
-      back_at_ = kNever;
+      back_at_ = Outbox::kNever;
       endpoint_->plug();
     }
     if (options_.pace == Pace::kReal) turn(now);

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "virtual_urg/statuses.h"
+
 namespace kurumaisu::virtual_urg {
 namespace {
 
 // Statuses as C-42-03320B lists them, 8.3 to 8.10.
-constexpr const char* kGood = "00";
 constexpr int kSlowest = 10;       // of CR; each is 1 % less
 constexpr int kInitialSpeed = 99;  // of CR
 constexpr double kPercent = 0.01;

@@ -13,7 +13,7 @@ namespace {
 
 // [bytes] that the system may hold for a client that does not read: a few scans, as in the sensor, not a minute of them.
 constexpr int kSendBuffer = 16384;
-constexpr std::size_t kPiece = 4096;  // [bytes] read at once
+constexpr std::size_t kTcpPiece = 4096;  // [bytes] read at once
 
 sockaddr_in addressOf(const std::string& host, std::uint16_t port) {
   sockaddr_in address{};
@@ -66,7 +66,7 @@ bool Tcp::accept() {
 }
 
 std::optional<std::string> Tcp::read() {
-  std::string bytes(kPiece, '\0');
+  std::string bytes(kTcpPiece, '\0');
   const ssize_t count = recv(client_.get(), bytes.data(), bytes.size(), 0);
   if (count > 0) {
     bytes.resize(static_cast<std::size_t>(count));
