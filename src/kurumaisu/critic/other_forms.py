@@ -23,7 +23,7 @@ from kurumaisu.types import FloatArray
 _SIZES = (0.25, 0.5, 1.5, 2.0, 3.0)
 _MISSED = (0.05, 0.15)  # what an equation may miss, as a share of its signal's norm, 1 sd
 _LOUD = 15.0  # norm of a signal from which that could show
-_LEAST = 3.0  # [nat] by which it must be likelier than nothing
+_LEAST = 3.0  # [nat] by which it must be likelier than nothing, and than one more effect
 _WEIGHED = 6  # sets, the best ones, besides parts of the best one
 _NEAR = 1.05  # times a size, which says what a fit does itself
 _BENT = 0.05  # share of a mark that a fit must not be able to do itself, else it is no other form
@@ -50,7 +50,7 @@ def missed(problem: Problem, found: Naming) -> tuple[Missed | None, Fit]:
         gain, what = _missed(problem, fit)
         return log_posterior(fit, len(found.p)) + gain, fit, what
 
-    best = max((worth(fit) for fit in found.fits[:_WEIGHED]), key=lambda one: one[0])
+    first = best = max((worth(fit) for fit in found.fits[:_WEIGHED]), key=lambda one: one[0])
     while len(best[1].candidates) > 1:
         parts = [best[1].candidates - {one} for one in sorted(best[1].candidates, key=lambda one: one.id)]
         fits = [known.get(part) or problem.fit_candidates(part, best[1].start) for part in parts]
@@ -58,7 +58,8 @@ def missed(problem: Problem, found: Naming) -> tuple[Missed | None, Fit]:
         if fewer[0] <= best[0]:
             break
         best = fewer
-    return best[2], best[1]
+    _, fit, what = best if best[0] > first[0] + _LEAST else first
+    return what, fit
 
 
 def _missed(problem: Problem, fit: Fit) -> tuple[float, Missed | None]:
