@@ -48,7 +48,7 @@ def test_a_size_is_no_surer_than_the_form_that_it_belongs_to(tmp_path):
         told = [EffectSetting(name, values)]
         assembly = Assembly(replace(shots, measured=marks.base + marks.together(told)))
         forms = [form for form in assembly.forms if form.id == name]
-        fit = pinned(assembly, assembly.settle(None), forms, told, None, None)
+        fit = pinned(assembly, assembly.settle(None), forms, told, None, {}, None)
         ((setting, known),) = fit.settings
         assert setting.parameters[name.removeprefix("laser.")] == pytest.approx(next(iter(values.values())), rel=1e-3)
         missed[name] = fit.missed
@@ -90,4 +90,5 @@ def test_only_equations_that_are_nearly_right_may_have_scans_off_together(name, 
     made = SimpleNamespace(parts=lambda: [Part(name, slice(0, 1), np.array([0.005]))])
     assembly = SimpleNamespace(columns=columns, free=[SimpleNamespace(id="a.map")])
     normal = SimpleNamespace(beam_noise=SimpleNamespace(valid=np.ones((2, 4), dtype=bool)))
-    assert _spread_of(assembly, normal, made) == pytest.approx(spread)
+    assert _spread_of(assembly, normal, made, {}) == pytest.approx(spread)
+    assert _spread_of(assembly, normal, made, {name: SimpleNamespace()}) == 0.0

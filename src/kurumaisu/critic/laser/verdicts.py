@@ -95,7 +95,7 @@ def criticise(
     if not made.curve and not assembly.strange:
         seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms)
         scatter = with_whole_scans(scatter, seen, fit.normal.scan_noise, recording, ids)
-        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made))
+        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made, others))
     finding = _finding(assembly, normal, made, fit, scatter)
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
@@ -267,10 +267,14 @@ def size_of(change: FloatArray) -> float:
     return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))
 
 
-def _spread_of(assembly: Assembly, normal: Normal, made: _Made) -> float:
-    """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others."""
+def _spread_of(assembly: Assembly, normal: Normal, made: _Made, others: Mapping[str, OtherForm]) -> float:
+    """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others.
+
+    others: the curves that some of it may follow instead, in which no scans are off together.
+    """
     valid, blocks = normal.beam_noise.valid, {free.id for free in assembly.free}
     parts = [part for part in made.parts() if part.id in blocks or effects.by_id(part.id).empirical]
+    parts = [part for part in parts if part.id not in others]
     moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in parts]
     return float(np.std(sum(moved))) if moved else 0.0
 
