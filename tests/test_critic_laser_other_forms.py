@@ -64,6 +64,18 @@ def test_what_an_effect_follows_is_found_by_drawing_what_it_does(covariate, chan
     assert np.trace(gram @ prior) == pytest.approx(FORM**2 * np.sum(moved**2))
 
 
+@pytest.mark.parametrize("readings", [0, 1, SCANS * BEAMS])
+def test_what_is_the_same_everywhere_is_drawn_by_finite_curves(readings):
+    """All walls are as dark; and of no reading, nothing is drawn."""
+    shots, seen, _ = scene(np.random.default_rng(4))
+    change = np.full(seen.ranges.shape, 0.01)
+    found = other_form(change, shots, seen, np.arange(change.size).reshape(change.shape) < readings)
+    assert (found is None) == (readings < 2)
+    if found is not None:
+        assert np.isfinite(found.columns(shots, seen)).all()
+        assert np.isfinite(found.prior).all()
+
+
 def test_coefficients_integrated_out_are_noise_of_their_covariance():
     rng = np.random.default_rng(1)
     every, root = rng.standard_normal((40, 5)), rng.standard_normal((2, 2))

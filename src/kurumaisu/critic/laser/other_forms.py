@@ -64,11 +64,13 @@ def other_form(change: FloatArray, shots: Shots, seen: Look, valid: BoolArray) -
     step = max(int(known.sum()) // _SAMPLES, 1)
     target = change[known][::step]
     whole = float(target @ target)
+    if whole == 0.0:
+        return None
     best, least = None, _DRAWN * whole
     for name in (*_FOLLOWED, _RETURNS):
         values = _values(name, shots, seen)[known][::step]
         fine = np.unique(values) if name == _RETURNS else _knots(values, _FINE)
-        if whole == 0.0 or len(fine) < 2 or (name == _RETURNS and len(fine) > _MOST):
+        if len(fine) < 2 or (name == _RETURNS and len(fine) > _MOST):
             continue
         left = _left(_steps(fine, values) if name == _RETURNS else _hats(fine, values), target)
         if left < least:
@@ -93,7 +95,7 @@ def _over(name: str, values: FloatArray, change: FloatArray) -> OtherForm:
     fine = _knots(values, _FINE)
     drawn = _fitted(_hats(fine, values), change)
     ways = (fine, np.searchsorted(np.sort(values), fine), np.cumsum(np.abs(np.diff(drawn, prepend=drawn[:1]))))
-    along = np.sum([(way - way[0]) / (way[-1] - way[0]) for way in ways], axis=0)
+    along = np.sum([(way - way[0]) / max(float(way[-1] - way[0]), 1e-300) for way in ways], axis=0)
     knots = np.interp(np.linspace(0.0, along[-1], _HATS), along, fine)
     # Rough or smooth along these, with a level of its own or without: nobody knows.
     every = priors_of(np.arange(_HATS, dtype=float), _hats(knots, values))
