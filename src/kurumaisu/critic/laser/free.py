@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kurumaisu import effects
 from kurumaisu.critic.laser.columns import Marks
-from kurumaisu.critic.laser.shots import Shots
+from kurumaisu.critic.laser.shots import Look, Shots
 from kurumaisu.critic.laser.walls import Rays
 from kurumaisu.critic.smooth_basis import Basis, knots_of, priors_of
 from kurumaisu.effects import Echoes, Parameter
@@ -122,11 +122,7 @@ def _slope(shots: Shots, ranges: FloatArray) -> FloatArray:
 
 
 def _curves(shots: Shots, marks: Marks) -> Iterator[tuple[Free, FloatArray]]:
-    seen = marks.seen
-    still = np.where(np.isfinite(seen.ranges), seen.ranges, 0.0)
-    stamp: Any = shots.stamps[:, np.newaxis]
-    bearings = np.broadcast_to(shots.laser.bearings, still.shape)
-    echoes = Echoes(stamp, bearings, still, seen.incidence, seen.returns, still, still, still, still, seen.origins)
+    echoes = echoes_of(shots, marks.seen)
     known = np.isfinite(marks.base)
     for name, of in effects.RANGE_COVARIATES.items():
         at = np.asarray(of(echoes), dtype=float)
@@ -144,6 +140,14 @@ def _curves(shots: Shots, marks: Marks) -> Iterator[tuple[Free, FloatArray]]:
         basis = Basis(name, knots, {}, priors, float(low), float(high))
         columns = basis.matrix(at.ravel()).reshape(*at.shape, len(knots))
         yield Free(effects.smooth_range_id(name), None, basis, priors, slice(0), whole), columns
+
+
+def echoes_of(shots: Shots, seen: Look) -> Echoes:
+    """Return what the beams (k, b) of all scans meet, for curves over it; of nothing, at a range of 0."""
+    still = np.where(np.isfinite(seen.ranges), seen.ranges, 0.0)
+    stamp: Any = shots.stamps[:, np.newaxis]
+    bearings = np.broadcast_to(shots.laser.bearings, still.shape)
+    return Echoes(stamp, bearings, still, seen.incidence, seen.returns, still, still, still, still, seen.origins)
 
 
 def _knots(values: FloatArray) -> FloatArray:

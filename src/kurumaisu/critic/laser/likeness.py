@@ -53,6 +53,10 @@ class Likeness:
         """Return how far numbers are from the model's own, in sds."""
         return np.asarray((numbers - self.offset) / self.sd)
 
+    def moves_places(self, change: FloatArray) -> bool:
+        """Return whether a change of the numbers (m,) moves the places of piles, by more than chance."""
+        return bool((np.abs(change / self.sd)[self._places] >= _FAR).any())
+
     def cost(self, numbers: FloatArray) -> float:
         """Return the negative log likelihood of the measured numbers for simulated ones, 0 for a perfect model."""
         lower = self._root(numbers)

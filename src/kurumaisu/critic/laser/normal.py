@@ -16,6 +16,7 @@ from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, grid_step
 from kurumaisu.critic.laser.displaced import displaced
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate, marginal, whitened
+from kurumaisu.critic.laser.other_forms import OtherForm
 from kurumaisu.critic.laser.path import Sight, Steady, steady
 from kurumaisu.critic.laser.shots import Shots, look, own_with, predict, rows_of
 from kurumaisu.critic.laser.sought import moved, stands
@@ -76,6 +77,7 @@ class Assembly:
         # A beam that meets nothing with one of the effects at work says nothing about it.
         self.first = replace(self.first, valid=self.first.valid & np.isfinite(self.columns).all(axis=2))
         self._fixed = fixed.shape[2]
+        self._nuisance = slice(0, 0)
 
     def _linearise(self, shots: Shots, *, roughly: bool) -> None:
         """Predict at the shots' shifted poses; the residual is as of the reference's own.
@@ -193,7 +195,7 @@ class Assembly:
         seen, layout, grid = self.marks.seen, self.layout, grid_step(self.shots.measured)
         for _ in range(_ROUNDS):
             beam = refined(self.first, beam, lambda last: self.leftover(last, project), seen, layout, grid)
-        narrow = max((free.span.stop for free in self.free if free.whole), default=self._fixed)
+        narrow = max(self._fixed, self._nuisance.stop, *(free.span.stop for free in self.free if free.whole))
         grams, cross = self._crossed(beam, narrow)
         scan = estimate(grams, self.layout, truth, project)
         gram = without_beams(grams, cross, self.layout, scan, beam.own_sd)
@@ -202,6 +204,7 @@ class Assembly:
     def _projected(self, fitted: Sequence[Form]) -> IntArray:
         """Return the columns of every effect, and of the blocks that change whole scans."""
         spans = [form.span for form in self._plain(fitted)] + [free.span for free in self.free if free.whole]
+        spans.append(self._nuisance)
         return np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
 
     def common_mode(self, normal: Normal, truth: tuple[float, float] | None, fitted: Sequence[Form]) -> CommonMode:
@@ -228,6 +231,14 @@ class Assembly:
             shift=np.zeros_like(self.shots.shift),
         )
         return Assembly(shots, frozenset())
+
+    def beside(self, others: Sequence[OtherForm]) -> Assembly:
+        """Return the same scans with columns of what effects may do instead, of which no noise is made, either."""
+        out, count = copy(self), self.columns.shape[2]
+        more = [each.columns(self.shots, self.marks.seen).astype(np.float32) for each in others]
+        out.columns = np.concatenate([self.columns, *more], axis=2)
+        out._nuisance = slice(count, out.columns.shape[2])
+        return out
 
     def products(self, normal: Normal, columns: FloatArray, residual: FloatArray) -> FloatArray:
         """Return the normal equations of other columns (k, b, m) and another residual (k, b), in the noise known."""

@@ -10,12 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from kurumaisu import effects
 from kurumaisu.critic.laser.columns import Form
 from kurumaisu.critic.laser.normal import Assembly, Normal
+from kurumaisu.critic.laser.other_forms import OtherForm
 from kurumaisu.critic.laser.rivals import Rival
 from kurumaisu.critic.smooth_alike import FORM
 from kurumaisu.effects import Parameter
@@ -64,15 +67,18 @@ def pinned(
     forms: Sequence[Form],
     settings: Sequence[EffectSetting],
     winner: Rival | None,
+    others: Mapping[str, OtherForm],
     truth: tuple[float, float] | None,
 ) -> Pinned:
     """Return the forms, refitted together.
 
-    winner: a block that acts beside them, whose coefficients are integrated out; truth: known sd of the reference.
+    winner: a block that acts beside them, whose coefficients are integrated out; others: what some of them may do
+    instead, which is not left over either; truth: known sd of the reference.
     """
     if not forms and winner is None:
         return Pinned((), assembly, normal, assembly.residual, np.empty((*assembly.residual.shape, 0)))
     at = [dict(setting.parameters) for setting in settings]
+    curves = [others[form.id] for form in forms if form.id in others]
     block = _block(assembly, winner)
     # What is as large as a reading's own scatter has moved poses, and made outliers of readings, as much.
     moving = _loud(assembly, normal, _settings(forms, at)) or any(
@@ -84,7 +90,7 @@ def pinned(
     for _ in range(_ROUNDS if moving else 1):
         if moving:
             # Where the chair was, which scans count and how they scatter: all of that was found without the effect.
-            assembly = assembly.again(_settings(forms, at))
+            assembly = assembly.again(_settings(forms, at)).beside(curves)
             normal = normal if winner is not None else assembly.settle(truth)
         before = _values(free, at)
         for _ in range(_STEPS):
@@ -101,6 +107,10 @@ def pinned(
     signals = _signals(assembly, _settings(forms, at), {i: absent[i] for i in guessed})
     slopes = [_slope(assembly, forms, at, each) for each in free]
     sds = np.hypot(sds, _doubt(assembly, normal, free, (slopes, guessed, signals)) * sds)
+    drawn = {i: others[forms[i].id] for i in guessed if forms[i].id in others}
+    left = left - _instead(
+        assembly, normal, (free, slopes, block), (drawn, dict(zip(guessed, signals, strict=True))), left
+    )
     out: list[dict[str, float]] = [{} for _ in forms]
     for each, sd in zip(free, sds.tolist(), strict=True):
         out[each.index][each.parameter.name] = sd
@@ -169,6 +179,40 @@ def _doubt(
     own = np.array([[each.index == i for i in guessed] for each in free])
     share = np.where(own, alike**2 + (1 - alike**2) / _WAYS, alike**2 / _WAYS)
     return np.asarray(FORM * np.sqrt(share @ norms[count:] ** 2))
+
+
+def _instead(
+    assembly: Assembly,
+    normal: Normal,
+    fitted: tuple[Sequence[_Free], Sequence[FloatArray], FloatArray],
+    instead: tuple[Mapping[int, OtherForm], Mapping[int, FloatArray]],
+    left: FloatArray,
+) -> FloatArray:
+    """Return what of the rest (k, b) [m] effects would do by other curves than their equations.
+
+    fitted: the parameters, how the mean follows each, and a block beside them; instead: the curves, and what the
+    equations do, both by effect.
+    """
+    (free, slopes, block), (curves, signals) = fitted, instead
+    if not curves:
+        return np.zeros_like(left)
+    parts = [curve.columns(assembly.shots, assembly.marks.seen) for curve in curves.values()]
+    known = [*(slope[:, :, np.newaxis] for slope in slopes), block, *(signals[i][:, :, np.newaxis] for i in curves)]
+    every = np.concatenate([*known, *parts], axis=2)
+    gram = assembly.products(normal, every, left)
+    fixed = len(slopes) + block.shape[2]
+    powers = np.diag(gram)[fixed : fixed + len(curves)]
+    ends = np.cumsum([fixed + len(curves), *(part.shape[2] for part in parts)])
+    places = [np.arange(low, high) for low, high in pairwise(ends)]
+    priors = [
+        curve.scaled(gram[np.ix_(own, own)], power)
+        for curve, own, power in zip(curves.values(), places, powers.tolist(), strict=True)
+    ]
+    sizes = np.r_[np.array([each.prior for each in free]), np.ones(block.shape[2])]
+    use = np.concatenate([np.arange(fixed), *places])
+    prior = block_diag(np.diag(sizes**2), *priors)
+    inner = np.eye(len(use)) + gram[np.ix_(use, use)] @ prior
+    return np.asarray(every[:, :, use] @ (prior @ np.linalg.solve(inner, gram[use, -1])))
 
 
 def _settings(forms: Sequence[Form], at: Sequence[dict[str, float]]) -> list[EffectSetting]:

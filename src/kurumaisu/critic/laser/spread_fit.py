@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from kurumaisu.types import BoolArray, FloatArray
 
 _NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
 _SIZES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # in units of a parameter's scale, tried first
+_FINELY = 4  # steps between two of these of what says where readings pile up
 _ROUNDS = 4  # Gauss-Newton steps of a refit
 _SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
 _FARTHEST = 3.0  # such a step, in units of the first difference
@@ -112,14 +114,30 @@ class ScatterFit:
             null = self._simulate.null(effect)
             for p in self._parameters(effect):
                 found: list[Push] = []
+                least = 0.0
                 for value in sorted(_sizes(p), key=lambda value: -abs(value - p.null)):
                     moved = self._numbers((EffectSetting(effect.id, {**null, p.name: value}),), 1)
                     if np.array_equal(moved, plain):
+                        least = value
                         break  # it only shapes what others do, or does nothing when it is smaller
                     found.append(Push(effect, p.name, value, moved - plain))
                 if not found:
                     self._shapes.add((effect.id, p.name))
                 yield from reversed(found)
+                if any(self.likeness.moves_places(push.change) for push in found):
+                    yield from self._between(found, least, plain)
+
+    def _between(self, found: Sequence[Push], least: float, plain: FloatArray) -> Iterator[Push]:
+        """Yield a parameter's pushes at values between those tried; least: one that did nothing.
+
+        Where readings pile up is known to a step of them: from half or twice as far off no small step leads there.
+        """
+        values, null = sorted({least, *(push.value for push in found)}), self._simulate.null(found[0].effect)
+        for low, high in pairwise(values):
+            if low > 0:
+                for value in np.geomspace(low, high, _FINELY + 1)[1:-1].tolist():
+                    setting = EffectSetting(found[0].effect.id, {**null, found[0].name: value})
+                    yield replace(found[0], value=value, change=self._numbers((setting,), 1) - plain)
 
     def candidates(self, without: set[type[Mechanism]]) -> Iterator[type[Mechanism]]:
         """Yield the effects that may be looked for, without some."""

@@ -10,9 +10,11 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.laser import pictures, rivals, still
+from kurumaisu.critic.laser.company import company, forms_beside
 from kurumaisu.critic.laser.estimates import estimates_of, of_block, settings_of, with_scatter
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.normal import Assembly, Normal
+from kurumaisu.critic.laser.other_forms import OtherForm
 from kurumaisu.critic.laser.pictures import NO_PICTURES, Part, Pictures, misfits, noise_rows
 from kurumaisu.critic.laser.pinned import Pinned, pinned
 from kurumaisu.critic.laser.rivals import Rival, Weighed
@@ -83,16 +85,17 @@ def criticise(
         found = Search(assembly.forms, normal.gram).run()
     normal = assembly.full(normal)
     made = _made(assembly, normal, found)
+    others = forms_beside(assembly, normal, made.fit)
+    made = made.beside(assembly, normal, others)
     progress("laser: fitting what acts")
-    fit = pinned(assembly, normal, made.fit.forms, settings_of(assembly, made.fit), made.winner, recording.truth)
+    acting = settings_of(assembly, made.fit)
+    fit = pinned(assembly, normal, made.fit.forms, acting, made.winner, others, recording.truth)
     progress("laser: weighing effects on the scatter")
     scatter, comparison = ([], ()) if assembly.strange else _scatter(assembly, fit, ids, strange=made.curve)
     if not made.curve and not assembly.strange:
-        # Seen anew, scans have no forms to project out; where they were not, effects may have moved them all together.
-        again = fit.assembly is not assembly
-        seen = fit.assembly.common_mode(fit.normal, recording.truth, () if again else made.fit.forms)
+        seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms)
         scatter = with_whole_scans(scatter, seen, fit.normal.scan_noise, recording, ids)
-        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made))
+        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made, others))
     finding = _finding(assembly, normal, made, fit, scatter)
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
@@ -126,6 +129,17 @@ class _Made:
     def curve(self) -> bool:
         """Whether a curve acts, which is in no catalogue."""
         return self.winner is not None and self.winner.free.basis is not None
+
+    def beside(self, assembly: Assembly, normal: Normal, others: Mapping[str, OtherForm]) -> _Made:
+        """Return the same without effects that others of another form explain; of a curve, which is unlike any, all."""
+        if self.curve:
+            return self
+        fit, winner = company(assembly, normal, self.found, (self.fit, self.winner), others)
+        if fit is self.fit and winner is self.winner:
+            return self
+        if winner is None:
+            return _Made(self.weighed, fit, None, np.empty(0), np.empty((0, 0)))
+        return _Made(self.weighed, *_with(winner, normal))
 
     def parts(self) -> list[Part]:
         """Return what acts, one by one."""
@@ -253,10 +267,14 @@ def size_of(change: FloatArray) -> float:
     return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))
 
 
-def _spread_of(assembly: Assembly, normal: Normal, made: _Made) -> float:
-    """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others."""
+def _spread_of(assembly: Assembly, normal: Normal, made: _Made, others: Mapping[str, OtherForm]) -> float:
+    """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others.
+
+    others: the curves that some of it may follow instead, in which no scans are off together.
+    """
     valid, blocks = normal.beam_noise.valid, {free.id for free in assembly.free}
     parts = [part for part in made.parts() if part.id in blocks or effects.by_id(part.id).empirical]
+    parts = [part for part in parts if part.id not in others]
     moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in parts]
     return float(np.std(sum(moved))) if moved else 0.0
 
