@@ -32,9 +32,16 @@ def found_of(*sets, confounded=()):
     return Naming((*map(fit_of, sets), fit_of("")), defaultdict(lambda: 1.0), confounded, 0.0)
 
 
+def undriven():
+    """Return a problem of which nothing is asked."""
+    problem = SimpleNamespace(missed=None)
+    problem.changed = lambda **_: problem
+    return problem
+
+
 def decision(found, better=None):
     beyond = Beyond(Rivalry((), -np.inf, {}, {}, 0.0), None, 1.0, better)
-    return Decision(SimpleNamespace(), found, Growth(0.0, 0.0, START), beyond)
+    return Decision(undriven(), found, Growth(0.0, 0.0, START), beyond)
 
 
 def test_what_is_named_is_in_no_set():
@@ -62,7 +69,7 @@ def judged(monkeypatch):
 
 
 def decided():
-    return decide.decide(SimpleNamespace(), None, lambda _: None)
+    return decide.decide(undriven(), None, lambda _: None)
 
 
 def test_noise_taken_about_a_set_that_is_not_the_best_is_taken_again(judged):
