@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from kurumaisu.critic.laser.columns import Column, Form
+from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.free import Free
 from kurumaisu.critic.laser.grids import grid_of
 from kurumaisu.critic.laser.reframed import from_base_link
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.trust import trusted_place
 from kurumaisu.critic.laser.twins import twins
-from kurumaisu.critic.laser.verdicts import LaserFinding
 from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.critic.verdict import Cause, Estimate
 from kurumaisu.effects import Parameter

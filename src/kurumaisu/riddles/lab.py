@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.laser.verdicts import LaserFinding
+from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
 from kurumaisu.critic.recording import LaserMount, Recording, Series
 from kurumaisu.critic.rehearsal import Manner, Rehearsal

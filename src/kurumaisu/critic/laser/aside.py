@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.shots import missing
-from kurumaisu.critic.laser.verdicts import LaserFinding, criticise
+from kurumaisu.critic.laser.verdicts import criticise
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.worker import Progress, Worker
 from kurumaisu.params import Model, load_model

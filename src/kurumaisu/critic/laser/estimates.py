@@ -28,15 +28,14 @@ def settings_of(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
         start += len(form.columns)
         effect = effects.by_id(form.id)
         if len(form.columns) > 1 and form.columns[0].beside:
-            nulls = {p.name: p.null for p in effect.parameters}
-            out.append(EffectSetting(form.id, {**nulls, **assembly.marks.joined(form, at)}))
+            out.append(EffectSetting(form.id, {**assembly.marks.null(effect), **assembly.marks.joined(form, at)}))
             continue
-        values = {p.name: p.null for p in effect.parameters}
+        values = assembly.marks.null(effect)
         for column, coefficient in zip(form.columns, at.tolist(), strict=True):
             if column.squared:
                 values |= _squared(effect, form.at, coefficient)
             else:
-                values[column.parameter.name] = column.parameter.null + column.parameter.scale * coefficient
+                values[column.parameter.name] += column.parameter.scale * coefficient
         shape = {} if form.columns[0].squared else form.at
         values |= shape
         # Two effects that nearly cancel are fitted as sums, which no bound stops.

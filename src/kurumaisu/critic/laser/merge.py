@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from kurumaisu.critic.explain import Criticism
-from kurumaisu.critic.laser.verdicts import LaserFinding
+from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.verdict import Kind
 from kurumaisu.critic.words import named
 

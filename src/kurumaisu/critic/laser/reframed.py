@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.laser.verdicts import LaserFinding
+from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.verdict import NORMAL90, Cause
 from kurumaisu.effects import BeamEffect, Beams, Context, Reference, ReferenceEffect

@@ -12,10 +12,12 @@ from kurumaisu import effects
 from kurumaisu.critic.laser import pictures, rivals, still
 from kurumaisu.critic.laser.company import company, forms_beside
 from kurumaisu.critic.laser.estimates import estimates_of, of_block, settings_of, with_scatter
+from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.lacking import lacking
+from kurumaisu.critic.laser.leading import leading, with_lead
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.other_forms import OtherForm
-from kurumaisu.critic.laser.pictures import NO_PICTURES, Part, Pictures, misfits, noise_rows
+from kurumaisu.critic.laser.pictures import Part, Pictures, misfits, noise_rows
 from kurumaisu.critic.laser.pinned import Pinned, pinned
 from kurumaisu.critic.laser.rivals import Rival, Weighed
 from kurumaisu.critic.laser.search import Fitted, Found, Search
@@ -30,35 +32,16 @@ from kurumaisu.critic.laser.unknowns import unknowns
 from kurumaisu.critic.laser.whole_scans import beyond, with_whole_scans
 from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.replay import extend
 from kurumaisu.critic.smooth_alike import FORM
 from kurumaisu.critic.story import Comparison
-from kurumaisu.critic.verdict import Cause, NextExperiment, Unknown
-from kurumaisu.params import EffectSetting, Model
+from kurumaisu.critic.verdict import Cause, NextExperiment
+from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
 MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
 _SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
 Progress = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class LaserFinding:
-    """What the scans say.
-
-    causes: named and material; confounded: sets of which one acts; unknown: what is in no catalogue; settings: what
-    extends the model; details, pictures: for the report; small: certain, but they do not matter; refused: why there
-    is no laser criticism, None where there is; next_experiment: what supplies what the scans lack.
-    """
-
-    causes: tuple[Cause, ...] = ()
-    confounded: tuple[tuple[str, ...], ...] = ()
-    unknown: tuple[Unknown, ...] = ()
-    settings: tuple[EffectSetting, ...] = ()
-    details: tuple[str, ...] = ()
-    pictures: Pictures = NO_PICTURES
-    small: tuple[str, ...] = ()
-    refused: str | None = None
-    next_experiment: NextExperiment | None = None
 
 
 def criticise(
@@ -90,6 +73,15 @@ def criticise(
     progress("laser: fitting what acts")
     acting = settings_of(assembly, made.fit)
     fit = pinned(assembly, normal, made.fit.forms, acting, made.winner, others, recording.truth)
+    lead = leading(assembly, normal, made.fit, fit)
+    if lead is not None and all(own.id != lead.id for own in model.effects):
+        progress(f"laser: looking at the rest beside {lead.id}")
+        rest = criticise(recording, extend(model, [lead]), progress, ids)
+        sds = next(sds for setting, sds in fit.settings if setting is lead)
+        cause = Cause(lead.id, min(made.found.p[lead.id], 1.0), estimates_of(lead, sds), _gain(made, lead.id))
+        size = size_of(assembly.marks.together([lead])[normal.beam_noise.valid])
+        rest = replace(rest, details=(*rest.details, *_told({lead.id: size}, ())))
+        return with_lead(rest, lead, cause, assembly, normal)
     progress("laser: weighing effects on the scatter")
     scatter, comparison = ([], ()) if assembly.strange else _scatter(assembly, fit, ids, strange=made.curve)
     if not made.curve and not assembly.strange:

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An effect that does far more than small changes tell: the rest is looked for with it in place.
+
+Where beams come from far elsewhere, readings pass for outliers, the chair is sought where it is not, and a crowd of
+small effects draws what is left.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic.laser.finding import LaserFinding
+from kurumaisu.critic.laser.normal import Assembly, Normal
+from kurumaisu.critic.laser.pictures import Part, misfits
+from kurumaisu.critic.laser.pinned import Pinned
+from kurumaisu.critic.laser.search import Fitted
+from kurumaisu.critic.verdict import Cause
+from kurumaisu.params import EffectSetting
+from kurumaisu.types import FloatArray
+
+_BENT = 0.5  # share of what an effect does by which its line may be off
+_LOUD = 1.0  # rms, in sds of single readings, from which that matters
+
+
+def leading(assembly: Assembly, normal: Normal, fit: Fitted, refitted: Pinned) -> EffectSetting | None:
+    """Return the loudest effect that moves beams and, refitted by simulation, does quite another thing than by line."""
+    settings = {setting.id: setting for setting, _ in refitted.settings}
+    loudest, out, start = _LOUD, None, 0
+    for form in fit.forms:
+        stop = start + len(form.columns)
+        line = assembly.columns[:, :, form.span] @ fit.coefficients[start:stop]
+        start = stop
+        if issubclass(effects.by_id(form.id), effects.ReadingEffect):
+            continue
+        change = assembly.marks.together([settings[form.id]])
+        size = _loudness(assembly, normal, change)
+        if size > loudest and _loudness(assembly, normal, change - line) > _BENT * size:
+            loudest, out = size, settings[form.id]
+    return out
+
+
+def with_lead(
+    rest: LaserFinding, lead: EffectSetting, cause: Cause, assembly: Assembly, normal: Normal
+) -> LaserFinding:
+    """Return what was found with an effect in place, and the effect; cause: as it was found at first."""
+    again = next((each for each in rest.causes if each.id == lead.id), None)
+    if again is not None:
+        cause = replace(cause, parameters=again.parameters)
+    alone = copy(assembly)
+    alone.columns = assembly.marks.together([lead])[:, :, np.newaxis].astype(np.float32)
+    shown = misfits(alone, normal, [Part(lead.id, slice(0, 1), np.ones(1))])
+    others = (one for one in rest.pictures.misfits if one.explained_by != lead.id)
+    moved = any(setting.id == lead.id for setting in rest.settings)
+    return replace(
+        rest,
+        causes=(cause, *(each for each in rest.causes if each is not again)),
+        settings=rest.settings if moved else (lead, *rest.settings),
+        pictures=replace(rest.pictures, misfits=(*shown, *others)),
+    )
+
+
+def _loudness(assembly: Assembly, normal: Normal, change: FloatArray) -> float:
+    """Return the rms of a change of the readings, in their sds; what no longer meets anything counts as nothing."""
+    white = np.nan_to_num(change / assembly.first.sd)[normal.beam_noise.valid]
+    return float(np.sqrt(np.mean(white**2))) if white.size else 0.0
