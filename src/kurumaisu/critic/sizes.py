@@ -32,9 +32,8 @@ def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
     unit = np.array([fit.terms[i].step * fit.terms[i].parameter.scale for i in known])
     tight = np.array([fit.terms[i].step if fit.terms[i].shape else 0.0 for i in known])
     spread = np.linalg.inv(columns.T @ columns + np.diag(tight**2) + 1e-6 * np.eye(len(known)))
-    free = problem.missed is None  # else what other forms do is in the spread
-    doubt = _doubt(problem, fit, columns) if free else np.zeros(len(known))
-    order = _next_order(problem, fit, name) if free else 0.0
+    doubt = _doubt(problem, fit, columns) if known else np.empty(0)
+    order = _next_order(problem, fit, name)
     out = {}
     for at, term in enumerate(fit.terms):
         value = float(fit.values[at])
