@@ -23,12 +23,14 @@ def test_marks_are_beside_what_a_fit_does_itself():
 
     def simulated(settings):
         size = settings[0].parameters["size"]
-        return np.outer(np.linspace(0.0, 1.0, 5), [size, size**2, 1.0]).ravel()
+        return np.outer(np.linspace(0.0, 1.0, 5), [size, size**2, 1.0])
 
     def sized(size):
         return (EffectSetting("a", {"size": size}),)
 
-    marks = Missed(sized(1.0), ((sized(0.5), 1.0), (sized(3.0), 0.5)), (sized(1.0 + 1e-6),)).marks(simulated)
+    marks = Missed(sized(1.0), ((sized(0.5), 1.0), (sized(3.0), 0.5)), (sized(1.0 + 1e-6),)).marks(
+        simulated, np.asarray
+    )
     slope = np.outer(np.linspace(0.0, 1.0, 5), [1.0, 2.0, 0.0]).ravel()
     np.testing.assert_allclose(marks.T @ slope, 0.0, atol=1e-5)
     assert np.linalg.norm(marks, axis=0) == pytest.approx([0.25 * 0.61, 0.5 * 4.0 * 0.61], rel=0.01)

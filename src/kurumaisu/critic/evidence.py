@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -98,7 +98,7 @@ class Problem:
         noise: Noise | None = None,
         missed: Missed | None = None,
     ) -> Problem:
-        """Return the problem, with the same terms, of other drives, another model or another noise."""
+        """Return the problem, with the same terms, of other drives, another model or noise, or with more missed."""
         known = None if model is not None else self._known
         new = drives or self.drives, model or self.model, noise or self.noise
         other = Problem(*new, self.terms, self.ids, known, missed or self.missed)
@@ -160,12 +160,9 @@ class Problem:
     def whitened(self, drive: Drive, columns: FloatArray) -> FloatArray:
         """Return columns (3 m, k) of one of the drives, whitened."""
         if id(drive) not in self._whiteners:
-            white = whitener(drive, self.noise)
-
-            def simulated(settings: tuple[EffectSetting, ...]) -> FloatArray:
-                return white.whiten(self.simulated(drive, settings).reshape(-1, 1))[:, 0]
-
-            muted = None if self.missed is None else Muted(self.missed.marks(simulated))
+            white, muted = whitener(drive, self.noise), None
+            if self.missed is not None:
+                muted = Muted(self.missed.marks(partial(self.simulated, drive), white.whiten))
             self._whiteners[id(drive)] = drive, white, muted
         _, white, muted = self._whiteners[id(drive)]
         columns = white.whiten(columns)

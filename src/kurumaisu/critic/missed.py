@@ -26,11 +26,15 @@ class Missed:
     moved: tuple[tuple[Settings, float], ...]
     near: tuple[Settings, ...]
 
-    def marks(self, whitened: Callable[[Settings], FloatArray]) -> FloatArray:
-        """Return what a share of 1 sd of each mark changes of a run, whitened, (rows, k); whitened: its increments."""
-        here = whitened(self.here)
-        own = np.column_stack([whitened(settings) - here for settings in self.near])
-        return beside(own, np.column_stack([sd * (whitened(settings) - here) for settings, sd in self.moved]))
+    def marks(
+        self, simulated: Callable[[Settings], FloatArray], whiten: Callable[[FloatArray], FloatArray]
+    ) -> FloatArray:
+        """Return what a share of 1 sd of each mark changes of a run, whitened, (3 m, k); simulated: its increments."""
+        here = simulated(self.here)
+        own = [(simulated(settings) - here).ravel() for settings in self.near]
+        marks = [sd * (simulated(settings) - here).ravel() for settings, sd in self.moved]
+        white = whiten(np.column_stack([*own, *marks]))
+        return beside(white[:, : len(own)], white[:, len(own) :])
 
 
 def beside(own: FloatArray, marks: FloatArray) -> FloatArray:

@@ -33,9 +33,8 @@ def model_of(recording: Recording, model_file: Path, *, assume_law: bool) -> Mod
     model = load_model(model_file)
     if assume_law or recording.model is not None or any(run.voltage is not None for run in recording.runs):
         return model
-    return (
-        model if all(_sayable(model, run.command) for run in recording.runs if run.command) else follow_commands(model)
-    )
+    commands = [run.command for run in recording.runs if run.command is not None]
+    return model if all(_sayable(model, command) for command in commands) else follow_commands(model)
 
 
 def _sayable(model: Model, command: Series) -> bool:

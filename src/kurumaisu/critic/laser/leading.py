@@ -16,20 +16,18 @@ from kurumaisu import effects
 from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.pictures import Part, misfits
-from kurumaisu.critic.laser.pinned import Pinned
+from kurumaisu.critic.laser.pinned import LOUD, Pinned, loudness
 from kurumaisu.critic.laser.search import Fitted
 from kurumaisu.critic.verdict import Cause
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import FloatArray
 
 _BENT = 0.5  # share of what an effect does by which its line may be off
-_LOUD = 1.0  # rms, in sds of single readings, from which that matters
 
 
 def leading(assembly: Assembly, normal: Normal, fit: Fitted, refitted: Pinned) -> EffectSetting | None:
     """Return the loudest effect that moves beams and, refitted by simulation, does quite another thing than by line."""
     settings = {setting.id: setting for setting, _ in refitted.settings}
-    loudest, out, start = _LOUD, None, 0
+    loudest, out, start = LOUD, None, 0
     for form in fit.forms:
         stop = start + len(form.columns)
         line = assembly.columns[:, :, form.span] @ fit.coefficients[start:stop]
@@ -37,8 +35,8 @@ def leading(assembly: Assembly, normal: Normal, fit: Fitted, refitted: Pinned) -
         if issubclass(effects.by_id(form.id), effects.ReadingEffect):
             continue
         change = assembly.marks.together([settings[form.id]])
-        size = _loudness(assembly, normal, change)
-        if size > loudest and _loudness(assembly, normal, change - line) > _BENT * size:
+        size = loudness(assembly, normal, change)
+        if size > loudest and loudness(assembly, normal, change - line) > _BENT * size:
             loudest, out = size, settings[form.id]
     return out
 
@@ -61,9 +59,3 @@ def with_lead(
         settings=rest.settings if moved else (lead, *rest.settings),
         pictures=replace(rest.pictures, misfits=(*shown, *others)),
     )
-
-
-def _loudness(assembly: Assembly, normal: Normal, change: FloatArray) -> float:
-    """Return the rms of a change of the readings, in their sds; what no longer meets anything counts as nothing."""
-    white = np.nan_to_num(change / assembly.first.sd)[normal.beam_noise.valid]
-    return float(np.sqrt(np.mean(white**2))) if white.size else 0.0

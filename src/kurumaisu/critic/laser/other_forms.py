@@ -44,7 +44,7 @@ class OtherForm:
         """Return the curves (k, b, n) over the beams."""
         values = _values(self.covariate, shots, seen)
         if self.covariate == _RETURNS:
-            return np.asarray(values[:, :, np.newaxis] == self.knots, dtype=float)
+            return _steps(self.knots, values)
         return _hats(self.knots, values.ravel()).reshape(*values.shape, len(self.knots))
 
     def scaled(self, gram: FloatArray, power: float) -> FloatArray:
@@ -121,7 +121,7 @@ def _hats(knots: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _steps(steps: FloatArray, values: FloatArray) -> FloatArray:
-    return np.asarray(values[:, np.newaxis] == steps, dtype=float)
+    return np.asarray(values[..., np.newaxis] == steps, dtype=float)
 
 
 def _left(columns: FloatArray, target: FloatArray) -> float:

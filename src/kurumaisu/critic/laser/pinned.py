@@ -28,7 +28,7 @@ from kurumaisu.types import FloatArray
 _STEPS = 2
 _ROUNDS = 4  # times that the scans are seen anew with what moves their beams
 _SETTLED = 0.5  # sds by which a parameter may still move between two of them
-_LOUD = 1.0  # rms of what acts, in sds of single readings, from which scans are seen anew with it
+LOUD = 1.0  # rms of what acts, in sds of single readings, from which scans are seen anew with it
 _STEP = 0.05  # of a finite difference, in units of the larger of a parameter and its scale
 _SHAPE = 1.0  # prior sd of what only shapes an effect, in the same units
 _SIZE = 100.0  # and of its size
@@ -129,9 +129,13 @@ def _signals(
 
 def _loud(assembly: Assembly, normal: Normal, settings: Sequence[EffectSetting]) -> bool:
     """Tell whether effects move readings by more than they scatter anyway."""
-    beam = normal.beam_noise
-    change = np.nan_to_num(assembly.marks.together(settings) / assembly.first.sd)
-    return bool(np.mean(change[beam.valid] ** 2) > _LOUD**2)
+    return loudness(assembly, normal, assembly.marks.together(settings)) > LOUD
+
+
+def loudness(assembly: Assembly, normal: Normal, change: FloatArray) -> float:
+    """Return the rms of a change of the readings, in their sds; what no longer meets anything counts as nothing."""
+    white = np.nan_to_num(change / assembly.first.sd)[normal.beam_noise.valid]
+    return float(np.sqrt(np.mean(white**2))) if white.size else 0.0
 
 
 def _values(free: Sequence[_Free], at: Sequence[dict[str, float]]) -> FloatArray:

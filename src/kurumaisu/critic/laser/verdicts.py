@@ -74,7 +74,8 @@ def criticise(
     acting = settings_of(assembly, made.fit)
     fit = pinned(assembly, normal, made.fit.forms, acting, made.winner, others, recording.truth)
     lead = leading(assembly, normal, made.fit, fit)
-    if lead is not None and all(own.id != lead.id for own in model.effects):
+    certain = lead is not None and made.found.p[lead.id] >= NAMED
+    if lead is not None and certain and all(own.id != lead.id for own in model.effects):
         progress(f"laser: looking at the rest beside {lead.id}")
         rest = criticise(recording, extend(model, [lead]), progress, ids)
         sds = next(sds for setting, sds in fit.settings if setting is lead)
