@@ -110,6 +110,8 @@ def test_curves(channel, covariate):
         expected = {"v": v, "w": w, "lateral": u}
         if channel in expected:
             expected[channel] = expected[channel] + added
+        elif channel == "curvature":
+            expected["w"] = expected["w"] + added * expected["v"]
         else:  # v_gain, w_gain: a share of the rate
             rate = channel.removesuffix("_gain")
             expected[rate] = expected[rate] + added * expected[rate]

@@ -89,3 +89,17 @@ def test_a_jump_that_does_what_an_effect_does_speaks_for_it():
     rivalry = compare(problem, Naming((right, empty), {"base.reverse_gain": 1.0}, (), 0.0))
     assert rivalry.winner is None
     assert rivalry.odds["base.reverse_gain"] > 10
+
+
+def test_a_tyre_that_goes_flat_bends_the_way_from_then_on_and_is_no_veer():
+    flat = hidden.Kind(2, "time", lambda s, a, b: s.v * (s.time > 25))
+    problem = problem_of(hidden.make(flat, 40.0, 1010, seconds=40.0, runs=2).recording)
+    veer, empty = problem.fit(["base.veer"], {}), problem.fit_candidates((), {})
+    rivalry = compare(problem, Naming((veer, empty), {"base.veer": 1.0}, (), 0.0))
+    assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.curvature.time", frozenset())
+    assert rivalry.p_effects["base.veer"] < 0.1
+    extension = extend(problem, empty, rivalry.winner.curve, rivalry.winner.belief.prior)
+    found = smooth_shapes.shape_of(extension)
+    assert found.place[1] - 0.1 < 25 < found.place[2] + 0.1
+    assert smooth_words.channel(extension.curve) == "base.w"
+    assert smooth_words.shape(extension, intervals=False).endswith(" rad/m")

@@ -29,10 +29,12 @@ from kurumaisu.types import FloatArray
 # Sizes of a curve, whitened: with the catalogue's prior of the size of an effect, nine tenths up to Z_USUAL.
 _SIZES = np.concatenate([np.geomspace(Z_LOW, Z_USUAL, 8), np.geomspace(Z_USUAL, Z_HIGH, 5)[1:]])
 _LOG_WEIGHTS = np.log(np.concatenate([np.full(8, 0.9 / 8), np.full(4, 0.1 / 4)]))
-# What a rate's factor may follow: over the rate itself it would be the sum of a rate and a curve again.
+# What a rate's factor may follow: over the rate itself it would be the sum of a rate and a curve again, and so would
+# how the way bends over the speed.
 _BRAKES = {
     "v_gain": ("w", "abs_w", "v_times_w", "time", "since_command", "since_reversal", "heading", "distance", "x", "y"),
     "w_gain": ("v", "abs_v", "v_times_w", "time", "since_command", "since_reversal", "heading", "distance", "x", "y"),
+    "curvature": ("time", "since_reversal", "heading", "x", "y"),
 }
 
 

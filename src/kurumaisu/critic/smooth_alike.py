@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.smooth import Belief, Curve, columns, taken_up
 from kurumaisu.critic.smooth_designs import Designs
@@ -90,7 +91,7 @@ class Likeness:
         if not fit.ids:
             return set()
         free = self._finer(fit, curve)
-        rate = curve.channel.removesuffix("_gain")
+        rate = effects.CHANNELS[curve.channel].rate
         # A curve of factors may be one about another gain than 1, but for one over the rate itself: it holds the gain.
         if rate not in (curve.channel, curve.basis.covariate.removeprefix("abs_")):
             level = free[:, :1] if not len(curve.basis.knots) else free.sum(axis=1, keepdims=True)

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu.critic import explain, replay, smooth_shapes, smooth_words
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import GRID, Drive
@@ -120,7 +121,7 @@ def _nearer(worth: Gain | None, channel: str) -> bool:
 
     What a curve leaves of something strong is no normal noise: a few surprises may cost all that the density gains.
     """
-    seen = worth and worth.channels.get(_SEEN_IN[channel.removesuffix("_gain")])
+    seen = worth and worth.channels.get(_SEEN_IN[effects.CHANNELS[channel].rate])
     return bool(seen and seen.rmse and seen.rmse.lo90 > 0)
 
 
@@ -158,7 +159,7 @@ def _samples(
 
     That are those in which the chair moves on.
     """
-    rate = extension.curve.channel.removesuffix("_gain")
+    rate, by = effects.CHANNELS[extension.curve.channel].rate, effects.CHANNELS[extension.curve.channel].by
     channel = ("v", "lateral", "w").index(rate)
     motion = replay.motion(drive, problem.model, extension.fit.settings)
     values = extension.curve.basis.samples(motion)
@@ -172,8 +173,8 @@ def _samples(
     if "period" in extension.curve.basis.constants:
         x = np.mod(x, extension.curve.basis.constants["period"])
     use = np.isfinite(x) & ((motion.v != 0) | (motion.w != 0))[middle]
-    if rate != extension.curve.channel:  # a share of the rate: of a small one nothing can be said
-        rates = (motion.v if rate == "v" else motion.w)[middle]
+    if by:  # a share of a rate: of a small one nothing can be said
+        rates = (motion.v if by == "v" else motion.w)[middle]
         use &= np.abs(rates) > 0.3 * np.abs(rates).max()
         residual, left = (each / np.where(use, rates, 1.0) for each in (residual, left))
     return x, residual, left, use

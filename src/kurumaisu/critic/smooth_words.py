@@ -17,6 +17,7 @@ CHANNELS = {
     "w": "yaw rate",
     "v_gain": "forward speed",
     "w_gain": "yaw rate",
+    "curvature": "curvature of the way",
 }
 _SHARES = {"v_gain": "of the forward speed", "w_gain": "of the yaw rate"}  # in place of a unit
 COVARIATES = {
@@ -49,7 +50,7 @@ def covariate(curve: Curve) -> tuple[str, str, str]:
 
 def channel(curve: Curve) -> str:
     """Return the channel as the verdict has it."""
-    return f"base.{curve.channel.removesuffix('_gain')}"
+    return f"base.{effects.CHANNELS[curve.channel].rate}"
 
 
 def followed(curve: Curve) -> str:
@@ -59,7 +60,7 @@ def followed(curve: Curve) -> str:
 
 def unit_of(curve: Curve) -> str:
     """Return the unit of the curve; in words where it is a share."""
-    return _SHARES.get(curve.channel, effects.CHANNELS[curve.channel])
+    return _SHARES.get(curve.channel, effects.CHANNELS[curve.channel].unit)
 
 
 def shape(extension: Extension, *, intervals: bool = True) -> str:

@@ -60,7 +60,8 @@ _SMOOTH = """
 
 Where something acts that is none of these, the critic extends the model by a curve, which the simulator runs as it
 runs all others: `smooth.CHANNEL.COVARIATE` adds a rate that follows another quantity, while the chair moves, after
-everything else of the stage FLOOR; the channels `v_gain` and `w_gain` multiply the rate by 1 + curve.
+everything else of the stage FLOOR; the channels `v_gain` and `w_gain` multiply the rate by 1 + curve, and `curvature`
+adds a yaw rate of curve · v.
 
 ```yaml
 effects:
@@ -101,7 +102,7 @@ def text() -> str:
 
 def _smooth_table() -> str:
     """Return channels and covariates of smooth effects."""
-    rows = [f"Channels: {', '.join(f'`{name}` [{unit}]' for name, unit in effects.CHANNELS.items())}.", ""]
+    rows = [f"Channels: {', '.join(f'`{name}` [{channel.unit}]' for name, channel in effects.CHANNELS.items())}.", ""]
     rows += ["| covariate | what it is | parameter besides |", "|---|---|---|"]
     for name, meaning in effects.MEANINGS.items():
         constant = effects.CONSTANTS.get(name)

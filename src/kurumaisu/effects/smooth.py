@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,26 @@ from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 
 SMOOTH = "smooth"  # stands for every curve where effects are chosen by id
-# A rate gets the curve added, or is multiplied by 1 + curve: something that brakes acts against either direction.
-CHANNELS: Mapping[str, str] = {"v": "m/s", "lateral": "m/s", "w": "rad/s", "v_gain": "1", "w_gain": "1"}
+_MOVED = {"v": "v", "lateral": "u", "w": "w"}  # the rates of a motion by name
+
+
+class Channel(NamedTuple):
+    """A rate that gets a curve added, times another one if `by` names it; unit: of the curve."""
+
+    unit: str
+    rate: str
+    by: str = ""
+
+
+# What brakes takes a share of a rate in either direction; a tyre without air bends the way at any speed.
+CHANNELS: Mapping[str, Channel] = {
+    "v": Channel("m/s", "v"),
+    "lateral": Channel("m/s", "lateral"),
+    "w": Channel("rad/s", "w"),
+    "v_gain": Channel("1", "v", "v"),
+    "w_gain": Channel("1", "w", "w"),
+    "curvature": Channel("rad/m", "w", "v"),
+}
 _ID = re.compile(rf"smooth\.({'|'.join(CHANNELS)})\.([A-Za-z][\w.]*)")
 _MOST = 64  # knots
 
@@ -80,18 +98,15 @@ class Smooth(Effect):
             raise Error(f"{cls.id}: knots must increase: {numbered(values, 'knot', 0)}")
 
     def apply(self, motion: Motion) -> Motion:
-        """Add the curve to the rate where the chair moves, or multiply the rate by 1 + curve."""
+        """Add the curve, times a rate or not, to the channel's rate where the chair moves."""
+        channel = CHANNELS[self.channel]
         moving = (motion.v != 0) | (motion.w != 0)
         added = moving * curve(self.covariate, self.values, self._follower.values(motion))
-        if self.channel == "v":
-            return replace(motion, v=motion.v + added)
-        if self.channel == "w":
-            return replace(motion, w=motion.w + added)
-        if self.channel == "v_gain":
-            return replace(motion, v=motion.v * (1 + added))
-        if self.channel == "w_gain":
-            return replace(motion, w=motion.w * (1 + added))
-        return replace(motion, u=added if motion.u is None else motion.u + added)
+        if channel.by:
+            added = added * getattr(motion, channel.by)
+        rate = _MOVED[channel.rate]
+        before = getattr(motion, rate)
+        return replace(motion, **{rate: added if before is None else before + added})
 
 
 @cache

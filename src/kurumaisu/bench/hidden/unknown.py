@@ -106,6 +106,11 @@ def derating(r: Rates, s: Sizes) -> Rates:
     return replace(r, v=r.v * (1 - s["size"] * np.clip((r.t - s["moment"]) / 8.0, 0.0, 1.0)))
 
 
+def puncture(r: Rates, s: Sizes) -> Rates:
+    """A turn of `size` per metre driven from a moment on: a tyre goes flat."""
+    return replace(r, w=r.w + s["size"] * r.v * (r.t > s["moment"]))
+
+
 def draught(r: Rates, s: Sizes) -> Rates:
     """A turn of `size` [rad/s] beside an open door: within half a metre of y = `door` from where the drive began."""
     turns = (STEP * (r.w + r.moving * r.noise[:, 2])).tolist()
@@ -172,6 +177,7 @@ STRANGE_BASE: dict[str, Strange] = {
         lambda rng: {"girth": float(rng.uniform(0.8, 1.3)), "spot": float(rng.random())},
     ),
     "derating": Strange(Form("floor", derating), 0.1, "base.v", ("t", "time"), _uniform("moment", 15.0, 40.0)),
+    "puncture": Strange(Form("floor", puncture), 0.05, "base.w", ("t", "time"), _uniform("moment", 15.0, 45.0)),
     "draught": Strange(Form("floor", draught), 0.05, "base.w", ("y", "position"), _uniform("door", -0.5, 0.5)),
 }
 STRANGE_LASER: dict[str, Strange] = {
