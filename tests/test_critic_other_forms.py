@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a loud cause of another form than the catalogue's leaves behind is no second cause."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.bench.hidden import Ask, base_catalogue, make
+from kurumaisu.bench.hidden.motion import STEP, Form
 from kurumaisu.critic import other_forms, pipeline
-from kurumaisu.critic.missed import Missed, Muted
+from kurumaisu.critic.missed import Missed, Muted, change
 from kurumaisu.params import EffectSetting, shipped
 
 MD100 = shipped("launch/md100.yaml")
@@ -28,7 +31,7 @@ def test_marks_are_beside_what_a_fit_does_itself():
     def sized(size):
         return (EffectSetting("a", {"size": size}),)
 
-    marks = Missed(sized(1.0), ((sized(0.5), 1.0), (sized(3.0), 0.5)), (sized(1.0 + 1e-6),)).marks(
+    marks = Missed(sized(1.0), ((sized(0.5), False, 1.0), (sized(3.0), False, 0.5)), (sized(1.0 + 1e-6),)).marks(
         simulated, np.asarray
     )
     slope = np.outer(np.linspace(0.0, 1.0, 5), [1.0, 2.0, 0.0]).ravel()
@@ -53,3 +56,28 @@ def test_a_lag_that_is_not_of_the_first_order_is_a_lag_and_nothing_else(form, ex
     tau = verdict.causes[0].parameters["tau"]
     assert tau.estimate == pytest.approx(case.truth.parameters["base.lag_v"]["tau"], rel=0.1)
     assert all(what is None for what, _ in told) is exact
+
+
+def test_what_holds_back_is_told_from_what_drives_on():
+    """While it speeds up a slower chair has less way, while it slows down more."""
+    here, there = np.array([[0.2, 0.0, -0.1]]), np.array([[0.1, 0.1, -0.3]])
+    np.testing.assert_allclose(change(here, there), [-0.1, 0.1, -0.2])
+    np.testing.assert_allclose(change(here, there, held_back=True), [-0.1, 0.0, 0.0])
+
+
+def test_a_chair_that_turns_sooner_less_than_more_lags_and_does_nothing_else(tmp_path, monkeypatch):
+    """Its rest passed for yaw rates that jump."""
+
+    def uneven(rates, sizes):
+        out, level = np.empty_like(rates.w), 0.0
+        for k, asked in enumerate(rates.w.tolist()):
+            tau = sizes["size"] * (1.5 if abs(asked) > abs(level) else 0.67)
+            after = asked + (level - asked) * np.exp(-STEP / tau)
+            out[k], level = (level + after) / 2, after
+        return replace(rates, w=out)
+
+    hidden = replace(base_catalogue.BASE["base.lag_w"], other=Form("rates", uneven))
+    monkeypatch.setitem(base_catalogue.BASE, "base.lag_w", hidden)
+    case = make(Ask("single", ("base.lag_w",), 30.0, "other", regime="usual", family="base"), 31703, tmp_path)
+    verdict = pipeline.criticise(case.recording, MD100, lambda _: None).verdict
+    assert ([cause.id for cause in verdict.causes], verdict.confounded, verdict.unknown) == (["base.lag_w"], (), ())

@@ -18,12 +18,13 @@ Settings = tuple[EffectSetting, ...]
 class Missed:
     """Marks by which a run may be off, each by a normal share of its own, but for what a fit does itself.
 
-    here: effects as they act; moved: effects as they would with another size or shape, with the sd of the share of what
-    that changes; near: effects as they would with a little more of each size or shape.
+    here: effects as they act; moved: effects as they would with another size or shape, whether that counts only where
+    it holds the chair back, and the sd of the share of what that changes; near: effects as they would with a little
+    more of each size or shape.
     """
 
     here: Settings
-    moved: tuple[tuple[Settings, float], ...]
+    moved: tuple[tuple[Settings, bool, float], ...]
     near: tuple[Settings, ...]
 
     def marks(
@@ -31,10 +32,16 @@ class Missed:
     ) -> FloatArray:
         """Return what a share of 1 sd of each mark changes of a run, whitened, (3 m, k); simulated: its increments."""
         here = simulated(self.here)
-        own = [(simulated(settings) - here).ravel() for settings in self.near]
-        marks = [sd * (simulated(settings) - here).ravel() for settings, sd in self.moved]
+        own = [change(here, simulated(settings)) for settings in self.near]
+        marks = [sd * change(here, simulated(settings), held_back=only) for settings, only, sd in self.moved]
         white = whiten(np.column_stack([*own, *marks]))
         return beside(white[:, : len(own)], white[:, len(own) :])
+
+
+def change(here: FloatArray, there: FloatArray, *, held_back: bool = False) -> FloatArray:
+    """Return what increments (m, 3) have more there than here, (3 m,); held_back: only where that is less way."""
+    more = there - here
+    return np.asarray(np.where(more * here < 0, more, 0.0) if held_back else more).ravel()
 
 
 def beside(own: FloatArray, marks: FloatArray) -> FloatArray:

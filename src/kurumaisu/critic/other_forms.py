@@ -3,20 +3,24 @@
 
 What an equation misses lies along other effects, so a strong cause of another form would bring false ones with it. So
 where that is likelier than an exact equation, what it may miss is noise: a Gaussian process whose directions are the
-marks of the same cause at other sizes (a sum of lags is a lag of more poles, a sum of dead zones a soft one).
+marks of the same cause at other sizes (a sum of lags is a lag of more poles, a sum of dead zones a soft one). What
+makes a chair slow to respond may do so more when it speeds up than when it slows down, or less.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.catalogue import Term, settings_of
+from kurumaisu import effects
+from kurumaisu.critic.catalogue import settings_of
 from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem, log_posterior
-from kurumaisu.critic.missed import Missed, beside
+from kurumaisu.critic.missed import Missed, beside, change
 from kurumaisu.critic.naming import Naming
+from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 # Sizes of a cause, as shares of the one fitted, whose marks together stand for those of its other forms.
@@ -34,9 +38,7 @@ def columns(problem: Problem, drive: Drive, fit: Fit) -> FloatArray:
 
     A mark that is no multiple of the fitted one's is that of another form: a rounder corner, a longer tail.
     """
-    here = problem.simulated(drive, fit.settings)
-    moved = [problem.simulated(drive, settings_of(fit.terms, values)) for _, values in _marks(fit)]
-    return np.column_stack([np.empty((here.size, 0)), *((each - here).reshape(-1, 1) for each in moved)])
+    return np.column_stack([np.empty((drive.measured.size, 0)), *_changes(problem, drive, fit, _marks(fit))])
 
 
 def missed(problem: Problem, found: Naming) -> tuple[Missed | None, Fit]:
@@ -65,21 +67,19 @@ def missed(problem: Problem, found: Naming) -> tuple[Missed | None, Fit]:
 def _missed(problem: Problem, fit: Fit) -> tuple[float, Missed | None]:
     """Return how much likelier the data are with what the equations of a set miss, in nats, and that; else 0, None."""
     loud = _loudness(problem, fit)
-    marks = [(term, values) for term, values in _marks(fit) if loud.get(term.id, 0.0) >= _LOUD]
+    marks = [mark for mark in _marks(fit) if loud.get(mark.id, 0.0) >= _LOUD]
     if not marks:
         return 0.0, None
-    near = [values for _, values in _marks(fit, (_NEAR,))]
-    residual = problem.residual(fit.terms, fit.values)
-    own, white = (
-        np.column_stack([residual - problem.residual(fit.terms, values) for values in some])
-        for some in (near, [values for _, values in marks])
-    )
-    ends = np.cumsum([3 * len(drive.measured) for drive in problem.drives])[:-1]
-    split = zip(np.split(residual, ends), np.split(own, ends), np.split(white, ends), strict=True)
-    parts = [(left, beside(slopes, mark)) for left, slopes, mark in split]
+    near = [mark for mark in _marks(fit, (_NEAR,)) if not mark.held_back]
+    whole, parts = np.zeros(len(marks)), []
+    for drive in problem.drives:
+        left = (drive.measured - problem.simulated(drive, fit.settings)).ravel()
+        white = problem.whitened(drive, np.column_stack([left, *_changes(problem, drive, fit, [*near, *marks])]))
+        whole += np.sum(white[:, 1 + len(near) :] ** 2, axis=0)
+        parts.append((white[:, 0], beside(white[:, 1 : 1 + len(near)], white[:, 1 + len(near) :])))
     lengths = np.sqrt(np.sum([np.sum(mark**2, axis=0) for _, mark in parts], axis=0))
-    bent = lengths > _BENT * np.linalg.norm(white, axis=0)
-    names = np.array([term.id for term, _ in marks])
+    bent = lengths > _BENT * np.sqrt(whole)
+    names = np.array([mark.id for mark in marks])
     many = np.array([np.sum(bent & (names == name)) for name in names])
     signals = np.array([loud[name] for name in names])
     shares = np.where(bent, signals / np.sqrt(np.maximum(many, 1)) / np.where(bent, lengths, 1.0), 0.0)
@@ -89,8 +89,8 @@ def _missed(problem: Problem, fit: Fit) -> tuple[float, Missed | None]:
     if gains[best] < _LEAST:
         return 0.0, None
     each = zip(marks, sds[best].tolist(), strict=True)
-    moved = tuple((settings_of(fit.terms, values), sd) for (_, values), sd in each if sd > 0)
-    return gains[best], Missed(fit.settings, moved, tuple(settings_of(fit.terms, values) for values in near))
+    moved = tuple((mark.settings, mark.held_back, sd) for mark, sd in each if sd > 0)
+    return gains[best], Missed(fit.settings, moved, tuple(mark.settings for mark in near))
 
 
 def _gain(left: FloatArray, marks: FloatArray) -> float:
@@ -100,15 +100,32 @@ def _gain(left: FloatArray, marks: FloatArray) -> float:
     return 0.5 * float(np.sum(along**2 / (1 + values)) - np.sum(np.log1p(values)))
 
 
-def _marks(fit: Fit, shares: Sequence[float] = _SIZES) -> list[tuple[Term, FloatArray]]:
-    """Return each term of a fit that has a size, with values of the fit where that is another one."""
+@dataclass(frozen=True)
+class _Mark:
+    """What a cause would do with another size: its id, all settings, and whether only where it holds the chair back."""
+
+    id: str
+    settings: tuple[EffectSetting, ...]
+    held_back: bool
+
+
+def _marks(fit: Fit, shares: Sequence[float] = _SIZES) -> list[_Mark]:
+    """Return the marks of each term of a fit that has a size, where that is other ones."""
     out = []
     for i, term in enumerate(fit.terms):
+        responds = getattr(effects.by_id(term.id), "stage", None) == effects.Stage.RESPONSE
         for share in () if term.fixed else shares:
             value = term.null + share * (fit.values[i] - term.null)
             value = float(np.clip(value, term.parameter.lower, term.parameter.upper))
-            out.append((term, np.where(np.arange(len(fit.values)) == i, value, fit.values)))
+            moved = settings_of(fit.terms, np.where(np.arange(len(fit.values)) == i, value, fit.values))
+            out += [_Mark(term.id, moved, held_back) for held_back in ((False, True) if responds else (False,))]
     return out
+
+
+def _changes(problem: Problem, drive: Drive, fit: Fit, marks: Sequence[_Mark]) -> list[FloatArray]:
+    """Return what each mark changes of the increments of a drive, (3 m,) each."""
+    here = problem.simulated(drive, fit.settings)
+    return [change(here, problem.simulated(drive, mark.settings), held_back=mark.held_back) for mark in marks]
 
 
 def _loudness(problem: Problem, fit: Fit) -> dict[str, float]:
