@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A reference pose where nobody measured one: the particle filter's path through the scans."""
+"""A reference pose where nobody measured one: the particle filter's path through the scans, or the wheels' odometry."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ Progress = Callable[[str], None]
 def with_reference(recording: Recording, seed: int, progress: Progress) -> Recording:
     """Return the recording with a pose for every run that somebody drove, mapping those that have none.
 
-    A run of which motions are to be predicted may go without.
+    Without scans the odometry is the reference of what was asked for. A run of which motions are to be predicted may go
+    without a pose.
 
-    Raise Error for a run that was driven and has neither a pose nor scans and odometry to find one from.
+    Raise Error for a run that was driven and has neither a pose nor odometry to find one from.
     """
     if all(run.pose is not None or run.queries is not None for run in recording.runs):
         return recording
     runs = tuple(
-        _with_mapped_pose(recording, run, seed, progress)
+        _with_pose(recording, run, seed, progress)
         if run.pose is None and run.queries is None and driven(run)
         else run
         for run in recording.runs
@@ -85,7 +86,11 @@ def scan_log(recording: Recording, run: Run) -> ScanLog:
     return log
 
 
-def _with_mapped_pose(recording: Recording, run: Run, seed: int, progress: Progress) -> Run:
+def _with_pose(recording: Recording, run: Run, seed: int, progress: Progress) -> Run:
+    if run.scan is None and run.odom is not None and (run.voltage is not None or run.command is not None):
+        poses = Series(run.odom.t, run.odom.values[:, :3], ("x", "y", "theta"))
+        source = "the odometry (no pose was measured): what wheels do on the floor does not show in it"
+        return replace(run, pose=poses, pose_source=source)
     path = map_run(scan_log(recording, run), seed, progress).trajectory
     source = f"particle filter over {len(path)} scans (no pose was measured), seed {seed}"
     return replace(run, pose=Series(path[:, 0], path[:, 1:], ("x", "y", "theta")), pose_source=source)
