@@ -32,9 +32,7 @@ def with_reference(recording: Recording, seed: int, progress: Progress) -> Recor
     if all(run.pose is not None or run.queries is not None for run in recording.runs):
         return recording
     runs = tuple(
-        _with_pose(recording, run, seed, progress)
-        if run.pose is None and run.queries is None and driven(run)
-        else run
+        _with_pose(recording, run, seed, progress) if run.pose is None and run.queries is None and driven(run) else run
         for run in recording.runs
     )
     return replace(recording, runs=runs)

@@ -82,8 +82,15 @@ def _of_run(run: Run, model: Model) -> list[str]:
         lawful &= match is plain
     words = _one(sanity_pose.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
     words += [*sanity_jumps.words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
-    words += [*_one(sanity_pose.folded(run.pose)), *_one(sanity_stamps.words(run.pose))]
-    told = [line for name, part, rates in inputs for line in _against(name, part, pose, rates, model, follows[name])]
+    words += _one(sanity_pose.folded(run.pose))
+    # Poses that were worked out repeat themselves at rest, to the last bit; measured ones never do.
+    measured = run.pose_source == "measured"
+    words += _one(sanity_stamps.words(run.pose)) if measured else []
+    told = [
+        line
+        for name, part, rates in inputs
+        for line in _against(name, part, pose if measured else None, rates, model, follows[name])
+    ]
     for name, match, number in known:
         told += [*match.words, *sanity_input.sign_and_unit(match, number, name)]
     # Of poses that are mirrored every input seems to have the wrong sign; by another law some voltages have.
@@ -102,10 +109,12 @@ def _inputs(run: Run) -> list[tuple[str, Series]]:
 
 
 def _against(
-    name: str, part: Series, pose: Series, rates: tuple[Rates, Rates], model: Model, follows: FloatArray
+    name: str, part: Series, pose: Series | None, rates: tuple[Rates, Rates], model: Model, follows: FloatArray
 ) -> list[str]:
-    """Return what is wrong with poses in the light of an input, or with the input itself; follows: as volts have it."""
+    """Return what is wrong with an input, or with measured poses in its light; follows: as volts have it."""
     words = sanity_volts.words(part, rates[1], model, follows) if name == "voltage" else []
+    if pose is None:
+        return words
     times = sanity_rows.repeats(pose, rates[1])
     words += [sanity_rows.held(times)] if times > _REPEATS or _SOME_TWICE[0] < times < _SOME_TWICE[1] else []
     for check in (

@@ -12,7 +12,7 @@ from kurumaisu import effects
 from kurumaisu.critic import replay
 from kurumaisu.critic.drive import Drive
 from kurumaisu.params import EffectSetting, Model
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray
 
 _HATS = 8
 _HARMONICS = 4
@@ -21,7 +21,8 @@ _TURN = 2 * np.pi
 _ROUNDING = 1e-6  # of a quantity's size: less spread is none
 # Before the data, neighbouring knots differ at random (1), or so do neighbouring slopes (2): rough or smooth.
 _ORDERS = (1, 2)
-_FINER = 4  # knots for one
+FINER = 4  # knots, or waves, for one
+_FINE = 3  # the same, of curves that the data may well bend so often
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Basis:
     knots: of the hats, empty where periodic; constants: the parameter that the covariate needs to be computed, if any;
     priors: covariances of the coefficients, (k, k) each, of a curve whose mean square over the drives is 1;
     low, high: the covariate lies between them in 95 % of the time that the chair moves. ways: out of how many like it
-    this one was chosen by the data.
+    this one was chosen by the data; harmonics: waves of a periodic one.
     """
 
     covariate: str
@@ -41,11 +42,12 @@ class Basis:
     low: float
     high: float
     ways: int = 1
+    harmonics: int = _HARMONICS
 
     @property
     def size(self) -> int:
         """Return the number of coefficients."""
-        return len(self.knots) or 1 + 2 * _HARMONICS
+        return len(self.knots) or 1 + 2 * self.harmonics
 
     def samples(self, motion: effects.Motion) -> FloatArray:
         """Return the covariate of a motion from its start on, (n,); inf where there is none yet."""
@@ -53,16 +55,22 @@ class Basis:
 
     def matrix(self, at: FloatArray) -> FloatArray:
         """Return the basis at values of the covariate (n,), (n, k)."""
-        return _matrix(self.knots, self.constants.get("period", 0.0), at)
+        return _matrix(self.knots, self.constants.get("period", 0.0), at, self.harmonics)
 
-    def finer(self) -> Basis:
-        """Return the curves over the same with `_FINER` knots for one, which hold these; waves are what they are."""
+    def finer(self, times: int = FINER) -> Basis:
+        """Return the curves over the same with that many knots for one, or waves, which hold these; without a prior."""
         count = len(self.knots)
         if not count:
-            return self
-        at = np.linspace(0, count - 1, _FINER * (count - 1) + 1)
+            return replace(self, harmonics=times * self.harmonics, priors=())
+        at = np.linspace(0, count - 1, times * (count - 1) + 1)
         knots = np.interp(at, np.arange(count), self.knots)
         return replace(self, knots=knots, priors=())
+
+    def fine(self, motions: Sequence[effects.Motion]) -> Basis:
+        """Return the curves over the same that bend more often, with their prior over these motions."""
+        finer = self.finer(_FINE)
+        matrix = finer.matrix(np.concatenate([finer.samples(motion)[_moving(motion)] for motion in motions]))
+        return replace(finer, priors=tuple(priors_of(finer.knots, matrix)))
 
     def parameters(self, coefficients: FloatArray) -> dict[str, float]:
         """Return the parameters of the curve as a model file has them."""
@@ -70,8 +78,8 @@ class Basis:
         if len(self.knots):
             named = {f"knot_{i}": float(knot) for i, knot in enumerate(self.knots)}
             return {**self.constants, **named, **{f"value_{i}": c for i, c in enumerate(numbers)}}
-        cosines = {f"cos_{i}": c for i, c in enumerate(numbers[1 : 1 + _HARMONICS], 1)}
-        sines = {f"sin_{i}": c for i, c in enumerate(numbers[1 + _HARMONICS :], 1)}
+        cosines = {f"cos_{i}": c for i, c in enumerate(numbers[1 : 1 + self.harmonics], 1)}
+        sines = {f"sin_{i}": c for i, c in enumerate(numbers[1 + self.harmonics :], 1)}
         return {**self.constants, "level": numbers[0], **cosines, **sines}
 
 
@@ -94,8 +102,7 @@ def bases(
             continue
         constants = {"period": girth[0]} if name == "distance" and girth else _constants(name, drives, model)
         samples = [_samples(name, constants, motion) for motion in motions]
-        moving = [(motion.v != 0) | (motion.w != 0) for motion in motions]
-        pooled = np.concatenate([values[moved] for values, moved in zip(samples, moving, strict=True)])
+        pooled = np.concatenate([values[_moving(motion)] for values, motion in zip(samples, motions, strict=True)])
         known = pooled[np.isfinite(pooled)]
         if len(known) < _FEWEST or np.ptp(known) <= _ROUNDING * max(1.0, float(np.abs(known).max())):
             continue
@@ -103,10 +110,14 @@ def bases(
         knots = np.empty(0) if period else knots_of(known)
         if not period and len(knots) < 3:
             continue
-        matrix = _matrix(knots, period, pooled)
+        matrix = _matrix(knots, period, pooled, _HARMONICS)
         low, high = np.quantile(known, [0.025, 0.975])
         ways = girth[1] if name == "distance" and girth else 1
         yield Basis(name, knots, constants, tuple(priors_of(knots, matrix)), float(low), float(high), ways)
+
+
+def _moving(motion: effects.Motion) -> BoolArray:
+    return np.asarray((motion.v != 0) | (motion.w != 0))
 
 
 def _samples(name: str, constants: dict[str, float], motion: effects.Motion) -> FloatArray:
@@ -134,7 +145,7 @@ def knots_of(values: FloatArray, hats: int = _HATS) -> FloatArray:
     return np.asarray(knots[keep]) if high > low else np.empty(0)
 
 
-def _matrix(knots: FloatArray, period: float, at: FloatArray) -> FloatArray:
+def _matrix(knots: FloatArray, period: float, at: FloatArray, harmonics: int) -> FloatArray:
     if len(knots):
         inside = np.clip(at, knots[0], knots[-1])
         below = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
@@ -142,7 +153,7 @@ def _matrix(knots: FloatArray, period: float, at: FloatArray) -> FloatArray:
         rows, hats = np.arange(len(at)), np.zeros((len(at), len(knots)))
         hats[rows, below], hats[rows, below + 1] = 1 - share, share
         return hats
-    phase = np.multiply.outer(_TURN * at / period, np.arange(1, _HARMONICS + 1))
+    phase = np.multiply.outer(_TURN * at / period, np.arange(1, harmonics + 1))
     return np.column_stack([np.ones(len(at)), np.cos(phase), np.sin(phase)])
 
 
@@ -158,7 +169,7 @@ def priors_of(knots: FloatArray, matrix: FloatArray) -> Iterator[FloatArray]:
             bare = centre @ _walk(knots, order) @ centre.T
             level = np.ones((len(knots), len(knots)))
         else:
-            weights = np.arange(1, _HARMONICS + 1.0) ** (-2 * order)
+            weights = np.arange(1, matrix.shape[1] // 2 + 1.0) ** (-2 * order)
             bare = np.diag(np.concatenate([[0.0], weights, weights]))
             level = np.diag(np.eye(len(bare))[0])
         bare = bare / np.sum(gram * bare)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kurumaisu.critic import replay
@@ -34,6 +36,19 @@ class Designs:
                 self._made.append((rates, near[0]))
             self._of[fit.candidates] = near[0]
         return self._of[fit.candidates]
+
+    def paced(self, fit: Fit, curve: Curve) -> Curve:
+        """Return a curve of the design about a fit as it is beside that very fit.
+
+        Waves over the distance come as often by another one, which makes more or less of the way.
+        """
+        if curve.basis.covariate != "distance":
+            return curve
+        design = self.about(fit)
+        there = next(rates for rates, made in self._made if made is design)
+        ways = [float(np.abs(rates[0]).sum()) for rates in (self._rates(fit), there)]
+        constants = {name: period * ways[0] / ways[1] for name, period in curve.basis.constants.items()}
+        return replace(curve, basis=replace(curve.basis, constants=constants)) if ways[0] != ways[1] else curve
 
     def columns(self, fit: Fit, curve: Curve) -> FloatArray:
         """Return the whitened columns of a curve beside a fit, (rows, k)."""

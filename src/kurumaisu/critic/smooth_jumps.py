@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 from kurumaisu.critic import replay
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.smooth import Belief, Curve, beliefs, columns, taken_up
-from kurumaisu.critic.smooth_basis import Basis
+from kurumaisu.critic.smooth_basis import FINER, Basis
 from kurumaisu.types import FloatArray
 
 _PLACES = 24  # with as many samples between them
@@ -38,9 +38,9 @@ class Jump(Basis):
     place: FloatArray = field(kw_only=True)
     hats: FloatArray = field(kw_only=True)
 
-    def finer(self) -> Basis:
+    def finer(self, times: int = FINER) -> Basis:
         """Return the curves over the same with more knots, which hold these."""
-        smooth = Basis(self.covariate, self.hats, self.constants, (), self.low, self.high).finer()
+        smooth = Basis(self.covariate, self.hats, self.constants, (), self.low, self.high).finer(times)
         apart = np.abs(smooth.knots[:, None] - self.knots).min(axis=1) > np.ptp(self.knots)
         return replace(smooth, knots=np.sort(np.append(smooth.knots[apart], self.knots)))
 

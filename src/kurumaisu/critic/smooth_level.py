@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.smooth_basis import Basis
+from kurumaisu.critic.smooth_basis import FINER, Basis
 from kurumaisu.types import FloatArray
 
 CHANNELS = ("v", "lateral", "w")  # a share of a rate that is off by as much everywhere is a gain of the catalogue
@@ -34,7 +34,7 @@ class Level(Basis):
         """Return ones, (n, 1)."""
         return np.ones((len(at), 1))
 
-    def finer(self) -> Basis:
+    def finer(self, times: int = FINER) -> Basis:
         """Return the same: a number has no knots between its knots."""
         return self
 

@@ -15,6 +15,7 @@ from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.smooth import Belief, Curve, Design, belief, taken_up
 from kurumaisu.critic.smooth_alike import Likeness
+from kurumaisu.critic.smooth_bent import bent
 from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.critic.smooth_jumps import jumps, over_own
 from kurumaisu.types import FloatArray
@@ -24,7 +25,8 @@ _ODDS = 0.1  # that something outside the catalogue acts, before the data; all c
 _SHARE = 0.002  # posterior, as far as it is believed, from which it is asked which effect a curve draws
 _FITS = 10  # sets of the catalogue beside which curves are tried
 _JUMPING = 0.2  # share of what is outside the catalogue that jumps
-_HINTS = 3  # curves beside a set that are tried with a jump: most of one shows in a curve that cannot jump
+_BENDING = 0.2  # share of it that bends more often than a usual curve can
+_HINTS = 3  # curves beside a set that are tried so: most of a jump shows in a curve that cannot jump
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,7 @@ def _tried(bare: Sequence[tuple[Fit, float]], also: frozenset[Candidate]) -> lis
 
 def _rivals(problem: Problem, designs: Designs, fits: Sequence[tuple[Fit, float]]) -> Iterator[Rival]:
     grams: dict[Design, list[FloatArray]] = {}
+    plain = float(np.log1p(-_JUMPING - _BENDING))
     for fit, worth in fits:
         design = designs.about(fit)
         if design not in grams:
@@ -141,10 +144,12 @@ def _rivals(problem: Problem, designs: Designs, fits: Sequence[tuple[Fit, float]
             found = belief(gram - part.T @ part, b[curve.columns], curve.basis.priors)
             # All curves of a kind that the data chose from share what one has.
             chosen = replace(found, nats=found.nats - float(np.log(curve.basis.ways)))
-            beside.append(Rival(fit, curve, chosen, worth + chosen.nats + share + float(np.log1p(-_JUMPING))))
+            beside.append(Rival(fit, designs.paced(fit, curve), chosen, worth + chosen.nats + share + plain))
         yield from beside
         if fit.ids <= fits[0][0].ids:  # in its place an effect may have taken up the jump
             hints = [rival.curve for rival in sorted(beside, key=lambda rival: -rival.worth)[:_HINTS]]
+            for curve, found in bent(problem, fit, hints):
+                yield Rival(fit, curve, found, worth + found.nats + share + float(np.log(_BENDING)))
             for curve, found in jumps(problem, fit, [*hints, *(c for c in over_own(design.curves) if c not in hints)]):
                 yield Rival(fit, curve, found, worth + found.nats + share + float(np.log(_JUMPING)))
 

@@ -19,6 +19,9 @@ _TURNS = 3.0  # of the wheel in all drives, at least: fewer are a slope or a car
 _MOST = 150  # periods
 _WAVING = ("v_gain", "w")  # a wheel out of round takes a share of the way, a bent caster turns the chair
 _AT_ONCE = 16  # of them: more leave the processor's cache
+_OVERTONES = 4
+_PARTS = (1, 2, 3)  # of a turn, after which it may be as large as after all of it
+_CLOSER = 8  # periods for one about the best: an overtone is out of step sooner
 
 
 def girth(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, int] | None:
@@ -33,21 +36,54 @@ def girth(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, i
         return None
     low, high = max(1 / _LONGEST, _TURNS / longest), 1 / _SHORTEST
     waves = np.linspace(low, high, int(np.clip(2 * longest * (high - low), 2, _MOST)))
-    gram, pull = np.zeros((len(_WAVING), len(waves), 2, 2)), np.zeros((len(_WAVING), len(waves), 2))
-    for drive, motion, way in zip(problem.drives, motions, ways, strict=True):
-        sensitivity = Sensitivity(drive, motion)
-        left = (drive.measured - problem.simulated(drive, settings)).reshape(-1, 1)
-        white = problem.whitened(drive, left)[:, 0]
-        at = 0
-        for some in _waved(way, waves):
-            here = slice(at, at + some.shape[1] // 2)
-            at = here.stop
-            for channel, of_gram, of_pull in zip(_WAVING, gram, pull, strict=True):
-                both = problem.whitened(drive, sensitivity.increments(channel, some)).reshape(len(white), -1, 2)
-                of_gram[here] += np.einsum("nki,nkj->kij", both, both)
-                of_pull[here] += np.einsum("nki,n->ki", both, white)
-    gained = np.einsum("cki,cki->ck", pull, np.linalg.solve(gram + 1e-9 * np.eye(2), pull[..., None])[..., 0])
-    return float(1 / waves[int(np.argmax(gained.max(axis=0)))]), gained.size
+    sought = _Sought(problem, settings, motions, ways)
+    gained = np.stack([sought.gained(channel, waves, 1) for channel in _WAVING])
+    channel, best = np.unravel_index(int(np.argmax(gained)), gained.shape)
+    # What comes once per turn, but briefly, has overtones as large, any of which may stand out.
+    apart, closer = waves[1] - waves[0], np.arange(-_CLOSER, _CLOSER + 1) / _CLOSER
+    near = [(waves[best] + apart * closer) / turns for turns in _PARTS]
+    near = [some[(some >= low) & (some <= high)] for some in near]
+    found = [(wave, sought.gained(_WAVING[channel], wave, _OVERTONES)) for wave in near if len(wave) > 1]
+    likeliest, _ = max(((wave[np.argmax(g)], g.max()) for wave, g in found), key=lambda one: one[1])
+    return float(1 / likeliest), gained.size
+
+
+class _Sought:
+    """What is left about simulated drives, and what waves along their ways explain of it."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        settings: Sequence[EffectSetting],
+        motions: Sequence[effects.Motion],
+        ways: Sequence[FloatArray],
+    ) -> None:
+        self._problem = problem
+        self._drives = []
+        for drive, motion, way in zip(problem.drives, motions, ways, strict=True):
+            left = (drive.measured - problem.simulated(drive, settings)).reshape(-1, 1)
+            self._drives.append((drive, Sensitivity(drive, motion), way, problem.whitened(drive, left)[:, 0]))
+
+    def gained(self, channel: str, waves: FloatArray, overtones: int) -> FloatArray:
+        """Return the squares that each of evenly spaced waves, with as many overtones, explains in a channel, (n,)."""
+        size = 2 * overtones
+        gram, pull = np.zeros((len(waves), size, size)), np.zeros((len(waves), size))
+        for drive, sensitivity, way, white in self._drives:
+            tones = zip(*(_waved(way, times * waves) for times in range(1, overtones + 1)), strict=True)
+            at = 0
+            for some in tones:
+                here = slice(at, at + some[0].shape[1] // 2)
+                at = here.stop
+                # (rows, waves, cosines and sines of all tones)
+                whole = [
+                    self._problem.whitened(drive, sensitivity.increments(channel, tone)).reshape(len(white), -1, 2)
+                    for tone in some
+                ]
+                both = whole[0] if overtones == 1 else np.concatenate(whole, axis=2)
+                gram[here] += np.einsum("nki,nkj->kij", both, both)
+                pull[here] += np.einsum("nki,n->ki", both, white)
+        along = np.linalg.solve(gram + 1e-9 * np.eye(size), pull[..., None])[..., 0]
+        return np.asarray(np.einsum("ki,ki->k", pull, along))
 
 
 def _waved(way: FloatArray, waves: FloatArray) -> Iterator[FloatArray]:

@@ -81,6 +81,7 @@ def _truth(ask: Ask, scale: Scale, sizes: dict[str, Sizes]) -> Truth:
     rivals = sizing.rival_columns(scale, [name for name in sizing.RIVALS if name not in ids])
     left = _left(whole, own, rivals)
     nearest = min(left, key=lambda name: left[name])
+    also = {"base.saturation": sizing.left_by_clips(scale, whole)} if ask.kind == "confounded" else {}
     return Truth(
         ask.kind,
         ids,
@@ -90,7 +91,7 @@ def _truth(ask: Ask, scale: Scale, sizes: dict[str, Sizes]) -> Truth:
         z_rival=left[nearest],
         rival=nearest,
         z_form=sizing.left_beside(whole, usual)["usual"],
-        accepted=_accepted(ids, left),
+        accepted=_accepted(ids, left | also),
     )
 
 

@@ -16,6 +16,7 @@ from kurumaisu.types import FloatArray
 
 # Every id with a mean signal that a size can scale; the same list for everything that is hidden.
 RIVALS = tuple(name for name, hidden in BASE.items() if hidden.scaled and name != "base.process_noise")
+_CLIPS = (0.5, 0.7, 0.8, 0.9)  # sizes of clips: what they take of the fastest rates
 _RANDOM = np.random.default_rng  # seeds below are fixed: rivals are the same for all recordings
 
 
@@ -72,6 +73,18 @@ def left_beside(signal: FloatArray, columns: Mapping[str, FloatArray]) -> dict[s
         fit = np.linalg.lstsq(kept, signal, rcond=None)[0]
         out[name] = float(np.linalg.norm(signal - kept @ fit))
     return out
+
+
+def left_by_clips(scale: Scale, signal: FloatArray) -> float:
+    """Return the norm of what the best of several clips leaves of a signal: at one speed they are a gain, but below 1.
+
+    The typical clip lies beyond the speed of most drives at one speed.
+    """
+    hidden = BASE["base.saturation"]
+    sizes = [{**hidden.draw(_RANDOM(0)), "axis": axis, "size": size} for axis in (0.0, 1.0) for size in _CLIPS]
+    columns = scale.signals([[hidden.fault(one, "plain")] for one in sizes]).T
+    along = [max(float(c @ signal), 0.0) / max(float(c @ c), 1e-9) for c in columns]
+    return min(float(np.linalg.norm(signal - share * c)) for share, c in zip(along, columns, strict=True))
 
 
 def rival_columns(scale: Scale, names: Sequence[str]) -> dict[str, FloatArray]:

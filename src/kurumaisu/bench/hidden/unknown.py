@@ -37,7 +37,7 @@ class Strange:
 
 
 def carpet(r: Rates, s: Sizes) -> Rates:
-    """V less by a share `size` on half of the floor, beyond a line through where the drive began.
+    """V less by a share `size` on half of the floor, beyond x = `edge` in the map.
 
     Where the chair is depends on how much it was held up, and on its noise: another path than the one asked for.
     """
@@ -45,7 +45,7 @@ def carpet(r: Rates, s: Sizes) -> Rates:
     cos, sin = np.cos(heading), np.sin(heading)
     ahead = (cos * r.v * STEP).tolist()
     shaken = (r.moving * (cos * r.noise[:, 0] - sin * r.noise[:, 1]) * STEP).tolist()
-    x, line = float(r.start[0]), float(r.start[0] + s["edge"])
+    x, line = float(r.start[0]), s["edge"]
     held = np.empty(len(ahead))
     for k, (step, shake) in enumerate(zip(ahead, shaken, strict=True)):
         held[k] = s["size"] * (x > line)
@@ -112,11 +112,11 @@ def puncture(r: Rates, s: Sizes) -> Rates:
 
 
 def draught(r: Rates, s: Sizes) -> Rates:
-    """A turn of `size` [rad/s] beside an open door: within half a metre of y = `door` from where the drive began."""
+    """A turn of `size` [rad/s] beside an open door: within half a metre of y = `door` in the map."""
     turns = (STEP * (r.w + r.moving * r.noise[:, 2])).tolist()
     ahead = (STEP * (r.v + r.moving * r.noise[:, 0])).tolist()
     aside = (STEP * r.moving * r.noise[:, 1]).tolist()
-    heading, y = float(r.start[2]), -s["door"]
+    heading, y = float(r.start[2]), float(r.start[1] - s["door"])
     push = np.empty(len(turns))
     for k, (turn, moving) in enumerate(zip(turns, r.moving.tolist(), strict=True)):
         push[k] = s["size"] * moving * math.exp(-(y**2) / (2 * 0.5**2))
