@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -15,7 +15,8 @@ from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import FELT, MATERIAL, confirmed, felt_share, moved_share
+from kurumaisu.critic.gain import CHANNELS
+from kurumaisu.critic.material import FELT, MATERIAL, NO_NOISE, confirmed, felt_share, moved_share, nearer
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
 from kurumaisu.critic.options import version
@@ -85,9 +86,13 @@ def criticism(
     problem, found, growth = made.problem, made.found, made.growth
     best = found.best
     shares = {name: moved_share(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
-    gains = confirmed(worth, found.nats(best))
+    nats = found.nats(best)
+    # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
+    gains = confirmed(worth, nats) or (nats >= NO_NOISE and nearer(worth, tuple(CHANNELS)))
     felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
+    told = tuple(group for group in found.confounded if not best.ids & set(group) or matters & set(group))
+    found = replace(found, confounded=told)
     kind = _kind(found, matters)
     fitted = {name: doubtful.widened(found, name, sizes.estimates(problem, best, name)) for name in sorted(best.ids)}
     causes = tuple(_cause(problem, found, name, fitted[name]) for name in found.named if name in matters)

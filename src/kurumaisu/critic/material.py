@@ -20,6 +20,8 @@ MATERIAL = 0.005  # share of the way (or of the turn) from which an effect matte
 FELT = 0.1  # share of what is uncertain anyway, per increment, from which an effect matters to a prediction
 _SAME = 1e-6  # [s] less than any clock resolves: stamps of equal spacing differ by rounding
 STRONG = 8.0  # [nat] of evidence from which _LIKELY will do
+# [nat] over nothing: were the noise twice as large as estimated, a quarter of it would still be beyond doubt.
+NO_NOISE = 50.0
 _LIKELY = 0.84  # standard deviations: a gain with a probability of 0.8
 HORIZON = 2.0  # [s] over which ways and turns are compared
 
@@ -34,6 +36,17 @@ def confirmed(worth: Gain | None, nats: float) -> bool:
     gain = worth.log_density_per_sample
     sd = max(gain.hi90 - gain.lo90, 1e-12) / (2 * NORMAL90)
     return gain.lo90 > 0 or (nats >= STRONG and gain.gain > _LIKELY * sd)
+
+
+def nearer(worth: Gain | None, channels: Sequence[str]) -> bool:
+    """Return whether drives held out are simulated nearer to what was measured in one of some channels, in none less.
+
+    What a curve or an equation leaves of something strong is no normal noise: a few surprises may cost all that the
+    density gains.
+    """
+    errors = [worth.channels[name].rmse for name in channels if name in worth.channels] if worth is not None else []
+    known = [error for error in errors if error is not None]
+    return any(error.lo90 > 0 for error in known) and all(error.hi90 > 0 for error in known)
 
 
 def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:

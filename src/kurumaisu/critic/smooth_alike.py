@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import effects
+from kurumaisu.critic.catalogue import Candidate
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.smooth import Belief, Curve, columns, taken_up
 from kurumaisu.critic.smooth_designs import Designs
@@ -25,6 +26,7 @@ class Likeness:
     def __init__(self, problem: Problem, best: Fit, designs: Designs) -> None:
         self._problem, self._best, self._designs = problem, best, designs
         self._signals = {name: signal_of(problem, best, name) for name in sorted(best.ids)}
+        self._fits: dict[frozenset[Candidate], Fit] = {}
 
     def drawn(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
         """Return what this curve draws of the best fit's effects, beside another fit that lacks them.
@@ -36,18 +38,47 @@ class Likeness:
         # Of several, one may hide what another does: then a small whole has large parts.
         if len(missing) != 1 or fit.ids - self._best.ids:
             return {}
+        signals = {name: self._signals[name] for name in missing}
+        return self._like(signals, fit, curve, belief, self._best.log_likelihood)
+
+    def drawn_alone(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
+        """Return the one effect of the best fit that draws what this curve does, beside a fit that lacks several.
+
+        The others may only mend its form, as a bent law does of a limit that has no corner.
+        """
+        missing = [one for one in self._best.candidates if one not in fit.candidates]
+        if len(missing) < 2 or not fit.candidates <= self._best.candidates:
+            return {}
+        found: dict[str, float] = {}
+        for one in sorted(missing, key=lambda one: one.id):
+            alone = self._alone(fit.candidates | {one})
+            found |= self._like(
+                {one.id: signal_of(self._problem, alone, one.id)}, fit, curve, belief, alone.log_likelihood
+            )
+        strongest = max(found, key=lambda name: found[name], default="")
+        return {strongest: found[strongest]} if found else {}
+
+    def _alone(self, candidates: frozenset[Candidate]) -> Fit:
+        if candidates not in self._fits:
+            self._fits[candidates] = self._problem.fit_candidates(candidates, self._best.start)
+        return self._fits[candidates]
+
+    def _like(
+        self, signals: dict[str, FloatArray], fit: Fit, curve: Curve, belief: Belief, likelihood: float
+    ) -> dict[str, float]:
+        """Return those of some effects of which a curve beside a fit draws the signals; likelihood: of them instead."""
         y, own = taken_up(self._problem, fit)
         free = self._designs.columns(fit, curve)
         free = free - own @ (own.T @ free)
         spread = np.eye(free.shape[1]) + belief.prior @ (free.T @ free)
         drawn = free @ np.linalg.solve(spread, belief.prior @ (free.T @ y))
-        signals = {name: self._signals[name] - own @ (own.T @ self._signals[name]) for name in sorted(missing)}
+        signals = {name: signal - own @ (own.T @ signal) for name, signal in signals.items()}
         found = {
             name: 0.5 * float(FORM**2 * signal @ signal)
             for name, signal in signals.items()
             if _correlation(drawn, signal) > _ALIKE
         }
-        return self._by_no_jump(found, fit, curve, self._best.log_likelihood - fit.log_likelihood)
+        return self._by_no_jump(found, fit, curve, likelihood - fit.log_likelihood)
 
     def _by_no_jump(self, found: dict[str, float], fit: Fit, curve: Curve, already: float) -> dict[str, float]:
         """Return those effects of which a curve is drawn though it jumps; already: what they explain of it [nat].

@@ -15,7 +15,17 @@ from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.extended import process_noise
-from kurumaisu.critic.material import FELT, HORIZON, MATERIAL, STRONG, confirmed, felt_share, moved_share
+from kurumaisu.critic.material import (
+    FELT,
+    HORIZON,
+    MATERIAL,
+    NO_NOISE,
+    STRONG,
+    confirmed,
+    felt_share,
+    moved_share,
+    nearer,
+)
 from kurumaisu.critic.misfit import bins, moments
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.next_experiment import Proposal
@@ -27,8 +37,6 @@ from kurumaisu.critic.verdict import NORMAL90, Gain, Unknown
 from kurumaisu.types import BoolArray, FloatArray
 
 _LISTED = 3  # curves that may act, at most
-# [nat] over nothing: were the noise twice as large as estimated, a quarter of it would still be beyond doubt.
-_NO_NOISE = 50.0
 _UNHELD = 0.5  # probability at most of a curve that did not hold
 _SEEN_IN = {"v": "dx", "lateral": "dy", "w": "dtheta"}  # channels of a gain
 _PLAUSIBLE = 0.02  # posterior from which another curve is listed
@@ -102,27 +110,19 @@ def _matters(share: float, felt: float) -> bool:
 def _held(made: Decision, worth: Gain | None) -> bool:
     assert made.beyond.extension is not None
     nats = _nats(made.found, made.beyond)
-    return confirmed(worth, nats) or (nats >= STRONG and _nearer(worth, made.beyond.extension.curve.channel))
+    rate = effects.CHANNELS[made.beyond.extension.curve.channel].rate
+    return confirmed(worth, nats) or (nats >= STRONG and nearer(worth, (_SEEN_IN[rate],)))
 
 
 def _no_noise(made: Decision) -> bool:
     best = made.beyond.rivalry.rivals[0]
-    return made.found.nats(best.fit) + best.belief.nats >= _NO_NOISE
+    return made.found.nats(best.fit) + best.belief.nats >= NO_NOISE
 
 
 def _nats(found: Naming, beyond: Beyond) -> float:
     """Return the evidence [nat] for what was found: over the catalogue, or, where an effect may be it, over nothing."""
     best = beyond.rivalry.rivals[0]
     return beyond.rivalry.lead if beyond.rivalry.winner else found.nats(best.fit) + best.belief.nats
-
-
-def _nearer(worth: Gain | None, channel: str) -> bool:
-    """Return whether drives held out are simulated nearer to what was measured, in the direction of a channel.
-
-    What a curve leaves of something strong is no normal noise: a few surprises may cost all that the density gains.
-    """
-    seen = worth and worth.channels.get(_SEEN_IN[effects.CHANNELS[channel].rate])
-    return bool(seen and seen.rmse and seen.rmse.lo90 > 0)
 
 
 def figure(problem: Problem, extension: Extension) -> Misfit:

@@ -92,6 +92,7 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
         draws = likeness.drawn(rival.fit, rival.curve, rival.belief) if asked else {}
         if asked and rival.worth - ceiling > BEYOND:  # else it is no news, and nobody asks whose form it mends
             draws = draws or likeness.mended(rival.fit, rival.curve)
+            draws = draws or likeness.drawn_alone(rival.fit, rival.curve, rival.belief)
         drawn = {name for name, nats in draws.items() if rival.worth - ceiling < BEYOND + nats}
         wins = not drawn and rival.worth - ceiling > BEYOND and share > _SHARE
         part = likeness.part_of(rival.fit, rival.curve) if wins else set()
