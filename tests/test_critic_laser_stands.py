@@ -47,6 +47,18 @@ def test_stands_are_found_whatever_their_jitter_happens_to_be():
         assert len(np.unique(still, axis=0)) == 4, seed
 
 
+def test_a_stand_begins_when_the_chair_has_rolled_out():
+    """Slowly: from row to row it moves by hardly more than the poses' jitter."""
+    times = 0.1 * np.arange(70)
+    way = np.interp(times, [0.0, 1.0, 1.24, 5.83, 6.0, 7.0], [-0.5, -0.02, 0.0, 0.0, 0.013, 0.6])
+    for seed in range(40):
+        poses = np.column_stack([way, 0 * way, 0 * way]) + 1.3e-3 * np.random.default_rng(seed).standard_normal((70, 3))
+        same = (np.diff(steadied(times, poses), axis=0) == 0).all(axis=1)
+        rows = np.flatnonzero(np.r_[False, same] | np.r_[same, False])
+        assert 13 <= rows[0] <= 15, seed
+        assert 55 <= rows[-1] <= 58, seed
+
+
 def test_a_scan_rests_on_the_poses_of_when_its_beams_leave(tmp_path):
     shots = gather(recording(tmp_path, None, 0.0, 1, scans=10), MODEL)
     for delay in (0.0, 0.3):

@@ -12,23 +12,27 @@ _APART = 1e-3  # [s] from the middle of a pause, at which the stand before ends 
 _STEP = 8.0  # sds of the poses' jitter that lie between two of them where the chair stands
 _SPREAD = 2.2  # sds of the jitter, itself known to a third from few poses, that poses of one place scatter by
 _FEWEST = 5  # poses of a stand
+_OFF = 4.0  # sds of the jitter by which poses at the ends of a stand are off where the chair still rolls, or does again
 
 
 def steadied(times: FloatArray, poses: FloatArray) -> FloatArray:
     """Return poses (n, 3), those of each stand replaced by their mean; times (n,) [s].
 
     A reference errs alike while the chair stands. Taken for so many independent poses it would seem to be far better
-    known than it is.
+    known than it is. One scan taken while the chair rolls out would be off by all that it rolls.
     """
     if len(times) < _FEWEST:
         return poses
     jitter = np.maximum(_jitter(poses), 1e-9)
     step = np.abs(np.diff(poses, axis=0)) / jitter
-    cuts = np.flatnonzero((step > _STEP).any(axis=1) | (np.diff(times) > _PAUSE)) + 1
+    pauses = np.flatnonzero(np.diff(times) > _PAUSE) + 1
+    cuts = np.union1d(np.flatnonzero((step > _STEP).any(axis=1)) + 1, pauses)
+    apart = {0, len(times), *pauses.tolist()}  # nobody drove there
     out = poses.copy()
     for rows in np.split(np.arange(len(times)), cuts):
         if len(rows) >= _FEWEST and _stands(poses[rows], jitter):
-            out[rows] = poses[rows].mean(axis=0)
+            still = rows[_still(poses[rows], jitter, rows[0] not in apart, rows[-1] + 1 not in apart)]
+            out[still] = poses[still].mean(axis=0) if len(still) >= _FEWEST else poses[still]
     return out
 
 
@@ -51,6 +55,24 @@ def held(times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _stands(poses: FloatArray, jitter: FloatArray) -> bool:
     """Tell whether poses scatter as much as their jitter, and no more."""
     return bool((poses.std(axis=0) <= _SPREAD * jitter).all())
+
+
+def _still(poses: FloatArray, jitter: FloatArray, before: bool, behind: bool) -> slice:
+    """Return the rows of a stand (n, 3) without those at its ends in which the chair may still roll.
+
+    before, behind: whether it was driven there, so that nobody knows when within the last interval it came to rest.
+    """
+    low, high, centre = 0, len(poses), np.median(poses, axis=0)
+
+    def rolls(first: int, count: int) -> bool:
+        off = poses[first : first + count].mean(axis=0) - centre
+        return bool((np.abs(off) * np.sqrt(count) > _OFF * jitter).any())
+
+    while before and high - low >= _FEWEST and (rolls(low, 1) or rolls(low, 2)):
+        low += 1
+    while behind and high - low >= _FEWEST and (rolls(high - 1, 1) or rolls(high - 2, 2)):
+        high -= 1
+    return slice(low + before, high - behind)
 
 
 def _jitter(poses: FloatArray) -> FloatArray:
