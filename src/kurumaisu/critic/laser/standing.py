@@ -12,6 +12,7 @@ _APART = 1e-3  # [s] from the middle of a pause, at which the stand before ends 
 _STEP = 8.0  # sds of the poses' jitter that lie between two of them where the chair stands
 _SPREAD = 2.2  # sds of the jitter, itself known to a third from few poses, that poses of one place scatter by
 _FEWEST = 5  # poses of a stand
+_MOSTLY = 0.5  # share of what might be a stand that is one: of a slow drive some poses always lie together
 _OFF = 4.0  # sds of the jitter by which poses at the ends of a stand are off where the chair still rolls, or does again
 
 
@@ -30,9 +31,9 @@ def steadied(times: FloatArray, poses: FloatArray) -> FloatArray:
     apart = {0, len(times), *pauses.tolist()}  # nobody drove there
     out = poses.copy()
     for rows in np.split(np.arange(len(times)), cuts):
-        if len(rows) >= _FEWEST and _stands(poses[rows], jitter):
-            still = rows[_still(poses[rows], jitter, rows[0] not in apart, rows[-1] + 1 not in apart)]
-            out[still] = poses[still].mean(axis=0) if len(still) >= _FEWEST else poses[still]
+        still = rows[_still(poses[rows], jitter, rows[0] not in apart, rows[-1] + 1 not in apart)]
+        if len(still) >= max(_FEWEST, _MOSTLY * len(rows)) and _stands(poses[still], jitter):
+            out[still] = poses[still].mean(axis=0)
     return out
 
 
@@ -62,17 +63,13 @@ def _still(poses: FloatArray, jitter: FloatArray, before: bool, behind: bool) ->
 
     before, behind: whether it was driven there, so that nobody knows when within the last interval it came to rest.
     """
-    low, high, centre = 0, len(poses), np.median(poses, axis=0)
-
-    def rolls(first: int, count: int) -> bool:
-        off = poses[first : first + count].mean(axis=0) - centre
-        return bool((np.abs(off) * np.sqrt(count) > _OFF * jitter).any())
-
-    while before and high - low >= _FEWEST and (rolls(low, 1) or rolls(low, 2)):
-        low += 1
-    while behind and high - low >= _FEWEST and (rolls(high - 1, 1) or rolls(high - 2, 2)):
-        high -= 1
-    return slice(low + before, high - behind)
+    off = (poses - np.median(poses, axis=0)) / jitter
+    one = (np.abs(off) > _OFF).any(axis=1)
+    two = (np.abs(off[1:] + off[:-1]) > np.sqrt(2) * _OFF).any(axis=1)  # each with the next one
+    ahead, back = ~(one | np.r_[two, False]), ~(one | np.r_[False, two])[::-1]
+    low = int(np.argmax(ahead)) + 1 if before else 0
+    high = len(poses) - (int(np.argmax(back)) + 1 if behind else 0)
+    return slice(low, max(high, low))
 
 
 def _jitter(poses: FloatArray) -> FloatArray:
