@@ -110,6 +110,8 @@ def test_curves(channel, covariate):
         expected = {"v": v, "w": w, "lateral": u}
         if channel in expected:
             expected[channel] = expected[channel] + added
+        elif channel == "speed":
+            expected["v"] = expected["v"] + added * np.sign(expected["v"])
         elif channel == "curvature":
             expected["w"] = expected["w"] + added * expected["v"]
         else:  # v_gain, w_gain: a share of the rate

@@ -29,7 +29,7 @@ def seen_within_a_cell(drive):
     return drive.seen_at(times, poses)
 
 
-@pytest.mark.parametrize("channel", ["v", "lateral", "w", "v_gain", "w_gain", "curvature"])
+@pytest.mark.parametrize("channel", ["v", "lateral", "w", "v_gain", "w_gain", "curvature", "speed"])
 @pytest.mark.parametrize("cut", ["whole", "part", "within a cell"])
 def test_columns_are_what_a_little_of_the_curve_changes(drive, channel, cut):
     seen = {"whole": drive, "part": split(drive, 3)[1], "within a cell": seen_within_a_cell(drive)}[cut]

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """When what is outside the catalogue is told: drives held out confirm it, by density or by where the chair comes to."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 import unknown_effects as hidden
 
 from kurumaisu.critic import pipeline, smooth_explain
+from kurumaisu.critic.material import nearer
 from kurumaisu.critic.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
 from kurumaisu.params import shipped
 
@@ -19,15 +21,21 @@ def gain(low):
     return Gain(LOST, {}, {"dx": ChannelGain(LOST, rmse), "dtheta": ChannelGain(LOST)})
 
 
-@pytest.mark.parametrize(("channel", "low", "near"), [("v", 0.01, True), ("v_gain", 0.01, True), ("v", -0.01, False)])
-def test_surprises_do_not_hide_that_the_chair_is_simulated_nearer(channel, low, near):
-    assert smooth_explain._nearer(gain(low), channel) is near
+@pytest.mark.parametrize(
+    ("channels", "low", "near"),
+    [(("dx",), 0.01, True), (("dx", "dtheta"), 0.01, True), (("dx",), -0.01, False), (("dx", "dy"), 0.01, False)],
+)
+def test_surprises_do_not_hide_that_the_chair_is_simulated_nearer(channels, low, near):
+    """In one direction, and in none farther off."""
+    worse = ChannelGain(LOST, RmseGain(0.1, 0.15, -0.05, -0.06, -0.04, "m"))
+    one = gain(low)
+    assert nearer(replace(one, channels={**one.channels, "dy": worse}), channels) is near
 
 
 def test_what_is_not_known_confirms_nothing():
-    assert not smooth_explain._nearer(None, "v")
-    assert not smooth_explain._nearer(gain(0.01), "w")
-    assert not smooth_explain._nearer(gain(0.01), "lateral")
+    assert not nearer(None, ("dx",))
+    assert not nearer(gain(0.01), ("dtheta",))
+    assert not nearer(gain(0.01), ("dy",))
 
 
 @pytest.mark.parametrize(("winner", "nats"), [("a curve", 5.0), (None, 62.0)])
@@ -45,8 +53,8 @@ def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, leas
     """Nothing is extended by what did not hold, and no curve is certain."""
     recording = hidden.make(hidden.KINDS["gully"], 40.0, 1010, seconds=40.0, runs=2).recording
     monkeypatch.setattr(smooth_explain, "confirmed", lambda worth, nats: False)
-    monkeypatch.setattr(smooth_explain, "_nearer", lambda worth, channel: False)
-    monkeypatch.setattr(smooth_explain, "_NO_NOISE", least)
+    monkeypatch.setattr(smooth_explain, "nearer", lambda worth, channels: False)
+    monkeypatch.setattr(smooth_explain, "NO_NOISE", least)
     found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None)
     assert (found.verdict.verdict, found.verdict.causes) == (verdict, ())
     assert not any(setting.id.startswith("smooth") for setting in found.settings)

@@ -35,6 +35,7 @@ _BRAKES = {
     "v_gain": ("w", "abs_w", "v_times_w", "time", "since_command", "since_reversal", "heading", "distance", "x", "y"),
     "w_gain": ("v", "abs_v", "v_times_w", "time", "since_command", "since_reversal", "heading", "distance", "x", "y"),
     "curvature": ("time", "since_reversal", "heading", "x", "y"),
+    "speed": ("time", "heading", "x", "y"),
 }
 
 

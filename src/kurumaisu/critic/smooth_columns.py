@@ -24,7 +24,9 @@ class Sensitivity:
     def __init__(self, drive: Drive, motion: effects.Motion) -> None:
         poses = plant.path(motion, np.array([0.0, 0.0, motion.heading or 0.0]))
         moving = ((motion.v != 0) | (motion.w != 0)).astype(float)
-        self._weights = {"": GRID * moving, "v": GRID * moving * motion.v, "w": GRID * moving * motion.w}
+        self._weights = {
+            name: GRID * moving * effects.factor(channel, motion) for name, channel in effects.CHANNELS.items()
+        }
         self._heading = 0.5 * (poses[:-1, 2] + poses[1:, 2])
         # Anything summed over the grid is taken at the reference's times, linear within a cell: the share of it before.
         below, share = drive.places
@@ -53,9 +55,9 @@ class Sensitivity:
 
     def _derivative(self, channel: str) -> Iterator[csr_array]:
         """Yield the derivatives (m, n) of dx, dy and, where a channel turns the chair, of the turn."""
-        rate, by = effects.CHANNELS[channel].rate, effects.CHANNELS[channel].by
+        rate = effects.CHANNELS[channel].rate
         along = self._turned() if rate == "w" else self._moved(np.pi / 2 if rate == "lateral" else 0.0)
-        weights = self._weights[by][self._cells]
+        weights = self._weights[channel][self._cells]
         for part in along:
             yield csr_array((weights * part, self._cells, self._rows), shape=(len(self._first), len(self._steps)))
 

@@ -159,8 +159,8 @@ def _samples(
 
     That are those in which the chair moves on.
     """
-    rate, by = effects.CHANNELS[extension.curve.channel].rate, effects.CHANNELS[extension.curve.channel].by
-    channel = ("v", "lateral", "w").index(rate)
+    into = effects.CHANNELS[extension.curve.channel]
+    channel = ("v", "lateral", "w").index(into.rate)
     motion = replay.motion(drive, problem.model, extension.fit.settings)
     values = extension.curve.basis.samples(motion)
     middle = np.clip(((drive.times[1:] + drive.times[:-1]) / 2 - drive.start) / GRID, 0, len(values) - 1).astype(int)
@@ -173,8 +173,8 @@ def _samples(
     if "period" in extension.curve.basis.constants:
         x = np.mod(x, extension.curve.basis.constants["period"])
     use = np.isfinite(x) & ((motion.v != 0) | (motion.w != 0))[middle]
-    if by:  # a share of a rate: of a small one nothing can be said
-        rates = (motion.v if by == "v" else motion.w)[middle]
+    if into.by:  # a share of a rate: of a small one nothing can be said
+        rates = effects.factor(into, motion)[middle]
         use &= np.abs(rates) > 0.3 * np.abs(rates).max()
         residual, left = (each / np.where(use, rates, 1.0) for each in (residual, left))
     return x, residual, left, use

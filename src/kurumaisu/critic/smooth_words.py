@@ -18,6 +18,7 @@ CHANNELS = {
     "v_gain": "forward speed",
     "w_gain": "yaw rate",
     "curvature": "curvature of the way",
+    "speed": "size of the forward speed",
 }
 _SHARES = {"v_gain": "of the forward speed", "w_gain": "of the yaw rate"}  # in place of a unit
 COVARIATES = {

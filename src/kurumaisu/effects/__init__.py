@@ -52,7 +52,7 @@ from kurumaisu.effects.reverse_gain import ReverseGain
 from kurumaisu.effects.saturation import Saturation
 from kurumaisu.effects.sign import Sign
 from kurumaisu.effects.slope import Slope
-from kurumaisu.effects.smooth import CHANNELS, SMOOTH, constant_of, curve, smooth_id, smooth_of
+from kurumaisu.effects.smooth import CHANNELS, SMOOTH, constant_of, curve, factor, smooth_id, smooth_of
 from kurumaisu.effects.smooth_covariates import (
     CONSTANTS,
     COVARIATES,
@@ -264,6 +264,7 @@ __all__ = [
     "check",
     "constant_of",
     "curve",
+    "factor",
     "fluctuation",
     "incidence",
     "of_world",

@@ -60,8 +60,8 @@ _SMOOTH = """
 
 Where something acts that is none of these, the critic extends the model by a curve, which the simulator runs as it
 runs all others: `smooth.CHANNEL.COVARIATE` adds a rate that follows another quantity, while the chair moves, after
-everything else of the stage FLOOR; the channels `v_gain` and `w_gain` multiply the rate by 1 + curve, and `curvature`
-adds a yaw rate of curve · v.
+everything else of the stage FLOOR; the channels `v_gain` and `w_gain` multiply the rate by 1 + curve, `curvature`
+adds a yaw rate of curve · v, and `speed` a forward speed of curve · sign(v).
 
 ```yaml
 effects:

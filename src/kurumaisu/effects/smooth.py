@@ -7,7 +7,7 @@ What the critic puts into the model for an effect that is not in the catalogue. 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import ClassVar, NamedTuple
@@ -20,18 +20,25 @@ from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 
 SMOOTH = "smooth"  # stands for every curve where effects are chosen by id
+_BY: Mapping[str, Callable[[Motion], FloatArray]] = {
+    "": lambda motion: np.ones_like(motion.v),
+    "v": lambda motion: motion.v,
+    "w": lambda motion: motion.w,
+    "direction": lambda motion: np.sign(motion.v),
+}
 _MOVED = {"v": "v", "lateral": "u", "w": "w"}  # the rates of a motion by name
 
 
 class Channel(NamedTuple):
-    """A rate that gets a curve added, times another one if `by` names it; unit: of the curve."""
+    """A rate that gets a curve added, times what `by` names, if anything; unit: of the curve."""
 
     unit: str
     rate: str
     by: str = ""
 
 
-# What brakes takes a share of a rate in either direction; a tyre without air bends the way at any speed.
+# What slips takes a share of a rate in either direction, what drags as much of any speed; a tyre without air bends the
+# way, however fast it is driven.
 CHANNELS: Mapping[str, Channel] = {
     "v": Channel("m/s", "v"),
     "lateral": Channel("m/s", "lateral"),
@@ -39,6 +46,7 @@ CHANNELS: Mapping[str, Channel] = {
     "v_gain": Channel("1", "v", "v"),
     "w_gain": Channel("1", "w", "w"),
     "curvature": Channel("rad/m", "w", "v"),
+    "speed": Channel("m/s", "v", "direction"),
 }
 _ID = re.compile(rf"smooth\.({'|'.join(CHANNELS)})\.([A-Za-z][\w.]*)")
 _MOST = 64  # knots
@@ -102,11 +110,15 @@ class Smooth(Effect):
         channel = CHANNELS[self.channel]
         moving = (motion.v != 0) | (motion.w != 0)
         added = moving * curve(self.covariate, self.values, self._follower.values(motion))
-        if channel.by:
-            added = added * getattr(motion, channel.by)
+        added = added * factor(channel, motion)
         rate = _MOVED[channel.rate]
         before = getattr(motion, rate)
         return replace(motion, **{rate: added if before is None else before + added})
+
+
+def factor(channel: Channel, motion: Motion) -> FloatArray:
+    """Return by what a curve is multiplied before it is added to a channel's rate, (n,)."""
+    return _BY[channel.by](motion)
 
 
 @cache
