@@ -10,8 +10,10 @@ from hidden_effect import recording, recording_of
 from scipy.integrate import trapezoid
 
 from kurumaisu import geometry
-from kurumaisu.critic import drive, pipeline, prior, replay
+from kurumaisu.critic import drive, explain, pipeline, prior, replay
+from kurumaisu.critic.material import nearer
 from kurumaisu.critic.recording import Series
+from kurumaisu.critic.reference import with_reference
 from kurumaisu.critic.verdict import read_verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
@@ -172,6 +174,31 @@ def test_a_gain_of_the_odometry_is_named():
     verdict = criticise(data).verdict
     assert [cause.id for cause in verdict.causes] == ["base.gain_w"]
     assert verdict.causes[0].parameters["gain"].estimate == pytest.approx(0.1, abs=0.03)
+
+
+def test_without_poses_and_scans_the_odometry_is_what_commands_are_compared_with():
+    """It repeats itself at rest, to the last bit, as no reference that is measured does."""
+    data = recording("base.gain_w", 0.1, 70, 40.0)
+
+    def counted(run):
+        steady = np.round(run.pose.values, 3)
+        rates = np.zeros((len(steady), 2))
+        return replace(
+            run, pose=None, odom=Series(run.pose.t, np.hstack([steady, rates]), ("x", "y", "theta", "v", "w"))
+        )
+
+    runs = tuple(counted(run) for run in data.runs)
+    found = criticise(with_reference(replace(data, runs=runs), 0, lambda _: None))
+    assert [cause.id for cause in found.verdict.causes] == ["base.gain_w"]
+    assert found.story.pose_source.startswith("the odometry")
+
+
+@pytest.mark.parametrize(("near", "verdict"), [(True, "named"), (False, "none")])
+def test_what_cannot_be_noise_is_named_where_it_simulates_nearer(monkeypatch, near, verdict):
+    """Though the density of what is held out gains nothing, as where it differs from drive to drive."""
+    monkeypatch.setattr(explain, "confirmed", lambda worth, nats: False)
+    monkeypatch.setattr(explain, "nearer", lambda worth, channels: near and nearer(worth, channels))
+    assert criticise(recording("base.gain_w", 0.1, 70, 40.0)).verdict.verdict == verdict
 
 
 def test_a_recording_too_short_to_hold_anything_back_names_nothing():

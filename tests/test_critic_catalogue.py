@@ -9,7 +9,7 @@ import pytest
 from hidden_effect import recording, recording_of
 from scipy import optimize
 
-from kurumaisu.critic import pipeline, solve
+from kurumaisu.critic import explain, pipeline, solve
 from kurumaisu.critic.catalogue import Term
 from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Problem
@@ -55,6 +55,13 @@ def test_a_lever_to_the_side_is_exactly_a_leak_of_turns_and_said_as_a_set():
     assert verdict.verdict == "confounded"
     assert verdict.confounded == (("base.cross_w_to_v", "base.marker_y"),)
     assert verdict.causes == ()
+
+
+def test_a_set_of_which_nothing_matters_is_not_told(monkeypatch):
+    for share in ("moved_share", "felt_share"):
+        monkeypatch.setattr(explain, share, lambda problem, settings, without: 0.0)
+    verdict = pipeline.criticise(with_lever(recording(None, 0.0, 71, 40.0), 0.0, 0.05), MD100, lambda _: None).verdict
+    assert (verdict.verdict, verdict.confounded) == ("none", ())
 
 
 def test_a_lever_ahead_is_named_and_measured():

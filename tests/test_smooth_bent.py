@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Curves that bend often, flat spots of wheels and narrow gusts; and one that draws a top speed without a corner."""
+
+import math
+
+import pytest
+import unknown_effects as hidden
+
+from kurumaisu.critic import smooth_words
+from kurumaisu.critic.drive import prepare
+from kurumaisu.critic.evidence import Problem
+from kurumaisu.critic.naming import Naming
+from kurumaisu.critic.smooth_alike import Likeness
+from kurumaisu.critic.smooth_designs import Designs
+from kurumaisu.critic.smooth_known import informed
+from kurumaisu.critic.smooth_search import compare
+from kurumaisu.critic.smooth_waves import girth
+
+GIRTH = 1.137  # [m]
+
+
+def problem_of(recording):
+    return Problem([informed(prepare(run, hidden.MODEL), run) for run in recording.runs], hidden.MODEL, hidden.USUAL)
+
+
+def dent(s, a, b):
+    turn = s.gone / GIRTH - 0.4
+    return -s.v * math.exp(-((turn - round(turn)) ** 2) / (2 * 0.05**2))
+
+
+@pytest.fixture(scope="module")
+def dented():
+    """Return a wheel with a flat spot, beside which a gain makes up for the speed that is lost."""
+    problem = problem_of(hidden.make(hidden.Kind(0, "distance", dent), 30.0, 1020, seconds=60.0).recording)
+    return problem, problem.fit(["base.gain_v"], {}), problem.fit_candidates((), {})
+
+
+def test_the_period_of_a_flat_spot_is_that_of_a_turn(dented):
+    """Of the way as it was made: each overtone is as large, and out of step after some turns."""
+    problem, gain, _ = dented
+    found, _ = girth(problem, gain.settings)
+    assert found == pytest.approx(GIRTH, rel=0.008)
+
+
+def test_waves_come_as_often_beside_an_effect_that_makes_more_of_the_way(dented):
+    problem, gain, empty = dented
+    designs = Designs(problem, gain)
+    curve = next(c for c in designs.about(empty).curves if c.basis.covariate == "distance")
+    size = gain.values[0]
+    beside = designs.paced(gain, curve).basis.constants["period"]
+    assert beside == pytest.approx(designs.paced(empty, curve).basis.constants["period"] * (1 + size), rel=1e-3)
+
+
+def test_what_a_flat_spot_costs_on_the_mean_is_no_certain_gain_beside_its_waves(dented):
+    problem, gain, empty = dented
+    rivalry = compare(problem, Naming((gain, empty), {"base.gain_v": 1.0}, (), 0.0))
+    assert rivalry.winner.curve.id == "smooth.v_gain.distance"
+    assert rivalry.p_effects["base.gain_v"] < 0.9
+    assert {rival.curve.basis.harmonics for rival in rivalry.rivals if not rival.fit.ids} >= {4, 12}
+
+
+def test_a_narrow_gust_is_drawn_by_a_curve_that_bends_often():
+    gust = hidden.Kind(2, "y", lambda s, a, b: hidden.bump((s.y - 0.3) / 0.12))
+    problem = problem_of(hidden.make(gust, 40.0, 1021, seconds=60.0).recording)
+    rivalry = compare(problem, Naming((problem.fit_candidates((), {}),), {}, (), 1.0))
+    usual = max(r.worth for r in rivalry.rivals if len(r.curve.basis.knots) == 8)
+    assert (smooth_words.channel(rivalry.winner.curve), rivalry.winner.curve.basis.covariate) == ("base.w", "y")
+    assert len(rivalry.winner.curve.basis.knots) == 22
+    assert rivalry.winner.worth > usual + 10
+
+
+def test_a_top_speed_without_a_corner_is_one_though_a_bent_law_mends_it():
+    soft = hidden.Kind(0, "abs_v", lambda s, a, b: s.v * (1 / (1 + (abs(s.v) / 0.5) ** 10) ** 0.1 - 1))
+    problem = problem_of(hidden.make(soft, 100.0, 1025, seconds=40.0, runs=2).recording)
+    empty = problem.fit_candidates((), {})
+    mended = problem.fit(["base.saturation", "base.curvature_v"], {})
+    designs = Designs(problem, mended)
+    rivals = compare(problem, Naming((mended, empty), {}, (), 0.0)).rivals
+    drawn = [Likeness(problem, mended, designs).drawn_alone(r.fit, r.curve, r.belief) for r in rivals[:3]]
+    assert any("base.saturation" in names for names in drawn)
