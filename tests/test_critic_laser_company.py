@@ -142,6 +142,13 @@ def test_all_scans_tell_whether_they_have_a_common_mode(seed):
     assert _weighed(0.0, seed)[0].nats < 2
 
 
+def test_scans_that_are_off_by_as_much_as_they_may_have_something_else_that_is_wrong():
+    """Walls that stand elsewhere had a common mode of 0.1 m beside them."""
+    seen, noise = _weighed(0.3, 1)
+    assert noise.common_sd == pytest.approx(0.1)
+    assert with_whole_scans([], seen, noise, _recording(), None) == []
+
+
 def _recording():
     stamps = 0.1 * np.arange(50)
     scan = Series(stamps, np.ones((50, 2)), ("r0", "r1"))

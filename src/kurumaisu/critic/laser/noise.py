@@ -24,6 +24,7 @@ _USUAL = np.array([0.005, 0.005, 2e-4, 1.0, 0.05, 5.0])
 # A common mode may be of each scan alone, at 30 ms, or last for ten seconds.
 _SPREAD = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 1.0])
 _LOW, _HIGH = np.array([1e-5, 1e-5, 1e-6, 0.01, 1e-4, 1.0]), np.array([0.3, 0.3, 0.1, 10.0, 0.98, 60.0])
+_WHOLE = 0.99  # of the largest common mode
 _NONE = 0.003  # share that lasts of a reference that does not wander, as far as can be seen
 _TRIED = (0.05, 0.2, 0.6)  # shares, one of which must be likelier
 _STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that last are one
@@ -236,8 +237,11 @@ def common_mode(
 ) -> CommonMode:
     """Return what says that scans have a common mode, by all of them; noise: the likeliest one, other arguments alike.
 
-    By Laplace's approximation of the integral over its sd and its time constant.
+    By Laplace's approximation of the integral over its sd and its time constant. One as large as any may be stands for
+    something else that is wrong.
     """
+    if noise.common_sd > _WHOLE * _HIGH[2]:
+        return CommonMode(-np.inf, 1.0, 1.0)
     likelihood = _Likelihood(grams, layout, project)
 
     def cost(x: FloatArray) -> float:
