@@ -17,7 +17,7 @@ _BESIDE = 4  # beams on each side of a corner or jump: an error of the pose or t
 _STEEPEST = np.radians(75.0)
 _GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
 _PILED = 20  # readings of one value, the least or the greatest, that are a pile if hardly more lie beside them
-_GRID = 1e-3  # [m] within which values are one
+_GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
 
 
 def edges(seen: Look, increment: float) -> BoolArray:
@@ -49,13 +49,17 @@ def trusted(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
 
 
 def piles(readings: FloatArray) -> tuple[float, float]:
-    """Return the least and the greatest reading [m] where readings pile up there, as if cut off; else infinite ones."""
+    """Return the least and the greatest reading [m] where readings pile up there, as if cut off; else infinite ones.
+
+    Of a pile that is not sharp, the end that lies inside.
+    """
     values = readings[np.isfinite(readings)]
     ends = []
     for sign in (-1.0, 1.0):
         off = np.max(sign * values) - sign * values if len(values) else values
-        pile, beside = np.sum(off < _GRID), np.sum((off >= _GRID) & (off < _GATE))
-        ends.append(sign * float(np.max(sign * values)) if pile > max(_PILED, beside) else sign * np.inf)
+        grids = [grid for grid in _GRIDS if np.sum(off < grid) > max(_PILED, np.sum((off >= grid) & (off < _GATE)))]
+        within = float(np.max(off[off < grids[0]])) if grids else np.inf
+        ends.append(sign * (float(np.max(sign * values)) - within) if grids else sign * np.inf)
     return ends[0], ends[1]
 
 
