@@ -3,6 +3,7 @@
 
 import math
 
+import numpy as np
 import pytest
 import unknown_effects as hidden
 
@@ -11,6 +12,7 @@ from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.smooth_alike import Likeness
+from kurumaisu.critic.smooth_basis import knots_of
 from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.smooth_search import compare
@@ -78,3 +80,11 @@ def test_a_top_speed_without_a_corner_is_one_though_a_bent_law_mends_it():
     rivals = compare(problem, Naming((mended, empty), {}, (), 0.0)).rivals
     drawn = [Likeness(problem, mended, designs).drawn_alone(r.fit, r.curve, r.belief) for r in rivals[:3]]
     assert any("base.saturation" in names for names in drawn)
+
+
+def test_a_speed_that_is_one_but_for_rounding_is_followed_by_nothing():
+    """A few seconds at another speed, and curves had all their knots at one place."""
+    speeds = np.full(1000, 0.42110524) + 1e-15 * np.arange(1000)
+    speeds[:5] = 0.2
+    assert len(knots_of(speeds)) == 0
+    assert len(knots_of(np.linspace(0.2, 0.5, 1000))) == 8

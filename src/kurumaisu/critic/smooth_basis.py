@@ -137,12 +137,17 @@ def _constants(name: str, drives: Sequence[Drive], model: Model) -> dict[str, fl
 
 
 def knots_of(values: FloatArray, hats: int = _HATS) -> FloatArray:
-    """Return knots half way between evenly spaced ones and ones with as many samples between them."""
+    """Return knots half way between evenly spaced ones and ones with as many samples between them.
+
+    None where nearly all values are one, but for rounding.
+    """
     low, high = np.quantile(values, [0.01, 0.99])
+    if high - low <= _ROUNDING * max(1.0, abs(low), abs(high)):
+        return np.empty(0)
     inside = np.clip(values, low, high)
     knots = 0.5 * (np.linspace(low, high, hats) + np.quantile(inside, np.linspace(0, 1, hats)))
     keep = np.append(True, np.diff(knots) > 1e-3 * (high - low))
-    return np.asarray(knots[keep]) if high > low else np.empty(0)
+    return np.asarray(knots[keep])
 
 
 def _matrix(knots: FloatArray, period: float, at: FloatArray, harmonics: int) -> FloatArray:
