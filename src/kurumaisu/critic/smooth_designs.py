@@ -23,13 +23,16 @@ class Designs:
 
     def __init__(self, problem: Problem, best: Fit) -> None:
         self._problem = problem
-        self._made = [(self._rates(best), Design(problem, best.settings))]
+        rates = self._rates(best)
+        self._made = [(rates, Design(problem, best.settings))]
         self._of = {best.candidates: self._made[0][1]}
+        self._ways = {best.candidates: _way(rates)}
 
     def about(self, fit: Fit) -> Design:
         """Return the design about a fit, or about another one that has nearly the same rates."""
         if fit.candidates not in self._of:
             rates = self._rates(fit)
+            self._ways[fit.candidates] = _way(rates)
             near = [design for other, design in self._made if _near(rates, other)]
             if not near:
                 near = [Design(self._problem, fit.settings)]
@@ -45,10 +48,11 @@ class Designs:
         if curve.basis.covariate != "distance":
             return curve
         design = self.about(fit)
-        there = next(rates for rates, made in self._made if made is design)
-        ways = [float(np.abs(rates[0]).sum()) for rates in (self._rates(fit), there)]
-        constants = {name: period * ways[0] / ways[1] for name, period in curve.basis.constants.items()}
-        return replace(curve, basis=replace(curve.basis, constants=constants)) if ways[0] != ways[1] else curve
+        here, there = self._ways[fit.candidates], next(_way(rates) for rates, made in self._made if made is design)
+        if here == there:
+            return curve
+        constants = {name: period * here / there for name, period in curve.basis.constants.items()}
+        return replace(curve, basis=replace(curve.basis, constants=constants))
 
     def columns(self, fit: Fit, curve: Curve) -> FloatArray:
         """Return the whitened columns of a curve beside a fit, (rows, k)."""
@@ -61,6 +65,10 @@ class Designs:
         """Return v and w of all drives, (2, n)."""
         motions = [replay.motion(drive, self._problem.model, fit.settings) for drive in self._problem.drives]
         return np.concatenate([np.stack([motion.v, motion.w]) for motion in motions], axis=1)
+
+
+def _way(rates: FloatArray) -> float:
+    return float(np.abs(rates[0]).sum())
 
 
 def _near(one: FloatArray, other: FloatArray) -> bool:
