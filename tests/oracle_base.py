@@ -238,7 +238,7 @@ def slope(p, drive):
     for speed, w in zip(drive.v, drive.w, strict=True):
         middle = heading + w * drive.dt / 2
         uphill = p["climb_x"] * math.cos(middle) + p["climb_y"] * math.sin(middle)
-        v.append(speed - uphill if (speed, w) != (0, 0) else 0.0)
+        v.append(speed - uphill if max(abs(speed), abs(w)) > 1e-3 else speed)
         heading += w * drive.dt
     return v, _still(len(v)), drive.w
 
@@ -250,7 +250,7 @@ def caster_reversal(p, drive):
     sides = [0.0] * max(round(0.03 / drive.dt), 1)  # of the last turn, the oldest first: casters take that long
     since, out = 0.0, []
     for v, w in zip(drive.v, drive.w, strict=True):
-        way = (v > 0) - (v < 0)
+        way = (v >= 0.02) - (v <= -0.02)
         if way != 0:
             if last_way not in (0, way):
                 kicked_to, since = sides[0], 0.0
@@ -259,7 +259,7 @@ def caster_reversal(p, drive):
         kick = p["kick"] * math.exp(-(since + travelled / 2) / p["length"]) if abs(v) > 1e-3 else 0.0
         out.append(w + kicked_to * kick)
         since += travelled
-        sides = [*sides[1:], math.copysign(1.0, w) if w != 0 else sides[-1]]
+        sides = [*sides[1:], math.copysign(1.0, w) if abs(w) >= 0.05 else sides[-1]]
     return drive.v, _still(len(out)), out
 
 

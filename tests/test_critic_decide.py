@@ -94,15 +94,27 @@ def test_two_sets_that_lead_to_each_other_come_to_an_end(judged):
 
 @pytest.mark.parametrize(
     ("start", "better"),
-    [({("a", "offset"): 0.0}, False), ({("a", "offset"): 0.9}, True), ({("b", "offset"): 1.0}, False)],
+    [
+        ({"a": 0.0, "b": 0.2}, False),
+        ({"a": 0.9, "b": 0.2}, True),
+        ({"a": 0.9, "b": 3.0}, False),
+        ({"a": 0.9}, True),
+        ({"b": 0.2}, False),
+        ({"c": 1.0}, False),
+    ],
 )
 def test_a_fit_that_first_values_beat_is_stuck(start, better):
-    """The best value is 1; the fit stuck at 0.5, as on a wrong tooth of a comb."""
-    parameter = Parameter("offset", "V", null=0.0, scale=1.0, lower=-2.0, upper=2.0)
-    problem = SimpleNamespace(residual=lambda _, values: 4.0 * (values - 1.0))
-    fit = SimpleNamespace(terms=(Term("a", parameter, 0.0),), log_likelihood=-2.0)
-    assert naming.begins_better(problem, fit, start) is better
-    assert not naming.begins_better(problem, SimpleNamespace(terms=()), start)
+    """The best values are 1 and 0.2; the fit stuck at 0.5 and 0.2, as on a wrong tooth of a comb.
+
+    Where first values are those of a part of the set, the rest stays as it was fitted.
+    """
+    parameter = Parameter("offset", "V", null=0.0, scale=1.0, lower=-5.0, upper=5.0)
+    problem = SimpleNamespace(residual=lambda _, values: 4.0 * (values - [1.0, 0.2]))
+    terms, own = (Term("a", parameter, 0.0), Term("b", parameter, 0.0)), (0.5, 0.2)
+    at = {term.key: value for term, value in zip(terms, own, strict=True)}
+    fit = SimpleNamespace(terms=terms, start=at, log_likelihood=-2.0)
+    assert naming.begins_better(problem, fit, {(name, "offset"): value for name, value in start.items()}) is better
+    assert not naming.begins_better(problem, SimpleNamespace(terms=()), {("a", "offset"): 0.9})
 
 
 @pytest.mark.parametrize(("by_noise", "curved"), [(0.0, True), (4.0, False)])

@@ -23,7 +23,7 @@ def test_what_moves_a_resting_chair_has_curves_of_its_own(cause: str, shared: bo
     drive = Drive("made", "command", 0.0, v, w, t[::10], poses)
     problem = Problem([drive], follow_commands(load_model(shipped("launch/md100.yaml"))), START)
     empty = problem.fit((), {})
-    small = (EffectSetting(cause, {"gain": 1e-3} if shared else {"offset": 1e-3, "rests": 0.0}),)
+    small = (EffectSetting(cause, {"gain": 2e-3} if shared else {"offset": 2e-3, "rests": 0.0}),)
     best = replace(problem.fit([cause], {}), settings=small)
     designs = Designs(problem, best)
     assert (designs.about(empty) is designs.about(best)) is shared

@@ -29,7 +29,6 @@ from kurumaisu.critic.smooth_search import BEYOND
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-_REST = 1e-3  # [m/s], [rad/s] below which a chair rests: one that lags never quite does
 _ANEW = 1  # times at most that all is judged anew, because other effects act than those about which the noise was taken
 Progress = Callable[[str], None]
 Truth = tuple[float, float] | None
@@ -185,4 +184,4 @@ def scatter(
 def _resting(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> Drive:
     """Return a drive that knows where the simulated chair rests although it is asked to move."""
     motion = replay.motion(drive, model, settings)
-    return replace(drive, still=(np.abs(motion.v) < _REST) & (np.abs(motion.w) < _REST))
+    return replace(drive, still=~motion.moving)

@@ -155,13 +155,14 @@ def _beside_rivals(
 
 
 def begins_better(problem: Problem, fit: Fit, start: Mapping[Key, float]) -> bool:
-    """Tell whether other first values of a set explain more than its fit, which stuck half way.
+    """Tell whether other first values of a set, or of a part of it, explain more than its fit, which stuck half way.
 
-    Else what is needless seems to act: beside it a comb of likely values is searched anew, and found out better.
+    Else what is needless seems to act, and what stands in for what acts seems not to.
     """
-    if not fit.terms or any(term.key not in start for term in fit.terms if not term.fixed):
+    own = fit.start if fit.terms else {}
+    if not any(key in start for key in own):
         return False
-    values = np.array([term.parameter.lower if term.fixed else start[term.key] for term in fit.terms])
+    values = np.array([term.parameter.lower if term.fixed else start.get(term.key, own[term.key]) for term in fit.terms])
     left = problem.residual(fit.terms, values)
     return -0.5 * float(left @ left) > fit.log_likelihood + _STUCK
 

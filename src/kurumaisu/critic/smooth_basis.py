@@ -12,7 +12,7 @@ from kurumaisu import effects
 from kurumaisu.critic import replay
 from kurumaisu.critic.drive import Drive
 from kurumaisu.params import EffectSetting, Model
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import FloatArray
 
 _HATS = 8
 _HARMONICS = 4
@@ -69,7 +69,7 @@ class Basis:
     def fine(self, motions: Sequence[effects.Motion]) -> Basis:
         """Return the curves over the same that bend more often, with their prior over these motions."""
         finer = self.finer(_FINE)
-        matrix = finer.matrix(np.concatenate([finer.samples(motion)[_moving(motion)] for motion in motions]))
+        matrix = finer.matrix(np.concatenate([finer.samples(motion)[motion.moving] for motion in motions]))
         return replace(finer, priors=tuple(priors_of(finer.knots, matrix)))
 
     def parameters(self, coefficients: FloatArray) -> dict[str, float]:
@@ -102,7 +102,7 @@ def bases(
             continue
         constants = {"period": girth[0]} if name == "distance" and girth else _constants(name, drives, model)
         samples = [_samples(name, constants, motion) for motion in motions]
-        pooled = np.concatenate([values[_moving(motion)] for values, motion in zip(samples, motions, strict=True)])
+        pooled = np.concatenate([values[motion.moving] for values, motion in zip(samples, motions, strict=True)])
         known = pooled[np.isfinite(pooled)]
         if len(known) < _FEWEST or np.ptp(known) <= _ROUNDING * max(1.0, float(np.abs(known).max())):
             continue
@@ -114,10 +114,6 @@ def bases(
         low, high = np.quantile(known, [0.025, 0.975])
         ways = girth[1] if name == "distance" and girth else 1
         yield Basis(name, knots, constants, tuple(priors_of(knots, matrix)), float(low), float(high), ways)
-
-
-def _moving(motion: effects.Motion) -> BoolArray:
-    return np.asarray((motion.v != 0) | (motion.w != 0))
 
 
 def _samples(name: str, constants: dict[str, float], motion: effects.Motion) -> FloatArray:

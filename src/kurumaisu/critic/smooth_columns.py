@@ -23,7 +23,7 @@ class Sensitivity:
 
     def __init__(self, drive: Drive, motion: effects.Motion) -> None:
         poses = plant.path(motion, np.array([0.0, 0.0, motion.heading or 0.0]))
-        moving = ((motion.v != 0) | (motion.w != 0)).astype(float)
+        moving = motion.moving.astype(float)
         self._weights = {
             name: GRID * moving * effects.factor(channel, motion) for name, channel in effects.CHANNELS.items()
         }

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu.critic import replay
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.smooth import Curve, Design, columns
@@ -73,5 +74,5 @@ def _way(rates: FloatArray) -> float:
 
 def _near(one: FloatArray, other: FloatArray) -> bool:
     apart, size = (np.sqrt(np.mean(rates**2, axis=1)) for rates in (one - other, other))
-    moves, moved = ((rates != 0).any(axis=0) for rates in (one, other))
+    moves, moved = ((np.abs(rates) > effects.RESTS).any(axis=0) for rates in (one, other))
     return bool(np.all(apart <= _NEAR * size) and np.mean(moves != moved) <= _RESTS)

@@ -172,7 +172,7 @@ def _samples(
     x = values[middle]
     if "period" in extension.curve.basis.constants:
         x = np.mod(x, extension.curve.basis.constants["period"])
-    use = np.isfinite(x) & ((motion.v != 0) | (motion.w != 0))[middle]
+    use = np.isfinite(x) & motion.moving[middle]
     if into.by:  # a share of a rate: of a small one nothing can be said
         rates = effects.factor(into, motion)[middle]
         use &= np.abs(rates) > 0.3 * np.abs(rates).max()

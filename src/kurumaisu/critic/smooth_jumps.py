@@ -149,7 +149,7 @@ def jumps(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[tuple
 
 def _first(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[_Tried]:
     motions = [replay.motion(drive, problem.model, fit.settings) for drive in problem.drives]
-    moving = [(motion.v != 0) | (motion.w != 0) for motion in motions]
+    moving = [motion.moving for motion in motions]
     for curve in curves:
         if not len(curve.basis.knots):
             continue

@@ -15,6 +15,7 @@ from kurumaisu.effects.accel_limit import AccelLimit
 from kurumaisu.effects.backlash import Backlash
 from kurumaisu.effects.base import (
     LATE,
+    RESTS,
     BaseEffect,
     Context,
     Effect,
@@ -71,6 +72,7 @@ from kurumaisu.params import EffectSetting
 
 # What the critic looks for.
 BASE: tuple[type[BaseEffect], ...] = (
+    CrossVToW,  # of the voltage as it is put out, before anything is made of it
     GainV,
     GainW,
     LeftRightGain,
@@ -93,7 +95,6 @@ BASE: tuple[type[BaseEffect], ...] = (
     Saturation,
     BatterySag,
     CrossWToV,
-    CrossVToW,
     AccelLimit,
     Payload,
     Understeer,
@@ -232,6 +233,7 @@ __all__ = [
     "PERIODIC",
     "RANGE_COVARIATES",
     "RECORDING_TIME",
+    "RESTS",
     "SMOOTH",
     "WORLD",
     "BaseEffect",

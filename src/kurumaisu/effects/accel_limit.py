@@ -11,7 +11,7 @@ from kurumaisu.effects.base import LATE, Context, Effect, Follows, Motion, Param
 from kurumaisu.types import FloatArray
 
 _LATEST = 0.98  # of a step: what is left then tells little of the new target
-_REACHED = 1e-9  # [m/s], [rad/s] from a target at which a ramp has reached it
+_REACHED = 0.01  # share of a change by which a ramp may be off the old target, to have reached it
 
 
 class AccelLimit(Effect):
@@ -63,5 +63,5 @@ def _ramped(motion: Motion, target: FloatArray, slowness: float, level: float) -
     begun = np.where(late > 0, before + np.clip(change, -reach, reach), target)
     rates, end = _core.ramp(begun, slowness, motion.dt, level)
     # One that was still on its way goes on meanwhile.
-    waiting = np.isclose(np.concatenate([[level], rates[:-1]]), before, rtol=0.0, atol=_REACHED)
+    waiting = np.abs(np.concatenate([[level], rates[:-1]]) - before) <= _REACHED * np.abs(begun - before)
     return np.asarray(rates - np.where(waiting, late * (begun - before), 0.0)), end

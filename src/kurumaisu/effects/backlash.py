@@ -25,8 +25,7 @@ class Backlash(Effect):
     def apply(self, motion: Motion) -> Motion:
         """Drag w."""
         w, self._level = _core.play(motion.w, self.values["play"] / 2, self._level)
-        moving = (motion.v != 0) | (motion.w != 0)
-        return replace(motion, w=moving * w)
+        return replace(motion, w=motion.moving * w)
 
     def settle(self, motion: Motion) -> None:
         """Stand in the middle of the play."""

@@ -17,8 +17,9 @@ import numpy as np
 
 from kurumaisu._core import AxisLaw
 from kurumaisu.effects.mechanism import Mechanism, Parameter
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray
 
+RESTS = 1.0e-3  # [m/s], [rad/s] up to which its brakes hold a chair at rest: one that lags never quite comes to rest
 LATE = "share of the step before the change"  # no name that a recording could have
 
 
@@ -78,6 +79,11 @@ class Motion:
     u: FloatArray | None = None
     heading: float | None = None
     known: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def moving(self) -> BoolArray:
+        """Return in which steps the chair does not rest, (n,)."""
+        return np.asarray((np.abs(self.v) > RESTS) | (np.abs(self.w) > RESTS))
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
+from kurumaisu.effects.base import RESTS, Effect, Follows, Motion, Parameter, Rate, Stage
 from kurumaisu.types import BoolArray, FloatArray
 
-_DRIVING = 1.0e-3  # [m/s] from which a chair drives: a lag never quite comes to rest
 # [s] A turn shorter than this before a reversal swings no caster. In a step within which the commands change, the mean
 # has part of the next turn already; which side it has must not depend on where in the step that was.
 _SWING = 0.03
+# [m/s], [rad/s] from which a chair drives one way, or turns to one side: a veer or a lever of the axis is no turn of the
+# casters, and one that spins does not reverse.
+_DRIVES, _TURNS = 0.02, 0.05
 
 
 class CasterReversal(Effect):
@@ -28,7 +30,7 @@ class CasterReversal(Effect):
     )
     empirical = True
     sentence = "after reversing the chair swings to one side until its casters have turned"
-    formula = "w ± kick · exp(−s / length) while driving; s: distance since the reversal, ±: side of the last turn"
+    formula = "w ± kick · exp(−s / length) while driving; s: distance since the reversal, ±: side of the last turn above 0.05 rad/s"
     source = "study of front casters in reverse, 2003: worst from 90°; 0.05-0.3 rad/s over 0.25 m"
     shows_in = Rate.W
     follows = Follows.V_CHANGE
@@ -40,11 +42,11 @@ class CasterReversal(Effect):
 
     def apply(self, motion: Motion) -> Motion:
         """Kick w after reversals; a step counts with the distance at its middle."""
-        direction = _held(np.sign(motion.v), self._direction)
+        direction = _held(_signs(motion.v, _DRIVES), self._direction)
         if self._turns is None:
             self._turns = np.zeros(max(round(_SWING / motion.dt), 1))
         past = self._turns
-        turns = np.concatenate([past, _held(np.sign(motion.w), float(past[-1]))])
+        turns = np.concatenate([past, _held(_signs(motion.w, _TURNS), float(past[-1]))])
         earlier = np.concatenate([[self._direction], direction[:-1]])
         reversed_here = (direction != earlier) & (earlier != 0)
         side = _last(reversed_here, turns[: len(motion.w)], self._side)
@@ -54,12 +56,17 @@ class CasterReversal(Effect):
         kick = self.values["kick"] * np.exp(-(since + way / 2) / self.values["length"])
         self._direction, self._turns, self._side = float(direction[-1]), turns[-len(past) :], float(side[-1])
         self._travel = float(since[-1] + way[-1])
-        return replace(motion, w=motion.w + side * kick * (np.abs(motion.v) > _DRIVING))
+        return replace(motion, w=motion.w + side * kick * (np.abs(motion.v) > RESTS))
 
     def settle(self, motion: Motion) -> None:
         """Have the casters trail."""
-        self._direction = float(np.sign(motion.v[-1]))
-        self._turns = np.full(max(round(_SWING / motion.dt), 1), np.sign(motion.w[-1]))
+        self._direction = float(_signs(motion.v, _DRIVES)[-1])
+        self._turns = np.full(max(round(_SWING / motion.dt), 1), _signs(motion.w, _TURNS)[-1])
+
+
+def _signs(rates: FloatArray, least: float) -> FloatArray:
+    """Return the signs of rates (n,), 0 of those that are smaller than the least."""
+    return np.asarray(np.sign(rates) * (np.abs(rates) >= least))
 
 
 def _held(signs: FloatArray, before: float) -> FloatArray:

@@ -33,15 +33,14 @@ class ProcessNoise(Effect):
     _level = (0.0, 0.0)  # of the unit noises of v and w
 
     def apply(self, motion: Motion) -> Motion:
-        """Add noise to v and w where either is not 0."""
+        """Add noise to v and w where the chair moves."""
         decay = np.exp(-motion.dt / self.values["tau"])
         draws = np.sqrt(1 - decay**2) * self.context.rng.standard_normal((len(motion.v), 2))
         from scipy.signal import lfilter  # half a second to load, for those who have no lag or noise
 
         noise = [lfilter([1], [1, -decay], draws[:, i], zi=[decay * self._level[i]])[0] for i in range(2)]
         self._level = (float(noise[0][-1]), float(noise[1][-1]))
-        moving = (motion.v != 0) | (motion.w != 0)
-        size = moving * (1 + self.values["growth"] * (np.abs(motion.v) + np.abs(motion.w)) / _USUAL)
+        size = motion.moving * (1 + self.values["growth"] * (np.abs(motion.v) + np.abs(motion.w)) / _USUAL)
         return replace(
             motion,
             v=motion.v + size * self.values["sd_v"] * noise[0],

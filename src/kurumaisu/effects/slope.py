@@ -33,5 +33,4 @@ class Slope(Effect):
         # A sum of turns drifts away from where a chair on a real floor heads: better what was measured.
         heading = motion.known.get("heading", after - motion.w * motion.dt / 2)
         loss = self.values["climb_x"] * np.cos(heading) + self.values["climb_y"] * np.sin(heading)
-        moving = (motion.v != 0) | (motion.w != 0)
-        return replace(motion, v=motion.v - moving * loss)
+        return replace(motion, v=motion.v - motion.moving * loss)

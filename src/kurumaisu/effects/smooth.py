@@ -108,8 +108,7 @@ class Smooth(Effect):
     def apply(self, motion: Motion) -> Motion:
         """Add the curve, times a rate or not, to the channel's rate where the chair moves."""
         channel = CHANNELS[self.channel]
-        moving = (motion.v != 0) | (motion.w != 0)
-        added = moving * curve(self.covariate, self.values, self._follower.values(motion))
+        added = motion.moving * curve(self.covariate, self.values, self._follower.values(motion))
         added = added * factor(channel, motion)
         rate = _MOVED[channel.rate]
         before = getattr(motion, rate)
