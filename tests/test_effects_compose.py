@@ -5,6 +5,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+
 from kurumaisu.bench.hidden import base_case
 from kurumaisu.bench.hidden.noise import REGIMES
 from kurumaisu.critic import noise

@@ -162,7 +162,9 @@ def begins_better(problem: Problem, fit: Fit, start: Mapping[Key, float]) -> boo
     own = fit.start if fit.terms else {}
     if not any(key in start for key in own):
         return False
-    values = np.array([term.parameter.lower if term.fixed else start.get(term.key, own[term.key]) for term in fit.terms])
+    values = np.array(
+        [term.parameter.lower if term.fixed else start.get(term.key, own[term.key]) for term in fit.terms]
+    )
     left = problem.residual(fit.terms, values)
     return -0.5 * float(left @ left) > fit.log_likelihood + _STUCK
 

@@ -11,8 +11,8 @@ from kurumaisu.types import BoolArray, FloatArray
 # [s] A turn shorter than this before a reversal swings no caster. In a step within which the commands change, the mean
 # has part of the next turn already; which side it has must not depend on where in the step that was.
 _SWING = 0.03
-# [m/s], [rad/s] from which a chair drives one way, or turns to one side: a veer or a lever of the axis is no turn of the
-# casters, and one that spins does not reverse.
+# [m/s], [rad/s] from which a chair drives one way, or turns to one side: a veer or a lever of the axis is no turn of
+# the casters, and one that spins does not reverse.
 _DRIVES, _TURNS = 0.02, 0.05
 
 
@@ -30,7 +30,7 @@ class CasterReversal(Effect):
     )
     empirical = True
     sentence = "after reversing the chair swings to one side until its casters have turned"
-    formula = "w ± kick · exp(−s / length) while driving; s: distance since the reversal, ±: side of the last turn above 0.05 rad/s"
+    formula = "w ± kick · exp(−s / length) while driving; s: distance since the reversal, ±: side of the last turn"
     source = "study of front casters in reverse, 2003: worst from 90°; 0.05-0.3 rad/s over 0.25 m"
     shows_in = Rate.W
     follows = Follows.V_CHANGE
