@@ -21,9 +21,9 @@ NOISE = Noise(position_sd=0.005, heading_sd=0.005, sd_v=0.01, sd_lateral=0.003, 
 STEP = "base.dac_quantisation"
 
 
-def problem_with(form, step, seed):
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(seed), seconds=40.0, rate=10.0)
-    faults = [BASE[STEP].fault({"size": step}, form)] if step else []
+def problem_with(form, step, seed, cut=0.0, design="rich"):
+    drives = base_case.draw_drives(design, USUAL, np.random.default_rng(seed), seconds=40.0, rate=10.0)
+    faults = [BASE[STEP].fault({"size": step, "cut": cut}, form)] if step else []
     data = base_case.recording("steps", drives, faults)
     return Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset({STEP}))
 
@@ -36,6 +36,15 @@ def test_a_converters_step_is_found_among_all_its_teeth(form, phase):
     assert best.start[STEP, "phase"] == phase
     assert best.start[STEP, "cut"] == 0.0
     assert best.score > problem.fit_candidates((), {}).score + 10
+
+
+@pytest.mark.parametrize("step", [0.0156, 0.0391])
+def test_what_a_converter_cuts_off_is_found_in_drives_by_a_stick(step):
+    """A stick has hundreds of voltages: teeth are narrow, and hidden by the mean that is lost at any size."""
+    problem = problem_with("other", step, 3, cut=1.0, design="stick")
+    best = max((problem.fit_candidates([c], {}) for c in problem.candidates), key=lambda fit: fit.score)
+    assert best.start[STEP, "step"] == pytest.approx(step, rel=5e-3)
+    assert (best.start[STEP, "phase"], best.start[STEP, "cut"]) == (0.5, 1.0)
 
 
 def test_without_steps_no_tooth_is_worth_its_cost():
@@ -60,7 +69,7 @@ def test_steps_are_found_although_smooth_effects_together_draw_their_mean():
 @pytest.mark.parametrize(("step", "gain", "hopeless"), [(0.0367, 0.0, False), (0.02, 0.3, True)])
 def test_a_comb_is_not_fitted_alone_where_something_else_explains_far_more(step, gain, hopeless):
     drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
-    faults = [BASE[STEP].fault({"size": step}, "plain"), BASE["base.gain_w"].fault({"size": gain}, "plain")]
+    faults = [BASE[STEP].fault({"size": step, "cut": 0.0}, "plain"), BASE["base.gain_w"].fault({"size": gain}, "plain")]
     data = base_case.recording("steps", drives, faults)
     ids = frozenset({STEP, "base.gain_w"})
     problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=ids)

@@ -19,6 +19,7 @@ from kurumaisu.critic.catalogue import Term, settings_of
 from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.noise import Noise, whitened
 from kurumaisu.critic.smooth_columns import Sensitivity
+from kurumaisu.effects import Motion
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
@@ -26,9 +27,11 @@ _CELLS = 20  # of the grid for which a change of the rates is held
 _TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a first value needs no more
 _ALIKE = (0.4, 0.8)  # correlation of neighbouring sizes: below, there is one between them; above, they may be farther
 _GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
-_SIZES = 500  # at most
+_SIZES = 700  # at most
 _HALVINGS = 6  # of the way between two sizes: the narrowest teeth are that much closer than rates tell
 _FAINT = 0.2  # of the norm of its neighbour
+_FEW = 0.2  # share of a change below which its teeth are not looked at by themselves
+_NOTHING = 1e-9  # share of the largest direction below which it is none
 _BEST = 6  # that are tried
 _PRECISION = np.float32  # of what only first values come of: half the room and half the time
 
@@ -65,6 +68,7 @@ class Comb:
             both = np.column_stack([sensitivity.increments(channel, held) for channel in ("v", "w")])
             self._columns.append(whitened(drive, both, noise)[0].astype(_PRECISION))
         self._grams = [columns.T @ columns for columns in self._columns]
+        self._smooth = _smooth(self._plain)
         self._squares: dict[Way, FloatArray] = {}
 
     def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[Start]:
@@ -91,10 +95,11 @@ class Comb:
         What steers and what drives show by so different amounts that rates alike may hide teeth of the weaker one.
         """
         values, changes = np.array([value for value, _ in found]), np.array([change for _, change in found])
+        teeth = self._teeth(changes)
         for _ in range(_HALVINGS):
             if not 1 < len(values) < _SIZES:
                 break
-            squares, between = self._products(changes)
+            squares, between = self._products(teeth)
             seen = np.minimum(squares[:-1], squares[1:]) > _FAINT**2 * np.maximum(squares[:-1], squares[1:])
             apart = (values[1:] / values[:-1] > 1 + _GROWTH[0]) & seen
             far = np.flatnonzero(apart & (between < _ALIKE[0] * np.sqrt(squares[:-1] * squares[1:])))
@@ -103,6 +108,7 @@ class Comb:
             more = np.sqrt(values[far] * values[far + 1]) * np.sign(values[far])
             own = np.array([self._change(term, fixed, float(value)) for value in more])
             values, changes = np.insert(values, far + 1, more), np.insert(changes, far + 1, own, axis=0)
+            teeth = np.insert(teeth, far + 1, self._teeth(own), axis=0)
         return values, changes
 
     def _products(self, changes: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -128,24 +134,37 @@ class Comb:
         p = term.parameter
         for sign, room in ((-1.0, term.null - p.lower), (1.0, p.upper - term.null)):
             if room > 0:
-                yield from self._one_way(term, fixed, sign, room)
+                yield from reversed(list(self._one_way(term, fixed, sign, room)))
 
     def _one_way(self, term: Term, fixed: Sequence[Term], sign: float, room: float) -> Iterator[Walk]:
-        size, growth = abs(term.step) * term.parameter.scale / 3, _GROWTH[1]
+        """Yield sizes from the largest on down: the smaller, the closer, so there may be too many of those."""
+        size, growth = room, _GROWTH[1]
+        least = abs(term.step) * term.parameter.scale / 3
         before: FloatArray | None = None
         for _ in range(_SIZES):
-            if size > room:
+            if size < least:
                 return
             value = term.null + sign * size
-            here = self._change(term, fixed, value)
+            change = self._change(term, fixed, value)
+            here = self._teeth(change)
             alike = 1.0 if before is None else _alike(before, here)
             if alike < _ALIKE[0] and growth > _GROWTH[0]:
-                size, growth = size / (1 + growth) * (1 + growth / 2), growth / 2
+                size, growth = size * (1 + growth) / (1 + growth / 2), growth / 2
                 continue
-            yield value, here
+            yield value, change
             before = here
             growth = min(1.5 * growth, _GROWTH[1]) if alike > _ALIKE[1] else growth
-            size *= 1 + growth
+            size /= 1 + growth
+
+    def _teeth(self, changes: FloatArray) -> FloatArray:
+        """Return of changes (..., bins) what no law of either rate does, which all sizes have in common.
+
+        Where the rest of a step is cut off, its mean is lost at any size: seen with it, all sizes are alike. All of a
+        change that has hardly any teeth.
+        """
+        rest = changes - (changes @ self._smooth) @ self._smooth.T
+        few = np.linalg.norm(rest, axis=-1) < _FEW * np.linalg.norm(changes, axis=-1)
+        return np.asarray(np.where(few[..., np.newaxis], changes, rest))
 
     def _change(self, term: Term, fixed: Sequence[Term], value: float) -> FloatArray:
         """Return what a value adds to v and w in the bins of all drives, (bins,)."""
@@ -154,6 +173,19 @@ class Comb:
         moved = [replay.motion(drive, self._model, settings) for drive in self._drives]
         pairs = zip(moved, self._plain, strict=True)
         return np.concatenate([_means(rate) for a, b in pairs for rate in (a.v - b.v, a.w - b.w)])
+
+
+def _smooth(motions: Sequence[Motion]) -> FloatArray:
+    """Return orthonormal columns (bins, 8): of either rate and direction, a constant and a share."""
+    blocks = []
+    for motion in motions:
+        for own, rate in enumerate((motion.v, motion.w)):
+            columns = np.zeros((-(-len(rate) // _CELLS), 8))
+            sides = (rate > 0).astype(float), (rate < 0).astype(float), np.maximum(rate, 0.0), np.minimum(rate, 0.0)
+            columns[:, 4 * own : 4 * own + 4] = np.column_stack([_means(side) for side in sides])
+            blocks.append(columns)
+    left, sizes, _ = np.linalg.svd(np.concatenate(blocks), full_matrices=False)
+    return np.asarray(left * (sizes > _NOTHING * max(sizes[0], _NOTHING)))
 
 
 def _begin(drive: Drive, seconds: float) -> Drive:

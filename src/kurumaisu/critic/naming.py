@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
+from kurumaisu import effects
 from kurumaisu.critic import stand_ins
 from kurumaisu.critic.catalogue import Candidate, Key, Term
 from kurumaisu.critic.evidence import HOPE, Fit, Problem, log_posterior
@@ -185,7 +186,8 @@ def _neighbours(
                 begin = {key: value for key, value in kept.items() if not other.rough or key[0] != other.id}
                 yield fit.candidates - {one} | {other}, begin
                 if other.rough and other.id == one.id:  # what stood in for the right form may go with the wrong one
-                    yield from ((fit.candidates - {one, more} | {other}, begin) for more in fit.candidates - {one})
+                    rest = fit.candidates - {one}
+                    yield from ((rest - gone | {other}, begin) for gone in _stand_ins(rest))
     for other in screen.fixed:
         if other.id not in fit.ids and screen.mends(other):
             yield fit.candidates | {other}, kept
@@ -195,6 +197,19 @@ def _neighbours(
                 yield frozenset({other}), {}
             yield fit.candidates | {other}, kept
     yield from _combs(problem, screen, fit)
+
+
+def _stand_ins(rest: Chosen) -> Iterator[Chosen]:
+    """Yield each effect of some, and each pair of which one shows in the forward speed and the other in the yaw rate.
+
+    Steps of a converter are in both, so for their wrong form two may stand in.
+    """
+    yield from (frozenset({one}) for one in rest)
+    yield from (frozenset({one, other}) for one in rest if _in_v(one) for other in rest if not _in_v(other))
+
+
+def _in_v(candidate: Candidate) -> bool:
+    return getattr(effects.by_id(candidate.id), "shows_in", None) == effects.Rate.V
 
 
 def hopeless_alone(problem: Problem, rough: Candidate, empty: Fit, fit: Fit) -> bool:

@@ -41,6 +41,18 @@ class Likeness:
         signals = {name: self._signals[name] for name in missing}
         return self._like(signals, fit, curve, belief, self._best.log_likelihood)
 
+    def drawn_together(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
+        """Return the effects of the best fit, several, that do together what this curve draws beside a part of it.
+
+        A free curve over the yaw rate is any law of it: for one that explains less than they do it is no news.
+        """
+        missing = self._best.ids - fit.ids
+        if len(missing) < 2 or not fit.ids <= self._best.ids:
+            return {}
+        together = signal_of(self._problem, self._best, *missing)
+        found = self._like({"": together}, fit, curve, belief, self._best.log_likelihood)
+        return dict.fromkeys(missing, found[""]) if found else {}
+
     def drawn_alone(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
         """Return the one effect of the best fit that draws what this curve does, beside a fit that lacks several.
 
@@ -133,11 +145,11 @@ class Likeness:
         return {name for name, signal in signals.items() if _norm(own.T @ signal) > _ALIKE * _norm(signal)}
 
 
-def signal_of(problem: Problem, fit: Fit, name: str) -> FloatArray:
-    """Return what an effect of a fit does, whitened."""
+def signal_of(problem: Problem, fit: Fit, *names: str) -> FloatArray:
+    """Return what effects of a fit do together, whitened."""
     null = np.array(
         [
-            term.null if term.id == name and not term.shape else value
+            term.null if term.id in names and not term.shape else value
             for term, value in zip(fit.terms, fit.values, strict=True)
         ]
     )

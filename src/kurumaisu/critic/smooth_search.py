@@ -21,6 +21,7 @@ from kurumaisu.critic.smooth_jumps import jumps, over_own
 from kurumaisu.types import FloatArray
 
 BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
+_BEHIND = 10.0  # [nat] behind the best set from which a curve that draws several of its effects speaks for them
 _ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
 _SHARE = 0.002  # posterior, as far as it is believed, from which it is asked which effect a curve draws
 _FITS = 10  # sets of the catalogue beside which curves are tried
@@ -93,6 +94,8 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
         if asked and rival.worth - ceiling > BEYOND:  # else it is no news, and nobody asks whose form it mends
             draws = draws or likeness.mended(rival.fit, rival.curve)
             draws = draws or likeness.drawn_alone(rival.fit, rival.curve, rival.belief)
+        if asked and rival.worth < ceiling - _BEHIND:
+            draws = draws or likeness.drawn_together(rival.fit, rival.curve, rival.belief)
         drawn = {name for name, nats in draws.items() if rival.worth - ceiling < BEYOND + nats}
         wins = not drawn and rival.worth - ceiling > BEYOND and share > _SHARE
         part = likeness.part_of(rival.fit, rival.curve) if wins else set()

@@ -68,7 +68,12 @@ BASE: dict[str, Hidden] = {
     "base.dac_zero_f": Hidden(*_of("volts", ev.dac_zero_f), 0.02, True, 0.3, _as("offset")),
     "base.dac_zero_s": Hidden(*_of("volts", ev.dac_zero_s), 0.02, True, 0.3, _as("offset")),
     "base.dac_quantisation": Hidden(
-        *_of("volts", ev.dac_quantisation, ev.dac_truncation), 0.02, False, 0.06, _as("step")
+        *_of("volts", ev.dac_quantisation, ev.dac_truncation),
+        0.02,
+        False,
+        0.06,
+        _as("step"),
+        lambda rng: {"cut": float(rng.integers(2))},
     ),
     "base.reverse_gain": Hidden(*_of("events", ev.reverse_gain), 0.08, True, 0.6, _as("gain")),
     "base.curvature_v": Hidden(*_of("events", ev.curvature_v, ev.expo_v), 0.1, True, 0.8, _as("curvature")),

@@ -39,11 +39,11 @@ def dac_quantisation(e: Events, s: Sizes) -> Made:
 
 
 def dac_truncation(e: Events, s: Sizes) -> Made:
-    """Both voltages on the middles of a grid of `size` [V], of which 0 is an edge (mid-rise)."""
+    """Both voltages on a grid of `size` [V]: with `cut` the next level towards 0, else half a step more (mid-rise)."""
     step = max(s["size"], 1e-9)
 
     def cut(volt: FloatArray) -> FloatArray:
-        return np.asarray(np.sign(volt) * (np.floor(np.abs(volt) / step) * step + step / 2))
+        return np.asarray(np.sign(volt) * (np.floor(np.abs(volt) / step) * step + (1 - s["cut"]) * step / 2))
 
     v_f, v_s = cut(laws.volts(e.v, laws.TRANSLATION)), cut(laws.volts(e.w, laws.STEERING))
     v = np.where(e.v == 0, 0.0, laws.rates(v_f, np.sign(e.v), laws.TRANSLATION))
