@@ -253,13 +253,23 @@ def test_another_steering_law_is_neither_a_unit_nor_a_sign(seed):
 
 
 def test_another_form_is_tried_without_what_stood_in_for_it():
-    """From a wrong form beside a needless effect to the right form alone: neither step alone is better."""
+    """From a wrong form beside needless effects to the right form alone: no step alone is better."""
     zero, other = (Candidate("zero", (Term("zero", OFFSET, 0.0, rough=rough),), 2.0) for rough in (False, True))
-    needless = Candidate("needless", (Term("needless", OFFSET, 0.0),), 1.0)
-    problem = SimpleNamespace(candidates=(zero, other, needless))
+    ahead, turning, also = (
+        Candidate(name, (Term(name, OFFSET, 0.0),), 1.0) for name in ("base.gain_v", "base.gain_w", "base.lag_w")
+    )
+    problem = SimpleNamespace(candidates=(zero, other))
     screen = SimpleNamespace(fixed=(), parts=list, related=lambda *_: True, mends=lambda *_: True)
-    fit = SimpleNamespace(candidates=frozenset({zero, needless}), ids=frozenset({"zero", "needless"}), start={})
-    assert frozenset({other}) in {chosen for chosen, _ in naming._neighbours(problem, screen, screen, fit)}
+
+    def tried(*needless):
+        chosen = frozenset({zero, *needless})
+        fit = SimpleNamespace(candidates=chosen, ids=frozenset(one.id for one in chosen), start={})
+        return {chosen for chosen, _ in naming._neighbours(problem, screen, screen, fit)}
+
+    assert frozenset({other}) in tried(ahead)
+    assert frozenset({other}) in tried(ahead, turning)  # one in each rate
+    assert frozenset({other}) not in tried(turning, also)
+    assert frozenset({other, also}) in tried(turning, also)
 
 
 def test_what_clips_does_not_hide_what_else_it_may_be():
