@@ -52,7 +52,7 @@ def test_evidence_is_over_nothing_where_an_effect_may_be_it_as_well(winner, nats
 def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, least, verdict):
     """Nothing is extended by what did not hold, and no curve is certain."""
     recording = hidden.make(hidden.KINDS["gully"], 40.0, 1010, seconds=40.0, runs=2).recording
-    monkeypatch.setattr(smooth_explain, "confirmed", lambda worth, nats: False)
+    monkeypatch.setattr(smooth_explain, "confirmed", lambda worth, nats, free: False)
     monkeypatch.setattr(smooth_explain, "nearer", lambda worth, channels: False)
     monkeypatch.setattr(smooth_explain, "NO_NOISE", least)
     found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None)

@@ -23,19 +23,23 @@ STRONG = 8.0  # [nat] of evidence from which _LIKELY will do
 # [nat] over nothing: were the noise twice as large as estimated, a quarter of it would still be beyond doubt.
 NO_NOISE = 50.0
 _LIKELY = 0.84  # standard deviations: a gain with a probability of 0.8
+_CERTAIN = 20.0  # [nat] of evidence from which data held out need but gain
 HORIZON = 2.0  # [s] over which ways and turns are compared
 
 
-def confirmed(worth: Gain | None, nats: float) -> bool:
+def confirmed(worth: Gain | None, nats: float, *, free: bool = False) -> bool:
     """Return whether drives held out confirm a finding that gains so much evidence on the drives it was fitted to.
 
-    Blocks of a few drives scatter widely: what is certain by the evidence need not be so by the blocks again.
+    Blocks of a few drives scatter widely: what is certain by the evidence need not be so by the blocks again. A short
+    drive held out may gain by chance as little as what is not there would lose, but for a free curve, which has sizes
+    enough to fit what comes once.
     """
     if worth is None:
         return False
     gain = worth.log_density_per_sample
     sd = max(gain.hi90 - gain.lo90, 1e-12) / (2 * NORMAL90)
-    return gain.lo90 > 0 or (nats >= STRONG and gain.gain > _LIKELY * sd)
+    least = 0.0 if nats >= _CERTAIN and not free else _LIKELY * sd
+    return gain.lo90 > 0 or (nats >= STRONG and gain.gain > least)
 
 
 def nearer(worth: Gain | None, channels: Sequence[str]) -> bool:

@@ -185,7 +185,7 @@ def _neighbours(
                 # What fits one form of a comb is nowhere near what fits another.
                 begin = {key: value for key, value in kept.items() if not other.rough or key[0] != other.id}
                 yield fit.candidates - {one} | {other}, begin
-                if other.rough and other.id == one.id:  # what stood in for the right form may go with the wrong one
+                if other.id == one.id:  # what stood in for the right form may go with the wrong one
                     rest = fit.candidates - {one}
                     yield from ((rest - gone | {other}, begin) for gone in _stand_ins(rest))
     for other in screen.fixed:

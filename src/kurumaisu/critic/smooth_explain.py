@@ -111,7 +111,7 @@ def _held(made: Decision, worth: Gain | None) -> bool:
     assert made.beyond.extension is not None
     nats = _nats(made.found, made.beyond)
     rate = effects.CHANNELS[made.beyond.extension.curve.channel].rate
-    return confirmed(worth, nats) or (nats >= STRONG and nearer(worth, (_SEEN_IN[rate],)))
+    return confirmed(worth, nats, free=True) or (nats >= STRONG and nearer(worth, (_SEEN_IN[rate],)))
 
 
 def _no_noise(made: Decision) -> bool:
