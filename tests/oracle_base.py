@@ -318,5 +318,7 @@ def steering_law(p, v_f, v_s, signs):
         answers = [w for w in (left, right) if (w > 0) == (w is left) and w != 0]
         if len(answers) == 2:
             answers = [w for w in answers if w * meant > 0]
+        if p["meant"] == 1:  # it would rather rest
+            answers = [w for w in answers if w * meant >= 0]
         out.append(volts("steering", answers[0]) if answers else 0.0)
     return v_f, out

@@ -89,7 +89,7 @@ def test_chunks_give_the_same_voltages_as_the_whole(effect, cut, seed):
 
 def test_the_other_steering_law_is_the_shipped_one():
     """Voltages of the published law, by (2) with its intercepts flipped, typed from the model file's other law."""
-    law = effects.by_id("base.steering_law")({"flip": 1.0}, context())
+    law = effects.by_id("base.steering_law")({"flip": 1.0, "meant": 0.0}, context())
     asked = np.array([0.7, 0.1, 0.0, -0.1, -0.7])
     given_volts = effects.Volts(np.zeros(5), MODEL.steering.volts(asked), np.zeros(5), np.sign(asked))
     answered = law.apply(given_volts)

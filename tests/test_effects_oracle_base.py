@@ -79,7 +79,7 @@ def test_volts(name):
         rng = np.random.default_rng([seed, 2])
         values, run = drawn(name, rng, seed > 2), drive(rng)
         if name == "base.steering_law":
-            values = {"flip": float(rng.choice([0.0, 0.3, 1.0]))}
+            values = {"flip": float(rng.choice([0.0, 0.3, 1.0])), "meant": float(rng.integers(2))}
         v_f = [oracle_base.volts("translation", v) for v in run.v]
         v_s = [oracle_base.volts("steering", w) for w in run.w]
         signs = [float(np.sign(w)) for w in run.w]

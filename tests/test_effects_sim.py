@@ -98,5 +98,5 @@ def test_a_marker_is_seen_and_does_not_move_the_chair(tmp_path):
 
 def test_the_other_steering_law_in_the_simulator(tmp_path):
     """A small turn to the right by the published law is one to the left by the other."""
-    last = run(tmp_path, "{id: base.steering_law, parameters: {flip: 1.0}}", command(0.0, -0.1), 1.0)
+    last = run(tmp_path, "{id: base.steering_law, parameters: {flip: 1.0, meant: 0.0}}", command(0.0, -0.1), 1.0)
     assert last.rates[2] == pytest.approx((0.469278 * 0.1 - 0.169476 + 0.104181) / -0.499211, abs=1e-9)

@@ -30,6 +30,8 @@ _GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
 _SIZES = 700  # at most
 _HALVINGS = 6  # of the way between two sizes: the narrowest teeth are that much closer than rates tell
 _FAINT = 0.2  # of the norm of its neighbour
+_KNOTS = 8  # of a free curve over a rate, per direction
+_AT = np.arange(_KNOTS)
 _FEW = 0.2  # share of a change below which its teeth are not looked at by themselves
 _NOTHING = 1e-9  # share of the largest direction below which it is none
 _BEST = 6  # that are tried
@@ -95,35 +97,40 @@ class Comb:
         What steers and what drives show by so different amounts that rates alike may hide teeth of the weaker one.
         """
         values, changes = np.array([value for value, _ in found]), np.array([change for _, change in found])
+        if len(values) < 2:
+            return values, changes
         teeth = self._teeth(changes)
+        squares, between = self._products(teeth, np.roll(teeth, -1, axis=0))
+        between = between[:-1]
         for _ in range(_HALVINGS):
-            if not 1 < len(values) < _SIZES:
-                break
-            squares, between = self._products(teeth)
             seen = np.minimum(squares[:-1], squares[1:]) > _FAINT**2 * np.maximum(squares[:-1], squares[1:])
             apart = (values[1:] / values[:-1] > 1 + _GROWTH[0]) & seen
             far = np.flatnonzero(apart & (between < _ALIKE[0] * np.sqrt(squares[:-1] * squares[1:])))
-            if not len(far):
+            if not len(far) or len(values) >= _SIZES:
                 break
             more = np.sqrt(values[far] * values[far + 1]) * np.sign(values[far])
             own = np.array([self._change(term, fixed, float(value)) for value in more])
-            values, changes = np.insert(values, far + 1, more), np.insert(changes, far + 1, own, axis=0)
-            teeth = np.insert(teeth, far + 1, self._teeth(own), axis=0)
+            cut = self._teeth(own)
+            square, before, after = self._products(cut, teeth[far], teeth[far + 1])
+            between = np.insert(between, far + 1, after)
+            between[far + np.arange(len(far))] = before
+            values, squares = np.insert(values, far + 1, more), np.insert(squares, far + 1, square)
+            changes, teeth = np.insert(changes, far + 1, own, axis=0), np.insert(teeth, far + 1, cut, axis=0)
         return values, changes
 
-    def _products(self, changes: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the square of what each of some changes (k, bins) does, (k,), and its product with the next, (k - 1,).
+    def _products(self, changes: FloatArray, *others: FloatArray) -> list[FloatArray]:
+        """Return the square of what each of some changes (k, bins) does, and its product with that of others, (k,) each.
 
         Most change one rate only, and not at rest.
         """
-        squares, between = np.zeros(len(changes)), np.zeros(max(len(changes) - 1, 0))
-        for gram, own in zip(self._grams, self._parts(changes), strict=True):
-            use = np.flatnonzero(own.any(axis=0))
-            loud = own[:, use].astype(_PRECISION)
-            seen = loud @ gram[np.ix_(use, use)]
-            squares += np.einsum("kb,kb->k", seen, loud)
-            between += np.einsum("kb,kb->k", seen[:-1], loud[1:])
-        return squares, between
+        out = [np.zeros(len(changes)) for _ in (changes, *others)]
+        for gram, *parts in zip(self._grams, *(self._parts(each) for each in (changes, *others)), strict=True):
+            use = np.flatnonzero(np.any([part.any(axis=0) for part in parts], axis=0))
+            loud = [part[:, use].astype(_PRECISION) for part in parts]
+            seen = loud[0] @ gram[np.ix_(use, use)]
+            for total, part in zip(out, loud, strict=True):
+                total += np.einsum("kb,kb->k", seen, part)
+        return out
 
     def _parts(self, changes: FloatArray) -> list[FloatArray]:
         """Return what belongs to each drive of changes (k, bins)."""
@@ -157,7 +164,7 @@ class Comb:
             size /= 1 + growth
 
     def _teeth(self, changes: FloatArray) -> FloatArray:
-        """Return of changes (..., bins) what no law of either rate does, which all sizes have in common.
+        """Return of changes (..., bins) what no smooth law of either rate does, which all sizes have in common.
 
         Where the rest of a step is cut off, its mean is lost at any size: seen with it, all sizes are alike. All of a
         change that has hardly any teeth.
@@ -176,14 +183,20 @@ class Comb:
 
 
 def _smooth(motions: Sequence[Motion]) -> FloatArray:
-    """Return orthonormal columns (bins, 8): of either rate and direction, a constant and a share."""
+    """Return orthonormal columns (bins, k): free curves over either rate, in either direction, of a few knots."""
+    tops = [max(float(np.abs(getattr(motion, name)).max(initial=0.0)) for motion in motions) for name in "vw"]
     blocks = []
     for motion in motions:
-        for own, rate in enumerate((motion.v, motion.w)):
-            columns = np.zeros((-(-len(rate) // _CELLS), 8))
-            sides = (rate > 0).astype(float), (rate < 0).astype(float), np.maximum(rate, 0.0), np.minimum(rate, 0.0)
-            columns[:, 4 * own : 4 * own + 4] = np.column_stack([_means(side) for side in sides])
-            blocks.append(columns)
+        for own, (rate, top) in enumerate(zip((motion.v, motion.w), tops, strict=True)):
+            hats = np.zeros((-(-len(rate) // _CELLS), 4 * _KNOTS))
+            for side, sign in enumerate((1.0, -1.0)):
+                heights = np.maximum(
+                    1 - np.abs(sign * rate[:, np.newaxis] / max(top, _NOTHING) * (_KNOTS - 1) - _AT), 0.0
+                )
+                heights *= (sign * rate > 0)[:, np.newaxis]
+                first = (2 * own + side) * _KNOTS
+                hats[:, first : first + _KNOTS] = np.column_stack([_means(hat) for hat in heights.T])
+            blocks.append(hats)
     left, sizes, _ = np.linalg.svd(np.concatenate(blocks), full_matrices=False)
     return np.asarray(left * (sizes > _NOTHING * max(sizes[0], _NOTHING)))
 

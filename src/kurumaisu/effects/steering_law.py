@@ -11,15 +11,21 @@ from kurumaisu.effects.base import Context, Follows, Parameter, Rate, Stage, Vol
 
 
 class SteeringLaw(VoltageEffect):
-    """The motor controller turns V_s into the yaw rate by a law whose intercepts are scaled by (1 - 2 flip)."""
+    """The motor controller turns V_s into the yaw rate by a law whose intercepts are scaled by (1 - 2 flip).
+
+    meant: 1 where it knows the side that was meant, as by a second line, and rests rather than turn to the other.
+    """
 
     id = "base.steering_law"
     stage = Stage.CONTROLLER
-    parameters = (Parameter("flip", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),)
+    parameters = (
+        Parameter("flip", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
+        Parameter("meant", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
+    )
     sentence = "the steering law's intercepts have the other sign"
-    formula = "w of V_s by (2) with intercepts · (1 − 2 flip)"
+    formula = "w of V_s by (2) with intercepts · (1 − 2 flip); with meant = 1, 0 where that is a turn to the other side"
     source = "paper, equation (2): as printed, its two branches overlap"
-    choices = ({"flip": 1.0},)
+    choices = ({"flip": 1.0, "meant": 0.0}, {"flip": 1.0, "meant": 1.0})
     shows_in = Rate.W
     follows = Follows.W
 
@@ -39,4 +45,6 @@ class SteeringLaw(VoltageEffect):
         if self.values["flip"] == 0:
             return volts
         w = self._inverse.rates(volts.v_s, volts.sign_w)
+        if self.values["meant"] >= 0.5:
+            w = np.where(w * volts.sign_w < 0, 0.0, w)
         return replace(volts, v_s=self.context.steering.volts(w), sign_w=np.sign(w))

@@ -28,7 +28,7 @@ def tell(seed: int) -> Iterator[str]:
     """Yield the riddle, line by line."""
     yield "equation (2): as printed, or with both intercepts of the other sign?"
     chair = lab.chair()
-    flipped = replace(chair, effects=(EffectSetting("base.steering_law", {"flip": 1.0}),))
+    flipped = replace(chair, effects=(EffectSetting("base.steering_law", {"flip": 1.0, "meant": 0.0}),))
     truths = (_Truth("published", chair), _Truth("corrected", flipped))
     yield ""
     yield "standing, V_s swept over +-0.3 V; what the chair does in the middle, |V_s| < 0.1 V:"
