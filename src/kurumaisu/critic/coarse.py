@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.special import expit, softmax
+from scipy.special import expit, logit, softmax
 
 from kurumaisu.critic.evidence import Fit, log_posterior
 from kurumaisu.critic.naming import Naming
@@ -36,6 +36,11 @@ def believed(found: Naming, odds: Mapping[str, float]) -> tuple[dict[str, float]
 def _doubted(found: Naming, name: str, odds: float) -> float:
     plain = min(_simpler(found, name, odds), odds)
     return (odds - plain) / variance(found) + plain
+
+
+def doubted(found: Naming, p: float) -> float:
+    """Return the probability of something that is judged by what a set of effects leaves, as far as it is believed."""
+    return float(expit(logit(p) / variance(found)))
 
 
 def weights(found: Naming) -> FloatArray:

@@ -119,7 +119,7 @@ class Comb:
         return values, changes
 
     def _products(self, changes: FloatArray, *others: FloatArray) -> list[FloatArray]:
-        """Return the square of what each of some changes (k, bins) does, and its product with that of others, (k,) each.
+        """Return the square of what each of some changes (k, bins) does, and its products with those of others, (k,).
 
         Most change one rate only, and not at rest.
         """

@@ -138,6 +138,7 @@ def _judged(
             again = naming.search(problem, progress, fit)
     beyond = smooth_judge.judge(problem, again, progress)
     p, still_open = coarse.believed(again, beyond.rivalry.odds)
+    growth = replace(growth, p=coarse.doubted(again, growth.p))
     return Decision(problem, weighed_anew(replace(again, confounded=still_open), p), growth, beyond)
 
 
