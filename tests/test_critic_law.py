@@ -40,5 +40,7 @@ def test_who_recorded_voltages_has_a_law():
 def test_the_other_steering_law_is_found_without_voltages(tmp_path):
     case = make(Ask("single", ("base.steering_law",), family="base", form="plain"), 31190, tmp_path)
     silent = replace(case.recording, runs=tuple(replace(run, voltage=None) for run in case.recording.runs))
-    verdict = pipeline.criticise(silent, MD100, lambda _: None).verdict
+    rivals = ("steering_law", "dac_zero_s", "dead_zone_w", "gain_w", "curvature_w", "left_right_gain", "sign")
+    ids = frozenset(f"base.{name}" for name in rivals)
+    verdict = pipeline.criticise(silent, MD100, lambda _: None, ids=ids).verdict
     assert [cause.id for cause in verdict.causes] == ["base.steering_law"]

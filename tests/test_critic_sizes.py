@@ -76,7 +76,7 @@ def test_the_form_of_one_cause_is_in_doubt_for_what_looks_like_it_only():
 def test_the_steps_of_a_converter_may_be_those_of_another_tooth():
     """The likelihood has many peaks: one is told by its curvature to parts per million, and its neighbour fits, too."""
     name = "base.dac_quantisation"
-    problem, _ = fitted([name], {name: {"size": 0.012}}, "other", seed=5)
+    problem, _ = fitted([name], {name: {"size": 0.012, "cut": 0.0}}, "other", seed=5)
     fit = max((problem.fit_candidates([c], {}) for c in problem.candidates), key=lambda fit: fit.score)
     told = sizes.estimates(problem, fit, name)
     assert told["step"].lo90 < 0.012 < told["step"].hi90
@@ -93,7 +93,7 @@ def test_an_interval_ends_at_the_bound():
 def test_beside_the_steps_of_a_converter_a_size_has_room_on_both_sides():
     """Where its step goes with another size, it goes off its tooth at once: that is no end of the other's interval."""
     hidden = {
-        "base.dac_quantisation": {"size": 0.045},
+        "base.dac_quantisation": {"size": 0.045, "cut": 0.0},
         "base.slope": {"size": 0.024, "bearing": 2.5},
         "base.delay": {"size": 0.12},
     }
