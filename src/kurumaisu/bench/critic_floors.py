@@ -64,7 +64,7 @@ def _right(one: Score) -> bool:
 
 
 def _strong(one: Score) -> bool:
-    return one.truth.z >= 10 and one.truth.z_rival >= 6
+    return one.truth.strong
 
 
 def _is_misnamed_surely(one: Score) -> bool:

@@ -105,8 +105,8 @@ def run(options: argparse.Namespace) -> int:
     for who, all_of in scores.items():
         _row(table, f"all: {who}", all_of)
         if kind in ("single", "pair", "triple"):
-            hard = [one for one in all_of if one.truth.z >= 10 and one.truth.z_rival >= 6]
-            _row(table, f"  z >= 10, rival's z >= 6: {who}", hard)
+            hard = [one for one in all_of if one.truth.strong]
+            _row(table, f"  each z >= 10, rival's z >= 6: {who}", hard)
     _summary(scores["critic"])
     return 0
 

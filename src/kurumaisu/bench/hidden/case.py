@@ -9,6 +9,7 @@ from kurumaisu.bench.hidden.noise import Regime
 from kurumaisu.critic.recording import Recording
 from kurumaisu.types import FloatArray
 
+STRONG, APART = 10.0, 6.0  # z from which an id must be found, and be told from its nearest rival
 KINDS = ("null", "single", "pair", "triple", "unknown", "wrong", "confounded")
 
 
@@ -38,6 +39,11 @@ class Truth:
     problem: str = ""
     accepted: tuple[tuple[str, ...], ...] = ()
     background: tuple[str, ...] = ()
+
+    @property
+    def strong(self) -> bool:
+        """Tell whether each of the ids shows beside the others, and none is nearly another one."""
+        return min([self.z, *self.z_alone.values()]) >= STRONG and self.z_rival >= APART
 
 
 @dataclass(frozen=True)

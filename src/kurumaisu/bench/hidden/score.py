@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.bench.hidden.case import Truth
+from kurumaisu.bench.hidden.case import APART, Truth
 from kurumaisu.bench.hidden.wrong import WRONG
 from kurumaisu.critic.verdict import Verdict
 
 SURE = 0.95  # probability from which an answer is taken for sure
 _SEEN = 3.0  # whitened norm below which nobody can tell two effects apart for sure
-_TOLD_APART = 6.0  # whitened norm from which a rival is to be told from the truth
 _TWINS = 0.1  # and below which they do the same
 
 
@@ -86,7 +85,7 @@ def _right(truth: Truth, verdict: Verdict, named: set[str]) -> bool:
         allowed = {name for ids in truth.accepted for name in ids}
         a_set = any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
         return a_set or (exact and truth.z_rival > _TWINS)
-    if len(truth.ids) > 1 and truth.z_rival < _TOLD_APART and verdict.verdict != "unknown":
+    if len(truth.ids) > 1 and truth.z_rival < APART and verdict.verdict != "unknown":
         # Of several causes one may have a twin: it is right to name the others, and to give the set for that one.
         sets = {name for group in verdict.confounded for name in group}
         return named <= set(truth.ids) <= named | sets
