@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Wrong data are recognised, whatever effect the robot has besides; good data with large effects are not wrong."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from kurumaisu.bench import drives, sanity, wrong_data, wrong_scans
+from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic import sanity_fit, sanity_input, sanity_rates, sanity_rows, sanity_stamps
 from kurumaisu.critic.reading import read_recording
 from kurumaisu.critic.recording import Series
@@ -169,3 +171,11 @@ def test_nothing_is_wrong_with_a_real_bag():
     recording = read_recording(DATA / name)
     assert recording.invalid == ()
     assert examine(recording, load_model(shipped("launch/md100.yaml"))).invalid == []
+
+
+@pytest.mark.parametrize("fault", ["scan mirrored", "wrong map"])
+def test_scans_are_compared_with_the_map_though_only_the_model_mounts_the_laser(fault, tmp_path):
+    model = load_model(shipped("launch/md100.yaml"))
+    made = make(Ask("wrong", (fault,), family="laser"), 34100, tmp_path)
+    assert examine(replace(made.recording, laser=None), model).invalid
+    assert examine(replace(made.null, laser=None), model).invalid == []

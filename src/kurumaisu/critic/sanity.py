@@ -22,6 +22,7 @@ from kurumaisu.critic import (
 )
 from kurumaisu.critic.clean import Faults
 from kurumaisu.critic.drive import from_voltages
+from kurumaisu.critic.laser.shots import laser_of
 from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
 from kurumaisu.critic.sanity_input import Match
 from kurumaisu.critic.sanity_pose import Course
@@ -39,18 +40,27 @@ _SOME_TWICE = (1.04, 1.7)
 def examine(recording: Recording, model: Model) -> Faults:
     """Return what is wrong with the runs to fit and to judge by, in words that begin with the run's name."""
     faults = Faults()
-    segments = _segments(recording)
+    segments, laser = _segments(recording), _mounted(recording, model)
     for run in recording.runs:
         words = _of_run(run, model)
-        for told in [*words, *_of_scans(run, recording.laser, model, None if words else segments)]:
+        for told in [*words, *_of_scans(run, laser, model, None if words else segments)]:
             faults.add(f"{run.name}: {told}", fatal=True)
     return faults
 
 
 def _segments(recording: Recording) -> FloatArray | None:
     """Return the walls of the recording's map; None where it has none, or nothing to compare it with."""
-    usable = recording.laser is not None and any(run.scan is not None for run in recording.runs)
+    usable = any(run.scan is not None for run in recording.runs)
     return load_world(recording.world).segments if recording.world is not None and usable else None
+
+
+def _mounted(recording: Recording, model: Model) -> LaserMount | None:
+    """Return the laser of the recording, else the model's; None where its fan cannot be that of the scans."""
+    laser = laser_of(model.laser, recording.laser, recording.runs)
+    if recording.laser is None and any(run.scan.values.shape[1] != laser.beams for run in recording.runs if run.scan):
+        return None
+    place = laser.mount
+    return LaserMount(place.x, place.y, place.yaw, laser.angle_min, laser.angle_increment, laser.beams)
 
 
 def _of_scans(run: Run, laser: LaserMount | None, model: Model, segments: FloatArray | None) -> list[str]:
