@@ -23,7 +23,7 @@ from kurumaisu.critic.drive import GRID, Drive, prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.noise import Growth, Noise, Scatter, whitener
-from kurumaisu.critic.pruned import pruned
+from kurumaisu.critic.pruned import in_turn, pruned
 from kurumaisu.critic.scan import Screen
 from kurumaisu.critic.smooth import Belief
 from kurumaisu.critic.smooth_alike import FORM, Likeness
@@ -226,6 +226,15 @@ def test_what_is_certain_or_confirmed_is_kept():
     assert pruned(certain, gain(-0.1), lambda _: gain(0.2)) == (certain, gain(-0.1))
     confirmed = decision({"a": 1.0, "b": 0.7}, fit_of("a b", 50.0), fit_of("a", 49.0))
     assert pruned(confirmed, gain(0.2), lambda _: gain(0.3)) == (confirmed, gain(0.2))
+
+
+@pytest.mark.parametrize(
+    ("held", "nats", "turned", "kept"),
+    [(-0.01, 50.0, 0.2, 0.2), (-0.01, 50.0, -0.02, -0.01), (-0.01, 15.0, 0.2, -0.01), (-0.1, 50.0, 0.2, -0.1)],
+)
+def test_where_drives_held_out_decide_nothing_each_is_left_out_in_turn(held, nats, turned, kept):
+    made = decision({"a": 1.0}, fit_of("a", nats))
+    assert in_turn(made, gain(held), lambda: gain(turned)) == gain(kept)
 
 
 @pytest.mark.parametrize(("told", "without", "best"), [(True, 0.2, ""), (False, 0.2, "a"), (False, -0.1, "")])

@@ -23,7 +23,7 @@ STRONG = 8.0  # [nat] of evidence from which _LIKELY will do
 # [nat] over nothing: were the noise twice as large as estimated, a quarter of it would still be beyond doubt.
 NO_NOISE = 50.0
 _LIKELY = 0.84  # standard deviations: a gain with a probability of 0.8
-_CERTAIN = 20.0  # [nat] of evidence from which data held out need but gain
+CERTAIN = 20.0  # [nat] of evidence from which data held out need but gain
 HORIZON = 2.0  # [s] over which ways and turns are compared
 
 
@@ -38,7 +38,7 @@ def confirmed(worth: Gain | None, nats: float, *, free: bool = False) -> bool:
         return False
     gain = worth.log_density_per_sample
     sd = max(gain.hi90 - gain.lo90, 1e-12) / (2 * NORMAL90)
-    least = 0.0 if nats >= _CERTAIN and not free else _LIKELY * sd
+    least = 0.0 if nats >= CERTAIN and not free else _LIKELY * sd
     return gain.lo90 > 0 or (nats >= STRONG and gain.gain > least)
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from kurumaisu.critic import smooth_explain
 from kurumaisu.critic.decide import Decision, uncurved
 from kurumaisu.critic.evidence import Fit
-from kurumaisu.critic.material import confirmed
+from kurumaisu.critic.material import CERTAIN, confirmed
 from kurumaisu.critic.verdict import Gain
 
 _TRIED = 2  # smaller sets, the likeliest first: each is fitted to all folds
@@ -34,6 +34,20 @@ def pruned(made: Decision, worth: Gain | None, measure: Callable[[Decision], Gai
         if confirmed(gained, found.nats(fit)):
             return other, gained
     return made, worth
+
+
+def in_turn(made: Decision, held: Gain | None, measure: Callable[[], Gain]) -> Gain | None:
+    """Return what effects are worth with each drive to fit left out in turn, too, if that confirms them.
+
+    Only where drives held out decide nothing: nobody may have driven so as to meet what acts, such as a threshold.
+    """
+    nats = made.found.nats(made.found.best)
+    if held is None or made.beyond.extension is not None or nats < CERTAIN or confirmed(held, nats):
+        return held
+    if held.log_density_per_sample.hi90 < 0:
+        return held
+    again = measure()
+    return again if confirmed(again, nats) else held
 
 
 def _uncurved(made: Decision, worth: Gain, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain]:
