@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -112,7 +112,8 @@ class Smooth(Effect):
         added = added * factor(channel, motion)
         rate = _MOVED[channel.rate]
         before = getattr(motion, rate)
-        return replace(motion, **{rate: added if before is None else before + added})
+        moved: dict[str, Any] = {rate: added if before is None else before + added}
+        return replace(motion, **moved)
 
 
 def factor(channel: Channel, motion: Motion) -> FloatArray:
