@@ -100,14 +100,6 @@ BASE: dict[str, Hidden] = {
     "base.battery_sag": Hidden(*_of("floor", ra.battery_sag, ra.battery_decay), 0.001, False, 0.01, _as("sag")),
     "base.understeer": Hidden(*_of("floor", ra.understeer, ra.characteristic_speed), 0.2, True, 1.5, _as("k")),
     "base.lateral_slip": Hidden(*_of("floor", ra.lateral_slip), 0.03, False, 0.5, _as("c")),
-    "base.slope": Hidden(
-        *_of("floor", ra.slope),
-        0.02,
-        False,
-        0.2,
-        _slope_names,
-        lambda rng: {"bearing": float(rng.uniform(-np.pi, np.pi))},
-    ),
     "base.caster_reversal": Hidden(
         *_of("floor", ra.caster_reversal, ra.caster_swing),
         0.15,
@@ -115,6 +107,15 @@ BASE: dict[str, Hidden] = {
         2.0,
         lambda s: {"kick": s["size"], "length": s["length"]},
         lambda rng: {"length": float(rng.uniform(0.15, 0.4))},
+    ),
+    # after all that turns the chair: it follows the heading
+    "base.slope": Hidden(
+        *_of("floor", ra.slope),
+        0.02,
+        False,
+        0.2,
+        _slope_names,
+        lambda rng: {"bearing": float(rng.uniform(-np.pi, np.pi))},
     ),
     "base.backlash": Hidden(*_of("events", ev.backlash, ev.presliding), 0.03, False, 0.5, _as("play")),
     "base.cross_w_to_v": Hidden(*_of("events", ev.cross_w_to_v), 0.02, True, 0.5, _as("lever")),
