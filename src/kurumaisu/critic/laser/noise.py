@@ -29,6 +29,7 @@ _NONE = 0.003  # share that lasts of a reference that does not wander, as far as
 _TRIED = (0.05, 0.2, 0.6)  # shares, one of which must be likelier
 _STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that last are one
 _STRETCHES = 40  # at most, and one more for each run: where scans are so far apart, what lasts less long hardly counts
+_WEAK = 1e-9  # prior precision of a column's coefficient, in what the readings would tell if nothing else erred
 _APART = 0.2  # in logs, to see how surely each is known
 
 
@@ -202,16 +203,19 @@ class _Likelihood:
     def __init__(self, grams: Sequence[Gram], layout: Layout, project: IntArray) -> None:
         """Take common columns to project out; the last common column is the residual."""
         self._grams, self._layout = [_only(gram, project) for gram in grams], layout
+        # Of columns that others draw as well, as a curve over the time does one over the heading of stands, nothing is
+        # learnt, whatever the noise: what is known of them beforehand must not follow it. Else each of them speaks for
+        # more noise.
+        each = sum(np.diag(gram.matrix)[gram.own + gram.shared : -1] for gram in self._grams)
+        self._norms = np.sqrt(np.maximum(each, 1e-300))
 
     def __call__(self, noise: ScanNoise) -> float:
         s, log_det = marginal(self._grams, self._layout, noise)
-        x, b, yy = s[:-1, :-1], s[:-1, -1], float(s[-1, -1])
-        norms = np.sqrt(np.maximum(np.diag(x), 1e-300))
-        x = x / np.outer(norms, norms) + 1e-9 * np.eye(len(x))
-        b = b / norms
+        yy = float(s[-1, -1])
+        x = s[:-1, :-1] / np.outer(self._norms, self._norms) + _WEAK * np.eye(len(s) - 1)
+        b = s[:-1, -1] / self._norms
         fitted = float(b @ np.linalg.solve(x, b)) if len(b) else 0.0
-        kept = float(np.linalg.slogdet(x)[1]) + 2 * float(np.log(norms).sum())
-        return 0.5 * (log_det + yy - fitted + kept)
+        return 0.5 * (log_det + yy - fitted + float(np.linalg.slogdet(x)[1]))
 
 
 def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] | None, project: IntArray) -> ScanNoise:

@@ -43,9 +43,18 @@ def trusted_place(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
 
 def trusted(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
     """Return (k, b) which readings may speak about the mean, outliers aside."""
-    low, high = piles(shots.measured)
-    inside = (base > low + _GATE) & (base < high - _GATE)
+    inside = within(base, piles(shots.measured))
     return np.asarray(trusted_place(shots, seen, base) & inside & np.isfinite(shots.measured))
+
+
+def within(base: FloatArray, ends: tuple[float, float], doubt: FloatArray | float = 0.0) -> BoolArray:
+    """Return (k, b) which beams are to be read well inside the ends [m] at which readings are cut off.
+
+    doubt [m]: by how much they may be read elsewhere, where that is more than a gate.
+    """
+    low, high = ends
+    gate = np.maximum(_GATE, doubt)
+    return np.asarray((base > low + gate) & (base < high - gate))
 
 
 def piles(readings: FloatArray) -> tuple[float, float]:
