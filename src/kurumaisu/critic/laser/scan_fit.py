@@ -40,12 +40,23 @@ def steepest(ranges: FloatArray, angles: FloatArray) -> FloatArray:
     return np.stack([np.ones_like(along), along, along, reach * along], axis=-1)
 
 
+def fluctuating(z: FloatArray, inside: BoolArray, stand: IntArray) -> FloatArray:
+    """Return what of some numbers (k, b) differs from scan to scan; inside (k, b): which of them count; stand (k,).
+
+    What a beam reads in all scans of a stand, an offset of its own or a rough wall leaves: neighbours may share it, but
+    it is no noise. Scans that stand alone, as in a drive, have what a beam keeps in all of them taken out.
+    """
+    _, group, count = np.unique(stand, return_inverse=True, return_counts=True)
+    group = np.where((stand >= 0) & (count[group] > 1), group + 1, 0)
+    member = (np.arange(len(count) + 1)[:, np.newaxis] == group).astype(float)
+    mean = (member @ np.where(inside, z, 0.0)) / np.maximum(member @ inside, 1.0)
+    return np.where(inside, z - mean[group], 0.0)
+
+
 class ScanFit:
     """The fit of some readings of each scan."""
 
-    def __init__(
-        self, basis: FloatArray, size: FloatArray, sd: FloatArray, trust: BoolArray, stand: IntArray
-    ) -> None:
+    def __init__(self, basis: FloatArray, size: FloatArray, sd: FloatArray, trust: BoolArray, stand: IntArray) -> None:
         """Take basis (k, b, q), sizes (k, q), deviations (k, b) [m], and stands (k,) as of a layout.
 
         trust (k, b): readings that say anything.

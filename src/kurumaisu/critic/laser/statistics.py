@@ -12,7 +12,7 @@ from kurumaisu.critic.laser.deviations import ELSEWHERE
 from kurumaisu.critic.laser.likeness import Kinds
 from kurumaisu.critic.laser.noise import ScanNoise
 from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.scan_fit import ScanFit, basis_of, steepest
+from kurumaisu.critic.laser.scan_fit import ScanFit, basis_of, fluctuating, steepest
 from kurumaisu.critic.laser.trust import piles, within
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -78,10 +78,7 @@ class Statistics:
         inside = self._trust & np.isfinite(left)
         z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
         out = [_log(_mean(z[group & inside] ** 2, 1.0)) for group in self._groups.masks]
-        power = _mean(z[inside] ** 2, 1.0)
-        for lag in (1, 2, 4):
-            both = inside[:, lag:] & inside[:, :-lag]
-            out.append(_mean(z[:, lag:][both] * z[:, :-lag][both], 0.0) / power)
+        out += _correlations(fluctuating(z, inside, self._stand), inside)
         size = np.abs(left[inside])
         out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > ELSEWHERE)]
         far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
@@ -254,6 +251,13 @@ def _share(hits: BoolArray) -> float:
 
 def _root(count: int) -> float:
     return 2 * float(np.sqrt(count + 0.375))
+
+
+def _correlations(z: FloatArray, inside: BoolArray) -> list[float]:
+    """Return how readings (k, b) of a scan correlate with those some beams on."""
+    power = _mean(z[inside] ** 2, 1.0)
+    both = ((lag, inside[:, lag:] & inside[:, :-lag]) for lag in (1, 2, 4))
+    return [_mean(z[:, lag:][of] * z[:, :-lag][of], 0.0) / max(power, 1e-12) for lag, of in both]
 
 
 def _correlation(common: FloatArray) -> float:

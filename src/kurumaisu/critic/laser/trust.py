@@ -17,6 +17,7 @@ _BESIDE = 4  # beams on each side of a corner or jump: an error of the pose or t
 _STEEPEST = np.radians(75.0)
 _GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
 _PILED = 20  # readings of one value, the least or the greatest, that are a pile if hardly more lie beside them
+_MICRON = 6  # decimals of a metre: readings a grid apart are not within it, however they were rounded
 _GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
 
 
@@ -65,7 +66,7 @@ def piles(readings: FloatArray) -> tuple[float, float]:
     values = readings[np.isfinite(readings)]
     ends = []
     for sign in (-1.0, 1.0):
-        off = np.max(sign * values) - sign * values if len(values) else values
+        off = np.round(np.max(sign * values) - sign * values if len(values) else values, _MICRON)
         grids = [grid for grid in _GRIDS if np.sum(off < grid) > max(_PILED, np.sum((off >= grid) & (off < _GATE)))]
         within = float(np.max(off[off < grids[0]])) if grids else np.inf
         ends.append(sign * (float(np.max(sign * values)) - within) if grids else sign * np.inf)
