@@ -6,7 +6,7 @@ import pytest
 
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, _Likelihood, whitened
+from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, _Likelihood, longest, whitened
 from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.scan_fit import fluctuating
 from kurumaisu.critic.laser.shots import gather
@@ -118,6 +118,28 @@ def test_columns_that_others_draw_as_well_speak_for_no_noise():
     cost = [[likelihood(noise) for noise in noises] for likelihood in (few, many)]
     assert np.diff(cost[1]) == pytest.approx(np.diff(cost[0]), abs=1e-3)
     assert np.diff(cost[0]) > 1.0, "scans are not off together"
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_common_mode_may_last_as_long_as_stands_that_are_shorter_cannot_deny(there):
+    """What it wanders by within a stand is known; what stands differ by is not, and effects must be surer than that."""
+    rng, count, each, beams = np.random.default_rng(6), 15, 16, 40
+    stand = np.repeat(np.arange(count), each)
+    layout = Layout(100.0 * stand + 0.1 * np.tile(np.arange(each), count), np.zeros(len(stand), dtype=int), stand)
+    walk = np.concatenate([np.cumsum(2e-4 * rng.standard_normal(each)) for _ in range(count)])
+    grams = []
+    for k in range(len(stand)):
+        left = 0.001 * rng.standard_normal((beams, 1)) + there * walk[k]
+        columns = np.hstack([np.ones((beams, 1)), np.tile(np.eye(count)[stand[k]], (beams, 1)), left])
+        rows = whitened(columns, np.ones(beams, dtype=bool), np.full(beams, 0.001), 0.0)
+        grams.append(Gram(rows.T @ rows, 0, 1))
+    likeliest = ScanNoise(0.002, 0.001, 4.5e-4 if there else 2e-5, 1.0)
+    wary = longest(grams, layout, np.arange(count), likeliest)
+    if not there:
+        assert wary == likeliest, "there is none"
+        return
+    assert wary.common_tau > 5.0
+    assert wary.common_sd**2 / wary.common_tau == pytest.approx(0.5 * 2e-4**2 / 0.1, rel=0.4)
 
 
 def test_what_comes_and_goes_with_the_time_is_no_common_mode(tmp_path, monkeypatch):

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag, cho_factor, cho_solve
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -30,6 +30,9 @@ _TRIED = (0.05, 0.2, 0.6)  # shares, one of which must be likelier
 _STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that last are one
 _STRETCHES = 40  # at most, and one more for each run: where scans are so far apart, what lasts less long hardly counts
 _WEAK = 1e-9  # prior precision of a column's coefficient, in what the readings would tell if nothing else erred
+_CERTAIN = 5.0  # [nat] from which there is a common mode
+_AS_LIKELY = 1.0  # [nat] by which a longer one may be less likely
+_LENGTHS = 5  # that are tried
 _APART = 0.2  # in logs, to see how surely each is known
 
 
@@ -190,11 +193,25 @@ def autoregressive(times: FloatArray, run: IntArray | FloatArray, tau: float) ->
 
 @dataclass(frozen=True)
 class CommonMode:
-    """What says that whole scans are off together: log evidence [nat], and sds of the logs of its sd and its tau."""
+    """What says that whole scans are off together: log evidence [nat], and sds of the logs of its sd and its tau.
+
+    wary: the noise with the longest one that is nearly as likely, _AS_LIKELY, if that is known.
+    """
 
     nats: float
     log_sd: float
     log_tau: float
+    wary: ScanNoise | None = None
+
+    def ends(self, noise: ScanNoise, sds: float) -> tuple[FloatArray, FloatArray]:
+        """Return sd [m] and tau [s] at so many sds below and above those of a noise."""
+        logs = np.array([-sds, sds])
+        sizes, taus = noise.common_sd * np.exp(logs * self.log_sd), noise.common_tau * np.exp(logs * self.log_tau)
+        if self.wary is not None:
+            far = sds / np.sqrt(2 * _AS_LIKELY)
+            sizes[1] = max(sizes[1], noise.common_sd * (self.wary.common_sd / noise.common_sd) ** far)
+            taus[1] = max(taus[1], noise.common_tau * (self.wary.common_tau / noise.common_tau) ** far)
+        return sizes, taus
 
 
 class _Likelihood:
@@ -234,6 +251,28 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
         return found
     begun = np.log(astuple(replace(found, lasting=lasting)))
     return _likeliest(likelihood, start, np.arange(known, 6), begun[known:])
+
+
+def longest(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
+    """Return a noise whose common mode, where there is one for sure, lasts as long as the scans allow.
+
+    The scans of a stand tell how far it wanders while they last. How far it comes until the next stand is told by no
+    more than that: the longer it lasts, the farther. Effects of the time or of the place must be surer than that.
+    """
+    likelihood = _Likelihood(grams, layout, project)
+    least = likelihood(noise)
+    if likelihood(replace(noise, common_sd=_FLOOR)) - least < _CERTAIN:
+        return noise
+    for tau in np.geomspace(_HIGH[3], noise.common_tau, _LENGTHS + 1)[:-1].tolist():
+        reach = np.log(noise.common_sd) + np.array([0.0, 0.5 * np.log(tau / noise.common_tau) + _APART])
+
+        def cost(log_sd: float, tau: float = tau) -> float:
+            return likelihood(replace(noise, common_sd=float(np.exp(log_sd)), common_tau=tau))
+
+        found = minimize_scalar(cost, bounds=reach, method="bounded", options={"maxiter": 8})
+        if found.fun - least < _AS_LIKELY:
+            return replace(noise, common_sd=float(np.exp(found.x)), common_tau=tau)
+    return noise
 
 
 def common_mode(
