@@ -31,8 +31,8 @@ _STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that la
 _STRETCHES = 40  # at most, and one more for each run: where scans are so far apart, what lasts less long hardly counts
 _WEAK = 1e-9  # prior precision of a column's coefficient, in what the readings would tell if nothing else erred
 _CERTAIN = 5.0  # [nat] from which there is a common mode
-_AS_LIKELY = 1.0  # [nat] by which a longer one may be less likely
-_LENGTHS = 5  # that are tried
+_UNLIKELY = 0.01  # times as likely as the likeliest, below which no longer one counts
+_LENGTHS = 7  # of a common mode that are tried
 _APART = 0.2  # in logs, to see how surely each is known
 
 
@@ -195,7 +195,7 @@ def autoregressive(times: FloatArray, run: IntArray | FloatArray, tau: float) ->
 class CommonMode:
     """What says that whole scans are off together: log evidence [nat], and sds of the logs of its sd and its tau.
 
-    wary: the noise with the longest one that is nearly as likely, _AS_LIKELY, if that is known.
+    wary: the noise with a longer one that is nearly as likely, about an sd from the likeliest, if that is known.
     """
 
     nats: float
@@ -208,9 +208,8 @@ class CommonMode:
         logs = np.array([-sds, sds])
         sizes, taus = noise.common_sd * np.exp(logs * self.log_sd), noise.common_tau * np.exp(logs * self.log_tau)
         if self.wary is not None:
-            far = sds / np.sqrt(2 * _AS_LIKELY)
-            sizes[1] = max(sizes[1], noise.common_sd * (self.wary.common_sd / noise.common_sd) ** far)
-            taus[1] = max(taus[1], noise.common_tau * (self.wary.common_tau / noise.common_tau) ** far)
+            sizes[1] = max(sizes[1], noise.common_sd * (self.wary.common_sd / noise.common_sd) ** sds)
+            taus[1] = max(taus[1], noise.common_tau * (self.wary.common_tau / noise.common_tau) ** sds)
         return sizes, taus
 
 
@@ -253,8 +252,8 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
     return _likeliest(likelihood, start, np.arange(known, 6), begun[known:])
 
 
-def longest(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
-    """Return a noise whose common mode, where there is one for sure, lasts as long as the scans allow.
+def wary_of(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
+    """Return a noise whose common mode, where there is one for sure, is the mean of those that last longer, too.
 
     The scans of a stand tell how far it wanders while they last. How far it comes until the next stand is told by no
     more than that: the longer it lasts, the farther. Effects of the time or of the place must be surer than that.
@@ -263,16 +262,20 @@ def longest(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: Sca
     least = likelihood(noise)
     if likelihood(replace(noise, common_sd=_FLOOR)) - least < _CERTAIN:
         return noise
-    for tau in np.geomspace(_HIGH[3], noise.common_tau, _LENGTHS + 1)[:-1].tolist():
+    found = [(1.0, noise.common_sd**2, noise.common_tau)]
+    for tau in np.geomspace(noise.common_tau, _HIGH[3], _LENGTHS)[1:].tolist():
         reach = np.log(noise.common_sd) + np.array([0.0, 0.5 * np.log(tau / noise.common_tau) + _APART])
 
         def cost(log_sd: float, tau: float = tau) -> float:
             return likelihood(replace(noise, common_sd=float(np.exp(log_sd)), common_tau=tau))
 
-        found = minimize_scalar(cost, bounds=reach, method="bounded", options={"maxiter": 8})
-        if found.fun - least < _AS_LIKELY:
-            return replace(noise, common_sd=float(np.exp(found.x)), common_tau=tau)
-    return noise
+        best = minimize_scalar(cost, bounds=reach, method="bounded", options={"maxiter": 8})
+        found.append((float(np.exp(min(least - best.fun, 0.0))), float(np.exp(2 * best.x)), tau))
+        if found[-1][0] < _UNLIKELY:
+            break
+    weights, squares, taus = np.array(found).T
+    mean = weights / weights.sum()
+    return replace(noise, common_sd=float(np.sqrt(mean @ squares)), common_tau=float(mean @ taus))
 
 
 def common_mode(

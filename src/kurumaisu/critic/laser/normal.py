@@ -22,8 +22,8 @@ from kurumaisu.critic.laser.noise import (
     ScanNoise,
     common_mode,
     estimate,
-    longest,
     marginal,
+    wary_of,
     whitened,
 )
 from kurumaisu.critic.laser.other_forms import OtherForm
@@ -48,7 +48,7 @@ _BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau
 class Normal:
     """gram (p + 1, p + 1): normal equations of all columns and, last, the residual; noise that made them so.
 
-    scan_noise: the likeliest; wary: with which the equations are made, whose common mode lasts as long as it may.
+    scan_noise: the likeliest; wary: with which the equations are made; nobody knows how long its common mode lasts.
     """
 
     gram: FloatArray
@@ -212,7 +212,7 @@ class Assembly:
         narrow = max(self._fixed, self._nuisance.stop, *(free.span.stop for free in self.free if free.whole))
         grams, cross = self._crossed(beam, narrow)
         scan = estimate(grams, self.layout, truth, project)
-        wary = longest(grams, self.layout, project, scan)
+        wary = wary_of(grams, self.layout, project, scan)
         gram = without_beams(grams, cross, self.layout, wary, beam.own_sd)
         return Normal(gram, scan, wary, beam, int(beam.valid.sum()))
 
