@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag, cho_factor, cho_solve
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -29,6 +29,10 @@ _NONE = 0.003  # share that lasts of a reference that does not wander, as far as
 _TRIED = (0.05, 0.2, 0.6)  # shares, one of which must be likelier
 _STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that last are one
 _STRETCHES = 40  # at most, and one more for each run: where scans are so far apart, what lasts less long hardly counts
+_WEAK = 1e-9  # prior precision of a column's coefficient, in what the readings would tell if nothing else erred
+_CERTAIN = 5.0  # [nat] from which there is a common mode
+_UNLIKELY = 0.01  # times as likely as the likeliest, below which no longer one counts
+_LENGTHS = 7  # of a common mode that are tried
 _APART = 0.2  # in logs, to see how surely each is known
 
 
@@ -189,11 +193,24 @@ def autoregressive(times: FloatArray, run: IntArray | FloatArray, tau: float) ->
 
 @dataclass(frozen=True)
 class CommonMode:
-    """What says that whole scans are off together: log evidence [nat], and sds of the logs of its sd and its tau."""
+    """What says that whole scans are off together: log evidence [nat], and sds of the logs of its sd and its tau.
+
+    wary: the noise with a longer one that is nearly as likely, about an sd from the likeliest, if that is known.
+    """
 
     nats: float
     log_sd: float
     log_tau: float
+    wary: ScanNoise | None = None
+
+    def ends(self, noise: ScanNoise, sds: float) -> tuple[FloatArray, FloatArray]:
+        """Return sd [m] and tau [s] at so many sds below and above those of a noise."""
+        logs = np.array([-sds, sds])
+        sizes, taus = noise.common_sd * np.exp(logs * self.log_sd), noise.common_tau * np.exp(logs * self.log_tau)
+        if self.wary is not None:
+            sizes[1] = max(sizes[1], noise.common_sd * (self.wary.common_sd / noise.common_sd) ** sds)
+            taus[1] = max(taus[1], noise.common_tau * (self.wary.common_tau / noise.common_tau) ** sds)
+        return sizes, taus
 
 
 class _Likelihood:
@@ -202,16 +219,19 @@ class _Likelihood:
     def __init__(self, grams: Sequence[Gram], layout: Layout, project: IntArray) -> None:
         """Take common columns to project out; the last common column is the residual."""
         self._grams, self._layout = [_only(gram, project) for gram in grams], layout
+        # Of columns that others draw as well, as a curve over the time does one over the heading of stands, nothing is
+        # learnt, whatever the noise: what is known of them beforehand must not follow it. Else each of them speaks for
+        # more noise.
+        each = sum(np.diag(gram.matrix)[gram.own + gram.shared : -1] for gram in self._grams)
+        self._norms = np.sqrt(np.maximum(each, 1e-300))
 
     def __call__(self, noise: ScanNoise) -> float:
         s, log_det = marginal(self._grams, self._layout, noise)
-        x, b, yy = s[:-1, :-1], s[:-1, -1], float(s[-1, -1])
-        norms = np.sqrt(np.maximum(np.diag(x), 1e-300))
-        x = x / np.outer(norms, norms) + 1e-9 * np.eye(len(x))
-        b = b / norms
+        yy = float(s[-1, -1])
+        x = s[:-1, :-1] / np.outer(self._norms, self._norms) + _WEAK * np.eye(len(s) - 1)
+        b = s[:-1, -1] / self._norms
         fitted = float(b @ np.linalg.solve(x, b)) if len(b) else 0.0
-        kept = float(np.linalg.slogdet(x)[1]) + 2 * float(np.log(norms).sum())
-        return 0.5 * (log_det + yy - fitted + kept)
+        return 0.5 * (log_det + yy - fitted + float(np.linalg.slogdet(x)[1]))
 
 
 def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] | None, project: IntArray) -> ScanNoise:
@@ -230,6 +250,32 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
         return found
     begun = np.log(astuple(replace(found, lasting=lasting)))
     return _likeliest(likelihood, start, np.arange(known, 6), begun[known:])
+
+
+def wary_of(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
+    """Return a noise whose common mode, where there is one for sure, is the mean of those that last longer, too.
+
+    The scans of a stand tell how far it wanders while they last. How far it comes until the next stand is told by no
+    more than that: the longer it lasts, the farther. Effects of the time or of the place must be surer than that.
+    """
+    likelihood = _Likelihood(grams, layout, project)
+    least = likelihood(noise)
+    if likelihood(replace(noise, common_sd=_FLOOR)) - least < _CERTAIN:
+        return noise
+    found = [(1.0, noise.common_sd**2, noise.common_tau)]
+    for tau in np.geomspace(noise.common_tau, _HIGH[3], _LENGTHS)[1:].tolist():
+        reach = np.log(noise.common_sd) + np.array([0.0, 0.5 * np.log(tau / noise.common_tau) + _APART])
+
+        def cost(log_sd: float, tau: float = tau) -> float:
+            return likelihood(replace(noise, common_sd=float(np.exp(log_sd)), common_tau=tau))
+
+        best = minimize_scalar(cost, bounds=reach, method="bounded", options={"maxiter": 8})
+        found.append((float(np.exp(min(least - best.fun, 0.0))), float(np.exp(2 * best.x)), tau))
+        if found[-1][0] < _UNLIKELY:
+            break
+    weights, squares, taus = np.array(found).T
+    mean = weights / weights.sum()
+    return replace(noise, common_sd=float(np.sqrt(mean @ squares)), common_tau=float(mean @ taus))
 
 
 def common_mode(

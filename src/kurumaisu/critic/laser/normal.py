@@ -15,7 +15,17 @@ from kurumaisu.critic.laser.columns import Form, Marks
 from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, grid_step, near, refined
 from kurumaisu.critic.laser.displaced import displaced
 from kurumaisu.critic.laser.free import blocks
-from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate, marginal, whitened
+from kurumaisu.critic.laser.noise import (
+    CommonMode,
+    Gram,
+    Layout,
+    ScanNoise,
+    common_mode,
+    estimate,
+    marginal,
+    wary_of,
+    whitened,
+)
 from kurumaisu.critic.laser.other_forms import OtherForm
 from kurumaisu.critic.laser.path import Sight, Steady, steady
 from kurumaisu.critic.laser.shots import Shots, look, own_with, predict, rows_of
@@ -36,10 +46,14 @@ _BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau
 
 @dataclass(frozen=True)
 class Normal:
-    """gram (p + 1, p + 1): normal equations of all columns and, last, the residual; noise that made them so."""
+    """gram (p + 1, p + 1): normal equations of all columns and, last, the residual; noise that made them so.
+
+    scan_noise: the likeliest; wary: with which the equations are made; nobody knows how long its common mode lasts.
+    """
 
     gram: FloatArray
     scan_noise: ScanNoise
+    wary: ScanNoise
     beam_noise: BeamNoise
     readings: int
 
@@ -198,8 +212,9 @@ class Assembly:
         narrow = max(self._fixed, self._nuisance.stop, *(free.span.stop for free in self.free if free.whole))
         grams, cross = self._crossed(beam, narrow)
         scan = estimate(grams, self.layout, truth, project)
-        gram = without_beams(grams, cross, self.layout, scan, beam.own_sd)
-        return Normal(gram, scan, beam, int(beam.valid.sum()))
+        wary = wary_of(grams, self.layout, project, scan)
+        gram = without_beams(grams, cross, self.layout, wary, beam.own_sd)
+        return Normal(gram, scan, wary, beam, int(beam.valid.sum()))
 
     def _projected(self, fitted: Sequence[Form]) -> IntArray:
         """Return the columns of every effect, and of the blocks that change whole scans."""
@@ -214,12 +229,13 @@ class Assembly:
         """
         project = self._projected(fitted)
         grams = self.grams(normal.beam_noise, project, lasting=True)
-        return common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise)
+        seen = common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise)
+        return replace(seen, wary=normal.wary)
 
     def full(self, normal: Normal) -> Normal:
         """Return the normal equations of all columns, in the noise that is known."""
         grams, cross = self._crossed(normal.beam_noise, self.columns.shape[2])
-        gram = without_beams(grams, cross, self.layout, normal.scan_noise, normal.beam_noise.own_sd)
+        gram = without_beams(grams, cross, self.layout, normal.wary, normal.beam_noise.own_sd)
         return replace(normal, gram=gram)
 
     def again(self, settings: Sequence[EffectSetting]) -> Assembly:
@@ -248,7 +264,7 @@ class Assembly:
         grams, cross = other._crossed(
             replace(normal.beam_noise, valid=normal.beam_noise.valid & known), columns.shape[2]
         )
-        return without_beams(grams, cross, self.layout, normal.scan_noise, normal.beam_noise.own_sd)
+        return without_beams(grams, cross, self.layout, normal.wary, normal.beam_noise.own_sd)
 
     def _crossed(self, beam: BeamNoise, count: int) -> tuple[list[Gram], Crossed]:
         """Return the first columns' normal equations of each scan, and what single beams' offsets share with them."""

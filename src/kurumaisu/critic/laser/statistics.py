@@ -8,31 +8,29 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from kurumaisu.critic.laser.deviations import ELSEWHERE, near
+from kurumaisu.critic.laser.deviations import ELSEWHERE
 from kurumaisu.critic.laser.likeness import Kinds
 from kurumaisu.critic.laser.noise import ScanNoise
 from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.trust import piles
+from kurumaisu.critic.laser.scan_fit import ScanFit, basis_of, fluctuating, steepest
+from kurumaisu.critic.laser.trust import piles, within
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
 _FAR = 6.0  # deviations of an outlier
-_COMMON = 0.005  # [m] plausible common mode of a scan, when it is read off one scan alone
+_WITHIN = 3.0  # sds of errors of poses, within which a reading may be one that is cut off
+_KEPT = 4  # fits of all scans, one for each place at which readings are cut off: a few megabytes each
 _CELL = 0.5  # [m] of the map in which errors are averaged
 _PILE = 0.05  # [m] of the place of a pile, counted as one: it is known to a step of the readings, which is a fiftieth
 _PLACES = 3  # numbers, the last ones, that are such places, or the step of a grid
 _GRID = 1e-3  # [m] to which readings are rounded before their values are counted
 _AMID = (0.1, 0.9)  # quantiles of readings between which walls are everywhere
-_OBLIQUE = np.radians(80.0)  # [rad] beyond which no reading counts
 _SQUARE = np.radians(60.0)  # [rad] within which a wall beside a jump hardly moves with an error of the heading
 _JUMP = 0.15  # [m] between the two sides of an edge, at least
 _FLAT = 0.2  # share of it by which either side may go on
 _BESIDE = 3  # beams by which errors of the pose move a narrow face that lies between two sides in truth
 _INSIDE = 0.15  # share of it from either side, beyond which a reading lies between them
 _LASTS = 0.03  # [m] within which a reading between two sides comes again where a beam meets a third one
-_LEVER = 0.5  # [m] from base_link to a laser, at most
-_ROUNDS = 3
-_SOME = 4  # every so-manieth reading says how wide all are
 
 
 @dataclass(frozen=True)
@@ -57,18 +55,12 @@ class Statistics:
         self._cells = _cells(assembly)
         self._jumps = _jumps(seen.ranges, seen.incidence)
         self._stand = assembly.layout.stand
-        self._basis, self._size = _basis(assembly, noise)
+        self._basis, self._size = basis_of(assembly, noise)
         axes = np.r_[0, 1 + np.arange(self._basis.shape[2] - 1) % 3]
-        limit = _steepest(seen.level, seen.incidence)[:, :, axes]
+        limit = steepest(seen.level, seen.incidence)[:, :, axes]
         self._moves = np.clip(self._basis, -limit, limit)
-        weighed = np.asarray(self._basis * (self._trust / self._sd)[:, :, np.newaxis])
-        inner = np.asarray(weighed.transpose(0, 2, 1) @ weighed, dtype=np.float64)
-        inner = inner + np.eye(inner.shape[1]) * (self._size**-2)[:, np.newaxis, :]
-        inverse = np.linalg.inv(inner)
-        self._solve = (inverse @ weighed.transpose(0, 2, 1)).astype(np.float32)  # half the memory, twice as fast
-        self._fitted = (self._basis / self._sd[:, :, np.newaxis]).astype(np.float32)
-        self._reach = np.sqrt(np.sum((self._basis * self._size[:, np.newaxis, :]) ** 2, axis=2)) / self._sd
-        self._common_sd = _common_sd(inner, inverse, self._size)
+        self._reach = np.sqrt(np.sum((self._moves[:, :, 1:] * self._size[:, np.newaxis, 1:]) ** 2, axis=2))
+        self._fits: dict[tuple[float, float], ScanFit] = {}
 
     def pose_errors(self, rng: np.random.Generator) -> FloatArray:
         """Return errors of readings (k, b) [m] by errors of the reference, drawn."""
@@ -80,26 +72,23 @@ class Statistics:
 
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
         """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
-        left, common = self._leftover(error)
-        common = common / self._common_sd
+        said = readings[self._trust]
+        ends = piles(said)
+        left, common = self._leftover(error, ends)
         inside = self._trust & np.isfinite(left)
         z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
-        out = [_log(float(np.mean(z[group & inside] ** 2))) for group in self._groups.masks if (group & inside).any()]
-        power = float(np.mean(z[inside] ** 2))
-        for lag in (1, 2, 4):
-            both = inside[:, lag:] & inside[:, :-lag]
-            out.append(float(np.mean(z[:, lag:][both] * z[:, :-lag][both])) / power)
+        out = [_log(_mean(z[group & inside] ** 2, 1.0)) for group in self._groups.masks]
+        out += _correlations(fluctuating(z, inside, self._stand), inside)
         size = np.abs(left[inside])
         out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > ELSEWHERE)]
         far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
         out.append(_share((far[:, 1:] & far[:, :-1])[inside[:, 1:]]))
-        out += [_log(float(np.mean(common**2))), float(common[1:] @ common[:-1]) / float(common @ common)]
+        out += [_log(float(np.mean(common**2))), _correlation(common)]
         out += [_between(z, inside, np.broadcast_to(np.arange(z.shape[1]), z.shape)), _between(z, inside, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
         out.append(_share(_mixed(readings) & self._jumps & ~_lasting(readings, self._stand)))
-        said = readings[self._trust]
-        return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(said)])
+        return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(ends)])
 
     def names(self) -> list[str]:
         """Return what a reader calls the numbers, in their order."""
@@ -140,28 +129,24 @@ class Statistics:
             ("greatest value at which readings pile up", False, False),
         ]
 
-    def _piles(self, readings: FloatArray) -> list[float]:
-        """Return the ends at which readings are cut off, in units in which a step of them matters to nobody."""
-        low, high = piles(readings)
+    def _piles(self, ends: tuple[float, float]) -> list[float]:
+        """Return the ends [m] at which readings are cut off, in units in which a step of them matters to nobody."""
+        low, high = ends
         return [max(low, 0.0) / _PILE, min(high, self._farthest) / _PILE]
 
-    def _leftover(self, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return what poses and common mode leave of the errors (k, b), in deviations, and the common modes (k,) [m].
+    def _leftover(
+        self, error: FloatArray, ends: tuple[float, float] = (-np.inf, np.inf)
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what poses and common mode leave of the errors (k, b), and the common modes (k,), in deviations.
 
-        Missing readings and outliers take the value that the others give them.
+        ends [m]: where readings are cut off. What lies beyond, or may by an error of the pose, says nothing.
         """
-        z = error / self._sd
-        known = self._trust & np.isfinite(z)
-        fitted = np.zeros_like(z)
-        inside = near(z, known, self._reach)
-        coefficients = np.zeros(self._size.shape)
-        for _ in range(_ROUNDS):
-            filled = np.where(inside, np.nan_to_num(z), fitted).astype(np.float32)
-            coefficients = (self._solve @ filled[:, :, np.newaxis])[:, :, 0]
-            fitted = (self._fitted @ coefficients[:, :, np.newaxis])[:, :, 0]
-            width = 1.4826 * float(np.median(np.abs((z - fitted)[inside])[::_SOME]))
-            inside = known & (np.abs(np.nan_to_num(z - fitted)) < 4.5 * max(width, 0.1))
-        return np.where(known, z - fitted, np.nan), coefficients[:, 0]
+        if ends not in self._fits:
+            if len(self._fits) >= _KEPT:
+                del self._fits[next(iter(self._fits))]
+            trust = self._trust & within(self._base, ends, _WITHIN * self._reach)
+            self._fits[ends] = ScanFit(self._basis, self._size, self._sd, trust, self._stand)
+        return self._fits[ends].leftover(error)
 
 
 def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, returns: FloatArray) -> Groups:
@@ -232,47 +217,12 @@ def _widened(mask: BoolArray) -> BoolArray:
     return np.asarray(maximum_filter1d(mask, 2 * _BESIDE + 1, axis=1, mode="constant"))
 
 
-def _basis(assembly: Assembly, noise: ScanNoise) -> tuple[FloatArray, FloatArray]:
-    """Return (k, b, q) what readings do by a common mode and by errors of the poses, and their sds (k, q)."""
-    parts = [assembly.random_columns(k) for k in range(len(assembly.residual))]
-    widest = max(part.shape[1] for part in parts)
-    basis = np.zeros((len(parts), parts[0].shape[0], widest))
-    size = np.full((len(parts), widest), 1e-6)
-    pose = np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], 1e-6)
-    for k, part in enumerate(parts):
-        basis[k, :, : part.shape[1]] = part
-        size[k, : part.shape[1]] = np.concatenate([[_COMMON], np.tile(pose, part.shape[1] // 3)])
-    return basis, size
-
-
-def _steepest(ranges: FloatArray, angles: FloatArray) -> FloatArray:
-    """Return how much the reading of a beam (k, b, 4) follows common mode, x, y [1] and yaw [m/rad] at most.
-
-    A finite difference over the edge of a wall finds far more, where in truth the beam meets the one wall or the other.
-    """
-    along = 1 / np.cos(np.minimum(angles, _OBLIQUE))
-    reach = np.where(np.isfinite(ranges), ranges, 0.0) + _LEVER
-    return np.stack([np.ones_like(along), along, along, reach * along], axis=-1)
-
-
-def _common_sd(inner: FloatArray, inverse: FloatArray, size: FloatArray) -> FloatArray:
-    """Return the sds (k,) [m] of common modes that noise and errors of poses alone give; inner (k, q, q), size (k, q).
-
-    Where walls are all on one side, what looks like a common mode is mostly an error of the pose.
-    """
-    eye = np.eye(inner.shape[1])
-    known = inner - eye * (size**-2)[:, np.newaxis, :]
-    drawn = eye * np.where(np.arange(size.shape[1]) > 0, size**2, 0.0)[:, np.newaxis, :]
-    covariance = inverse @ (known @ drawn @ known + known) @ inverse
-    return np.asarray(np.sqrt(np.maximum(covariance[:, 0, 0], 1e-18)))
-
-
 def _between(z: FloatArray, inside: BoolArray, group: IntArray) -> float:
     """Return the log of the mean squared group mean, each in deviations of what chance gives it."""
     count = np.bincount(group[inside])
     sums = np.bincount(group[inside], z[inside])
     many = count > 5
-    return _log(float(np.mean(sums[many] ** 2 / count[many])))
+    return _log(_mean(sums[many] ** 2 / count[many], 1.0))
 
 
 def _values(readings: FloatArray) -> list[float]:
@@ -301,6 +251,24 @@ def _share(hits: BoolArray) -> float:
 
 def _root(count: int) -> float:
     return 2 * float(np.sqrt(count + 0.375))
+
+
+def _correlations(z: FloatArray, inside: BoolArray) -> list[float]:
+    """Return how readings (k, b) of a scan correlate with those some beams on."""
+    power = _mean(z[inside] ** 2, 1.0)
+    both = ((lag, inside[:, lag:] & inside[:, :-lag]) for lag in (1, 2, 4))
+    return [_mean(z[:, lag:][of] * z[:, :-lag][of], 0.0) / max(power, 1e-12) for lag, of in both]
+
+
+def _correlation(common: FloatArray) -> float:
+    """Return how common modes (k,) follow those of the scans before."""
+    power = float(common @ common)
+    return float(common[1:] @ common[:-1]) / power if power else 0.0
+
+
+def _mean(values: FloatArray, none: float) -> float:
+    """Return the mean; none: what it is of no values, as chance would give it."""
+    return float(np.mean(values)) if values.size else none
 
 
 def _log(value: float) -> float:

@@ -73,7 +73,7 @@ def _planned(
     assembly = Assembly(replace(shots, measured=measured), wanted)
     noise = ScanNoise(*truth, *_COMMON)
     count = sum(len(form.columns) for form in assembly.forms)
-    normal = Normal(np.empty((0, 0)), noise, assembly.first, 0)
+    normal = Normal(np.empty((0, 0)), noise, noise, assembly.first, 0)
     gram = assembly.products(normal, assembly.columns[:, :, :count].astype(float), np.zeros_like(assembly.residual))
     return assembly.forms, gram
 

@@ -17,6 +17,7 @@ _BESIDE = 4  # beams on each side of a corner or jump: an error of the pose or t
 _STEEPEST = np.radians(75.0)
 _GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
 _PILED = 20  # readings of one value, the least or the greatest, that are a pile if hardly more lie beside them
+_MICRON = 6  # decimals of a metre: readings a grid apart are not within it, however they were rounded
 _GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
 
 
@@ -43,9 +44,18 @@ def trusted_place(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
 
 def trusted(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
     """Return (k, b) which readings may speak about the mean, outliers aside."""
-    low, high = piles(shots.measured)
-    inside = (base > low + _GATE) & (base < high - _GATE)
+    inside = within(base, piles(shots.measured))
     return np.asarray(trusted_place(shots, seen, base) & inside & np.isfinite(shots.measured))
+
+
+def within(base: FloatArray, ends: tuple[float, float], doubt: FloatArray | float = 0.0) -> BoolArray:
+    """Return (k, b) which beams are to be read well inside the ends [m] at which readings are cut off.
+
+    doubt [m]: by how much they may be read elsewhere, where that is more than a gate.
+    """
+    low, high = ends
+    gate = np.maximum(_GATE, doubt)
+    return np.asarray((base > low + gate) & (base < high - gate))
 
 
 def piles(readings: FloatArray) -> tuple[float, float]:
@@ -56,7 +66,7 @@ def piles(readings: FloatArray) -> tuple[float, float]:
     values = readings[np.isfinite(readings)]
     ends = []
     for sign in (-1.0, 1.0):
-        off = np.max(sign * values) - sign * values if len(values) else values
+        off = np.round(np.max(sign * values) - sign * values if len(values) else values, _MICRON)
         grids = [grid for grid in _GRIDS if np.sum(off < grid) > max(_PILED, np.sum((off >= grid) & (off < _GATE)))]
         within = float(np.max(off[off < grids[0]])) if grids else np.inf
         ends.append(sign * (float(np.max(sign * values)) - within) if grids else sign * np.inf)

@@ -40,6 +40,9 @@ from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
 MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
+# Share of what single readings scatter by, from which it matters that whole scans are off together: what neighbours
+# have in common beyond the simplest equation for it moves the mean of a scan as well.
+_HEARD = 0.06
 _SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
 Progress = Callable[[str], None]
 
@@ -62,7 +65,7 @@ def criticise(
     progress("laser: weighing effects")
     found = Search(assembly.forms, normal.gram).run()
     if found.best.forms:
-        assembly.refine(found.best.forms, normal.beam_noise, normal.scan_noise)
+        assembly.refine(found.best.forms, normal.beam_noise, normal.wary)
         shaped = [form for form in assembly.forms if form.start in {each.start for each in found.best.forms}]
         normal = assembly.settle(recording.truth, shaped)
         found = Search(assembly.forms, normal.gram).run()
@@ -89,7 +92,13 @@ def criticise(
         seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms)
         scatter = with_whole_scans(scatter, seen, fit.normal.scan_noise, recording, ids)
         scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made, others))
-    finding = _finding(assembly, normal, made, fit, scatter)
+    heard = beyond(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])))
+    finding = _finding(assembly, normal, made, fit, heard)
+    slight = tuple(each.setting.id for each in scatter if each not in heard)
+    words = tuple(
+        f"{name}: detectable, but it does not matter beside what single readings scatter by." for name in slight
+    )
+    finding = replace(finding, small=(*finding.small, *slight), details=(*finding.details, *words))
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
     return replace(finding, pictures=Pictures(shown, pictures.rivals(made.found), noise_rows(normal), comparison))

@@ -61,9 +61,8 @@ def with_whole_scans(
             whole.size.name: min(noise.common_sd, whole.size.upper),
             whole.memory.name: min(max(rho, whole.memory.lower), whole.memory.upper),
         }
-        logs = NORMAL90 * np.array([-1.0, 1.0])
-        sizes = noise.common_sd * np.exp(logs * seen.log_sd)
-        memories = np.exp(-_period(recording) / (noise.common_tau * np.exp(logs * seen.log_tau)))
+        sizes, taus = seen.ends(noise, NORMAL90)
+        memories = np.exp(-_period(recording) / taus)
         sds = {whole.size.name: _reach(noise.common_sd, sizes), whole.memory.name: _reach(rho, memories)}
         rest = [each for each in out if each is not known]
         out = [*rest, Scatter(EffectSetting(whole.id, values), p, max(nats, known.nats if known else nats), sds, {})]
