@@ -100,3 +100,14 @@ def test_a_simpler_cause_of_the_same_is_certain_however_strong_it_is():
     assert p_of("sign", 20.0) > 0.999
     assert p_of("strong", 20.0) < 0.9  # what is fitted as well only happened to be likelier
     assert p_of("sign", 3.0) < 0.9  # a curve is nearer than the gain
+
+
+@pytest.mark.parametrize("p", [0.0, 0.3, 0.93, 1.0])
+def test_what_a_set_leaves_is_doubted_as_the_set_is(p):
+    """Noise that grows is judged by the residuals, which strong causes leave larger where they are large."""
+    weak, strong = (Naming((fit_of({"strong": z}, 10.0), fit_of({}, 0.0)), EFFECTS, (), 0.0) for z in (1.0, 60.0))
+    assert coarse.doubted(weak, p) == pytest.approx(p, abs=1e-3)
+    if 0.5 < p < 1.0:
+        assert 0.5 < coarse.doubted(strong, p) < p - 0.05
+    else:
+        assert coarse.doubted(strong, p) >= p

@@ -187,7 +187,7 @@ def _neighbours(
                 yield fit.candidates - {one} | {other}, begin
                 if other.id == one.id:  # what stood in for the right form may go with the wrong one
                     rest = fit.candidates - {one}
-                    yield from ((rest - gone | {other}, begin) for gone in _stand_ins(rest))
+                    yield from ((rest - gone | {other}, begin) for gone in _that_stood_in(rest))
     for other in screen.fixed:
         if other.id not in fit.ids and screen.mends(other):
             yield fit.candidates | {other}, kept
@@ -199,7 +199,7 @@ def _neighbours(
     yield from _combs(problem, screen, fit)
 
 
-def _stand_ins(rest: Chosen) -> Iterator[Chosen]:
+def _that_stood_in(rest: Chosen) -> Iterator[Chosen]:
     """Yield each effect of some, and each pair of which one shows in the forward speed and the other in the yaw rate.
 
     Steps of a converter are in both, so for their wrong form two may stand in.
