@@ -16,7 +16,7 @@ from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.motion import STEP, Setting
 from kurumaisu.bench.hidden.motion import drive as hidden_drive
 from kurumaisu.bench.hidden.noise import USUAL, draw_rates, draw_reference
-from kurumaisu.critic import naming, replay, sanity
+from kurumaisu.critic import explain, naming, replay, sanity
 from kurumaisu.critic.catalogue import Candidate, Term
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import GRID, Drive, prepare
@@ -308,3 +308,9 @@ def test_no_dozen_of_effects_is_pieced_together():
     some = [Candidate(f"effect {i}", (), 1.0) for i in range(7)]
     assert screen._allowed(frozenset(some[:6]))
     assert not screen._allowed(frozenset(some))
+
+
+@pytest.mark.parametrize(("best", "told"), [("a b", ("a", "b")), ("a", ("a", "c"))])
+def test_what_acts_for_sure_is_told_as_a_set_where_no_effect_is_certain(best, told):
+    found = found_of({"a": 0.86, "b": 0.02, "c": 0.05}, fit_of(best, 200.0))
+    assert explain._open(found) == told

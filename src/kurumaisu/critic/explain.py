@@ -92,6 +92,8 @@ def criticism(
     felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     told = tuple(group for group in found.confounded if not best.ids & set(group) or matters & set(group))
+    if nats >= NO_NOISE and matters and not (told or matters & set(found.named)):
+        told = (_open(found),)
     found = replace(found, confounded=told)
     kind = _kind(found, matters)
     fitted = {name: doubtful.widened(found, name, sizes.estimates(problem, best, name)) for name in sorted(best.ids)}
@@ -130,6 +132,16 @@ def criticism(
 
 def _without(fit: Fit, name: str) -> tuple[EffectSetting, ...]:
     return tuple(setting for setting in fit.settings if setting.id != name)
+
+
+def _open(found: Naming) -> tuple[str, ...]:
+    """Return the effects of the best set, or the one with its likeliest rival: something acts, though none is certain.
+
+    Curves in no catalogue have the rest of the probability, but none of them enough to be told.
+    """
+    best = found.best.ids
+    rival = max(sorted(set(found.p) - best), key=lambda name: found.p[name], default=None)
+    return tuple(sorted(best if len(best) > 1 or rival is None else best | {rival}))
 
 
 def _kind(found: Naming, matters: set[str]) -> Kind:

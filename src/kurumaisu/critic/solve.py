@@ -48,6 +48,8 @@ def least_squares(problem: Linear, terms: Sequence[Term], start: FloatArray) -> 
     null = np.array([term.null for term in terms])
     tight = np.array([term.step if term.shape else 0.0 for term in terms])  # 1 / sd of a shape's prior, per step
     values, damping = np.clip(start, lower, upper), _DAMPING[0]
+    # Slopes of what has a comb of likely values lead astray: where they lead nowhere, the others go on alone.
+    rough, held = np.array([term.rough for term in terms]), np.zeros(len(terms), dtype=np.bool_)
 
     def cost_at(at: FloatArray, residual: FloatArray) -> float:
         return 0.5 * float(residual @ residual + np.sum((tight * (at - null) / unit) ** 2))
@@ -57,6 +59,7 @@ def least_squares(problem: Linear, terms: Sequence[Term], start: FloatArray) -> 
     for _ in range(_ROUNDS):
         pull = slopes.T @ residual - tight**2 * (values - null) / unit
         stuck = ((values <= lower) & (pull * unit < 0)) | ((values >= upper) & (pull * unit > 0)) | (lower == upper)
+        stuck |= held
         gram = slopes.T @ slopes + np.diag(tight**2)
         better = False
         while damping < _DAMPING[3]:
@@ -70,7 +73,10 @@ def least_squares(problem: Linear, terms: Sequence[Term], start: FloatArray) -> 
                 break
             damping *= _DAMPING[2]
         if not better:
-            break
+            if held.any() or not rough.any():
+                break
+            held, damping = rough, _DAMPING[0]
+            continue
         gained = cost - cost_at(tried, left)
         values, damping = tried, damping * _DAMPING[1]
         residual, cost = left, cost - gained
