@@ -158,6 +158,35 @@ def test_the_noise_whitens_to_unit_white():
     np.testing.assert_allclose(white_again, 1.0, atol=1e-6)
 
 
+def test_louder_noise_whitens_to_unit_white_where_it_is_known():
+    fault = BASE["base.process_noise"].fault({"size": 3.0}, "plain")
+    drives = draw_drives("rich", REGIMES["usual"], np.random.default_rng(5), seconds=40.0)
+    left = np.stack(
+        [
+            deviation(nominal_of(replace(setting, noise=None)), drive(setting, [fault])[0] + error)
+            for setting, error in zip(drives.settings, drives.errors, strict=True)
+        ]
+    )
+    scale = Scale(drives)
+    assert scale.louder(fault).whitener.whiten(left[..., None]).std() == pytest.approx(1.0, abs=0.08)
+    assert scale.whitener.whiten(left[..., None]).std() > 1.5
+
+
+def test_what_hides_in_loud_noise_is_sized_by_that_noise():
+    quiet = make(Ask("single", ("base.gain_v",), z=15.0, regime="usual", form="plain"), 8).truth
+    loud = make(Ask("pair", ("base.gain_v", "base.process_noise"), z=15.0, regime="usual", form="plain"), 8).truth
+    assert loud.z_alone == pytest.approx({"base.gain_v": 15.0, "base.process_noise": 15.0}, rel=0.05)
+    sizes = [abs(truth.parameters["base.gain_v"]["gain"]) for truth in (quiet, loud)]
+    assert sizes[1] > 1.05 * sizes[0]
+
+
+def test_a_load_that_only_lags_is_a_rival_of_a_delay():
+    """Both of a load's sizes are free, so the rival is not held to the share of one to the other that is usual."""
+    truth = make(Ask("single", ("base.delay",), z=30.0, regime="usual"), 9).truth
+    assert truth.rival == "base.payload"
+    assert truth.z_rival < 13.0  # 14.1 beside the usual share
+
+
 def test_z_left_beside_a_rival_is_the_projection():
     rng = np.random.default_rng(6)
     signal, columns = rng.standard_normal(50), rng.standard_normal((50, 2))

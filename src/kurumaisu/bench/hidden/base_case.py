@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -90,6 +91,13 @@ class Scale:
     def signals(self, alternatives: Sequence[Sequence[Fault]]) -> FloatArray:
         """Return whitened signals (samples, alternatives)."""
         return self.whitener.whiten(np.stack([self.deviations(faults) for faults in alternatives], axis=-1))
+
+    def louder(self, fault: Fault) -> Scale:
+        """Return what faults are worth under the noise that a fault in its amplitude makes."""
+        out = copy.copy(self)
+        out.path = replace(self.path, gate=self.path.gate * self.growth(fault))
+        out.whitener = Whitener(out.path, self.drives.regime)
+        return out
 
     def growth(self, fault: Fault) -> FloatArray:
         """Return how many times a fault in the noise's amplitude makes it between poses, (runs, n - 1)."""

@@ -18,6 +18,7 @@ from kurumaisu.types import FloatArray
 
 Z_RANGE = (5.0, 60.0)
 _SAME = 3.0  # a set of ids that leaves less than this z of the signal explains it
+_NOISE = "base.process_noise"
 _COUNT = {"null": 0, "single": 1, "pair": 2, "triple": 3}
 
 
@@ -29,17 +30,21 @@ def make_base(ask: Ask, seed: int) -> Case:
     drives = draw_drives(ask.design, regime, where)
     scale = Scale(drives)
     sizes: dict[str, Sizes] = {}
-    for name in ids:
+    heard = scale
+    for name in sorted(ids, key=lambda name: name != _NOISE):  # the others are worth less beside it
         wanted = ask.z or float(np.exp(what.uniform(*np.log(Z_RANGE))))
-        sizes[name] = _sizes(name, scale, ask.form, wanted, what)
+        sizes[name] = _sizes(name, heard, ask.form, wanted, what)
+        if name == _NOISE:
+            heard = scale.louder(BASE[name].fault(sizes[name], ask.form))
+    sizes = {name: sizes[name] for name in ids}
     faults = [BASE[name].fault(sizes[name], ask.form) for name in ids]
     name = f"hidden {seed}"
     null = recording(name, drives, ())
     found = recording(name, drives, faults) if faults else null
     known = None
-    if ids and not {"base.process_noise", "base.sign"} & set(ids):  # no mean, or no data that anybody would fit
+    if ids and not {_NOISE, "base.sign"} & set(ids):  # no mean, or no data that anybody would fit
         known = Known(tuple(drive(replace(s, noise=None), faults)[0] for s in drives.settings), regime)
-    return Case(found, null, _truth(ask, scale, sizes), seed, known)
+    return Case(found, null, _truth(ask, scale, heard, sizes), seed, known)
 
 
 def _random_ids(count: int, rng: np.random.Generator) -> tuple[str, ...]:
@@ -54,7 +59,7 @@ def _sizes(name: str, scale: Scale, form: str, wanted: float, rng: np.random.Gen
     sizes = hidden.draw(rng)
     if not hidden.scaled:
         return sizes
-    if name == "base.process_noise":
+    if name == _NOISE:
         size = sizing.scaled_to(wanted, lambda size: _spread_z(scale, hidden.fault({"size": size}, form)), 1.0, 20.0)
         return {"size": size}
     return sizing.size_for(scale, lambda given: hidden.fault(given, form), sizes, hidden.most, wanted)
@@ -65,29 +70,30 @@ def _spread_z(scale: Scale, fault: Fault) -> float:
     return sizing.spread_z(scale.path, scale.drives.regime, scale.growth(fault))
 
 
-def _truth(ask: Ask, scale: Scale, sizes: dict[str, Sizes]) -> Truth:
+def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Truth:
+    """Return the truth: heard is the scale under the noise that there is, of which what hides in it has a part."""
     ids = tuple(sizes)
     parameters = {name: BASE[name].names(sizes[name]) for name in ids}
-    means = [name for name in ids if name != "base.process_noise"]
+    means = [name for name in ids if name != _NOISE]
+    loud = {name: _spread_z(scale, BASE[name].fault(sizes[name], ask.form)) for name in ids if name == _NOISE}
     if not means:
-        z = _spread_z(scale, BASE[ids[0]].fault(sizes[ids[0]], ask.form)) if ids else 0.0
-        return Truth(ask.kind, ids, parameters, z=z, z_alone=dict.fromkeys(ids, z), accepted=(ids,) if ids else ())
+        return Truth(ask.kind, ids, parameters, z=sum(loud.values()), z_alone=loud, accepted=(ids,) if ids else ())
     faults = [BASE[name].fault(sizes[name], ask.form) for name in means]
     plain = [BASE[name].fault(sizes[name], "plain") for name in means]
     # All together, then each without the others, then each by its usual equation.
-    signals = scale.signals([faults, *([fault] for fault in faults), *([fault] for fault in plain)])
+    signals = heard.signals([faults, *([fault] for fault in faults), *([fault] for fault in plain)])
     whole, own = signals[:, 0], signals[:, 1 : 1 + len(faults)]
     usual = {"usual": signals[:, 1 + len(faults) :]}
-    rivals = sizing.rival_columns(scale, [name for name in sizing.RIVALS if name not in ids])
+    rivals = sizing.rival_columns(heard, [name for name in sizing.RIVALS if name not in ids])
     left = _left(whole, own, rivals)
     nearest = min(left, key=lambda name: left[name])
-    also = {"base.saturation": sizing.left_by_clips(scale, whole)} if ask.kind == "confounded" else {}
+    also = {"base.saturation": sizing.left_by_clips(heard, whole)} if ask.kind == "confounded" else {}
     return Truth(
         ask.kind,
         ids,
         parameters,
         z=float(np.linalg.norm(whole)),
-        z_alone=_alone(means, own),
+        z_alone=_alone(means, own) | loud,
         z_rival=left[nearest],
         rival=nearest,
         z_form=sizing.left_beside(whole, usual)["usual"],

@@ -60,6 +60,8 @@ def rival_faults() -> dict[str, list[Fault]]:
             shapes = [{"size": hidden.typical, "bearing": bearing} for bearing in (0.0, np.pi / 2)]
         if name == "base.saturation":
             shapes = [{**shapes[0], "axis": float(axis)} for axis in (0, 1)]
+        if name == "base.payload":  # its two sizes are free: either alone is one, too
+            shapes = [{"size": hidden.typical, "ratio": 0.01}, {"size": 1e-3, "ratio": 100.0}]
         many = shapes if len(shapes[0]) > 1 else shapes[:1]
         out[name] = [hidden.fault(shape, "plain") for shape in many]
     return out
