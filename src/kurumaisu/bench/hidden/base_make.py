@@ -29,14 +29,16 @@ def make_base(ask: Ask, seed: int) -> Case:
     regime = REGIMES[ask.regime] if ask.regime else draw_regime(how)
     drives = draw_drives(ask.design, regime, where)
     scale = Scale(drives)
-    sizes: dict[str, Sizes] = {}
+    worth = {name: ask.z or float(np.exp(what.uniform(*np.log(Z_RANGE)))) for name in ids}
+    sizes = {name: BASE[name].draw(what) for name in ids}
     heard = scale
-    for name in sorted(ids, key=lambda name: name != _NOISE):  # the others are worth less beside it
-        wanted = ask.z or float(np.exp(what.uniform(*np.log(Z_RANGE))))
-        sizes[name] = _sizes(name, heard, ask.form, wanted, what)
-        if name == _NOISE:
-            heard = scale.louder(BASE[name].fault(sizes[name], ask.form))
-    sizes = {name: sizes[name] for name in ids}
+    if _NOISE in ids:  # the others are worth less beside it
+        sizes[_NOISE] = _loudness(scale, ask.form, worth[_NOISE])
+        heard = scale.louder(BASE[_NOISE].fault(sizes[_NOISE], ask.form))
+    for name in _means(ids):
+        sizes[name] = _size(name, heard, ask.form, sizes[name], worth[name])
+    for name in _means(ids) if len(ids) > 1 else ():
+        sizes[name] = _size_beside(name, heard, ask.form, sizes, worth[name])
     faults = [BASE[name].fault(sizes[name], ask.form) for name in ids]
     name = f"hidden {seed}"
     null = recording(name, drives, ())
@@ -54,15 +56,37 @@ def _random_ids(count: int, rng: np.random.Generator) -> tuple[str, ...]:
     return tuple(names[i] for i in sorted(chosen))
 
 
-def _sizes(name: str, scale: Scale, form: str, wanted: float, rng: np.random.Generator) -> Sizes:
+def _means(ids: Sequence[str]) -> list[str]:
+    return [name for name in ids if name != _NOISE]
+
+
+def _loudness(scale: Scale, form: str, wanted: float) -> Sizes:
+    hidden = BASE[_NOISE]
+    return {"size": sizing.scaled_to(wanted, lambda n: _spread_z(scale, hidden.fault({"size": n}, form)), 1.0, 20.0)}
+
+
+def _size(name: str, scale: Scale, form: str, sizes: Sizes, wanted: float) -> Sizes:
+    """Return sizes of which the wanted z is that of what they alone do."""
     hidden = BASE[name]
-    sizes = hidden.draw(rng)
     if not hidden.scaled:
         return sizes
-    if name == _NOISE:
-        size = sizing.scaled_to(wanted, lambda size: _spread_z(scale, hidden.fault({"size": size}, form)), 1.0, 20.0)
-        return {"size": size}
     return sizing.size_for(scale, lambda given: hidden.fault(given, form), sizes, hidden.most, wanted)
+
+
+def _size_beside(name: str, scale: Scale, form: str, sizes: dict[str, Sizes], wanted: float) -> Sizes:
+    """Return sizes of which the wanted z is that of what is left of them beside the others.
+
+    What one effect does can be like what another does, or end with it: a clip has little to clip of a slow chair.
+    """
+    if not BASE[name].scaled:
+        return sizes[name]
+
+    def worth(size: float) -> float:
+        changed = sizes | {name: {**sizes[name], "size": size}}
+        own = sizing.shares(scale, [BASE[other].fault(changed[other], form) for other in _means(tuple(sizes))])[1]
+        return _alone(_means(tuple(sizes)), own)[name]
+
+    return {**sizes[name], "size": sizing.scaled_to(wanted, worth, sizes[name]["size"], BASE[name].most)}
 
 
 def _spread_z(scale: Scale, fault: Fault) -> float:
@@ -79,13 +103,9 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
     if not means:
         return Truth(ask.kind, ids, parameters, z=sum(loud.values()), z_alone=loud, accepted=(ids,) if ids else ())
     faults = [BASE[name].fault(sizes[name], ask.form) for name in means]
-    plain = [BASE[name].fault(sizes[name], "plain") for name in means]
-    # All together, then each without the others, then each by its usual equation.
-    signals = heard.signals([faults, *([fault] for fault in faults), *([fault] for fault in plain)])
-    whole, own = signals[:, 0], signals[:, 1 : 1 + len(faults)]
-    usual = {"usual": signals[:, 1 + len(faults) :]}
-    rivals = sizing.rival_columns(heard, [name for name in sizing.RIVALS if name not in ids])
-    left = _left(whole, own, rivals)
+    whole, own = sizing.shares(heard, faults)
+    usual = sizing.shares(heard, [BASE[name].fault(sizes[name], "plain") for name in means])[1]
+    left = _left(heard, ids, faults)
     nearest = min(left, key=lambda name: left[name])
     also = {"base.saturation": sizing.left_by_clips(heard, whole)} if ask.kind == "confounded" else {}
     return Truth(
@@ -96,17 +116,22 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
         z_alone=_alone(means, own) | loud,
         z_rival=left[nearest],
         rival=nearest,
-        z_form=sizing.left_beside(whole, usual)["usual"],
+        z_form=sizing.left_beside(whole, {"usual": usual})["usual"],
         accepted=_accepted(ids, left | also),
     )
 
 
-def _left(whole: FloatArray, own: FloatArray, rivals: dict[str, FloatArray]) -> dict[str, float]:
+def _left(scale: Scale, ids: Sequence[str], faults: Sequence[Fault]) -> dict[str, float]:
     """Return what a rival leaves of the signal in the place of whichever one of the hidden ids it replaces best."""
-    left = {}
-    for name, column in rivals.items():
-        instead = [np.column_stack([np.delete(own, i, axis=1), column]) for i in range(own.shape[1])]
-        left[name] = min(sizing.left_beside(whole, {"": columns}).get("", np.inf) for columns in instead)
+    whole, own = sizing.shares(scale, faults)
+    left: dict[str, float] = {}
+    for i in range(len(faults)):
+        others = np.delete(own, i, axis=1)
+        company = [*faults[:i], *faults[i + 1 :]]
+        rivals = sizing.rival_columns(scale, [name for name in sizing.RIVALS if name not in ids], company)
+        beside = {name: np.column_stack([others, columns]) for name, columns in rivals.items()}
+        for name, rest in sizing.left_beside(whole, beside).items():
+            left[name] = min(rest, left.get(name, np.inf))
     return left
 
 

@@ -67,6 +67,13 @@ def rival_faults() -> dict[str, list[Fault]]:
     return out
 
 
+def shares(scale: Scale, faults: Sequence[Fault]) -> tuple[FloatArray, FloatArray]:
+    """Return the signal (n,) of faults together, and what each adds to that of the others, (n, faults)."""
+    without = [[*faults[:i], *faults[i + 1 :]] for i in range(len(faults))]
+    signals = scale.signals([faults, *without])
+    return signals[:, 0], signals[:, :1] - signals[:, 1:]
+
+
 def left_beside(signal: FloatArray, columns: Mapping[str, FloatArray]) -> dict[str, float]:
     """Return the norm of what each name's columns (samples, k), fitted alone, leave of a signal."""
     out = {}
@@ -89,10 +96,11 @@ def left_by_clips(scale: Scale, signal: FloatArray) -> float:
     return min(float(np.linalg.norm(signal - share * c)) for share, c in zip(along, columns, strict=True))
 
 
-def rival_columns(scale: Scale, names: Sequence[str]) -> dict[str, FloatArray]:
-    """Return whitened columns of rivals at typical sizes."""
+def rival_columns(scale: Scale, names: Sequence[str], company: Sequence[Fault] = ()) -> dict[str, FloatArray]:
+    """Return whitened columns of rivals at typical sizes, of what each adds to other faults."""
     faults = {name: forms for name, forms in rival_faults().items() if name in names}
-    flat = scale.signals([[fault] for forms in faults.values() for fault in forms])
+    flat = scale.signals([[*company, fault] for forms in faults.values() for fault in forms])
+    flat = flat - scale.signals([company])
     out, at = {}, 0
     for name, forms in faults.items():
         out[name] = flat[:, at : at + len(forms)]
