@@ -58,3 +58,14 @@ def test_one_effect_that_does_what_two_others_do_does_not_hide_them():
     ids = frozenset((*sizes, "base.payload", "base.curvature_v", "base.curvature_w", "base.dead_zone_w"))
     problem = Problem([prepare(run, MODEL) for run in runs], MODEL, noise_of(USUAL), ids=ids)
     assert naming.search(problem, lambda _: None).best.ids == set(sizes)
+
+
+def test_a_search_whose_lines_promise_nothing_goes_on_by_fits(monkeypatch):
+    """Beside a large bend every set that lines know may lie outside its bounds."""
+    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=20.0, rate=10.0)
+    runs = base_case.recording("gain", drives, [BASE["base.gain_v"].fault({"size": 0.2}, "plain")]).runs
+    ids = frozenset({"base.gain_v", "base.curvature_v"})
+    problem = Problem([prepare(run, MODEL) for run in runs], MODEL, noise_of(USUAL), ids=ids)
+    monkeypatch.setattr(naming.Screen, "guesses", lambda _: [])
+    first = problem.fit(["base.curvature_v"], {})
+    assert naming.search(problem, lambda _: None, first).best.ids == {"base.gain_v"}

@@ -104,6 +104,8 @@ def run(options: argparse.Namespace) -> int:
             _row(table, name, scores["critic"][i * options.draws : (i + 1) * options.draws])
     for who, all_of in scores.items():
         _row(table, f"all: {who}", all_of)
+        if kind in ("pair", "triple"):
+            _row(table, f"  each z >= 5 beside the others: {who}", [one for one in all_of if one.truth.shown])
         if kind in ("single", "pair", "triple"):
             hard = [one for one in all_of if one.truth.strong]
             _row(table, f"  each z >= 10, rival's z >= 6: {who}", hard)

@@ -128,9 +128,9 @@ def _promising(guesses: Sequence[Guess], about: Fit, explained: float) -> list[G
     """Return the guesses that are worth a refit, of those about a fit; explained: what that explains [nat].
 
     Lines about two effects tell little of one that does what both do: it has the more to gain by a refit, and without
-    one it would never be known that fewer suffice.
+    one it would never be known that fewer suffice. None is worth one where by their lines all leave their bounds.
     """
-    best = guesses[0].score
+    best = max((guess.score for guess in guesses), default=0.0)
     close = [guess for guess in guesses[:_REFITS] if guess.score > best - _CLOSE]
     far = best - max(_CLOSE, _BENT * explained)
     size = len(about.candidates)

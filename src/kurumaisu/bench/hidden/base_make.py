@@ -11,12 +11,12 @@ import numpy as np
 from kurumaisu.bench.hidden import sizing
 from kurumaisu.bench.hidden.base_case import Scale, draw_drives, recording
 from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.case import Ask, Case, Known, Truth
+from kurumaisu.bench.hidden.case import FAINTEST, Ask, Case, Known, Truth
 from kurumaisu.bench.hidden.motion import Fault, Sizes, drive
 from kurumaisu.bench.hidden.noise import REGIMES, draw_regime
 from kurumaisu.types import FloatArray
 
-Z_RANGE = (5.0, 60.0)
+Z_RANGE = (FAINTEST, 60.0)
 _SAME = 3.0  # a set of ids that leaves less than this z of the signal explains it
 _NOISE = "base.process_noise"
 _COUNT = {"null": 0, "single": 1, "pair": 2, "triple": 3}
@@ -74,17 +74,15 @@ def _size(name: str, scale: Scale, form: str, sizes: Sizes, wanted: float) -> Si
 
 
 def _size_beside(name: str, scale: Scale, form: str, sizes: dict[str, Sizes], wanted: float) -> Sizes:
-    """Return sizes of which the wanted z is that of what is left of them beside the others.
-
-    What one effect does can be like what another does, or end with it: a clip has little to clip of a slow chair.
-    """
+    """Return sizes of which the wanted z is that of what they add to the others: a slow chair has little to clip."""
     if not BASE[name].scaled:
         return sizes[name]
+    names = _means(tuple(sizes))
 
     def worth(size: float) -> float:
         changed = sizes | {name: {**sizes[name], "size": size}}
-        own = sizing.shares(scale, [BASE[other].fault(changed[other], form) for other in _means(tuple(sizes))])[1]
-        return _alone(_means(tuple(sizes)), own)[name]
+        own = sizing.shares(scale, [BASE[other].fault(changed[other], form) for other in names])[1]
+        return float(np.linalg.norm(own[:, names.index(name)]))
 
     return {**sizes[name], "size": sizing.scaled_to(wanted, worth, sizes[name]["size"], BASE[name].most)}
 

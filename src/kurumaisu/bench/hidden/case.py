@@ -10,6 +10,7 @@ from kurumaisu.critic.recording import Recording
 from kurumaisu.types import FloatArray
 
 STRONG, APART = 10.0, 6.0  # z from which an id must be found, and be told from its nearest rival
+FAINTEST = 5.0  # z that is hidden at least; beside other causes less of it may show
 KINDS = ("null", "single", "pair", "triple", "unknown", "wrong", "confounded")
 
 
@@ -39,6 +40,11 @@ class Truth:
     problem: str = ""
     accepted: tuple[tuple[str, ...], ...] = ()
     background: tuple[str, ...] = ()
+
+    @property
+    def shown(self) -> bool:
+        """Tell whether of each of the ids as much shows beside the others as of the faintest that is hidden alone."""
+        return min([self.z, *self.z_alone.values()]) >= FAINTEST
 
     @property
     def strong(self) -> bool:
