@@ -91,7 +91,7 @@ def _of_run(run: Run, model: Model) -> list[str]:
         follows[name] = plain.correlation
         lawful &= match is plain
     words = _one(sanity_pose.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
-    words += [*sanity_jumps.words(run.pose), *_one(sanity_rows.blocks(run.pose, "pose"))]
+    words += [*sanity_jumps.words(run.pose, run.command), *_one(sanity_rows.blocks(run.pose, "pose"))]
     words += _one(sanity_pose.folded(run.pose))
     # Poses that were worked out repeat themselves at rest, to the last bit; measured ones never do.
     measured = run.pose_source == "measured"

@@ -14,17 +14,19 @@ _TURN = 0.6  # [rad] between two poses, least jump of a heading
 _BUNCH = 4.0
 _HALF = 0.4  # [rad] from half a turn
 _LONG = 1.15  # of the way that the robot makes between poses at its fastest, from which a step is no drive
+_CHANCE = 5.0  # sd of a position by which noise alone may lengthen a step: 3.5 of the difference of two
+_LATE = 1.0  # [s] after which a chair has done what it was asked for
 _PAUSE = 5.0  # [s] without a pose after which nobody knows how far the robot was driven, or carried
 
 
-def words(pose: Series) -> list[str]:
-    """Return what jumps, in words."""
+def words(pose: Series, command: Series | None = None) -> list[str]:
+    """Return what jumps, in words; command: v, w, for which a chair may be fast for once."""
     new = fresh(pose)
     if len(new.t) < 20:
         return []
     # Where rows were written faster than measured, several measurements may arrive as one step.
     slack = _BUNCH if len(new.t) < 0.8 * len(pose.t) else 1.0
-    return [line for line in (_position(new, slack), _heading(new)) if line is not None]
+    return [line for line in (_position(new, slack, command), _heading(new)) if line is not None]
 
 
 def fresh(pose: Series) -> Series:
@@ -33,8 +35,8 @@ def fresh(pose: Series) -> Series:
     return Series(pose.t[new], pose.values[new], pose.columns)
 
 
-def _position(pose: Series, slack: float) -> str | None:
-    lasting, _ = jumps(pose, slack)
+def _position(pose: Series, slack: float, command: Series | None) -> str | None:
+    lasting, _ = jumps(pose, slack, command)
     if not lasting:
         return None
     i = lasting[0]
@@ -70,7 +72,7 @@ def _times(rows: list[int]) -> str:
     return "once" if len(rows) == 1 else f"{len(rows)} times"
 
 
-def jumps(pose: Series, slack: float = 1.0) -> tuple[list[int], list[int]]:
+def jumps(pose: Series, slack: float = 1.0, command: Series | None = None) -> tuple[list[int], list[int]]:
     """Return rows after which the position goes on from elsewhere, and rows that alone are elsewhere."""
     xy, dt = pose.values[:, :2], np.diff(pose.t)
     if len(xy) < 20:
@@ -80,12 +82,12 @@ def jumps(pose: Series, slack: float = 1.0) -> tuple[list[int], list[int]]:
     strays = step - usual
     odd = np.hypot(*strays.T)
     beside = np.vstack([np.zeros(2), np.cumsum(strays, axis=0)])  # where it is next to where it was going
-    fast = float(np.quantile(np.hypot(*step.T) / dt, 0.95))
-    limit = np.maximum(
-        _FAR * max(position_noise(pose), 1e-9) * 1.5, 1.5 * slack * fast * np.maximum(dt, float(np.median(dt)))
-    )
+    fast = np.maximum(float(np.quantile(np.hypot(*step.T) / dt, 0.95)), _asked(command, pose.t))
+    noise = max(position_noise(pose), 1e-9)
+    most = fast * np.maximum(dt, float(np.median(dt)))
+    limit = np.maximum(1.5 * _FAR * noise, 1.5 * slack * most)
     # A robot that turns back between two poses is far from where it was going, but has not come far.
-    far = np.hypot(*step.T) > _LONG * fast * np.maximum(dt, float(np.median(dt)))
+    far = np.hypot(*step.T) > np.maximum(_LONG * most, most + _CHANCE * noise)
     lasting: list[int] = []
     single: list[int] = []
     for i in np.flatnonzero((odd > np.maximum(limit, 1e-6)) & far & (dt < _PAUSE)):
@@ -94,6 +96,16 @@ def jumps(pose: Series, slack: float = 1.0) -> tuple[list[int], list[int]]:
         here = lasting if np.hypot(*(after - before)) > 0.6 * odd[i] and len(xy) - i > 5 and i >= 4 else single
         here.append(int(i) + 1)
     return lasting, single
+
+
+def _asked(command: Series | None, t: FloatArray) -> FloatArray:
+    """Return the greatest speed (n - 1,) that was asked for between times (n,), or up to _LATE before."""
+    if command is None or not len(command.t):
+        return np.zeros(len(t) - 1)
+    first = np.maximum(np.searchsorted(command.t, t[:-1] - _LATE, side="right") - 1, 0)
+    end = np.maximum(np.searchsorted(command.t, t[1:], side="right"), first + 1)
+    speed = np.abs(command.values[:, 0])
+    return np.array([speed[i:j].max() for i, j in zip(first, end, strict=True)])
 
 
 def _running_median(rows: FloatArray, half: int = 4) -> FloatArray:
