@@ -180,11 +180,20 @@ def test_what_hides_in_loud_noise_is_sized_by_that_noise():
     assert sizes[1] > 1.05 * sizes[0]
 
 
-def test_a_load_that_only_lags_is_a_rival_of_a_delay():
-    """Both of a load's sizes are free, so the rival is not held to the share of one to the other that is usual."""
-    truth = make(Ask("single", ("base.delay",), z=30.0, regime="usual"), 9).truth
+@pytest.mark.parametrize(("z", "apart"), [(10.0, False), (200.0, True)])
+def test_a_short_delay_is_a_lag_of_both_axes_and_a_long_one_is_not(z, apart):
+    truth = make(Ask("single", ("base.delay",), z=z, regime="usual"), 9).truth
     assert truth.rival == "base.payload"
-    assert truth.z_rival < 13.0  # 14.1 beside the usual share
+    assert (truth.z_rival > 20.0) == apart
+    assert apart or truth.z_rival < 3.0
+
+
+def test_a_rival_is_tried_in_the_place_of_one_cause_beside_the_others():
+    """Turning about a point beside base_link is a marker there, whatever the turns are; a slower left turn is none."""
+    truth = make(Ask("pair", ("base.left_right_gain", "base.cross_w_to_v"), z=50.0, regime="usual"), 9).truth
+    assert truth.rival == "base.marker_y"
+    assert truth.z_rival < 0.5
+    assert min(truth.z_alone.values()) > 40.0
 
 
 def test_z_left_beside_a_rival_is_the_projection():

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from kurumaisu.types import FloatArray
 
 Z_RANGE = (FAINTEST, 60.0)
 _SAME = 3.0  # a set of ids that leaves less than this z of the signal explains it
+_PARTS = (1.0, 0.1)  # of a rival's typical size: a little of a lag is a delay, more of it is not
 _NOISE = "base.process_noise"
 _COUNT = {"null": 0, "single": 1, "pair": 2, "triple": 3}
 
@@ -102,7 +104,7 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
         return Truth(ask.kind, ids, parameters, z=sum(loud.values()), z_alone=loud, accepted=(ids,) if ids else ())
     faults = [BASE[name].fault(sizes[name], ask.form) for name in means]
     whole, own = sizing.shares(heard, faults)
-    usual = sizing.shares(heard, [BASE[name].fault(sizes[name], "plain") for name in means])[1]
+    usual = sizing.shares(heard, [BASE[name].fault(sizes[name], "plain") for name in means])
     left = _left(heard, ids, faults)
     nearest = min(left, key=lambda name: left[name])
     also = {"base.saturation": sizing.left_by_clips(heard, whole)} if ask.kind == "confounded" else {}
@@ -114,21 +116,21 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
         z_alone=_alone(means, own) | loud,
         z_rival=left[nearest],
         rival=nearest,
-        z_form=sizing.left_beside(whole, {"usual": usual})["usual"],
+        z_form=sizing.left_beside(whole - usual[0], {"usual": usual[1]})["usual"],
         accepted=_accepted(ids, left | also),
     )
 
 
 def _left(scale: Scale, ids: Sequence[str], faults: Sequence[Fault]) -> dict[str, float]:
     """Return what a rival leaves of the signal in the place of whichever one of the hidden ids it replaces best."""
-    whole, own = sizing.shares(scale, faults)
+    _, own = sizing.shares(scale, faults)
+    names = [name for name in sizing.RIVALS if name not in ids]
     left: dict[str, float] = {}
-    for i in range(len(faults)):
+    for i, part in product(range(len(faults)), _PARTS):
         others = np.delete(own, i, axis=1)
-        company = [*faults[:i], *faults[i + 1 :]]
-        rivals = sizing.rival_columns(scale, [name for name in sizing.RIVALS if name not in ids], company)
+        rivals = sizing.rival_columns(scale, names, [*faults[:i], *faults[i + 1 :]], part)
         beside = {name: np.column_stack([others, columns]) for name, columns in rivals.items()}
-        for name, rest in sizing.left_beside(whole, beside).items():
+        for name, rest in sizing.left_beside(own[:, i], beside).items():
             left[name] = min(rest, left.get(name, np.inf))
     return left
 

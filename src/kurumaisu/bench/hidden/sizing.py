@@ -50,8 +50,8 @@ def size_for(scale: Scale, make: Callable[[Sizes], Fault], sizes: Sizes, most: f
     return {**sizes, "size": scaled_to(wanted, worth, sizes["size"], most)}
 
 
-def rival_faults() -> dict[str, list[Fault]]:
-    """Return each rival at its typical size, in its usual form; those with a free shape in several."""
+def rival_faults(part: float = 1.0) -> dict[str, list[Fault]]:
+    """Return each rival at a part of its typical size, in its usual form; those with a free shape in several."""
     out: dict[str, list[Fault]] = {}
     for name in RIVALS:
         hidden = BASE[name]
@@ -63,7 +63,7 @@ def rival_faults() -> dict[str, list[Fault]]:
         if name == "base.payload":  # its two sizes are free: either alone is one, too
             shapes = [{"size": hidden.typical, "ratio": 0.01}, {"size": 1e-3, "ratio": 100.0}]
         many = shapes if len(shapes[0]) > 1 else shapes[:1]
-        out[name] = [hidden.fault(shape, "plain") for shape in many]
+        out[name] = [hidden.fault({**shape, "size": part * shape["size"]}, "plain") for shape in many]
     return out
 
 
@@ -96,9 +96,11 @@ def left_by_clips(scale: Scale, signal: FloatArray) -> float:
     return min(float(np.linalg.norm(signal - share * c)) for share, c in zip(along, columns, strict=True))
 
 
-def rival_columns(scale: Scale, names: Sequence[str], company: Sequence[Fault] = ()) -> dict[str, FloatArray]:
-    """Return whitened columns of rivals at typical sizes, of what each adds to other faults."""
-    faults = {name: forms for name, forms in rival_faults().items() if name in names}
+def rival_columns(
+    scale: Scale, names: Sequence[str], company: Sequence[Fault] = (), part: float = 1.0
+) -> dict[str, FloatArray]:
+    """Return whitened columns of rivals at a part of their typical sizes, of what each adds to other faults."""
+    faults = {name: forms for name, forms in rival_faults(part).items() if name in names}
     flat = scale.signals([[*company, fault] for forms in faults.values() for fault in forms])
     flat = flat - scale.signals([company])
     out, at = {}, 0
