@@ -232,6 +232,14 @@ class Problem:
         places = np.linspace(-1.0, 1.0, _PLACES) * apart.get(float(found[i]), 0.0)
         return self._nearest(terms, found, i, found[i] + places[places != 0])
 
+    def retoothed(self, fit: Fit, rough: Candidate) -> dict[Key, float]:
+        """Return the values of a fit with the best tooth of something rough in its set, seen beside the rest."""
+        values = fit.values
+        for i, term in enumerate(fit.terms):
+            if term.id == rough.id and term.rough:
+                values = self._rough_start(fit.terms, np.where(np.arange(len(values)) == i, term.null, values), i)
+        return {term.key: float(value) for term, value in zip(fit.terms, values, strict=True)}
+
     def hope(self, rough: Candidate, terms: Sequence[Term], values: FloatArray) -> float:
         """Return what the best tooth of a rough candidate explains beside other effects, by lines, in nats."""
         settings = settings_of(terms, values)

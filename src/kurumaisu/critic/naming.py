@@ -196,6 +196,8 @@ def _neighbours(
             if not hopeless_alone(problem, other, nothing.centre, fit):
                 yield frozenset({other}), {}
             yield fit.candidates | {other}, kept
+    # Its tooth was the best one when less acted beside it.
+    yield from ((fit.candidates, problem.retoothed(fit, one)) for one in fit.candidates if one.rough)
     yield from _combs(problem, screen, fit)
 
 

@@ -17,6 +17,7 @@ from kurumaisu.types import FloatArray
 # Every id with a mean signal that a size can scale; the same list for everything that is hidden.
 RIVALS = tuple(name for name, hidden in BASE.items() if hidden.scaled and name != "base.process_noise")
 _CLIPS = (0.5, 0.7, 0.8, 0.9)  # sizes of clips: what they take of the fastest rates
+_EVEN = 7  # noises that are louder all the time, from the usual one to the loudest that there is
 _RANDOM = np.random.default_rng  # seeds below are fixed: rivals are the same for all recordings
 
 
@@ -113,13 +114,17 @@ def rival_columns(
 def spread_z(path: Path, regime: Regime, grown: FloatArray) -> float:
     """Return the root of twice the mean log likelihood ratio of noise whose amplitude has grown, (runs, n - 1) times.
 
-    Drawn under the grown noise 16 times, from the filter that knows it.
+    Drawn under the grown noise 16 times, from the filter that knows it; over the likeliest of noises that are louder
+    all the time, as nobody knows how loud the usual one is.
     """
-    usual = Whitener(path, regime)
-    louder_path = Path(path.times, path.poses, path.gate * grown)
-    louder = Whitener(louder_path, regime)
+    louder = Whitener(Path(path.times, path.poses, path.gate * grown), regime)
     rng = _RANDOM(0)
     draws = louder.colour(rng.standard_normal((*path.poses.shape, 16)))
-    squares = [float((filter_.whiten(draws) ** 2).sum()) / 16 for filter_ in (usual, louder)]
-    ratio = 0.5 * (squares[0] - squares[1]) + 0.5 * (usual.log_determinant - louder.log_determinant)
-    return float(np.sqrt(2 * max(ratio, 0.0)))
+    even = np.geomspace(1.0, max(float(grown.max()), 1.0), _EVEN)
+    usual = max(_likelihood(Whitener(Path(path.times, path.poses, path.gate * each), regime), draws) for each in even)
+    return float(np.sqrt(2 * max(_likelihood(louder, draws) - usual, 0.0)))
+
+
+def _likelihood(whitener: Whitener, draws: FloatArray) -> float:
+    """Return the mean log likelihood of draws (runs, n, 3, draws), up to a constant."""
+    return -0.5 * float((whitener.whiten(draws) ** 2).sum()) / draws.shape[-1] - 0.5 * whitener.log_determinant
