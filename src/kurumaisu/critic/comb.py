@@ -75,10 +75,8 @@ class Comb:
 
     def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[Start]:
         """Return the most promising values of a term beside fixed ones; residual: of each drive, whitened."""
-        key = (term.key, *((other.key, other.parameter.lower) for other in fixed))
-        if key not in self._walked:
-            self._walked[key] = self._close(term, fixed, list(self._walk(term, fixed)))
-        values, changes = self._walked[key]
+        key = _way(term, fixed)
+        values, changes = self._sizes(term, fixed)
         if not len(values):
             return []
         if key not in self._squares:
@@ -90,6 +88,21 @@ class Comb:
         best = peaks[np.argsort(-gained[peaks])][:_BEST]
         apart = np.abs(np.diff(values, append=1.1 * values[-1]))
         return [Start(float(values[k]), float(apart[k]), float(gained[k])) for k in best]
+
+    def apart(self, term: Term, fixed: Sequence[Term], value: float) -> float:
+        """Return how far apart the sizes about a value are that were weighed."""
+        values, _ = self._sizes(term, fixed)
+        if len(values) < 2:
+            return 0.0
+        i = int(np.clip(np.searchsorted(values, value), 1, len(values) - 1))
+        return float(values[i] - values[i - 1])
+
+    def _sizes(self, term: Term, fixed: Sequence[Term]) -> tuple[FloatArray, FloatArray]:
+        """Return sizes (k,) of a term beside fixed ones, in order, and what each changes, (k, bins)."""
+        key = _way(term, fixed)
+        if key not in self._walked:
+            self._walked[key] = self._close(term, fixed, list(self._walk(term, fixed)))
+        return self._walked[key]
 
     def _close(self, term: Term, fixed: Sequence[Term], found: Sequence[Walk]) -> tuple[FloatArray, FloatArray]:
         """Return sizes with what they change, and more between neighbours of which the drives see no likeness.
@@ -180,6 +193,10 @@ class Comb:
         moved = [replay.motion(drive, self._model, settings) for drive in self._drives]
         pairs = zip(moved, self._plain, strict=True)
         return np.concatenate([_means(rate) for a, b in pairs for rate in (a.v - b.v, a.w - b.w)])
+
+
+def _way(term: Term, fixed: Sequence[Term]) -> Way:
+    return (term.key, *((other.key, other.parameter.lower) for other in fixed))
 
 
 def _smooth(motions: Sequence[Motion]) -> FloatArray:
