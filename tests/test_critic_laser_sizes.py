@@ -33,7 +33,11 @@ def test_a_curve_out_of_the_running_does_not_make_a_named_cause_worth_less_than_
     rival = Rival(NONE, CURVE, Belief(720.0, np.eye(8)), 720.0)
     found = SimpleNamespace(fits=(NAMED, NONE))
     made = SimpleNamespace(
-        found=found, weighed=SimpleNamespace(found=found, rivals=(rival,)), winner=rival if leads else None, curve=leads
+        found=found,
+        weighed=SimpleNamespace(found=found, rivals=(rival,)),
+        winner=rival if leads else None,
+        curve=leads,
+        more=None,
     )
     assert _gain(made, "laser.warmup") == pytest.approx(gain)
 

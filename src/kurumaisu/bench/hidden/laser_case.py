@@ -11,7 +11,7 @@ import numpy as np
 
 from kurumaisu.bench.hidden.backdrop import BACKDROPS, Backdrop, draw_backdrop
 from kurumaisu.bench.hidden.base_case import run_of
-from kurumaisu.bench.hidden.case import Ask, Case, Truth
+from kurumaisu.bench.hidden.case import APART, Ask, Case, Truth
 from kurumaisu.bench.hidden.laser_catalogue import LASER
 from kurumaisu.bench.hidden.laser_worth import MEANS, LaserScale, odd_z, spread_z
 from kurumaisu.bench.hidden.motion import Fault, Sizes
@@ -170,6 +170,7 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
         rival=nearest,
         z_form=left(gram, len(means), range(len(means), 2 * len(means))),
         accepted=(ids, *same),
+        near=tuple(name for name, z in rest.items() if z < APART) if len(ids) == 1 else (),
     )
 
 

@@ -61,8 +61,13 @@ class Normal:
 class Assembly:
     """Residuals, columns and what scans share, of some shots."""
 
-    def __init__(self, shots: Shots, ids: frozenset[str] | None = None) -> None:
-        """Take the shots, and the effects to look for; None for all."""
+    def __init__(
+        self, shots: Shots, ids: frozenset[str] | None = None, jumps: Sequence[BoolArray] | None = None
+    ) -> None:
+        """Take the shots, and the effects to look for; None for all.
+
+        jumps: for each track, at which of its poses (p,) rates are known to jump; None where nothing is known yet.
+        """
         self.hats = [hats(shots, row) for row in range(len(shots.stamps))]
         self.layout = Layout(shots.stamps, shots.run, stands(shots))
         self.tracks = shots.tracks
@@ -82,6 +87,8 @@ class Assembly:
         for i in range(_SHIFTS):
             found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._sights())
             self._linearise(found, roughly=i < _SHIFTS - 1)
+        if jumps is not None:
+            self.kinked = [found | known for found, known in zip(self.kinked, jumps, strict=True)]
         self.motion = self._motion()
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base) & self.mapped
@@ -222,14 +229,16 @@ class Assembly:
         spans.append(self._nuisance)
         return np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
 
-    def common_mode(self, normal: Normal, truth: tuple[float, float] | None, fitted: Sequence[Form]) -> CommonMode:
+    def common_mode(
+        self, normal: Normal, truth: tuple[float, float] | None, fitted: Sequence[Form], own_sd: float = 0.0
+    ) -> CommonMode:
         """Return what says that whole scans are off together, whatever effects on the mean there are.
 
-        fitted: forms that act, with their shapes.
+        fitted: forms that act, with their shapes; own_sd [m]: of whole scans in the model.
         """
         project = self._projected(fitted)
         grams = self.grams(normal.beam_noise, project, lasting=True)
-        seen = common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise)
+        seen = common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise, own_sd)
         return replace(seen, wary=normal.wary)
 
     def full(self, normal: Normal) -> Normal:
@@ -239,14 +248,17 @@ class Assembly:
         return replace(normal, gram=gram)
 
     def again(self, settings: Sequence[EffectSetting]) -> Assembly:
-        """Return the same scans predicted with effects at work, and poses sought anew; without columns."""
+        """Return the same scans predicted with effects at work, and poses sought anew; without columns.
+
+        The clearer the scans, the smoother a path through them; but where a rate had jumped, it did.
+        """
         shots = replace(
             self.shots,
             own=own_with(self.shots, settings),
             tracks=self.tracks,
             shift=np.zeros_like(self.shots.shift),
         )
-        return Assembly(shots, frozenset())
+        return Assembly(shots, frozenset(), self.kinked)
 
     def beside(self, others: Sequence[OtherForm]) -> Assembly:
         """Return the same scans with columns of what effects may do instead, of which no noise is made, either."""

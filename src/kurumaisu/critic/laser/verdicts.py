@@ -10,11 +10,12 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.laser import pictures, rivals, still
+from kurumaisu.critic.laser.besides import Besides, besides
 from kurumaisu.critic.laser.company import company, forms_beside
 from kurumaisu.critic.laser.estimates import estimates_of, of_block, settings_of, with_scatter
 from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.lacking import lacking
-from kurumaisu.critic.laser.leading import leading, with_lead
+from kurumaisu.critic.laser.leading import leading, taken_back, with_lead
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.other_forms import OtherForm
 from kurumaisu.critic.laser.pictures import Part, Pictures, misfits, noise_rows
@@ -27,9 +28,10 @@ from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
 from kurumaisu.critic.laser.spread_fit import ScatterFit
 from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.supply import every_id, supplier
+from kurumaisu.critic.laser.trust import trusted_place
 from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
-from kurumaisu.critic.laser.whole_scans import beyond, with_whole_scans
+from kurumaisu.critic.laser.whole_scans import beyond, own_sd, with_whole_scans
 from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.replay import extend
@@ -74,8 +76,7 @@ def criticise(
     others = forms_beside(assembly, normal, made.fit)
     made = made.beside(assembly, normal, others)
     progress("laser: fitting what acts")
-    acting = settings_of(assembly, made.fit)
-    fit = pinned(assembly, normal, made.fit.forms, acting, made.winner, others, recording.truth)
+    fit = _pinned(assembly, normal, made, others, recording.truth)
     lead = leading(assembly, normal, made.fit, fit)
     certain = lead is not None and made.found.p[lead.id] >= NAMED
     if lead is not None and certain and all(own.id != lead.id for own in model.effects):
@@ -86,13 +87,18 @@ def criticise(
         size = size_of(assembly.marks.together([lead])[normal.beam_noise.valid])
         rest = replace(rest, details=(*rest.details, *_told({lead.id: size}, ())))
         return with_lead(rest, lead, cause, assembly, normal)
+    made, fit = _cleared(assembly, normal, made, fit, others, recording.truth)
     progress("laser: weighing effects on the scatter")
-    scatter, comparison = ([], ()) if assembly.strange else _scatter(assembly, fit, ids, strange=made.curve)
-    if not made.curve and not assembly.strange:
-        seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms)
+    away = 0.0 if made.winner is None else rivals.elsewhere(made.winner, normal.gram)
+    scatter, comparison = (
+        ([], ()) if fit.assembly.strange else _scatter(assembly, fit, ids, strange=made.curve, away=away)
+    )
+    own = own_sd(model.effects)
+    if not made.curve and not fit.assembly.strange:
+        seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, own)
         scatter = with_whole_scans(scatter, seen, fit.normal.scan_noise, recording, ids)
-        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made, others))
-    heard = beyond(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])))
+        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made, others), own)
+    heard = beyond(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])), own)
     finding = _finding(assembly, normal, made, fit, heard)
     slight = tuple(each.setting.id for each in scatter if each not in heard)
     words = tuple(
@@ -114,18 +120,27 @@ def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model
 
 @dataclass(frozen=True)
 class _Made:
-    """What acts on the mean: the forms' fit; winner: a block beside it, if any, its coefficients and covariance."""
+    """What acts on the mean: the forms' fit; winner: a block beside it, if any, its coefficients and covariance.
+
+    more: what of the fit was found when the rest of it was in place.
+    """
 
     weighed: Weighed
     fit: Fitted
     winner: Rival | None
     coefficients: FloatArray
     covariance: FloatArray
+    more: Besides | None = None
 
     @property
     def found(self) -> Found:
-        """The search's result with blocks in the running."""
+        """The search's result with blocks in the running, before more was found."""
         return self.weighed.found
+
+    @property
+    def p(self) -> dict[str, float]:
+        """The posterior of each effect."""
+        return self.found.p if self.more is None else {**self.found.p, **self.more.found.p}
 
     @property
     def curve(self) -> bool:
@@ -142,6 +157,10 @@ class _Made:
         if winner is None:
             return _Made(self.weighed, fit, None, np.empty(0), np.empty((0, 0)))
         return _Made(self.weighed, *_with(winner, normal))
+
+    def and_more(self, more: Besides) -> _Made:
+        """Return the same with what acts beside it."""
+        return replace(self, fit=more.added_to(self.fit), more=more)
 
     def parts(self) -> list[Part]:
         """Return what acts, one by one."""
@@ -166,16 +185,48 @@ def _with(winner: Rival, normal: Normal) -> tuple[Fitted, Rival, FloatArray, Flo
     return fit, winner, coefficients, covariance
 
 
+def _pinned(
+    assembly: Assembly,
+    normal: Normal,
+    made: _Made,
+    others: Mapping[str, OtherForm],
+    truth: tuple[float, float] | None,
+) -> Pinned:
+    acting = settings_of(assembly, made.fit)
+    return pinned(assembly, normal, made.fit.forms, acting, made.winner, others, truth)
+
+
+def _cleared(
+    assembly: Assembly,
+    normal: Normal,
+    made: _Made,
+    fit: Pinned,
+    others: Mapping[str, OtherForm],
+    truth: tuple[float, float] | None,
+) -> tuple[_Made, Pinned]:
+    """Return what acts without what its refit takes back, and with what acts beside it, refitted."""
+    if made.winner is not None:
+        return made, fit
+    while True:
+        gone = taken_back(assembly, made.fit, fit)
+        more = besides(assembly, normal, made.found, made.fit, fit, others) if not gone and made.more is None else None
+        if not gone and more is None:
+            return made, fit
+        made = replace(made, fit=made.fit.without(gone)) if more is None else made.and_more(more)
+        fit = _pinned(assembly, normal, made, others, truth)
+
+
 def _scatter(
-    assembly: Assembly, fit: Pinned, ids: frozenset[str] | None, *, strange: bool
+    assembly: Assembly, fit: Pinned, ids: frozenset[str] | None, *, strange: bool, away: float
 ) -> tuple[list[Scatter], tuple[Comparison, ...]]:
     """Return the effects on how readings scatter about the best fit of their mean, and what they mend.
 
     strange: something that is in no catalogue acts on the mean. A curve misses steps and edges of it, nobody can say
-    how far, so that errors about it say nothing of scatter.
+    how far, so that errors about it say nothing of scatter. away [m]: by how far ends of walls may be elsewhere.
     """
     rows = fit.assembly.smooth_rows(_SCATTERED)
     few = fit.assembly.thinned(rows)
+    few.geometry &= trusted_place(few.shots, few.marks.seen, few.marks.base, away)
     statistics = Statistics(few, fit.normal.scan_noise)
     means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
@@ -189,7 +240,7 @@ def _scatter(
 
 
 def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatter: list[Scatter]) -> LaserFinding:
-    found = made.found
+    p = made.p
     sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
     settings = {setting.id: setting for setting, _ in fit.settings}
     estimates = {setting.id: estimates_of(setting, sds) for setting, sds in fit.settings}
@@ -201,18 +252,19 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
     curve = made.winner is not None and made.curve and made.winner.free.id in matters
-    gains = {name: _gain(made, name) for name in settings if found.p.get(name, 0.0) >= NAMED}
+    gains = {name: _gain(made, name) for name in settings if p.get(name, 0.0) >= NAMED}
     # A curve is what one covariate shows of a thing nobody knows: what it leaves may be as much, and looks like others.
     least = made.winner.belief.nats if made.winner is not None and curve else -np.inf
     causes = tuple(
-        Cause(name, min(found.p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
+        Cause(name, min(p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
     )
-    unknown = tuple(assembly.told())
+    # Of the scans as they are seen with what acts: a laser that is askew looks past the ends of walls.
+    unknown = tuple(fit.assembly.told())
     unknown += tuple(unknowns(made.weighed, normal.gram)) if curve else ()
     groups = () if curve else _confused(assembly, normal, made, causes)
     confounded = tuple(group for group in groups if matters & set(group))
     causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
-    small = tuple(name for name in sizes if name not in matters and found.p.get(name, 0.0) >= NAMED)
+    small = tuple(name for name in sizes if name not in matters and p.get(name, 0.0) >= NAMED)
     details = (_noise_told(assembly, normal), *lacking(assembly), *_told(sizes, small))
     causes, added = with_scatter(causes, settings, scatter)
     confounded += tuple(group for group in map(_set_of, scatter) if group)
@@ -230,8 +282,10 @@ def _set_of(scatter: Scatter) -> tuple[str, ...]:
 def _confused(assembly: Assembly, normal: Normal, made: _Made, causes: Sequence[Cause]) -> Groups:
     # Of a set, too: what explains the readings as well as its likeliest member belongs to it.
     open_ids = {name for group in made.found.confounded for name in group}
-    names = [*(cause.id for cause in causes), *sorted(open_ids & made.fit.ids)]
-    return joined(made.found.confounded, twins(made.found, made.winner, assembly.free, normal.gram, names))
+    later = made.more.found.best.ids if made.more is not None else frozenset()
+    names = [*(cause.id for cause in causes if cause.id not in later), *sorted((open_ids & made.fit.ids) - later)]
+    groups = joined(made.found.confounded, twins(made.found, made.winner, assembly.free, normal.gram, names))
+    return groups if made.more is None else joined(groups, made.more.groups)
 
 
 def _noise_told(assembly: Assembly, normal: Normal) -> str:
@@ -283,9 +337,13 @@ def _spread_of(assembly: Assembly, normal: Normal, made: _Made, others: Mapping[
 
 def _gain(made: _Made, name: str) -> float:
     """Return the log evidence of the best set over the best one without an effect [nat]."""
-    # A curve that does not lead by enough is out of the running here, too, as it is where p comes from.
-    rivals = [rival for rival in made.weighed.rivals if made.curve or rival.free.basis is None]
-    sets = [(fit.ids, fit.score) for fit in made.found.fits]
-    sets += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in rivals]
+    more = made.more.found if made.more is not None else None
+    if more is not None and name in more.best.ids:
+        sets = [(fit.ids, fit.score) for fit in more.fits]
+    else:
+        # A curve that does not lead by enough is out of the running here, too, as it is where p comes from.
+        rivals = [rival for rival in made.weighed.rivals if made.curve or rival.free.basis is None]
+        sets = [(fit.ids, fit.score) for fit in made.found.fits]
+        sets += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in rivals]
     own = max((worth for ids, worth in sets if name in ids), default=-np.inf)
     return float(own - max((worth for ids, worth in sets if name not in ids), default=-np.inf))
