@@ -58,7 +58,9 @@ def besides(
     # Seen anew: how far a chair turns within a delay is told by a path that the loud effect had bent.
     forms, columns = refitted.assembly.marks.forms(frozenset(form.id for form in known.values()))
     rest = [form for form in forms if _key(form) in known]
+    # While a delay, say, is not in place, a path through the scans is too smooth beside jumps of the rates.
     beams = refitted.normal.beam_noise
+    beams = replace(beams, valid=beams.valid & normal.beam_noise.valid)
     refitted = replace(refitted, normal=replace(normal, beam_noise=beams))
     curves = _curves(assembly, fit, refitted, others)
     gram = _gram([columns[:, :, form.span] for form in rest], refitted, curves)

@@ -61,13 +61,8 @@ class Normal:
 class Assembly:
     """Residuals, columns and what scans share, of some shots."""
 
-    def __init__(
-        self, shots: Shots, ids: frozenset[str] | None = None, jumps: Sequence[BoolArray] | None = None
-    ) -> None:
-        """Take the shots, and the effects to look for; None for all.
-
-        jumps: for each track, at which of its poses (p,) rates are known to jump; None where nothing is known yet.
-        """
+    def __init__(self, shots: Shots, ids: frozenset[str] | None = None) -> None:
+        """Take the shots, and the effects to look for; None for all."""
         self.hats = [hats(shots, row) for row in range(len(shots.stamps))]
         self.layout = Layout(shots.stamps, shots.run, stands(shots))
         self.tracks = shots.tracks
@@ -87,8 +82,6 @@ class Assembly:
         for i in range(_SHIFTS):
             found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._sights())
             self._linearise(found, roughly=i < _SHIFTS - 1)
-        if jumps is not None:
-            self.kinked = [found | known for found, known in zip(self.kinked, jumps, strict=True)]
         self.motion = self._motion()
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base) & self.mapped
@@ -248,17 +241,14 @@ class Assembly:
         return replace(normal, gram=gram)
 
     def again(self, settings: Sequence[EffectSetting]) -> Assembly:
-        """Return the same scans predicted with effects at work, and poses sought anew; without columns.
-
-        The clearer the scans, the smoother a path through them; but where a rate had jumped, it did.
-        """
+        """Return the same scans predicted with effects at work, and poses sought anew; without columns."""
         shots = replace(
             self.shots,
             own=own_with(self.shots, settings),
             tracks=self.tracks,
             shift=np.zeros_like(self.shots.shift),
         )
-        return Assembly(shots, frozenset(), self.kinked)
+        return Assembly(shots, frozenset())
 
     def beside(self, others: Sequence[OtherForm]) -> Assembly:
         """Return the same scans with columns of what effects may do instead, of which no noise is made, either."""

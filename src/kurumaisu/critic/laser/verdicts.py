@@ -4,24 +4,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.laser import pictures, rivals, still
-from kurumaisu.critic.laser.besides import Besides, besides
-from kurumaisu.critic.laser.company import company, forms_beside
-from kurumaisu.critic.laser.estimates import estimates_of, of_block, settings_of, with_scatter
+from kurumaisu.critic.laser.acting import Acting, acting, cleared, gain_of, refitted
+from kurumaisu.critic.laser.estimates import estimates_of, of_block, with_scatter
 from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.lacking import lacking
-from kurumaisu.critic.laser.leading import leading, taken_back, with_lead
+from kurumaisu.critic.laser.leading import leading, with_lead
 from kurumaisu.critic.laser.normal import Assembly, Normal
-from kurumaisu.critic.laser.other_forms import OtherForm
-from kurumaisu.critic.laser.pictures import Part, Pictures, misfits, noise_rows
-from kurumaisu.critic.laser.pinned import Pinned, pinned
-from kurumaisu.critic.laser.rivals import Rival, Weighed
-from kurumaisu.critic.laser.search import Fitted, Found, Search
+from kurumaisu.critic.laser.pictures import Pictures, misfits, noise_rows
+from kurumaisu.critic.laser.pinned import Pinned
+from kurumaisu.critic.laser.search import Fitted, Search
 from kurumaisu.critic.laser.shots import gather, missing
 from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
@@ -72,22 +69,21 @@ def criticise(
         normal = assembly.settle(recording.truth, shaped)
         found = Search(assembly.forms, normal.gram).run()
     normal = assembly.full(normal)
-    made = _made(assembly, normal, found)
-    others = forms_beside(assembly, normal, made.fit)
-    made = made.beside(assembly, normal, others)
+    made = acting(assembly, normal, found)
+    made = made.beside(assembly, normal)
     progress("laser: fitting what acts")
-    fit = _pinned(assembly, normal, made, others, recording.truth)
+    fit = refitted(assembly, normal, made, recording.truth)
     lead = leading(assembly, normal, made.fit, fit)
     certain = lead is not None and made.found.p[lead.id] >= NAMED
     if lead is not None and certain and all(own.id != lead.id for own in model.effects):
         progress(f"laser: looking at the rest beside {lead.id}")
         rest = criticise(recording, extend(model, [lead]), progress, ids)
         sds = next(sds for setting, sds in fit.settings if setting is lead)
-        cause = Cause(lead.id, min(made.found.p[lead.id], 1.0), estimates_of(lead, sds), _gain(made, lead.id))
+        cause = Cause(lead.id, min(made.found.p[lead.id], 1.0), estimates_of(lead, sds), gain_of(made, lead.id))
         size = size_of(assembly.marks.together([lead])[normal.beam_noise.valid])
         rest = replace(rest, details=(*rest.details, *_told({lead.id: size}, ())))
         return with_lead(rest, lead, cause, assembly, normal)
-    made, fit = _cleared(assembly, normal, made, fit, others, recording.truth)
+    made, fit = cleared(assembly, normal, made, fit, recording.truth)
     progress("laser: weighing effects on the scatter")
     away = 0.0 if made.winner is None else rivals.elsewhere(made.winner, normal.gram)
     scatter, comparison = (
@@ -97,7 +93,7 @@ def criticise(
     if not made.curve and not fit.assembly.strange:
         seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, own)
         scatter = with_whole_scans(scatter, seen, fit.normal.scan_noise, recording, ids)
-        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made, others), own)
+        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made), own)
     heard = beyond(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])), own)
     finding = _finding(assembly, normal, made, fit, heard)
     slight = tuple(each.setting.id for each in scatter if each not in heard)
@@ -116,104 +112,6 @@ def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model
     if not open_ids and not lacking(assembly):
         return None
     return supplier(model, open_ids or every_id(), recording.truth)
-
-
-@dataclass(frozen=True)
-class _Made:
-    """What acts on the mean: the forms' fit; winner: a block beside it, if any, its coefficients and covariance.
-
-    more: what of the fit was found when the rest of it was in place.
-    """
-
-    weighed: Weighed
-    fit: Fitted
-    winner: Rival | None
-    coefficients: FloatArray
-    covariance: FloatArray
-    more: Besides | None = None
-
-    @property
-    def found(self) -> Found:
-        """The search's result with blocks in the running, before more was found."""
-        return self.weighed.found
-
-    @property
-    def p(self) -> dict[str, float]:
-        """The posterior of each effect."""
-        return self.found.p if self.more is None else {**self.found.p, **self.more.found.p}
-
-    @property
-    def curve(self) -> bool:
-        """Whether a curve acts, which is in no catalogue."""
-        return self.winner is not None and self.winner.free.basis is not None
-
-    def beside(self, assembly: Assembly, normal: Normal, others: Mapping[str, OtherForm]) -> _Made:
-        """Return the same without effects that others of another form explain; of a curve, which is unlike any, all."""
-        if self.curve:
-            return self
-        fit, winner = company(assembly, normal, self.found, (self.fit, self.winner), others)
-        if fit is self.fit and winner is self.winner:
-            return self
-        if winner is None:
-            return _Made(self.weighed, fit, None, np.empty(0), np.empty((0, 0)))
-        return _Made(self.weighed, *_with(winner, normal))
-
-    def and_more(self, more: Besides) -> _Made:
-        """Return the same with what acts beside it."""
-        return replace(self, fit=more.added_to(self.fit), more=more)
-
-    def parts(self) -> list[Part]:
-        """Return what acts, one by one."""
-        out, start = [], 0
-        for form in self.fit.forms:
-            stop = start + len(form.columns)
-            out.append(Part(form.id, form.span, self.fit.coefficients[start:stop]))
-            start = stop
-        return [*out, Part(self.winner.free.id, self.winner.free.span, self.coefficients)] if self.winner else out
-
-
-def _made(assembly: Assembly, normal: Normal, found: Found) -> _Made:
-    weighed = rivals.weigh(found, assembly.free, normal.gram)
-    winner = weighed.winner
-    if winner is None:
-        return _Made(weighed, found.best, None, np.empty(0), np.empty((0, 0)))
-    return _Made(weighed, *_with(winner, normal))
-
-
-def _with(winner: Rival, normal: Normal) -> tuple[Fitted, Rival, FloatArray, FloatArray]:
-    fit, coefficients, covariance = rivals.joint(winner, normal.gram)
-    return fit, winner, coefficients, covariance
-
-
-def _pinned(
-    assembly: Assembly,
-    normal: Normal,
-    made: _Made,
-    others: Mapping[str, OtherForm],
-    truth: tuple[float, float] | None,
-) -> Pinned:
-    acting = settings_of(assembly, made.fit)
-    return pinned(assembly, normal, made.fit.forms, acting, made.winner, others, truth)
-
-
-def _cleared(
-    assembly: Assembly,
-    normal: Normal,
-    made: _Made,
-    fit: Pinned,
-    others: Mapping[str, OtherForm],
-    truth: tuple[float, float] | None,
-) -> tuple[_Made, Pinned]:
-    """Return what acts without what its refit takes back, and with what acts beside it, refitted."""
-    if made.winner is not None:
-        return made, fit
-    while True:
-        gone = taken_back(assembly, made.fit, fit)
-        more = besides(assembly, normal, made.found, made.fit, fit, others) if not gone and made.more is None else None
-        if not gone and more is None:
-            return made, fit
-        made = replace(made, fit=made.fit.without(gone)) if more is None else made.and_more(more)
-        fit = _pinned(assembly, normal, made, others, truth)
 
 
 def _scatter(
@@ -239,7 +137,7 @@ def _scatter(
     return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
 
-def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatter: list[Scatter]) -> LaserFinding:
+def _finding(assembly: Assembly, normal: Normal, made: Acting, fit: Pinned, scatter: list[Scatter]) -> LaserFinding:
     p = made.p
     sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
     settings = {setting.id: setting for setting, _ in fit.settings}
@@ -252,7 +150,7 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
     curve = made.winner is not None and made.curve and made.winner.free.id in matters
-    gains = {name: _gain(made, name) for name in settings if p.get(name, 0.0) >= NAMED}
+    gains = {name: gain_of(made, name) for name in settings if p.get(name, 0.0) >= NAMED}
     # A curve is what one covariate shows of a thing nobody knows: what it leaves may be as much, and looks like others.
     least = made.winner.belief.nats if made.winner is not None and curve else -np.inf
     causes = tuple(
@@ -279,7 +177,7 @@ def _set_of(scatter: Scatter) -> tuple[str, ...]:
     return group if certain and scatter.p < NAMED else ()
 
 
-def _confused(assembly: Assembly, normal: Normal, made: _Made, causes: Sequence[Cause]) -> Groups:
+def _confused(assembly: Assembly, normal: Normal, made: Acting, causes: Sequence[Cause]) -> Groups:
     # Of a set, too: what explains the readings as well as its likeliest member belongs to it.
     open_ids = {name for group in made.found.confounded for name in group}
     later = made.more.found.best.ids if made.more is not None else frozenset()
@@ -323,27 +221,13 @@ def size_of(change: FloatArray) -> float:
     return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))
 
 
-def _spread_of(assembly: Assembly, normal: Normal, made: _Made, others: Mapping[str, OtherForm]) -> float:
+def _spread_of(assembly: Assembly, normal: Normal, made: Acting) -> float:
     """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others.
 
-    others: the curves that some of it may follow instead, in which no scans are off together.
+    In the curves that some of it may follow instead no scans are off together.
     """
     valid, blocks = normal.beam_noise.valid, {free.id for free in assembly.free}
     parts = [part for part in made.parts() if part.id in blocks or effects.by_id(part.id).empirical]
-    parts = [part for part in parts if part.id not in others]
+    parts = [part for part in parts if part.id not in made.others]
     moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in parts]
     return float(np.std(sum(moved))) if moved else 0.0
-
-
-def _gain(made: _Made, name: str) -> float:
-    """Return the log evidence of the best set over the best one without an effect [nat]."""
-    more = made.more.found if made.more is not None else None
-    if more is not None and name in more.best.ids:
-        sets = [(fit.ids, fit.score) for fit in more.fits]
-    else:
-        # A curve that does not lead by enough is out of the running here, too, as it is where p comes from.
-        rivals = [rival for rival in made.weighed.rivals if made.curve or rival.free.basis is None]
-        sets = [(fit.ids, fit.score) for fit in made.found.fits]
-        sets += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in rivals]
-    own = max((worth for ids, worth in sets if name in ids), default=-np.inf)
-    return float(own - max((worth for ids, worth in sets if name not in ids), default=-np.inf))
