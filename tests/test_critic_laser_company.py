@@ -86,6 +86,19 @@ def test_a_tenth_more_readings_beyond_three_deviations_matters_to_nobody():
     assert few > 2.9
 
 
+def test_what_grows_with_the_range_otherwise_than_its_law_is_one_doubt_not_many():
+    """Four numbers are off by as much as a form may do to each, all together from near to far."""
+    nulls = 0.01 * np.random.default_rng(1).standard_normal((50, 4))
+    none, along = np.zeros(4, dtype=bool), np.linspace(-1.0, 1.0, 4)
+    measured = 2.0 * (1 + 0.15 * along)
+    costs = []
+    for trends in (np.empty((0, 0)), along[np.newaxis]):
+        likeness = Likeness(nulls, measured, Kinds(none, none, trends), ~none)
+        costs.append(likeness.cost(np.full(4, 2.0)) - likeness.cost(measured))
+    assert costs[0] > 2.0
+    assert costs[1] < 1.0
+
+
 def _forms():
     offset = effects.by_id("laser.offset").parameters[0]
     warmth = effects.by_id("laser.temperature").parameters[0]
