@@ -146,6 +146,7 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
     parameters = {name: LASER[name].called(sizes[name], ask.form) for name in ids}
     odd = {name: _odd(name, scale, sizes[name], ask.form) for name in ids if LASER[name].by != "mean"}
     means = [name for name in ids if name not in odd]
+    scale = scale.noisier([LASER[name].fault(sizes[name], ask.form) for name in odd])
     truth = Truth(ask.kind, ids, parameters, background=backdrop.ids, accepted=(ids,) if ids else ())
     if not means:
         return replace(truth, z=float(np.linalg.norm(list(odd.values()))), z_alone=odd)
