@@ -11,7 +11,7 @@ from kurumaisu.bench import critic, critic_floors, critic_table
 from kurumaisu.bench.hidden.baselines import BASELINES
 from kurumaisu.bench.hidden.case import Truth
 from kurumaisu.bench.hidden.score import score, scored_names
-from kurumaisu.critic.verdict import Verdict
+from kurumaisu.critic.verdict import Cause, Verdict
 
 OPTIONS = argparse.Namespace(draws=2, seed=0, jobs=1, log=None)
 
@@ -60,6 +60,22 @@ def test_names_said_for_sure_count_against_it_where_nothing_is_hidden_that_has_a
 def test_a_curve_that_is_not_among_the_first_three_is_not_found():
     truth = Truth("unknown", ("threshold_slip",), channel="v", covariates=("v",))
     assert not score(truth, Verdict("none"), 0.0).followed
+
+
+@pytest.mark.parametrize(
+    ("group", "right"),
+    [(("a", "b"), True), (("a", "b", "c"), True), (("a", "b", "c", "d"), False), (("b", "c"), False)],
+)
+def test_a_set_may_have_what_is_told_apart_with_doubt(group, right):
+    truth = Truth("confounded", ("a",), z=30.0, accepted=(("a",), ("b",)), near=("b", "c"))
+    assert score(truth, Verdict("confounded", confounded=(group,)), 0.0).right == right
+
+
+def test_where_nothing_does_the_same_the_name_is_right_too():
+    alone = Truth("confounded", ("a",), z=30.0, z_rival=4.0, accepted=(("a",),), near=("b",))
+    cause = Cause("a", 0.98, {}, 9.0)
+    assert score(alone, Verdict("named", causes=(cause,)), 0.0).right
+    assert not score(replace(alone, accepted=(("a",), ("b",))), Verdict("named", causes=(cause,)), 0.0).right
 
 
 @pytest.mark.parametrize("figure", critic_floors.FIGURES, ids=lambda figure: figure.label)

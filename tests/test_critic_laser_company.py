@@ -11,8 +11,9 @@ from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, co
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
 from kurumaisu.critic.laser.spread_fit import ScatterFit
+from kurumaisu.critic.laser.twins import twins
 from kurumaisu.critic.laser.verdicts import size_of
-from kurumaisu.critic.laser.whole_scans import beyond, with_whole_scans
+from kurumaisu.critic.laser.whole_scans import beyond, own_sd, with_whole_scans
 from kurumaisu.critic.recording import Recording, Run, Series
 from kurumaisu.critic.verdict import NORMAL90
 from kurumaisu.params import EffectSetting
@@ -85,12 +86,42 @@ def test_a_tenth_more_readings_beyond_three_deviations_matters_to_nobody():
     assert few > 2.9
 
 
+def test_what_grows_with_the_range_otherwise_than_its_law_is_one_doubt_not_many():
+    """Four numbers are off by as much as a form may do to each, all together from near to far."""
+    nulls = 0.01 * np.random.default_rng(1).standard_normal((50, 4))
+    none, along = np.zeros(4, dtype=bool), np.linspace(-1.0, 1.0, 4)
+    measured = 2.0 * (1 + 0.15 * along)
+    costs = []
+    for trends in (np.empty((0, 0)), along[np.newaxis]):
+        likeness = Likeness(nulls, measured, Kinds(none, none, trends), ~none)
+        costs.append(likeness.cost(np.full(4, 2.0)) - likeness.cost(measured))
+    assert costs[0] > 2.0
+    assert costs[1] < 1.0
+
+
 def _forms():
     offset = effects.by_id("laser.offset").parameters[0]
     warmth = effects.by_id("laser.temperature").parameters[0]
     one = Form("laser.offset", {}, (Column(offset, squared=False, beside={}),), 0)
     sides = tuple(Column(warmth, squared=False, beside={"reference": at}) for at in (10.0, 40.0))
     return [one, Form("laser.temperature", {"reference": 10.0}, sides, 1, between=False)]
+
+
+@pytest.mark.parametrize(("tau", "named"), [(2500.0, "laser.offset"), (100.0, "laser.warmup")])
+def test_what_falls_off_too_slowly_to_be_seen_is_an_offset(tau, named):
+    """In three minutes, nobody can see whether it does in forty."""
+    time = np.linspace(0.0, 180.0, 400)
+    offset, amplitude = (effects.by_id(name).parameters[0] for name in ("laser.offset", "laser.warmup"))
+    forms = [Form("laser.offset", {}, (Column(offset, squared=False, beside={}),), 0)]
+    for i, each in enumerate((2500.0, 100.0)):
+        forms.append(Form("laser.warmup", {"tau": each}, (Column(amplitude, squared=False, beside={}),), 1 + i))
+    y = 2.0 * np.exp(-time / tau) + 0.5 * np.random.default_rng(2).standard_normal(400)
+    rows = np.column_stack([np.ones(400), np.exp(-time / 2500.0), np.exp(-time / 100.0), y]) / 0.5
+    gram = rows.T @ rows
+    found = Search(forms, gram).run()
+    assert found.best.ids == {named}
+    assert found.p[named] > 0.95
+    assert twins(found, None, [], gram, [named]) == ()
 
 
 @pytest.mark.parametrize(("slope", "named"), [(0.0, "laser.offset"), (8.0, "laser.temperature")])
@@ -127,11 +158,11 @@ def _scans(common, seed, scans=250, readings=400, sd=0.004):
     return grams, Layout(0.1 * np.arange(scans), np.zeros(scans, dtype=int), nowhere)
 
 
-def _weighed(common, seed):
+def _weighed(common, seed, own=0.0):
     grams, layout = _scans(common, seed)
     none = np.arange(0)
     noise = estimate(grams, layout, (0.005, 0.005), none)
-    return common_mode(grams, layout, (0.005, 0.005), none, noise), noise
+    return common_mode(grams, layout, (0.005, 0.005), none, noise, own), noise
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -140,6 +171,14 @@ def test_all_scans_tell_whether_they_have_a_common_mode(seed):
     assert seen.nats > 10
     assert abs(np.log(noise.common_sd / 3e-4)) < 3 * seen.log_sd
     assert _weighed(0.0, seed)[0].nats < 2
+
+
+@pytest.mark.parametrize(("common", "own", "news"), [(3e-4, 3e-4, False), (9e-4, 3e-4, True), (0.0, 3e-4, True)])
+def test_scans_that_are_off_together_as_in_the_model_are_no_news(common, own, news):
+    seen, noise = _weighed(common, 2, own)
+    found = with_whole_scans([], seen, noise, _recording(), None)
+    assert [each.setting.id for each in beyond(found, 2e-4, own)] == (["laser.common_mode"] if news else [])
+    assert own_sd([_at("laser.common_mode", sd=own, rho=0.7), _at("laser.dropout", probability=0.1)]) == own
 
 
 def test_scans_that_are_off_by_as_much_as_they_may_have_something_else_that_is_wrong():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
+from kurumaisu.critic.laser.acting import gain_of
 from kurumaisu.critic.laser.columns import Form
 from kurumaisu.critic.laser.free import Free
 from kurumaisu.critic.laser.normal import Assembly
@@ -16,7 +17,7 @@ from kurumaisu.critic.laser.pinned import pinned
 from kurumaisu.critic.laser.rivals import Rival
 from kurumaisu.critic.laser.search import Fitted
 from kurumaisu.critic.laser.shots import gather
-from kurumaisu.critic.laser.verdicts import _gain, _spread_of, criticise
+from kurumaisu.critic.laser.verdicts import _spread_of, criticise
 from kurumaisu.critic.smooth import Belief
 from kurumaisu.critic.smooth_alike import FORM
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -33,9 +34,13 @@ def test_a_curve_out_of_the_running_does_not_make_a_named_cause_worth_less_than_
     rival = Rival(NONE, CURVE, Belief(720.0, np.eye(8)), 720.0)
     found = SimpleNamespace(fits=(NAMED, NONE))
     made = SimpleNamespace(
-        found=found, weighed=SimpleNamespace(found=found, rivals=(rival,)), winner=rival if leads else None, curve=leads
+        found=found,
+        weighed=SimpleNamespace(found=found, rivals=(rival,)),
+        winner=rival if leads else None,
+        curve=leads,
+        more=None,
     )
-    assert _gain(made, "laser.warmup") == pytest.approx(gain)
+    assert gain_of(made, "laser.warmup") == pytest.approx(gain)
 
 
 def test_a_size_is_no_surer_than_the_form_that_it_belongs_to(tmp_path):
@@ -89,8 +94,9 @@ def test_where_readings_are_cut_off_is_known_to_a_step_of_them(tmp_path, end):
 def test_only_equations_that_are_nearly_right_may_have_scans_off_together(name, spread):
     """Where a laser sits is geometry, which nobody may draw otherwise; a square of the range or walls are not."""
     columns = np.ones((2, 4, 1)) * [[[1.0], [3.0], [1.0], [3.0]]]
-    made = SimpleNamespace(parts=lambda: [Part(name, slice(0, 1), np.array([0.005]))])
+    made = SimpleNamespace(parts=lambda: [Part(name, slice(0, 1), np.array([0.005]))], others={})
     assembly = SimpleNamespace(columns=columns, free=[SimpleNamespace(id="a.map")])
     normal = SimpleNamespace(beam_noise=SimpleNamespace(valid=np.ones((2, 4), dtype=bool)))
-    assert _spread_of(assembly, normal, made, {}) == pytest.approx(spread)
-    assert _spread_of(assembly, normal, made, {name: SimpleNamespace()}) == 0.0
+    assert _spread_of(assembly, normal, made) == pytest.approx(spread)
+    made.others = {name: SimpleNamespace()}
+    assert _spread_of(assembly, normal, made) == 0.0

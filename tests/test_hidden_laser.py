@@ -191,6 +191,15 @@ def test_an_offset_is_no_twin_of_a_temperature_that_has_the_offset_in_it(tmp_pat
     assert ("laser.temperature",) not in case.truth.accepted
 
 
+def test_beside_noise_a_change_of_the_mean_is_worth_less(tmp_path):
+    ids = ("laser.scale", "laser.range_noise")
+    asked = {"regime": "clean", "design": "room", "family": "laser"}
+    alone = make(Ask("single", ids[:1], 30.0, **asked), 5, tmp_path).truth.z_alone["laser.scale"]
+    truth = make(Ask("pair", ids, 30.0, **asked), 5, tmp_path).truth
+    share = truth.parameters["laser.range_noise"]["share"]
+    assert 0.2 * alone < truth.z_alone["laser.scale"] < alone / (1 + 0.5 * share)
+
+
 def test_a_truth_is_told_only_of_what_a_catalogue_has_a_word_for(tmp_path):
     """Of a contaminated normal there is no t, of a footprint's width no gain; offsets of beams have no mirror."""
     for name, plain, other in (

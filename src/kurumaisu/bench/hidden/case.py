@@ -23,7 +23,8 @@ class Truth:
     leaves of it; z_alone: of each id's share in it; z_rival: what remains of the signal beside the nearest rival, whose
     id is rival; z_form: what the usual equation leaves of it; channel, covariates: where something outside the
     catalogue shows, and what it is right to say that it follows; problem: what is wrong with wrong data; accepted: sets
-    of ids of which each explains the signal to within z 3; background: ids that the null has, too, which are right to
+    of ids of which each explains the signal to within z 3; near: ids that leave less than APART of it, which a set may
+    have or not; background: ids that the null has, too, which are right to
     name and right to leave out.
     """
 
@@ -39,6 +40,7 @@ class Truth:
     covariates: tuple[str, ...] = ()
     problem: str = ""
     accepted: tuple[tuple[str, ...], ...] = ()
+    near: tuple[str, ...] = ()
     background: tuple[str, ...] = ()
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 
 from kurumaisu.bench.hidden.backdrop import BACKDROPS, Backdrop, draw_backdrop
 from kurumaisu.bench.hidden.base_case import run_of
-from kurumaisu.bench.hidden.case import Ask, Case, Truth
+from kurumaisu.bench.hidden.case import APART, Ask, Case, Truth
 from kurumaisu.bench.hidden.laser_catalogue import LASER
 from kurumaisu.bench.hidden.laser_worth import MEANS, LaserScale, odd_z, spread_z
 from kurumaisu.bench.hidden.motion import Fault, Sizes
@@ -146,6 +146,7 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
     parameters = {name: LASER[name].called(sizes[name], ask.form) for name in ids}
     odd = {name: _odd(name, scale, sizes[name], ask.form) for name in ids if LASER[name].by != "mean"}
     means = [name for name in ids if name not in odd]
+    scale = scale.noisier([LASER[name].fault(sizes[name], ask.form) for name in odd])
     truth = Truth(ask.kind, ids, parameters, background=backdrop.ids, accepted=(ids,) if ids else ())
     if not means:
         return replace(truth, z=float(np.linalg.norm(list(odd.values()))), z_alone=odd)
@@ -170,6 +171,7 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
         rival=nearest,
         z_form=left(gram, len(means), range(len(means), 2 * len(means))),
         accepted=(ids, *same),
+        near=tuple(name for name, z in rest.items() if z < APART) if len(ids) == 1 else (),
     )
 
 

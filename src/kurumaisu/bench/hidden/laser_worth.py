@@ -11,6 +11,7 @@ than its variance is left out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from scipy import sparse
@@ -43,8 +44,17 @@ class LaserScale:
         """Look once without faults."""
         self.tour, self._backdrop = tour, backdrop
         self.nominal = expected(tour, (), EVERY)
+        self._wider: FloatArray | float = 1.0
         self._seen = seen(self.nominal) & ~jolted(tour, self.nominal)[:, None]
         self.count = sum(len(leg.stamps) for leg in tour.legs) / len(self.nominal.stamps)
+
+    def noisier(self, faults: Sequence[Fault]) -> LaserScale:
+        """Return the same where readings have the noise of these faults, too: beside it, others are worth less."""
+        out = copy(self)
+        for fault in faults:
+            if fault.form.stage == "sd":
+                out._wider = out._wider * fault.form.act(self.nominal, fault.sizes).sd / self.nominal.sd
+        return out
 
     def signal(self, fault: Fault) -> FloatArray:
         """Return the change of the mean readings (s, b) [m].
@@ -74,7 +84,7 @@ class LaserScale:
 
     def _without_poses(self, signals: FloatArray) -> FloatArray:
         """Return the products of whitened signals without what errors of poses and of whole scans explain."""
-        sd = np.hypot(self.nominal.sd, 0.001 / np.sqrt(12))
+        sd = np.hypot(self.nominal.sd * self._wider, 0.001 / np.sqrt(12))
         effects = np.where(self._seen[..., None], self._pose_columns(), 0.0)
         white = _unchained(np.concatenate([signals, effects], axis=2) / sd[..., None], self._backdrop.beam_rho)
         # Stops stand still, so one scan says what all of its stop do; scans of a drive have each a pose of their own.

@@ -69,27 +69,33 @@ def scored_names(truth: Truth, named: frozenset[str], cpu: float) -> Score:
 
 def _right(truth: Truth, verdict: Verdict, named: set[str]) -> bool:
     """Return whether an answer is what the kind of case calls for."""
+    wanted = set(truth.ids)
     if truth.kind == "wrong":
         also = set(WRONG[truth.problem].also)
         return verdict.verdict == "invalid_data" or (bool(named) and named <= also)
     if truth.kind == "unknown":
         return not named and _is_followed(truth, verdict)
-    if truth.kind == "confounded":
-        allowed = {name for ids in truth.accepted for name in ids}
-        return any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
+    a_set = any(wanted <= set(group) <= _open(truth) for group in verdict.confounded)
+    if truth.kind == "confounded" and len(truth.accepted) > 1:
+        return a_set
     clean = verdict.verdict not in ("unknown", "invalid_data", "confounded") and not verdict.unknown
     discrete = truth.ids == ("base.sign",) and verdict.verdict == "invalid_data"
-    exact = discrete or (clean and named == set(truth.ids))
+    exact = discrete or (clean and named == wanted)
+    if truth.kind == "confounded":
+        return a_set or exact  # in these very drives it has no rival that does as well
     if len(truth.ids) == 1 and len(truth.accepted) > 1 and truth.z_rival < _SEEN:
         # The drives hardly tell it from others: the set of them is right, too; of twins it is the only right answer.
-        allowed = {name for ids in truth.accepted for name in ids}
-        a_set = any(set(truth.ids) <= set(group) <= allowed for group in verdict.confounded)
         return a_set or (exact and truth.z_rival > _TWINS)
     if len(truth.ids) > 1 and truth.z_rival < APART and verdict.verdict != "unknown":
         # Of several causes one may have a twin: it is right to name the others, and to give the set for that one.
         sets = {name for group in verdict.confounded for name in group}
         return named <= set(truth.ids) <= named | sets
     return exact
+
+
+def _open(truth: Truth) -> set[str]:
+    """Return what a set may have in it: what does the same, and what is not told from it beyond doubt."""
+    return {*truth.near, *(name for ids in truth.accepted for name in ids)}
 
 
 def _is_followed(truth: Truth, verdict: Verdict) -> bool:

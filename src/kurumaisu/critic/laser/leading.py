@@ -18,6 +18,7 @@ from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.pictures import Part, misfits
 from kurumaisu.critic.laser.pinned import LOUD, Pinned, loudness
 from kurumaisu.critic.laser.search import Fitted
+from kurumaisu.critic.prior import Z_LOW
 from kurumaisu.critic.verdict import Cause
 from kurumaisu.params import EffectSetting
 
@@ -39,6 +40,25 @@ def leading(assembly: Assembly, normal: Normal, fit: Fitted, refitted: Pinned) -
         if size > loudest and loudness(assembly, normal, change - line) > _BENT * size:
             loudest, out = size, settings[form.id]
     return out
+
+
+def taken_back(assembly: Assembly, fit: Fitted, refitted: Pinned) -> frozenset[str]:
+    """Return the effects that move beams of which, refitted by simulation, nothing is left.
+
+    They had drawn what the line of another one misses.
+    """
+    out, start = set[str](), 0
+    sizes = {setting.id: (setting.parameters, sds) for setting, sds in refitted.settings}
+    for form in fit.forms:
+        effect, column, line = effects.by_id(form.id), form.columns[0], float(fit.coefficients[start])
+        start += len(form.columns)
+        if issubclass(effect, effects.ReadingEffect) or len(form.columns) > 1 or column.squared:
+            continue
+        p, (values, sds) = column.parameter, sizes[form.id]
+        left = values[p.name] - assembly.marks.null(effect)[p.name]
+        if abs(left) < Z_LOW * sds[p.name] < abs(line * p.scale - left):
+            out.add(form.id)
+    return frozenset(out)
 
 
 def with_lead(

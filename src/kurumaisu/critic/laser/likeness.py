@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -19,14 +19,20 @@ _SILENT = 1e6  # sd of a number that says nothing
 _FAR = 5.0  # sds from which a number pulls no harder: what nothing explains yet must not bend what explains the others
 _DAMPED = 0.02  # share by which the curvature is raised: other draws make the slopes uncertain
 _FORM = 0.1  # share of what an effect does to a number, by which a real effect of that name may do more or less
+# Likewise, from end to end of the ranges or of the incidences: a footprint grows with the range, a law may not.
+_TREND = 0.15
 
 
 @dataclass(frozen=True)
 class Kinds:
-    """Which numbers (m,) are roots of counts, of the same sd, few or many; and which are places, alike in any form."""
+    """Which numbers (m,) are roots of counts, of the same sd, few or many; and which are places, alike in any form.
+
+    trends (g, m): from -1 to 1 over numbers of readings from near to far, or from straight to oblique; 0 elsewhere.
+    """
 
     counts: BoolArray
     places: BoolArray
+    trends: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
 
 class Likeness:
@@ -37,7 +43,7 @@ class Likeness:
 
         kinds: of which they are; heard: numbers that say anything.
         """
-        self._places = kinds.places
+        self._places, self._trends = kinds.places, kinds.trends
         self.offset, self.measured = nulls.mean(axis=0), measured
         spread = nulls.std(axis=0)
         count_sd = np.hypot(np.maximum(spread, _COUNT), _TAILS * np.abs(self.offset))
@@ -85,5 +91,9 @@ class Likeness:
 
     def _root(self, numbers: FloatArray) -> FloatArray:
         """Return the root of the covariance where effects made such numbers: their real form may do more or less."""
-        slack = np.where(self._places, 0.0, _FORM * np.minimum(np.abs(self.units(numbers)), self._most))
-        return np.asarray(np.linalg.cholesky(self._covariance + np.diag(slack**2)))
+        done = np.where(self._places, 0.0, np.clip(self.units(numbers), -self._most, self._most))
+        slack = np.diag((_FORM * done) ** 2)
+        if len(self._trends):
+            along = _TREND * self._trends * done
+            slack += along.T @ along
+        return np.asarray(np.linalg.cholesky(self._covariance + slack))

@@ -279,12 +279,18 @@ def wary_of(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: Sca
 
 
 def common_mode(
-    grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] | None, project: IntArray, noise: ScanNoise
+    grams: Sequence[Gram],
+    layout: Layout,
+    truth: tuple[float, float] | None,
+    project: IntArray,
+    noise: ScanNoise,
+    own_sd: float = 0.0,
 ) -> CommonMode:
     """Return what says that scans have a common mode, by all of them; noise: the likeliest one, other arguments alike.
 
-    By Laplace's approximation of the integral over its sd and its time constant. One as large as any may be stands for
-    something else that is wrong.
+    own_sd [m]: of what the model already has, which then needs another one; of how long that lasts the model knows
+    only from scan to scan. By Laplace's approximation of the integral over its sd and its time constant. One as large
+    as any may be stands for something else that is wrong.
     """
     if noise.common_sd > _WHOLE * _HIGH[2]:
         return CommonMode(-np.inf, 1.0, 1.0)
@@ -302,10 +308,12 @@ def common_mode(
     values, vectors = np.linalg.eigh(np.array([[bent[0], mixed], [mixed, bent[1]]]) / _APART**2)
     values = np.maximum(values, 1 / np.max(_SPREAD[2:4]) ** 2)  # no less is known than before the data
     sds = np.sqrt(np.diag(vectors @ np.diag(1 / values) @ vectors.T))
-    none = replace(noise, common_sd=_FLOOR)
-    if truth is None:  # errors of the reference may then stand in for it
-        start = np.log(np.maximum(astuple(none), _LOW))
-        none = _likeliest(likelihood, start, np.arange(2))
+    none = replace(noise, common_sd=max(own_sd, _FLOOR))
+    # Errors of the reference may stand in for it, where nobody knows them, and the model's own may last.
+    free = [*(range(2) if truth is None else ()), *([3] if own_sd else ())]
+    if free:
+        start = np.log(np.clip(astuple(none), _LOW, _HIGH))
+        none = _likeliest(likelihood, start, np.array(free))
     return CommonMode(likelihood(none) - here - 0.5 * float(np.log(values).sum()), float(sds[0]), float(sds[1]))
 
 

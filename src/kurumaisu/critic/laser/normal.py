@@ -222,14 +222,16 @@ class Assembly:
         spans.append(self._nuisance)
         return np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
 
-    def common_mode(self, normal: Normal, truth: tuple[float, float] | None, fitted: Sequence[Form]) -> CommonMode:
+    def common_mode(
+        self, normal: Normal, truth: tuple[float, float] | None, fitted: Sequence[Form], own_sd: float = 0.0
+    ) -> CommonMode:
         """Return what says that whole scans are off together, whatever effects on the mean there are.
 
-        fitted: forms that act, with their shapes.
+        fitted: forms that act, with their shapes; own_sd [m]: of whole scans in the model.
         """
         project = self._projected(fitted)
         grams = self.grams(normal.beam_noise, project, lasting=True)
-        seen = common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise)
+        seen = common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise, own_sd)
         return replace(seen, wary=normal.wary)
 
     def full(self, normal: Normal) -> Normal:

@@ -78,6 +78,12 @@ def other_form(change: FloatArray, shots: Shots, seen: Look, valid: BoolArray) -
     return None if best is None else _over(best, _values(best, shots, seen)[known][::step], target)
 
 
+def of_beams(shots: Shots) -> OtherForm:
+    """Return curves over the bearing: what single beams keep, be it as smooth as it may."""
+    ends = shots.laser.bearings[[0, -1]]
+    return OtherForm("bearing", np.linspace(ends.min(), ends.max(), _HATS), np.eye(_HATS))
+
+
 def without(gram: FloatArray, columns: IntArray, prior: FloatArray) -> FloatArray:
     """Return normal equations with some columns' coefficients integrated out, which are normal with a covariance."""
     values, vectors = np.linalg.eigh(prior)

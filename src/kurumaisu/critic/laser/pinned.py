@@ -18,7 +18,7 @@ from scipy.linalg import block_diag
 from kurumaisu import effects
 from kurumaisu.critic.laser.columns import Form
 from kurumaisu.critic.laser.normal import Assembly, Normal
-from kurumaisu.critic.laser.other_forms import OtherForm
+from kurumaisu.critic.laser.other_forms import OtherForm, of_beams
 from kurumaisu.critic.laser.rivals import Rival
 from kurumaisu.critic.smooth_alike import FORM
 from kurumaisu.effects import Parameter
@@ -51,7 +51,8 @@ class Pinned:
 
     assembly: the scans as they are seen with these effects, where any of them moves beams; normal: the noise there, as
     far as it was estimated anew; left (k, b) [m]: of the residual there; missed (k, b, n) [m]: what equations that are
-    only nearly right may have wrong in it, 1 sd.
+    only nearly right may have wrong in it, 1 sd; slopes (k, b, p) [m]: how the mean follows what was fitted, per prior
+    sd of each.
     """
 
     settings: tuple[tuple[EffectSetting, dict[str, float]], ...]
@@ -59,6 +60,7 @@ class Pinned:
     normal: Normal
     left: FloatArray
     missed: FloatArray
+    slopes: FloatArray
 
 
 def pinned(
@@ -76,7 +78,8 @@ def pinned(
     instead, which is not left over either; truth: known sd of the reference.
     """
     if not forms and winner is None:
-        return Pinned((), assembly, normal, assembly.residual, np.empty((*assembly.residual.shape, 0)))
+        none = np.empty((*assembly.residual.shape, 0))
+        return Pinned((), assembly, normal, assembly.residual, none, none)
     at = [dict(setting.parameters) for setting in settings]
     curves = [others[form.id] for form in forms if form.id in others]
     block = _block(assembly, winner)
@@ -90,7 +93,8 @@ def pinned(
     for _ in range(_ROUNDS if moving else 1):
         if moving:
             # Where the chair was, which scans count and how they scatter: all of that was found without the effect.
-            assembly = assembly.again(_settings(forms, at)).beside(curves)
+            # What beams keep beyond an equation is no error of whole scans, of which each has other beams that count.
+            assembly = assembly.again(_settings(forms, at)).beside([*curves, of_beams(assembly.shots)])
             normal = normal if winner is not None else assembly.settle(truth)
         before = _values(free, at)
         for _ in range(_STEPS):
@@ -115,7 +119,10 @@ def pinned(
     for each, sd in zip(free, sds.tolist(), strict=True):
         out[each.index][each.parameter.name] = sd
     missed = FORM * np.nan_to_num(np.stack(signals, axis=-1)) if signals else np.empty((*left.shape, 0))
-    return Pinned(tuple(zip(_settings(forms, at), out, strict=True)), assembly, normal, left, missed)
+    ways = np.empty((*left.shape, 0))
+    if free:
+        ways = np.stack([slope * each.prior for slope, each in zip(slopes, free, strict=True)], axis=-1)
+    return Pinned(tuple(zip(_settings(forms, at), out, strict=True)), assembly, normal, left, missed, ways)
 
 
 def _signals(

@@ -22,6 +22,7 @@ _FITS = 10  # best sets beside which blocks are tried
 _SINGLES = 12  # best single effects likewise
 _PRUNED = 3  # best sets with a block that are pruned
 _WEAK = 1e-4  # prior precision of a coefficient of the catalogue, in units of its parameter's scale
+_FARTHEST = 3.0  # sds of a block's coefficients, beyond which hardly one lies
 _SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in units of its scale
 
 
@@ -162,6 +163,12 @@ def size(rival: Rival, gram: FloatArray) -> tuple[float, float, float]:
     cumulated = np.cumsum(np.exp(nats - logsumexp(nats)))
     low, middle, high = (float(np.interp(q, cumulated, _SIZES)) for q in (0.05, 0.5, 0.95))
     return middle, low, high
+
+
+def elsewhere(rival: Rival, gram: FloatArray) -> float:
+    """Return how far [m] a block may have put any wall of the map; of a curve, 0."""
+    p = rival.free.parameter
+    return 0.0 if p is None else _FARTHEST * p.scale * size(rival, gram)[0]
 
 
 def _tried(fits: Sequence[Fitted]) -> Iterator[Fitted]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,9 +96,9 @@ class Statistics:
         return [name for name, *_ in self._told()]
 
     def kinds(self) -> Kinds:
-        """Return which of the numbers are roots of counts, and which are places of piles."""
+        """Return which of the numbers are roots of counts, which are places of piles, and which follow one another."""
         counts = np.array([count for _, count, _ in self._told()])
-        return Kinds(counts, np.arange(len(counts)) >= len(counts) - _PLACES)
+        return Kinds(counts, np.arange(len(counts)) >= len(counts) - _PLACES, _trends(self.names()))
 
     def of_errors(self) -> BoolArray:
         """Return which of the numbers follow how far readings are off their mean."""
@@ -161,6 +162,16 @@ def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, retu
         names.append(f"return {value:g}")
         masks.append(expected & (returns == value))
     return Groups(tuple(names), tuple(mask for mask in masks if mask.any()))
+
+
+def _trends(names: Sequence[str]) -> FloatArray:
+    """Return weights (g, m) from -1 to 1 over each numbers' groups of ranges, and of incidences."""
+    starts = [f"{what}, {of} " for what in ("spread", "missing readings") for of in ("range", "incidence")]
+    out = np.zeros((len(starts), len(names)))
+    for row, start in zip(out, starts, strict=True):
+        own = [i for i, name in enumerate(names) if name.startswith(start)]
+        row[own] = np.linspace(-1.0, 1.0, len(own))
+    return out
 
 
 def _cells(assembly: Assembly) -> IntArray:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from kurumaisu.critic.laser.shots import Look, Shots, fired
 from kurumaisu.types import BoolArray, FloatArray
@@ -21,25 +22,34 @@ _MICRON = 6  # decimals of a metre: readings a grid apart are not within it, how
 _GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
 
 
-def edges(seen: Look, increment: float) -> BoolArray:
-    """Return (k, b) which beams have a corner or a jump of the range beside them; increment [rad] between beams."""
+def edges(seen: Look, increment: float, reach: float = 0.0) -> BoolArray:
+    """Return (k, b) which beams have a corner or a jump of the range beside them; increment [rad] between beams.
+
+    reach [m]: by how far corners may be elsewhere than on the map.
+    """
     with np.errstate(divide="ignore"):
         near = 1 / seen.level
     middle = near[:, 1:-1]
     jump = ~(near > 0)
     jump[:, [0, -1]] = True  # nobody sees what lies beyond
     jump[:, 1:-1] |= np.abs(near[:, 2:] + near[:, :-2] - 2 * np.cos(increment) * middle) > _KINK * middle
+    beside = _BESIDE + reach * maximum_filter1d(np.nan_to_num(near), 3, axis=1) / increment
     wide = jump.copy()
-    for shift in range(-_BESIDE, _BESIDE + 1):
-        moved = jump[:, max(0, -shift) : jump.shape[1] - max(0, shift)]
-        wide[:, max(0, shift) : jump.shape[1] - max(0, -shift)] |= moved
+    for shift in range(1, int(beside[jump].max()) + 1):
+        far = jump & (beside >= shift)
+        wide[:, shift:] |= far[:, :-shift]
+        wide[:, :-shift] |= far[:, shift:]
     return wide
 
 
-def trusted_place(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
-    """Return (k, b) which beams meet a wall where a reading may speak about the mean, whatever they read."""
+def trusted_place(shots: Shots, seen: Look, base: FloatArray, reach: float = 0.0) -> BoolArray:
+    """Return (k, b) which beams meet a wall where a reading may speak about the mean, whatever they read.
+
+    reach [m]: as of edges.
+    """
     inside = (base > shots.laser.range_min + _GATE) & (base < shots.laser.range_max - _GATE)
-    return np.asarray(inside & ~edges(seen, shots.laser.angle_increment) & (seen.incidence < _STEEPEST))
+    beside = edges(seen, shots.laser.angle_increment, reach)
+    return np.asarray(inside & ~beside & (seen.incidence < _STEEPEST))
 
 
 def trusted(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:

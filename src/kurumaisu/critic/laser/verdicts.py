@@ -4,32 +4,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.laser import pictures, rivals, still
-from kurumaisu.critic.laser.company import company, forms_beside
-from kurumaisu.critic.laser.estimates import estimates_of, of_block, settings_of, with_scatter
+from kurumaisu.critic.laser.acting import Acting, acting, cleared, gain_of, refitted
+from kurumaisu.critic.laser.estimates import estimates_of, of_block, with_scatter
 from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.leading import leading, with_lead
 from kurumaisu.critic.laser.normal import Assembly, Normal
-from kurumaisu.critic.laser.other_forms import OtherForm
-from kurumaisu.critic.laser.pictures import Part, Pictures, misfits, noise_rows
-from kurumaisu.critic.laser.pinned import Pinned, pinned
-from kurumaisu.critic.laser.rivals import Rival, Weighed
-from kurumaisu.critic.laser.search import Fitted, Found, Search
+from kurumaisu.critic.laser.pictures import Pictures, misfits, noise_rows
+from kurumaisu.critic.laser.pinned import Pinned
+from kurumaisu.critic.laser.search import Fitted, Search
 from kurumaisu.critic.laser.shots import gather, missing
 from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
 from kurumaisu.critic.laser.spread_fit import ScatterFit
 from kurumaisu.critic.laser.statistics import Statistics
 from kurumaisu.critic.laser.supply import every_id, supplier
+from kurumaisu.critic.laser.trust import trusted_place
 from kurumaisu.critic.laser.twins import Groups, joined, twins
 from kurumaisu.critic.laser.unknowns import unknowns
-from kurumaisu.critic.laser.whole_scans import beyond, with_whole_scans
+from kurumaisu.critic.laser.whole_scans import beyond, own_sd, with_whole_scans
 from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.replay import extend
@@ -70,29 +69,32 @@ def criticise(
         normal = assembly.settle(recording.truth, shaped)
         found = Search(assembly.forms, normal.gram).run()
     normal = assembly.full(normal)
-    made = _made(assembly, normal, found)
-    others = forms_beside(assembly, normal, made.fit)
-    made = made.beside(assembly, normal, others)
+    made = acting(assembly, normal, found)
+    made = made.beside(assembly, normal)
     progress("laser: fitting what acts")
-    acting = settings_of(assembly, made.fit)
-    fit = pinned(assembly, normal, made.fit.forms, acting, made.winner, others, recording.truth)
+    fit = refitted(assembly, normal, made, recording.truth)
     lead = leading(assembly, normal, made.fit, fit)
     certain = lead is not None and made.found.p[lead.id] >= NAMED
     if lead is not None and certain and all(own.id != lead.id for own in model.effects):
         progress(f"laser: looking at the rest beside {lead.id}")
         rest = criticise(recording, extend(model, [lead]), progress, ids)
         sds = next(sds for setting, sds in fit.settings if setting is lead)
-        cause = Cause(lead.id, min(made.found.p[lead.id], 1.0), estimates_of(lead, sds), _gain(made, lead.id))
+        cause = Cause(lead.id, min(made.found.p[lead.id], 1.0), estimates_of(lead, sds), gain_of(made, lead.id))
         size = size_of(assembly.marks.together([lead])[normal.beam_noise.valid])
         rest = replace(rest, details=(*rest.details, *_told({lead.id: size}, ())))
         return with_lead(rest, lead, cause, assembly, normal)
+    made, fit = cleared(assembly, normal, made, fit, recording.truth)
     progress("laser: weighing effects on the scatter")
-    scatter, comparison = ([], ()) if assembly.strange else _scatter(assembly, fit, ids, strange=made.curve)
-    if not made.curve and not assembly.strange:
-        seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms)
+    away = 0.0 if made.winner is None else rivals.elsewhere(made.winner, normal.gram)
+    scatter, comparison = (
+        ([], ()) if fit.assembly.strange else _scatter(assembly, fit, ids, strange=made.curve, away=away)
+    )
+    own = own_sd(model.effects)
+    if not made.curve and not fit.assembly.strange:
+        seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, own)
         scatter = with_whole_scans(scatter, seen, fit.normal.scan_noise, recording, ids)
-        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made, others))
-    heard = beyond(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])))
+        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made), own)
+    heard = beyond(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])), own)
     finding = _finding(assembly, normal, made, fit, heard)
     slight = tuple(each.setting.id for each in scatter if each not in heard)
     words = tuple(
@@ -112,70 +114,17 @@ def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model
     return supplier(model, open_ids or every_id(), recording.truth)
 
 
-@dataclass(frozen=True)
-class _Made:
-    """What acts on the mean: the forms' fit; winner: a block beside it, if any, its coefficients and covariance."""
-
-    weighed: Weighed
-    fit: Fitted
-    winner: Rival | None
-    coefficients: FloatArray
-    covariance: FloatArray
-
-    @property
-    def found(self) -> Found:
-        """The search's result with blocks in the running."""
-        return self.weighed.found
-
-    @property
-    def curve(self) -> bool:
-        """Whether a curve acts, which is in no catalogue."""
-        return self.winner is not None and self.winner.free.basis is not None
-
-    def beside(self, assembly: Assembly, normal: Normal, others: Mapping[str, OtherForm]) -> _Made:
-        """Return the same without effects that others of another form explain; of a curve, which is unlike any, all."""
-        if self.curve:
-            return self
-        fit, winner = company(assembly, normal, self.found, (self.fit, self.winner), others)
-        if fit is self.fit and winner is self.winner:
-            return self
-        if winner is None:
-            return _Made(self.weighed, fit, None, np.empty(0), np.empty((0, 0)))
-        return _Made(self.weighed, *_with(winner, normal))
-
-    def parts(self) -> list[Part]:
-        """Return what acts, one by one."""
-        out, start = [], 0
-        for form in self.fit.forms:
-            stop = start + len(form.columns)
-            out.append(Part(form.id, form.span, self.fit.coefficients[start:stop]))
-            start = stop
-        return [*out, Part(self.winner.free.id, self.winner.free.span, self.coefficients)] if self.winner else out
-
-
-def _made(assembly: Assembly, normal: Normal, found: Found) -> _Made:
-    weighed = rivals.weigh(found, assembly.free, normal.gram)
-    winner = weighed.winner
-    if winner is None:
-        return _Made(weighed, found.best, None, np.empty(0), np.empty((0, 0)))
-    return _Made(weighed, *_with(winner, normal))
-
-
-def _with(winner: Rival, normal: Normal) -> tuple[Fitted, Rival, FloatArray, FloatArray]:
-    fit, coefficients, covariance = rivals.joint(winner, normal.gram)
-    return fit, winner, coefficients, covariance
-
-
 def _scatter(
-    assembly: Assembly, fit: Pinned, ids: frozenset[str] | None, *, strange: bool
+    assembly: Assembly, fit: Pinned, ids: frozenset[str] | None, *, strange: bool, away: float
 ) -> tuple[list[Scatter], tuple[Comparison, ...]]:
     """Return the effects on how readings scatter about the best fit of their mean, and what they mend.
 
     strange: something that is in no catalogue acts on the mean. A curve misses steps and edges of it, nobody can say
-    how far, so that errors about it say nothing of scatter.
+    how far, so that errors about it say nothing of scatter. away [m]: by how far ends of walls may be elsewhere.
     """
     rows = fit.assembly.smooth_rows(_SCATTERED)
     few = fit.assembly.thinned(rows)
+    few.geometry &= trusted_place(few.shots, few.marks.seen, few.marks.base, away)
     statistics = Statistics(few, fit.normal.scan_noise)
     means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
@@ -188,8 +137,8 @@ def _scatter(
     return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
 
-def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatter: list[Scatter]) -> LaserFinding:
-    found = made.found
+def _finding(assembly: Assembly, normal: Normal, made: Acting, fit: Pinned, scatter: list[Scatter]) -> LaserFinding:
+    p = made.p
     sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
     settings = {setting.id: setting for setting, _ in fit.settings}
     estimates = {setting.id: estimates_of(setting, sds) for setting, sds in fit.settings}
@@ -201,18 +150,19 @@ def _finding(assembly: Assembly, normal: Normal, made: _Made, fit: Pinned, scatt
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
     curve = made.winner is not None and made.curve and made.winner.free.id in matters
-    gains = {name: _gain(made, name) for name in settings if found.p.get(name, 0.0) >= NAMED}
+    gains = {name: gain_of(made, name) for name in settings if p.get(name, 0.0) >= NAMED}
     # A curve is what one covariate shows of a thing nobody knows: what it leaves may be as much, and looks like others.
     least = made.winner.belief.nats if made.winner is not None and curve else -np.inf
     causes = tuple(
-        Cause(name, min(found.p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
+        Cause(name, min(p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
     )
-    unknown = tuple(assembly.told())
+    # Of the scans as they are seen with what acts: a laser that is askew looks past the ends of walls.
+    unknown = tuple(fit.assembly.told())
     unknown += tuple(unknowns(made.weighed, normal.gram)) if curve else ()
     groups = () if curve else _confused(assembly, normal, made, causes)
     confounded = tuple(group for group in groups if matters & set(group))
     causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
-    small = tuple(name for name in sizes if name not in matters and found.p.get(name, 0.0) >= NAMED)
+    small = tuple(name for name in sizes if name not in matters and p.get(name, 0.0) >= NAMED)
     details = (_noise_told(assembly, normal), *lacking(assembly), *_told(sizes, small))
     causes, added = with_scatter(causes, settings, scatter)
     confounded += tuple(group for group in map(_set_of, scatter) if group)
@@ -227,11 +177,13 @@ def _set_of(scatter: Scatter) -> tuple[str, ...]:
     return group if certain and scatter.p < NAMED else ()
 
 
-def _confused(assembly: Assembly, normal: Normal, made: _Made, causes: Sequence[Cause]) -> Groups:
+def _confused(assembly: Assembly, normal: Normal, made: Acting, causes: Sequence[Cause]) -> Groups:
     # Of a set, too: what explains the readings as well as its likeliest member belongs to it.
     open_ids = {name for group in made.found.confounded for name in group}
-    names = [*(cause.id for cause in causes), *sorted(open_ids & made.fit.ids)]
-    return joined(made.found.confounded, twins(made.found, made.winner, assembly.free, normal.gram, names))
+    later = made.more.found.best.ids if made.more is not None else frozenset()
+    names = [*(cause.id for cause in causes if cause.id not in later), *sorted((open_ids & made.fit.ids) - later)]
+    groups = joined(made.found.confounded, twins(made.found, made.winner, assembly.free, normal.gram, names))
+    return groups if made.more is None else joined(groups, made.more.groups)
 
 
 def _noise_told(assembly: Assembly, normal: Normal) -> str:
@@ -269,23 +221,13 @@ def size_of(change: FloatArray) -> float:
     return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))
 
 
-def _spread_of(assembly: Assembly, normal: Normal, made: _Made, others: Mapping[str, OtherForm]) -> float:
+def _spread_of(assembly: Assembly, normal: Normal, made: Acting) -> float:
     """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others.
 
-    others: the curves that some of it may follow instead, in which no scans are off together.
+    In the curves that some of it may follow instead no scans are off together.
     """
     valid, blocks = normal.beam_noise.valid, {free.id for free in assembly.free}
     parts = [part for part in made.parts() if part.id in blocks or effects.by_id(part.id).empirical]
-    parts = [part for part in parts if part.id not in others]
+    parts = [part for part in parts if part.id not in made.others]
     moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in parts]
     return float(np.std(sum(moved))) if moved else 0.0
-
-
-def _gain(made: _Made, name: str) -> float:
-    """Return the log evidence of the best set over the best one without an effect [nat]."""
-    # A curve that does not lead by enough is out of the running here, too, as it is where p comes from.
-    rivals = [rival for rival in made.weighed.rivals if made.curve or rival.free.basis is None]
-    sets = [(fit.ids, fit.score) for fit in made.found.fits]
-    sets += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in rivals]
-    own = max((worth for ids, worth in sets if name in ids), default=-np.inf)
-    return float(own - max((worth for ids, worth in sets if name not in ids), default=-np.inf))

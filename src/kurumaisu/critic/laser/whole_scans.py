@@ -75,13 +75,22 @@ def _reach(value: float, ends: FloatArray) -> tuple[float, float]:
     return below, above
 
 
-def beyond(scatter: Sequence[Scatter], least: float) -> list[Scatter]:
-    """Return effects on the scatter without those that have whole scans off together by less than `least` [m]."""
+def own_sd(own: Sequence[EffectSetting]) -> float:
+    """Return the sd [m] of whole scans in a model with these effects."""
     sizes = {whole.id: whole.size.name for whole in together()}
+    return float(np.linalg.norm([each.parameters[sizes[each.id]] for each in own if each.id in sizes]))
+
+
+def beyond(scatter: Sequence[Scatter], least: float, own: float = 0.0) -> list[Scatter]:
+    """Return effects on the scatter without those that have whole scans off together by less than `least` [m].
+
+    own [m]: by which they are in the model already.
+    """
+    known = {whole.id for whole in together()}
     return [
         each
         for each in scatter
-        if each.setting.id not in sizes or each.setting.parameters[sizes[each.setting.id]] >= least
+        if each.setting.id not in known or np.sqrt(abs(own_sd([each.setting]) ** 2 - own**2)) >= least
     ]
 
 

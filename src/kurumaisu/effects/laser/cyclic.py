@@ -16,7 +16,7 @@ class Cyclic(ReadingEffect):
     stage = LaserStage.BIAS
     parameters = (
         Parameter("amplitude", "m", null=0.0, scale=0.003, lower=-0.1, upper=0.1),
-        Parameter("wavelength", "m", null=3.0, scale=1.0, lower=0.1, upper=20.0),
+        Parameter("wavelength", "m", null=3.0, scale=1.0, lower=0.1, upper=4.0),
         Parameter("phase", "rad", null=0.0, scale=1.0, lower=-6.3, upper=6.3),
     )
     sentence = "the error of the ranges repeats with the range, as of a phase-shift laser"
