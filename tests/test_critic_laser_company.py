@@ -11,7 +11,6 @@ from kurumaisu.critic.laser.noise import CommonMode, Gram, Layout, ScanNoise, co
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.spread import Scatter, ScatterSearch
 from kurumaisu.critic.laser.spread_fit import ScatterFit
-from kurumaisu.critic.laser.twins import twins
 from kurumaisu.critic.laser.verdicts import size_of
 from kurumaisu.critic.laser.whole_scans import beyond, own_sd, with_whole_scans
 from kurumaisu.critic.recording import Recording, Run, Series
@@ -105,23 +104,6 @@ def _forms():
     one = Form("laser.offset", {}, (Column(offset, squared=False, beside={}),), 0)
     sides = tuple(Column(warmth, squared=False, beside={"reference": at}) for at in (10.0, 40.0))
     return [one, Form("laser.temperature", {"reference": 10.0}, sides, 1, between=False)]
-
-
-@pytest.mark.parametrize(("tau", "named"), [(2500.0, "laser.offset"), (100.0, "laser.warmup")])
-def test_what_falls_off_too_slowly_to_be_seen_is_an_offset(tau, named):
-    """In three minutes, nobody can see whether it does in forty."""
-    time = np.linspace(0.0, 180.0, 400)
-    offset, amplitude = (effects.by_id(name).parameters[0] for name in ("laser.offset", "laser.warmup"))
-    forms = [Form("laser.offset", {}, (Column(offset, squared=False, beside={}),), 0)]
-    for i, each in enumerate((2500.0, 100.0)):
-        forms.append(Form("laser.warmup", {"tau": each}, (Column(amplitude, squared=False, beside={}),), 1 + i))
-    y = 2.0 * np.exp(-time / tau) + 0.5 * np.random.default_rng(2).standard_normal(400)
-    rows = np.column_stack([np.ones(400), np.exp(-time / 2500.0), np.exp(-time / 100.0), y]) / 0.5
-    gram = rows.T @ rows
-    found = Search(forms, gram).run()
-    assert found.best.ids == {named}
-    assert found.p[named] > 0.95
-    assert twins(found, None, [], gram, [named]) == ()
 
 
 @pytest.mark.parametrize(("slope", "named"), [(0.0, "laser.offset"), (8.0, "laser.temperature")])

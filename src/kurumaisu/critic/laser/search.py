@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu import effects
 from kurumaisu.critic.laser.columns import Form
 from kurumaisu.critic.naming import NAMED, RIVAL
 from kurumaisu.critic.prior import Z_LOW, log_prior, occam
@@ -22,7 +21,6 @@ _WEAK = 1e-4  # prior precision of a coefficient, in units of its parameter's sc
 # form, and what its form leaves is not another one.
 FORM = 0.02
 _CONTAINED = 1e-4  # share of a column's power that a form may leave, and contain it
-_LASTING = 1e-2  # likewise, of one that falls off so slowly that within the scans it is as good as constant
 _INSTEAD = 2.0  # times as likely without an effect as beside it is what stands in for it
 
 
@@ -118,10 +116,9 @@ class Search:
             self._known[chosen] = None if fit is None or self._plainer(chosen, fit) else fit
 
     def _plainer(self, chosen: frozenset[int], fit: Fitted) -> bool:
-        """Return whether a plainer form, which one of the set contains, explains as much in its place.
+        """Return whether a form of fewer columns, which one of the set contains, explains as much in its place.
 
-        What shows of a temperature that hardly varies, about a reference that is anywhere, is an offset. So is what
-        falls off over a time so long that the scans show none of it.
+        What shows of a temperature that hardly varies, about a reference that is anywhere, is an offset.
         """
         for i in chosen:
             for j in self._contains[i]:
@@ -191,18 +188,13 @@ def confusion(
 
 
 def _contained(form: Form, forms: Mapping[int, Form], gram: FloatArray) -> list[int]:
-    """Return which forms of one column and another effect a form contains that has several, or a time of its own."""
-    parameters = effects.by_id(form.id).parameters if form.at else ()
-    lasts = any(p.unit == "s" for p in parameters if p.name in form.at)
-    if len(form.columns) == 1 and not lasts:
-        return []
-    out, share = [], _CONTAINED if len(form.columns) > 1 else _LASTING
-    for j, other in forms.items():
-        plain = len(other.columns) == 1 and (len(form.columns) > 1 or not other.at)
-        if plain and other.id != form.id:
+    """Return which forms of one column and another effect a form of several columns contains."""
+    out = []
+    for j, other in forms.items() if len(form.columns) > 1 else ():
+        if len(other.columns) == 1 and other.id != form.id:
             inner, outer = gram[form.span, form.span], gram[form.span, other.start]
             left = gram[other.start, other.start] - outer @ np.linalg.lstsq(inner, outer, rcond=1e-9)[0]
-            if left < share * gram[other.start, other.start]:
+            if left < _CONTAINED * gram[other.start, other.start]:
                 out.append(j)
     return out
 
