@@ -18,16 +18,13 @@ from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.missed import Missed, Muted
 from kurumaisu.critic.noise import Noise, whitener
 from kurumaisu.critic.prior import Z_USUAL, in_proportion, log_prior, occam, occam_plane
+from kurumaisu.critic.teeth import Teeth
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
-_STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a refit may start
 _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
 _ROUGH_DERIVATIVE = 1e-4  # the same of what has a comb of likely values: right between its teeth
-_PLACES = 17  # that are tried on a tooth of a comb
-_TEETH, _BETTER = 8, 0.1  # how often a tooth is left for a likelier one close by, and by how much that is so [nat]
-HOPE = 4.0  # [nat] less is not worth a closer look: a tooth costs more
 _ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
 
 
@@ -137,8 +134,12 @@ class Problem:
 
     def residual(self, terms: Sequence[Term], values: FloatArray) -> FloatArray:
         """Return the whitened residual with these parameters, (rows,)."""
+        return np.concatenate(self.residuals(terms, values))
+
+    def residuals(self, terms: Sequence[Term], values: FloatArray) -> list[FloatArray]:
+        """Return the whitened residual of each drive, (rows,) each."""
         settings = settings_of(terms, values)
-        return np.concatenate([self._whitened(drive, settings) for drive in self.drives])
+        return [self._whitened(drive, settings) for drive in self.drives]
 
     def columns(self, terms: Sequence[Term], values: FloatArray, of: Sequence[Term]) -> FloatArray:
         """Return minus the derivative of the residual by each term of `of` at a fit, per step, (rows, k)."""
@@ -186,7 +187,7 @@ class Problem:
             y = self.residual((), np.empty(0))
             likelihood = -0.5 * float(y @ y)
             return Fit(frozenset(), (), np.empty(0), np.empty(0), (), likelihood, likelihood)
-        solution = self._on_teeth(terms, solve.least_squares(self, terms, self._start(terms, start)))
+        solution = self.teeth.likeliest(terms, solve.least_squares(self, terms, self.teeth.first(terms, start)))
         costs = self._occam(ordered, terms, solution)
         return Fit(
             frozenset(ordered),
@@ -198,85 +199,10 @@ class Problem:
             -solution.cost - costs,
         )
 
-    def _start(self, terms: Sequence[Term], start: Mapping[Key, float]) -> FloatArray:
-        """Return first values: those given; for others, one after the other, the best of some steps from null."""
-        lower = np.array([term.parameter.lower for term in terms])
-        upper = np.array([term.parameter.upper for term in terms])
-        values = np.array([start.get(term.key, term.null) for term in terms])
-        values = np.clip(values, lower, upper)
-        for i, term in enumerate(terms):
-            if term.key in start or term.shape or term.fixed:
-                continue
-            steps = [sign * n * term.step * term.parameter.scale for n in _STARTS for sign in (1, -1)]
-            values = self._rough_start(terms, values, i) if term.rough else values
-            values = self._nearest(terms, values, i, [term.null + step for step in steps])
-        return values
-
-    def _nearest(self, terms: Sequence[Term], values: FloatArray, i: int, guesses: Iterable[float]) -> FloatArray:
-        """Return values with the best of some guesses of one of them, or of itself where it is not null."""
-        p, own = terms[i].parameter, values[i]
-        inside = [guess for guess in guesses if p.lower <= guess <= p.upper]
-        inside += [own] if own != terms[i].null or not inside else []
-        tried = [np.where(np.arange(len(values)) == i, guess, values) for guess in inside]
-        return min(tried, key=lambda guess: float(np.sum(self.residual(terms, guess) ** 2)))
-
-    def _rough_start(self, terms: Sequence[Term], values: FloatArray, i: int) -> FloatArray:
-        """Return values with the best tooth of a comb of likely ones, and the best place on it."""
-        settings = settings_of(terms, values)
-        residual = [self._whitened(drive, settings) for drive in self.drives]
-        starts = self._comb.starts(terms[i], _form(terms, i), residual)
-        if not starts or starts[0].nats < HOPE:
-            return np.where(np.arange(len(values)) == i, starts[0].value if starts else values[i], values)
-        apart = {start.value: start.apart for start in starts}
-        found = self._nearest(terms, values, i, apart)
-        places = np.linspace(-1.0, 1.0, _PLACES) * apart.get(float(found[i]), 0.0)
-        return self._nearest(terms, found, i, found[i] + places[places != 0])
-
-    def _on_teeth(self, terms: Sequence[Term], solution: solve.Solution) -> solve.Solution:
-        """Return a solution in which what has a comb of likely values is where none close by is likelier.
-
-        The tooth on which it began was the best one before the others were fitted.
-        """
-        rough = [i for i, term in enumerate(terms) if term.rough and not term.fixed]
-        for _ in range(_TEETH if rough else 0):
-            values = solution.values
-            for i in rough:
-                apart = self._comb.apart(terms[i], _form(terms, i), float(values[i]))
-                for way in (apart, apart / _PLACES):
-                    values = self._nearest(terms, values, i, values[i] + way * np.linspace(-1.0, 1.0, _PLACES))
-            left = self.residual(terms, values)
-            if 0.5 * float(solution.residual @ solution.residual - left @ left) < _BETTER:
-                break
-            again = solve.least_squares(self, terms, values)
-            if again.cost >= solution.cost:
-                break
-            solution = again
-        return solution
-
-    def retoothed(self, fit: Fit, rough: Candidate) -> dict[Key, float]:
-        """Return the values of a fit with the best tooth of something rough in its set, seen beside the rest."""
-        values = fit.values
-        for i, term in enumerate(fit.terms):
-            if term.id == rough.id and term.rough:
-                values = self._rough_start(fit.terms, np.where(np.arange(len(values)) == i, term.null, values), i)
-        return {term.key: float(value) for term, value in zip(fit.terms, values, strict=True)}
-
-    def hope(self, rough: Candidate, terms: Sequence[Term], values: FloatArray) -> float:
-        """Return what the best tooth of a rough candidate explains beside other effects, by lines, in nats."""
-        settings = settings_of(terms, values)
-        residual = [self._whitened(drive, settings) for drive in self.drives]
-        form = [term for term in rough.terms if term.fixed]
-        starts = [self._comb.starts(term, form, residual) for term in rough.terms if term.rough]
-        return max((found[0].nats for found in starts if found), default=0.0)
-
-    @property
-    def comb_share(self) -> float:
-        """Return how many times longer the drives are than what the combs of likely values see of them."""
-        return self._comb.share
-
     @cached_property
-    def _comb(self) -> Comb:
-        return Comb(self.drives, self.model, self.noise, self._walked)
+    def teeth(self) -> Teeth:
+        """Return what finds first values, and those of what has a comb of likely ones."""
+        return Teeth(self, lambda: Comb(self.drives, self.model, self.noise, self._walked))
 
     def _occam(self, chosen: Sequence[Candidate], terms: Sequence[Term], solution: solve.Solution) -> float:
         """Return what the set costs, in nats: Laplace's approximation about the fit, with the prior of each signal."""
@@ -396,11 +322,6 @@ def _teeth(terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int])
     sds = [solution.sds[i] for i in many]
     width = np.sqrt(2 * np.pi) * np.array(sds) / np.maximum(sizes, 1e-12)
     return float(np.sum(_ROUGH_RANGE - np.log(np.clip(width, 1e-6, 1.0))))
-
-
-def _form(terms: Sequence[Term], i: int) -> list[Term]:
-    """Return the fixed terms that say in which form the effect of a term acts."""
-    return [term for term in terms if term.id == terms[i].id and term.fixed]
 
 
 def _shape_cost(term: Term, solution: solve.Solution, i: int) -> float:

@@ -12,10 +12,11 @@ from scipy.special import logsumexp
 from kurumaisu import effects
 from kurumaisu.critic import stand_ins
 from kurumaisu.critic.catalogue import Candidate, Key, Term
-from kurumaisu.critic.evidence import HOPE, Fit, Problem, log_posterior
+from kurumaisu.critic.evidence import Fit, Problem, log_posterior
 from kurumaisu.critic.exchanged import exchanges
 from kurumaisu.critic.scan import Guess, Screen
 from kurumaisu.critic.stand_ins import Posterior, confounded
+from kurumaisu.critic.teeth import HOPE
 from kurumaisu.types import FloatArray
 
 NAMED, RIVAL = stand_ins.NAMED, stand_ins.RIVAL
@@ -197,7 +198,9 @@ def _neighbours(
                 yield frozenset({other}), {}
             yield fit.candidates | {other}, kept
     # Its tooth was the best one when less acted beside it.
-    yield from ((fit.candidates, problem.retoothed(fit, one)) for one in fit.candidates if one.rough)
+    yield from (
+        (fit.candidates, problem.teeth.anew(fit.terms, fit.values, one.id)) for one in fit.candidates if one.rough
+    )
     yield from _combs(problem, screen, fit)
 
 
@@ -222,7 +225,7 @@ def hopeless_alone(problem: Problem, rough: Candidate, empty: Fit, fit: Fit) -> 
     sizes = [term for term in rough.terms if not term.fixed and not term.shape]
     if not all(term.rough for term in sizes):
         return False
-    hope = max(problem.hope(rough, empty.terms, empty.values), 0.0) * problem.comb_share * len(sizes)
+    hope = max(problem.teeth.hope(rough.terms, empty.terms, empty.values), 0.0) * problem.teeth.share * len(sizes)
     return empty.log_likelihood + _HOPES * hope < fit.log_likelihood - _HOPELESS
 
 
@@ -235,7 +238,10 @@ def _combs(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen,
     for other in problem.candidates if parts else ():
         if not other.rough or other in fit.candidates:
             continue
-        hopes = [(problem.hope(other, terms, values), likelihood, part) for part, terms, values, likelihood in parts]
+        hopes = [
+            (problem.teeth.hope(other.terms, terms, values), likelihood, part)
+            for part, terms, values, likelihood in parts
+        ]
         hope, likelihood, part = max(hopes, key=lambda found: found[0] + found[1])
         if hope > HOPE and likelihood + hope > fit.log_likelihood - _CLOSE:
             begin = {key: value for key, value in part.start.items() if key[0] != other.id}
