@@ -138,3 +138,42 @@ def test_what_changes_within_a_step_is_known_and_rests_are_rests():
             assert (w == 0) == (rates[before, 1] == 0)
         elif (rates[np.flatnonzero(inside)[0]] != rates[before]).any():
             assert share == pytest.approx((t[inside][0] - low) / 0.01, abs=1e-6)
+
+
+def steps_beside(step, cut, **others):
+    """Return a problem of a converter's steps beside smooth effects, and the candidates that hide in it."""
+    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
+    sizes = {STEP: {"size": step, "cut": cut}, **{f"base.{name}": {"size": size} for name, size in others.items()}}
+    data = base_case.recording("steps", drives, [BASE[name].fault(of, "other") for name, of in sizes.items()])
+    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset(sizes))
+    form = {"phase": 0.5, "cut": cut, "rests": 0.0}
+    rough = [
+        one
+        for one in problem.candidates
+        if one.id == STEP and {term.key[1]: term.parameter.lower for term in one.terms if term.fixed} == form
+    ]
+    return problem, rough + [one for one in problem.candidates if one.id != STEP and one.usual]
+
+
+def test_a_fit_goes_on_to_the_likeliest_tooth_close_by():
+    problem, chosen = steps_beside(0.02726, 1.0, gain_v=0.05, cross_w_to_v=-0.1)
+    near, true = (problem.fit_candidates(chosen, {(STEP, "step"): 0.02726 * off}) for off in (0.998, 1.0))
+    assert near.log_likelihood > true.log_likelihood - 0.5
+
+
+def test_a_tooth_is_sought_anew_beside_what_was_found_since():
+    problem, chosen = steps_beside(0.0523, 1.0, cross_v_to_w=0.03, cross_w_to_v=-0.06)
+    stuck = problem.fit_candidates(chosen, {(STEP, "step"): 0.06})
+    assert stuck.start[STEP, "step"] != pytest.approx(0.0523, rel=5e-3)
+    begin = problem.teeth.anew(stuck.terms, stuck.values, STEP)
+    assert begin[STEP, "step"] == pytest.approx(0.0523, rel=2e-3)
+    assert naming.search(problem, lambda _: None, stuck).best.start[STEP, "step"] == pytest.approx(0.0523, rel=2e-3)
+
+
+@pytest.mark.parametrize("cut", [0.0, 1.0])
+def test_edges_that_held_voltages_cross_do_not_use_up_the_sizes(cut):
+    """However close two sizes are, a voltage that is held for long may be rounded to one side, then to the other."""
+    problem, chosen = steps_beside(0.0523, cut)
+    rough = next(candidate for candidate in chosen if candidate.id == STEP)
+    begin = problem.teeth.first(rough.terms, {})
+    assert begin[[term.key for term in rough.terms].index((STEP, "step"))] == pytest.approx(0.0523, rel=2e-3)

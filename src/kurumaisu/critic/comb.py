@@ -27,6 +27,9 @@ _CELLS = 20  # of the grid for which a change of the rates is held
 _TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a first value needs no more
 _ALIKE = (0.4, 0.8)  # correlation of neighbouring sizes: below, there is one between them; above, they may be farther
 _GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
+# Least way from one size to the next, in sizes: what the largest value is moved by then, in steps.
+# Where a held voltage crosses an edge nothing is alike, however close.
+_SHIFT = 0.1
 _SIZES = 700  # at most
 _HALVINGS = 6  # of the way between two sizes: the narrowest teeth are that much closer than rates tell
 _FAINT = 0.2  # of the norm of its neighbour
@@ -168,7 +171,7 @@ class Comb:
             change = self._change(term, fixed, value)
             here = self._teeth(change)
             alike = 1.0 if before is None else _alike(before, here)
-            if alike < _ALIKE[0] and growth > _GROWTH[0]:
+            if alike < _ALIKE[0] and growth > max(_GROWTH[0], _SHIFT * size / room):
                 size, growth = size * (1 + growth) / (1 + growth / 2), growth / 2
                 continue
             yield value, change
