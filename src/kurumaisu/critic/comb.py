@@ -30,7 +30,8 @@ _GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
 # Least way from one size to the next, in sizes: what the largest value is moved by then, in steps.
 # Where a held voltage crosses an edge nothing is alike, however close.
 _SHIFT = 0.1
-_SIZES = 700  # at most
+_SIZES = 900  # at most
+_SEEN = 3.0  # z of a size below which there is none worth a look: what cuts off does more than what rounds
 _HALVINGS = 6  # of the way between two sizes: the narrowest teeth are that much closer than rates tell
 _FAINT = 0.2  # of the norm of its neighbour
 _KNOTS = 8  # of a free curve over a rate, per direction
@@ -165,10 +166,10 @@ class Comb:
         least = abs(term.step) * term.parameter.scale / 3
         before: FloatArray | None = None
         for _ in range(_SIZES):
-            if size < least:
-                return
             value = term.null + sign * size
             change = self._change(term, fixed, value)
+            if size < least and float(self._products(change[np.newaxis])[0][0]) < _SEEN**2:
+                return
             here = self._teeth(change)
             alike = 1.0 if before is None else _alike(before, here)
             if alike < _ALIKE[0] and growth > max(_GROWTH[0], _SHIFT * size / room):
