@@ -179,3 +179,10 @@ def test_scans_are_compared_with_the_map_though_only_the_model_mounts_the_laser(
     made = make(Ask("wrong", (fault,), family="laser"), 34100, tmp_path)
     assert examine(replace(made.recording, laser=None), model).invalid
     assert examine(replace(made.null, laser=None), model).invalid == []
+
+
+@pytest.mark.parametrize("seed", [36450, 36451])
+def test_a_laser_that_is_mounted_a_little_elsewhere_has_no_other_clock(seed, tmp_path):
+    """Before one wall, from a few distances, clocks 22 s apart would do as much: 10 and 18 cm."""
+    made = make(Ask("confounded", ("laser.mount_x",), design="wall", family="laser"), seed, tmp_path)
+    assert examine(made.recording, load_model(shipped("launch/md100.yaml"))).invalid == []
