@@ -179,7 +179,7 @@ def _odd(name: str, scale: LaserScale, sizes: Sizes, form: str) -> float:
     fault = LASER[name].fault(sizes, form)
     if fault.form.stage == "sd":
         return spread_z(scale.nominal, fault.form.act(scale.nominal, sizes), scale.count)
-    return odd_z(name, sizes, scale.nominal, scale.count)
+    return odd_z(name, sizes, scale)
 
 
 def _all_but(count: int, i: int) -> list[int]:

@@ -82,15 +82,33 @@ class LaserScale:
         mine = patches[:, None] == np.unique(patches)[: None if sd > 0 else 0]
         return np.where(self._seen[..., None], mine * sd / np.sqrt(_PATCH), 0.0)
 
-    def _without_poses(self, signals: FloatArray) -> FloatArray:
-        """Return the products of whitened signals without what errors of poses and of whole scans explain."""
+    def per_scan(self) -> FloatArray:
+        """Return how closely its readings know 1 m of a whole scan (s,) [1/m^2], beside errors of its poses in a drive.
+
+        While the chair stands, an error of its pose is the same in all scans.
+        """
+        products = self._products(np.empty((*self._seen.shape, 0)))
+        whole = products[:, -1, -1]
+        if not self.tour.moving:
+            return np.asarray(whole)
+        position, heading = self.tour.truth
+        prior = np.tile([position**-2, position**-2, heading**-2], (products.shape[1] - 1) // 3)
+        cross = products[:, :-1, -1:]
+        return np.asarray(whole - (cross * np.linalg.solve(products[:, :-1, :-1] + np.diag(prior), cross)).sum((1, 2)))
+
+    def _products(self, signals: FloatArray) -> FloatArray:
+        """Return the products (s, k + n, k + n) of whitened signals (s, b, k) and what `_pose_columns` are."""
         sd = np.hypot(self.nominal.sd * self._wider, 0.001 / np.sqrt(12))
         effects = np.where(self._seen[..., None], self._pose_columns(), 0.0)
         white = _unchained(np.concatenate([signals, effects], axis=2) / sd[..., None], self._backdrop.beam_rho)
+        return np.asarray(white.transpose(0, 2, 1) @ white)
+
+    def _without_poses(self, signals: FloatArray) -> FloatArray:
+        """Return the products of whitened signals without what errors of poses and of whole scans explain."""
         # Stops stand still, so one scan says what all of its stop do; scans of a drive have each a pose of their own.
         weight = 1.0 if self.tour.moving else self.count
         k = signals.shape[2]
-        products = weight * (white.transpose(0, 2, 1) @ white)
+        products = weight * self._products(signals)
         rest = self._taken(products, k)
         return np.asarray(products[:, :k, :k].sum(axis=0) - rest) * (self.count if self.tour.moving else 1.0)
 
@@ -218,15 +236,16 @@ def spread_z(nominal: Scans, changed: Scans, count: float) -> float:
     return float(np.sqrt(count * (q**2 - 1 - 2 * np.log(q)).sum()))
 
 
-def odd_z(name: str, sizes: Sizes, nominal: Scans, count: float) -> float:
+def odd_z(name: str, sizes: Sizes, scale: LaserScale) -> float:
     """Return z of what is neither mean nor deviation, by its likelihood ratio per reading."""
+    nominal, count = scale.nominal, scale.count
     valid = np.isfinite(nominal.ranges) & (nominal.mean < laws.LASER_FAR)
     readings, size = count * valid.sum(), sizes["size"]
     near = nominal.ranges[:, :-1], nominal.ranges[:, 1:]
     with np.errstate(invalid="ignore"):
         jumps = count * (valid[:, :-1] & valid[:, 1:] & (np.abs(near[0] - near[1]) > 0.1)).sum()
     beyond = count * (valid & (nominal.mean > 1 / max(size, 1e-9))).sum()
-    common = 1 + size**2 * (np.where(valid, nominal.sd, np.inf) ** -2).sum(axis=1)
+    common = 1 + size**2 * scale.per_scan()
     worth = {
         "laser.mixed_pixels": lambda: 2 * jumps * _bernoulli(size),
         "laser.dropout": lambda: 2 * readings * _bernoulli(size),
