@@ -27,6 +27,7 @@ _SHARE = 0.002  # posterior, as far as it is believed, from which it is asked wh
 _FITS = 10  # sets of the catalogue beside which curves are tried
 _JUMPING = 0.2  # share of what is outside the catalogue that jumps
 _BENDING = 0.2  # share of it that bends more often than a usual curve can
+_ROUNDED = 1e-9  # share of what a curve does that may be left beside a set by rounding, or less than nothing be
 _HINTS = 3  # curves beside a set that are tried so: most of a jump shows in a curve that cannot jump
 
 
@@ -145,7 +146,8 @@ def _rivals(problem: Problem, designs: Designs, fits: Sequence[tuple[Fit, float]
         cross, b = products[:-1], products[-1]
         for curve, gram in zip(design.curves, grams[design], strict=True):
             part = cross[:, curve.columns]
-            found = belief(gram - part.T @ part, b[curve.columns], curve.basis.priors)
+            left = gram - part.T @ part + _ROUNDED * np.diag(np.diag(gram))
+            found = belief(left, b[curve.columns], curve.basis.priors)
             # All curves of a kind that the data chose from share what one has.
             chosen = replace(found, nats=found.nats - float(np.log(curve.basis.ways)))
             beside.append(Rival(fit, designs.paced(fit, curve), chosen, worth + chosen.nats + share + plain))

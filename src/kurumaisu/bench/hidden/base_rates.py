@@ -14,6 +14,8 @@ from scipy.signal import lfilter
 from kurumaisu.bench.hidden.motion import STEP, Measured, Rates, Sizes
 from kurumaisu.types import FloatArray
 
+_STANDS = 1e-3  # [m/s] below which casters do not roll
+
 
 def _follow(rate: FloatArray, tau: float) -> FloatArray:
     """Return a first-order response from rest, by the trapezoidal rule."""
@@ -165,7 +167,7 @@ def caster_swing(r: Rates, s: Sizes) -> Rates:
 def _kicks(r: Rates, s: Sizes, shape: Callable[[FloatArray], FloatArray]) -> FloatArray:
     out = np.zeros_like(r.v)
     way = np.concatenate([[0.0], np.cumsum(np.abs(r.v)) * STEP])
-    driving = np.flatnonzero(r.v != 0)
+    driving = np.flatnonzero(np.abs(r.v) > _STANDS)
     turning = np.flatnonzero(r.asked_w != 0)
     turns = driving[1:][np.sign(r.v[driving[1:]]) != np.sign(r.v[driving[:-1]])]
     for start, end in pairwise([*turns, len(out)]):
@@ -175,7 +177,7 @@ def _kicks(r: Rates, s: Sizes, shape: Callable[[FloatArray], FloatArray]) -> Flo
             middle = (way[start:end] + way[start + 1 : end + 1]) / 2 - way[start]
             out[start:end] = s["size"] * np.sign(r.asked_w[turning[last]]) * shape(middle)
     # A chair that lags never quite comes to rest; its casters do not go on turning it there.
-    return np.asarray(np.where(np.abs(r.v) > 1e-3, out, 0.0))
+    return np.asarray(np.where(np.abs(r.v) > _STANDS, out, 0.0))
 
 
 def rate_noise(r: Rates, s: Sizes) -> Rates:
