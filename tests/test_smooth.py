@@ -342,3 +342,12 @@ def test_a_curve_that_draws_a_strong_cause_as_well_does_not_hide_it():
     verdict = pipeline.criticise(recording, MD100, lambda _: None).verdict
     assert [cause.id for cause in verdict.causes] == ["base.marker_x"]
     assert verdict.causes[0].p > 0.99
+
+
+def test_what_rounding_leaves_of_a_curve_speaks_for_nothing():
+    """At one speed a gain and an offset draw whatever a constant does: -1e-10 of 1e5 was left of that, for 68 nats."""
+    case = hidden_make(Ask("confounded"), 36463)
+    assert case.truth.ids == ("base.gain_v",)
+    verdict = pipeline.criticise(case.recording, MD100, lambda _: None).verdict
+    assert verdict.causes == ()
+    assert any({"base.gain_v", "base.dac_zero_f"} <= set(group) for group in verdict.confounded)
