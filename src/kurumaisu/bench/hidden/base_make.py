@@ -98,7 +98,7 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
     """Return the truth: heard is the scale under the noise that there is, of which what hides in it has a part."""
     ids = tuple(sizes)
     parameters = {name: BASE[name].names(sizes[name]) for name in ids}
-    means = [name for name in ids if name != _NOISE]
+    means = _means(ids)
     loud = {name: _spread_z(scale, BASE[name].fault(sizes[name], ask.form)) for name in ids if name == _NOISE}
     if not means:
         return Truth(ask.kind, ids, parameters, z=sum(loud.values()), z_alone=loud, accepted=(ids,) if ids else ())

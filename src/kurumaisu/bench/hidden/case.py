@@ -24,8 +24,7 @@ class Truth:
     id is rival; z_form: what the usual equation leaves of it; channel, covariates: where something outside the
     catalogue shows, and what it is right to say that it follows; problem: what is wrong with wrong data; accepted: sets
     of ids of which each explains the signal to within z 3; near: ids that leave less than APART of it, which a set may
-    have or not; background: ids that the null has, too, which are right to
-    name and right to leave out.
+    have or not; background: ids that the null has, too, which are right to name and right to leave out.
     """
 
     kind: str

@@ -35,7 +35,7 @@ def edges(seen: Look, increment: float, reach: float = 0.0) -> BoolArray:
     jump[:, 1:-1] |= np.abs(near[:, 2:] + near[:, :-2] - 2 * np.cos(increment) * middle) > _KINK * middle
     beside = _BESIDE + reach * maximum_filter1d(np.nan_to_num(near), 3, axis=1) / increment
     wide = jump.copy()
-    for shift in range(1, int(beside[jump].max()) + 1):
+    for shift in range(1, int(min(beside[jump].max(), jump.shape[1] - 1)) + 1):
         far = jump & (beside >= shift)
         wide[:, shift:] |= far[:, :-shift]
         wide[:, :-shift] |= far[:, shift:]
