@@ -131,7 +131,7 @@ BASE: dict[str, Hidden] = {
         lambda s: {"droop": s["size"], "tau": s["ratio"] * s["size"]},
         lambda rng: {"ratio": float(rng.uniform(1.5, 3.0))},
     ),
-    "base.process_noise": Hidden(*_of("spread", ra.rate_noise), 1.0, False, 20.0, lambda _: {}),
+    "base.process_noise": Hidden(*_of("spread", ra.rate_noise), 1.0, False, 4.0, lambda _: {}),
     "base.sign": Hidden(
         *_of("events", ev.sign), 1.0, False, 1.0, lambda _: {}, lambda rng: {"kind": float(rng.integers(4))}, False
     ),

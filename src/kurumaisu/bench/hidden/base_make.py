@@ -64,7 +64,11 @@ def _means(ids: Sequence[str]) -> list[str]:
 
 def _loudness(scale: Scale, form: str, wanted: float) -> Sizes:
     hidden = BASE[_NOISE]
-    return {"size": sizing.scaled_to(wanted, lambda n: _spread_z(scale, hidden.fault({"size": n}, form)), 1.0, 20.0)}
+
+    def worth(size: float) -> float:
+        return _spread_z(scale, hidden.fault({"size": size}, form))
+
+    return {"size": sizing.scaled_to(wanted, worth, hidden.typical, hidden.most)}
 
 
 def _size(name: str, scale: Scale, form: str, sizes: Sizes, wanted: float) -> Sizes:
