@@ -27,8 +27,8 @@ _CELLS = 20  # of the grid for which a change of the rates is held
 _TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a first value needs no more
 _ALIKE = (0.4, 0.8)  # correlation of neighbouring sizes: below, there is one between them; above, they may be farther
 _GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
-# Least way from one size to the next, in sizes: what the largest value is moved by then, in steps.
-# Where a held voltage crosses an edge nothing is alike, however close.
+# Least way from one size to the next: by so many steps it moves the largest value that there may be. Where a voltage
+# that is held crosses an edge nothing is alike, however close.
 _SHIFT = 0.1
 _SIZES = 900  # at most
 _SEEN = 3.0  # z of a size below which there is none worth a look: what cuts off does more than what rounds

@@ -108,8 +108,8 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
         return Truth(ask.kind, ids, parameters, z=sum(loud.values()), z_alone=loud, accepted=(ids,) if ids else ())
     faults = [BASE[name].fault(sizes[name], ask.form) for name in means]
     whole, own = sizing.shares(heard, faults)
-    usual = sizing.shares(heard, [BASE[name].fault(sizes[name], "plain") for name in means])
-    left = _left(heard, ids, faults)
+    usual, usual_own = sizing.shares(heard, [BASE[name].fault(sizes[name], "plain") for name in means])
+    left = _left(heard, ids, faults, own)
     nearest = min(left, key=lambda name: left[name])
     also = {"base.saturation": sizing.left_by_clips(heard, whole)} if ask.kind == "confounded" else {}
     return Truth(
@@ -120,14 +120,16 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
         z_alone=_alone(means, own) | loud,
         z_rival=left[nearest],
         rival=nearest,
-        z_form=sizing.left_beside(whole - usual[0], {"usual": usual[1]})["usual"],
+        z_form=sizing.left_beside(whole - usual, {"usual": usual_own})["usual"],
         accepted=_accepted(ids, left | also),
     )
 
 
-def _left(scale: Scale, ids: Sequence[str], faults: Sequence[Fault]) -> dict[str, float]:
-    """Return what a rival leaves of the signal in the place of whichever one of the hidden ids it replaces best."""
-    _, own = sizing.shares(scale, faults)
+def _left(scale: Scale, ids: Sequence[str], faults: Sequence[Fault], own: FloatArray) -> dict[str, float]:
+    """Return what a rival leaves of the signal in the place of whichever one of the hidden ids it replaces best.
+
+    own (n, faults): what each adds to the others.
+    """
     names = [name for name in sizing.RIVALS if name not in ids]
     left: dict[str, float] = {}
     for i, part in product(range(len(faults)), _PARTS):
