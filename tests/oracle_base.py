@@ -99,7 +99,12 @@ for _name, _rule in {
 @_each
 def saturation(p, v, w):
     def limit(rate, inverse):
-        return math.copysign(1 / inverse, rate) if abs(rate) * inverse > 1 else rate
+        if rate == 0 or inverse == 0:
+            return rate
+        if p["knee"]:
+            order = 1 / p["knee"]
+            return rate * math.exp(-p["knee"] * math.log1p((abs(rate) * inverse) ** order))
+        return math.copysign(min(abs(rate), 1 / inverse), rate)
 
     return limit(v, p["inverse_v"]), 0.0, limit(w, p["inverse_w"])
 

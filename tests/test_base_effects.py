@@ -34,7 +34,7 @@ STATIC = [
     ("base.curvature_w", {"curvature": -0.1}, V, [0.309, 0.416, -0.636, 0.525, 0.0, 0.0]),
     (
         "base.saturation",
-        {"inverse_v": 2.5, "inverse_w": 2.0},
+        {"inverse_v": 2.5, "inverse_w": 2.0, "knee": 0.0},
         [0.4, -0.4, 0.2, 0.0, 0.0, 0.4],
         [0.3, 0.4, -0.5, 0.5, 0, 0],
     ),

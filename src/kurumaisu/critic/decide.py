@@ -25,7 +25,6 @@ from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit, Problem
 from kurumaisu.critic.prior import odds
 from kurumaisu.critic.smooth_fit import Extension
-from kurumaisu.critic.smooth_search import BEYOND
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
@@ -72,8 +71,9 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
     hint = smooth_judge.hinted(first, found)
     if hint is not None:
         made = _judged(first, found, hint, truth, progress)
-        won = made.beyond.extension is not None and made.beyond.rivalry.winner is not None
-        if won and made.beyond.rivalry.lead - _by_noise(first, made, truth) > BEYOND:
+        rivalry = made.beyond.rivalry
+        won = made.beyond.extension is not None and rivalry.winner is not None
+        if won and rivalry.lead - _by_noise(first, made, truth) > rivalry.least:
             return made
         first = first.changed(missed=made.problem.missed)
     for _ in range(_ANEW + 1):

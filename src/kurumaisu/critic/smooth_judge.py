@@ -20,7 +20,7 @@ _ALARM = 0.01  # share of null draws with as much evidence above which a curve i
 _NEVER = float(np.log(1e3 / 1e-7))  # [nat] that no draw has of the curves, of which there are hundreds
 _HOPELESS = 100.0  # [nat] behind the catalogue, when simulated, that no other effects beside a curve make good
 _SLOW = 1.0  # [s] noise that is forgotten sooner can draw no curve over a place or a time, nor take one up
-_HINT = 0.0  # [nat] of lead, where slow noise is not believed, from which the noise is estimated about a curve
+_HINT = -3.0  # [nat] of lead, where slow noise is not believed, from which the noise is estimated about a curve
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,10 @@ from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.critic.smooth_jumps import jumps, over_own
 from kurumaisu.types import FloatArray
 
-BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
+_BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
+# The same where the catalogue has nothing: what effects of other forms leave is no danger then, and draws of noise are
+# asked besides.
+_OVER_NOTHING = 1.0
 _BEHIND = 10.0  # [nat] behind the best set from which a curve that draws several of its effects speaks for them
 _ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
 _SHARE = 0.002  # posterior, as far as it is believed, from which it is asked which effect a curve draws
@@ -48,7 +51,8 @@ class Rivalry:
     rivals: best first, but for those that draw an effect of the catalogue in another form, and so speak for that;
     lead: of the best one over the best set without a curve, or with one that so speaks for an effect [nat];
     p: posterior of each curve by the id of its effect; odds: log odds that each effect of the catalogue acts, with
-    curves in the running, which a probability near 1 cannot say; p_nothing: that there is neither.
+    curves in the running, which a probability near 1 cannot say; p_nothing: that there is neither; least: lead of a
+    curve that beats the catalogue [nat].
     """
 
     rivals: tuple[Rival, ...]
@@ -56,6 +60,7 @@ class Rivalry:
     p: dict[str, float]
     odds: dict[str, float]
     p_nothing: float
+    least: float = _BEYOND
 
     @property
     def p_effects(self) -> dict[str, float]:
@@ -65,7 +70,7 @@ class Rivalry:
     @property
     def winner(self) -> Rival | None:
         """Return the best set with a curve, if it beats the catalogue."""
-        return self.rivals[0] if self.rivals and self.lead > BEYOND else None
+        return self.rivals[0] if self.rivals and self.lead > self.least else None
 
 
 def no_rivals(found: Naming) -> Rivalry:
@@ -92,13 +97,13 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
         share = float(np.exp(rival.worth - total))
         asked = (rival.worth - total) / doubt > np.log(_SHARE)
         draws = likeness.drawn(rival.fit, rival.curve, rival.belief) if asked else {}
-        if asked and rival.worth - ceiling > BEYOND:  # else it is no news, and nobody asks whose form it mends
+        if asked and rival.worth - ceiling > _BEYOND:  # else it is no news, and nobody asks whose form it mends
             draws = draws or likeness.mended(rival.fit, rival.curve)
             draws = draws or likeness.drawn_alone(rival.fit, rival.curve, rival.belief)
         if asked and rival.worth < ceiling - _BEHIND:
             draws = draws or likeness.drawn_together(rival.fit, rival.curve, rival.belief)
-        drawn = {name for name, nats in draws.items() if rival.worth - ceiling < BEYOND + nats}
-        wins = not drawn and rival.worth - ceiling > BEYOND and share > _SHARE
+        drawn = {name for name, nats in draws.items() if rival.worth - ceiling < _BEYOND + nats}
+        wins = not drawn and rival.worth - ceiling > _BEYOND and share > _SHARE
         part = likeness.part_of(rival.fit, rival.curve) if wins else set()
         acting.append((rival.worth, (rival.fit.ids - part) | drawn))
         beyond += [] if drawn else [rival]
@@ -108,7 +113,8 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
         curves[rival.curve.id] = curves.get(rival.curve.id, 0.0) + float(np.exp(rival.worth - total))
     lead = beyond[0].worth - own if beyond else -np.inf
     nothing = float(sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if not fit.ids))
-    return Rivalry(tuple(beyond), lead, curves, _odds(acting, found.p), nothing)
+    least = _BEYOND if found.best.ids else _OVER_NOTHING
+    return Rivalry(tuple(beyond), lead, curves, _odds(acting, found.p), nothing, least)
 
 
 def _odds(acting: Sequence[tuple[float, frozenset[str]]], names: Iterable[str]) -> dict[str, float]:

@@ -90,7 +90,7 @@ BASE: dict[str, Hidden] = {
         lambda rng: {"ratio": float(rng.uniform(0.4, 1.2))},
     ),
     "base.saturation": Hidden(
-        *_of("events", ev.saturation),
+        *_of("events", ev.saturation, ev.soft_saturation),
         0.3,
         False,
         0.9,

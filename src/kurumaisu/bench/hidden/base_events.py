@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -180,12 +181,25 @@ def expo_w(e: Events, s: Sizes) -> Made:
 
 def saturation(e: Events, s: Sizes) -> Made:
     """Rates clipped at a share 1 - `size` of the fastest that anyone asks for; axis 0: v, 1: w, 2: both."""
-    v, w = e.v, e.w
-    if s["axis"] != 1:
-        v = np.clip(v, -s["top_v"] * (1 - s["size"]), s["top_v"] * (1 - s["size"]))
-    if s["axis"] != 0:
-        w = np.clip(w, -s["top_w"] * (1 - s["size"]), s["top_w"] * (1 - s["size"]))
+    return _limited(e, s, lambda rate, top: np.clip(rate, -top, top))
+
+
+def soft_saturation(e: Events, s: Sizes) -> Made:
+    """The same with a corner that is a parabola, from a fifth below the limit to a fifth above."""
+    return _limited(e, s, _rounded)
+
+
+def _limited(e: Events, s: Sizes, limit: Callable[[FloatArray, float], FloatArray]) -> Made:
+    top = 1 - s["size"]
+    v = e.v if s["axis"] == 1 else limit(e.v, s["top_v"] * top)
+    w = e.w if s["axis"] == 0 else limit(e.w, s["top_w"] * top)
     return replace(e, v=v, w=w)
+
+
+def _rounded(rate: FloatArray, top: float) -> FloatArray:
+    width, size = 0.2 * top, np.abs(rate)
+    beyond = np.clip(size - (top - width), 0.0, 2 * width)
+    return np.asarray(np.sign(rate) * np.minimum(size - beyond**2 / (4 * width), top))
 
 
 def cross_w_to_v(e: Events, s: Sizes) -> Made:

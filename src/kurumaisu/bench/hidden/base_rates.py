@@ -15,6 +15,7 @@ from kurumaisu.bench.hidden.motion import STEP, Measured, Rates, Sizes
 from kurumaisu.types import FloatArray
 
 _STANDS = 1e-3  # [m/s] below which casters do not roll
+_REVERSES = 0.01  # [m/s] below which a chair that turns does not drive one way: its axis may be off by a lever
 
 
 def _follow(rate: FloatArray, tau: float) -> FloatArray:
@@ -167,7 +168,7 @@ def caster_swing(r: Rates, s: Sizes) -> Rates:
 def _kicks(r: Rates, s: Sizes, shape: Callable[[FloatArray], FloatArray]) -> FloatArray:
     out = np.zeros_like(r.v)
     way = np.concatenate([[0.0], np.cumsum(np.abs(r.v)) * STEP])
-    driving = np.flatnonzero(np.abs(r.v) > _STANDS)
+    driving = np.flatnonzero(np.abs(r.v) > _REVERSES)
     turning = np.flatnonzero(r.asked_w != 0)
     turns = driving[1:][np.sign(r.v[driving[1:]]) != np.sign(r.v[driving[:-1]])]
     for start, end in pairwise([*turns, len(out)]):
