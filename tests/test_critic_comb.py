@@ -115,10 +115,25 @@ def test_a_top_speed_that_only_the_fastest_drives_meet_is_found():
     fault = BASE["base.saturation"].fault({"size": 1 - top, "axis": 0.0, "top_v": 1.0, "top_w": 1.0}, "plain")
     data = base_case.recording("top", drives, [fault])
     problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset({"base.saturation"}))
-    ahead = next(c for c in problem.candidates if [term.key[1] for term in c.terms] == ["inverse_v"])
+    ahead = next(c for c in problem.candidates if [term.key[1] for term in c.terms] == ["inverse_v", "knee"])
     fit = problem.fit_candidates([ahead], {})
     assert fit.values[0] == pytest.approx(1 / top, rel=0.02)
     assert fit.score > problem.fit_candidates((), {}).score
+
+
+@pytest.mark.parametrize(("form", "knee"), [("plain", 0.0), ("other", 0.1)])
+def test_a_limit_with_a_round_corner_is_told_from_one_with_a_sharp_one(form, knee):
+    """A parabola hides it, a power is fitted; else a curvature of the law stands beside the limit."""
+    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
+    fault = BASE["base.saturation"].fault({"size": 0.3, "axis": 0.0, "top_v": 0.9, "top_w": 1.0}, form)
+    data = base_case.recording("top", drives, [fault])
+    ids = frozenset({"base.saturation", "base.curvature_v"})
+    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=ids)
+    found = naming.search(problem, lambda _: None)
+    assert found.best.ids == {"base.saturation"}
+    assert found.best.start["base.saturation", "knee"] == knee
+    assert found.best.start["base.saturation", "inverse_v"] == pytest.approx(1 / 0.63, rel=0.05)
+    assert found.p["base.curvature_v"] < 0.2
 
 
 def test_what_changes_within_a_step_is_known_and_rests_are_rests():

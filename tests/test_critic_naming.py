@@ -23,7 +23,7 @@ from kurumaisu.critic.drive import GRID, Drive, prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.noise import Growth, Noise, Scatter, whitener
-from kurumaisu.critic.pruned import in_turn, pruned
+from kurumaisu.critic.pruned import in_turn, pruned, unmet
 from kurumaisu.critic.scan import Screen
 from kurumaisu.critic.smooth import Belief
 from kurumaisu.critic.smooth_alike import FORM, Likeness
@@ -187,7 +187,8 @@ def test_a_curve_beside_an_effect_may_be_what_its_equation_lacks(understeering, 
 
 
 def fit_of(names, score):
-    return SimpleNamespace(ids=frozenset(names.split()), candidates=frozenset(names.split()), score=score)
+    ids = frozenset(names.split())
+    return SimpleNamespace(ids=ids, candidates=ids, score=score, settings=())
 
 
 def found_of(p, *fits):
@@ -235,6 +236,18 @@ def test_what_is_certain_or_confirmed_is_kept():
 def test_where_drives_held_out_decide_nothing_each_is_left_out_in_turn(held, nats, turned, kept):
     made = decision({"a": 1.0}, fit_of("a", nats))
     assert in_turn(made, gain(held), lambda: gain(turned)) == gain(kept)
+
+
+@pytest.mark.parametrize(
+    ("held", "nats", "seen", "silent"),
+    [(-0.01, 50.0, 1.0, True), (-0.1, 50.0, 1.0, False), (-0.01, 15.0, 1.0, False), (-0.01, 50.0, 9.0, False)],
+)
+def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatch, held, nats, seen, silent):
+    """Whatever they gain, if it is no loss beyond chance."""
+    monkeypatch.setattr("kurumaisu.critic.pruned.expected_nats", lambda *_: seen)
+    made = decision({"a": 1.0}, fit_of("a", nats))
+    assert unmet(made, gain(held), ()) is silent
+    assert not unmet(made, None, ())
 
 
 @pytest.mark.parametrize(("told", "without", "best"), [(True, 0.2, ""), (False, 0.2, "a"), (False, -0.1, "")])

@@ -75,7 +75,8 @@ def test_a_top_speed_without_a_corner_is_one_though_a_bent_law_mends_it():
     soft = hidden.Kind(0, "abs_v", lambda s, a, b: s.v * (1 / (1 + (abs(s.v) / 0.5) ** 10) ** 0.1 - 1))
     problem = problem_of(hidden.make(soft, 100.0, 1025, seconds=40.0, runs=2).recording)
     empty = problem.fit_candidates((), {})
-    mended = problem.fit(["base.saturation", "base.curvature_v"], {})
+    sharp = {one.id: one for one in problem.candidates if one.usual}  # limits with a corner
+    mended = problem.fit_candidates([sharp["base.saturation"], sharp["base.curvature_v"]], {})
     designs = Designs(problem, mended)
     rivals = compare(problem, Naming((mended, empty), {}, (), 0.0)).rivals
     drawn = [Likeness(problem, mended, designs).drawn_alone(r.fit, r.curve, r.belief) for r in rivals[:3]]

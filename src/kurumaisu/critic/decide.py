@@ -37,13 +37,15 @@ Truth = tuple[float, float] | None
 class Decision:
     """What acts, in a problem whose noise is that about it.
 
-    growth: whether the noise grows with the rates; beyond: what was found outside the catalogue.
+    growth: whether the noise grows with the rates; beyond: what was found outside the catalogue; unmet: drives held out
+    can neither confirm nor refute it.
     """
 
     problem: Problem
     found: naming.Naming
     growth: noise.Growth
     beyond: smooth_judge.Beyond
+    unmet: bool = False
 
     @property
     def something(self) -> bool:

@@ -88,7 +88,8 @@ def criticism(
     shares = {name: moved_share(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
     nats = found.nats(best)
     # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
-    gains = confirmed(worth, nats) or (nats >= NO_NOISE and nearer(worth, tuple(CHANNELS)))
+    held = confirmed(worth, nats) or (nats >= NO_NOISE and nearer(worth, tuple(CHANNELS)))
+    gains = held or made.unmet
     felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     told = tuple(group for group in found.confounded if not best.ids & set(group) or matters & set(group))
@@ -117,7 +118,10 @@ def criticism(
         recording=recording.name,
         model=problem.model.name,
         headline=words.headline(verdict, found, matters, shares),
-        details=words.details(problem, found, drives, fitted, shares, matters),
+        details=(
+            *words.details(problem, found, drives, fitted, shares, matters),
+            *((words.UNMET,) if matters and not held else ()),
+        ),
         pose_source=_pose_source(recording),
         provenance=_provenance(recording),
         overlays=overlays(recording, problem.model, settings or None),

@@ -70,12 +70,20 @@ def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Se
 
 def felt_share(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
     """Return what `settings` have and `without` lack, in standard deviations of an increment's noise (rms)."""
-    total, count = 0.0, 0
-    for drive in problem.drives:
+    count = sum(len(drive.measured) for drive in problem.drives)
+    return float(np.sqrt(2 * expected_nats(problem, problem.drives, settings, without) / count))
+
+
+def expected_nats(
+    problem: Problem, drives: Sequence[Drive], settings: Sequence[EffectSetting], without: Sequence[EffectSetting]
+) -> float:
+    """Return what some drives would tell for `settings` over `without` [nat], if the chair were as `settings` say."""
+    total = 0.0
+    for drive in drives:
         moved = problem.simulated(drive, settings) - problem.simulated(drive, without)
         white = whitened(drive, moved.reshape(-1, 1), problem.noise)[0]
-        total, count = total + float(np.sum(white**2)), count + len(moved)
-    return float(np.sqrt(total / count))
+        total += float(np.sum(white**2))
+    return total / 2
 
 
 def spans(drive: Drive, horizon: float) -> tuple[IntArray, IntArray]:

@@ -31,7 +31,7 @@ from kurumaisu.critic.laser.verdicts import criticise as look
 from kurumaisu.critic.portion import bounded
 from kurumaisu.critic.predict_extended import forecast_of
 from kurumaisu.critic.predict_motion import Settings
-from kurumaisu.critic.pruned import in_turn, pruned
+from kurumaisu.critic.pruned import in_turn, pruned, unmet
 from kurumaisu.critic.recording import Recording, Run
 from kurumaisu.critic.replay import model_of
 from kurumaisu.critic.report import write_report
@@ -151,6 +151,7 @@ def _criticise_base(
     if whole and len(train) > 1:
         more = [*gain.folds(train, ()), *splits]
         held = in_turn(made, held, lambda: gain.measure(model, more, made.refit, baseline, made.problem.noise))
+    made = replace(made, unmet=bool(whole) and unmet(made, held, whole))
     progress("planning the next drive")
     scripts = next_experiment.drives()
     proposal = next_experiment.propose(made.problem, made.found, scripts)

@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from kurumaisu.critic import smooth_explain
 from kurumaisu.critic.decide import Decision, uncurved
+from kurumaisu.critic.drive import Drive
 from kurumaisu.critic.evidence import Fit
-from kurumaisu.critic.material import CERTAIN, confirmed
+from kurumaisu.critic.material import CERTAIN, confirmed, expected_nats
 from kurumaisu.critic.verdict import Gain
 
 _TRIED = 2  # smaller sets, the likeliest first: each is fitted to all folds
+_MET = 3.0  # [nat] that drives held out must be able to tell for their silence to say anything
 
 
 def pruned(made: Decision, worth: Gain | None, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain | None]:
@@ -48,6 +50,18 @@ def in_turn(made: Decision, held: Gain | None, measure: Callable[[], Gain]) -> G
         return held
     again = measure()
     return again if confirmed(again, nats) else held
+
+
+def unmet(made: Decision, held: Gain | None, drives: Sequence[Drive]) -> bool:
+    """Tell whether drives held out can neither confirm nor refute effects that are certain: they hardly meet them.
+
+    held: what the effects gain on these drives. What would be surprised there by more than chance is refuted.
+    """
+    found = made.found
+    if held is None or made.beyond.extension is not None or found.nats(found.best) < CERTAIN:
+        return False
+    seen = expected_nats(made.problem, drives, found.best.settings, ())
+    return seen < _MET and held.log_density_per_sample.hi90 > 0
 
 
 def _uncurved(made: Decision, worth: Gain, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain]:
