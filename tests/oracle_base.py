@@ -234,7 +234,11 @@ def accel_limit(p, drive):
             means.append(area / parts)
         return means
 
-    return ramp(drive.v, p["slowness_v"]), _still(len(drive.v)), ramp(drive.w, p["slowness_w"])
+    v, w = (
+        _lagged(ramp(rates, slowness), p["round"] * slowness, drive.dt)
+        for rates, slowness in ((drive.v, p["slowness_v"]), (drive.w, p["slowness_w"]))
+    )
+    return v, _still(len(v)), w
 
 
 @_rates("base.slope")

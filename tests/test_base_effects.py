@@ -122,7 +122,7 @@ def test_ramp_against_the_differential_equation():
     solution = solve_ivp(
         slope, (0, 2.0), [0.0, 0.0], t_eval=edges, max_step=DT / 3, method="LSODA", rtol=1e-9, atol=1e-10
     )
-    out = apply("base.accel_limit", {"slowness_v": slowness, "slowness_w": 0.0}, target, target)
+    out = apply("base.accel_limit", {"slowness_v": slowness, "slowness_w": 0.0, "round": 0.0}, target, target)
     np.testing.assert_allclose(out.v, np.diff(solution.y[1]) / DT, atol=1e-5)
     np.testing.assert_array_equal(out.w, target)
     assert np.abs(np.diff(out.v)).max() <= DT / slowness + 1e-12

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parameters with a comb of likely values, and inputs that change between two points of the replay's grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import Ask, base_case, make
+from kurumaisu.bench.hidden import Ask, base_case, base_rates, make, motion
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
@@ -96,7 +98,7 @@ def test_a_ramp_begins_when_its_command_does(start, slowness):
 
     A ramp that ends within a step, or in the next one, is no earlier either: else a delay seems to act.
     """
-    ramp = (EffectSetting("base.accel_limit", {"slowness_v": slowness, "slowness_w": 0.0}),)
+    ramp = (EffectSetting("base.accel_limit", {"slowness_v": slowness, "slowness_w": 0.0, "round": 0.0}),)
     assert replayed(start, ()) == pytest.approx(0.6 * (3.0 - start), abs=1e-9)
     assert replayed(start, ramp) == pytest.approx(0.6 * (3.0 - start) - 0.18 * slowness, abs=1e-6)
 
@@ -104,7 +106,7 @@ def test_a_ramp_begins_when_its_command_does(start, slowness):
 @pytest.mark.parametrize("start", [0.5, 0.5031, 0.5062, 0.5089])
 def test_a_ramp_shorter_than_a_step_begins_when_its_command_does(start):
     """0.6 m/s at 200 m/s^2 is reached 3 ms late: 0.9 mm less."""
-    ramp = (EffectSetting("base.accel_limit", {"slowness_v": 0.005, "slowness_w": 0.0}),)
+    ramp = (EffectSetting("base.accel_limit", {"slowness_v": 0.005, "slowness_w": 0.0, "round": 0.0}),)
     assert replayed(start, ramp) == pytest.approx(0.6 * (3.0 - start) - 0.0009, abs=1e-5)
 
 
@@ -134,6 +136,29 @@ def test_a_limit_with_a_round_corner_is_told_from_one_with_a_sharp_one(form, kne
     assert found.best.start["base.saturation", "knee"] == knee
     assert found.best.start["base.saturation", "inverse_v"] == pytest.approx(1 / 0.63, rel=0.05)
     assert found.p["base.curvature_v"] < 0.2
+
+
+def jerk_limited(r, s):
+    """Ramps whose slope itself comes and goes over `jerk` [s]: means over so long."""
+    ramped = base_rates.accel_limit(r, s)
+    count = round(s["jerk"] / motion.STEP)
+    means = (
+        np.convolve(np.pad(rate, (count - 1, 0)), np.ones(count) / count, "valid") for rate in (ramped.v, ramped.w)
+    )
+    return replace(ramped, **dict(zip("vw", means, strict=True)))
+
+
+@pytest.mark.parametrize(("act", "rounded"), [(base_rates.accel_limit, 0.0), (jerk_limited, 0.04)])
+def test_a_ramp_with_round_corners_is_a_ramp_without_a_delay(act, rounded):
+    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(6), seconds=40.0, rate=10.0)
+    fault = motion.Fault(motion.Form("rates", act), {"size": 0.4, "ratio": 0.8, "jerk": 0.03})
+    data = base_case.recording("ramp", drives, [fault])
+    ids = frozenset({"base.accel_limit", "base.delay"})
+    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=ids)
+    found = naming.search(problem, lambda _: None)
+    assert found.best.ids == {"base.accel_limit"}
+    assert found.best.start["base.accel_limit", "round"] == rounded
+    assert found.p["base.delay"] < 0.5
 
 
 def test_what_changes_within_a_step_is_known_and_rests_are_rests():

@@ -8,6 +8,7 @@ import numpy as np
 
 from kurumaisu import _core
 from kurumaisu.effects.base import LATE, Context, Effect, Follows, Motion, Parameter, Rate, Stage
+from kurumaisu.effects.first_order import FirstOrder
 from kurumaisu.types import FloatArray
 
 _LATEST = 0.98  # of a step: what is left then tells little of the new target
@@ -15,18 +16,26 @@ _REACHED = 0.01  # share of a change by which a ramp may be off the old target, 
 
 
 class AccelLimit(Effect):
-    """Both rates run after their targets with a limited slope; its inverse is the parameter, so that 0 is none."""
+    """Both rates run after their targets with a limited slope; its inverse is the parameter, so that 0 is none.
+
+    round: time constant that rounds the corners of the ramps, as a share of the time that a change by 1 takes: few
+    controllers change the acceleration at once.
+    """
 
     id = "base.accel_limit"
     stage = Stage.RESPONSE
     parameters = (
         Parameter("slowness_v", "s^2/m", null=0.0, scale=1.0, lower=0.0, upper=20.0),
         Parameter("slowness_w", "s^2/rad", null=0.0, scale=0.5, lower=0.0, upper=20.0),
+        Parameter("round", "1", null=0.0, scale=0.05, lower=0.0, upper=1.0),
     )
     separable = True
+    forms = ({"round": 0.0}, {"round": 0.04})
     empirical = True
     sentence = "the rates are ramped: large changes take longer than small ones"
-    formula = "|dv'/dt| ≤ 1 / slowness_v, |dw'/dt| ≤ 1 / slowness_w, towards v, w"
+    formula = (
+        "|dv'/dt| ≤ 1 / slowness_v, |dw'/dt| ≤ 1 / slowness_w, towards v, w; then first-order lags of round · slowness"
+    )
     source = "assumed: motor controllers ramp; 0.3-1.5 m/s²"
     shows_in = Rate.V
     follows = Follows.V_CHANGE
@@ -34,17 +43,24 @@ class AccelLimit(Effect):
     def __init__(self, values: Mapping[str, float], context: Context) -> None:
         super().__init__(values, context)
         self._v = self._w = 0.0  # at the end of the last step
+        self._lags = FirstOrder(), FirstOrder()
 
     def apply(self, motion: Motion) -> Motion:
         """Ramp v and w; a sample is the step's mean rate."""
         slow_v, slow_w = self.values["slowness_v"], self.values["slowness_w"]
         v, self._v = _ramped(motion, motion.v, slow_v, self._v)
         w, self._w = _ramped(motion, motion.w, slow_w, self._w)
+        share = self.values["round"]
+        v, w = (
+            lag.follow(rate, motion.dt, share * slowness)
+            for lag, rate, slowness in zip(self._lags, (v, w), (slow_v, slow_w), strict=True)
+        )
         return replace(motion, v=v, w=w)
 
     def settle(self, motion: Motion) -> None:
         """Have reached v and w."""
         self._v, self._w = float(motion.v[-1]), float(motion.w[-1])
+        self._lags[0].level, self._lags[1].level = self._v, self._w
 
 
 def _ramped(motion: Motion, target: FloatArray, slowness: float, level: float) -> tuple[FloatArray, float]:
