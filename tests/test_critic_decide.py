@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import base_case
+from kurumaisu.bench.hidden import Ask, base_case, make
 from kurumaisu.bench.hidden.noise import Colour, Regime
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic import decide, naming
@@ -18,6 +18,7 @@ from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.noise import START, Growth
+from kurumaisu.critic.pipeline import criticise
 from kurumaisu.critic.smooth_judge import Beyond
 from kurumaisu.critic.smooth_search import Rivalry
 from kurumaisu.effects import Parameter
@@ -117,16 +118,25 @@ def test_a_fit_that_first_values_beat_is_stuck(start, better):
     assert not naming.begins_better(problem, SimpleNamespace(terms=()), {("a", "offset"): 0.9})
 
 
-@pytest.mark.parametrize(("by_noise", "curved"), [(0.0, True), (4.0, False)])
-def test_a_curve_has_to_beat_the_noise_that_would_take_it_up(judged, monkeypatch, by_noise, curved):
+@pytest.mark.parametrize(("by_noise", "least", "curved"), [(0.0, 3.0, True), (3.5, 3.0, False), (3.5, 1.0, True)])
+def test_a_curve_has_to_beat_the_noise_that_would_take_it_up(judged, monkeypatch, by_noise, least, curved):
     curve = SimpleNamespace()
     won = decision(found_of("a"))
-    won = replace(won, beyond=Beyond(Rivalry((curve,), 5.0, {}, {}, 0.0), curve, 0.0))
+    won = replace(won, beyond=Beyond(Rivalry((curve,), 5.0, {}, {}, 0.0, least), curve, 0.0))
     monkeypatch.setattr(decide.smooth_judge, "hinted", lambda *_: curve)
     monkeypatch.setattr(decide, "_by_noise", lambda *_: by_noise)
     plain = decision(found_of("a"))
     monkeypatch.setattr(decide, "_judged", lambda _first, _found, hint, *_: plain if hint is None else won)
     assert decided() is (won if curved else plain)
+
+
+def test_noise_about_nothing_hides_no_weak_turn_by_the_heading():
+    """Its slow part has taken the turn up: about nothing the curve is behind, about itself 4 nats ahead."""
+    case = make(Ask("unknown", ("heading_veer",), form="other", family="base"), 37103)
+    verdict = criticise(case.recording, shipped("launch/md100.yaml"), lambda _: None).verdict
+    assert [(one.channel, one.covariate) for one in verdict.unknown] == [("base.w", "heading")]
+    assert verdict.verdict == "unknown"
+    assert not verdict.causes
 
 
 def test_slow_noise_is_heard_where_noise_about_a_curve_lacks_it():

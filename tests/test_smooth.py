@@ -128,6 +128,7 @@ def test_what_the_catalogue_explains_is_left_to_it():
     # Without the right effect the same drives look as if something unknown changed the yaw rate.
     blind = compare(problem, Naming((empty,), {}, (), 1.0))
     assert blind.winner.curve.channel in ("w", "w_gain")
+    assert blind.least < rivalry.least  # beside nothing there is no other form that a curve might draw
     assert false_alarm(problem, blind) == 0.0
 
 
