@@ -161,6 +161,21 @@ def test_a_ramp_with_round_corners_is_a_ramp_without_a_delay(act, rounded):
     assert found.p["base.delay"] < 0.5
 
 
+def test_a_search_among_ever_more_sets_is_cut_short(monkeypatch):
+    """A chair unlike its model in every way would be searched for minutes; what was found until then counts."""
+    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(8), seconds=40.0, rate=10.0)
+    faults = [BASE[f"base.{name}"].fault({"size": size}, "plain") for name, size in (("gain_v", 0.2), ("lag_w", 0.2))]
+    data = base_case.recording("two", drives, faults)
+    ids = frozenset({"base.gain_v", "base.lag_w", "base.lag_v", "base.curvature_v"})
+    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=ids)
+    whole = naming.search(problem, lambda _: None)
+    monkeypatch.setattr(naming, "_MOST", 1)
+    short = naming.search(problem, lambda _: None)
+    assert len(short.fits) < len(whole.fits)
+    assert short.best.score > short.empty.score + 100
+    assert whole.best.ids == {"base.gain_v", "base.lag_w"}
+
+
 def test_what_changes_within_a_step_is_known_and_rests_are_rests():
     t = np.round(np.arange(200) * 0.0333, 6)
     rates = np.column_stack([0.3 * (np.arange(200) % 3 == 0), 0.2 * (np.arange(200) % 4 == 0)])

@@ -26,6 +26,7 @@ _BENT = 0.05  # share of what a set explains by which lines may be off for one e
 _RIVALS = 2  # likely sets besides the best one from which others are looked for
 _CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
 _ROUNDS = 8  # scans at most
+_MOST = 200  # refitted sets from which on none is looked for: where ten effects seem to act, each round has a hundred
 _HOPES = 3.0  # times what lines promise at most, about nothing, that something with a comb of likely values explains
 _HOPELESS = 100.0  # [nat] behind the best set that nothing makes good
 _STUCK = 0.5  # [nat] by which a fit must be beaten by mere first values to be made again
@@ -110,6 +111,8 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
         if best is centre:
             break
         centre = best
+        if len(fits) > _MOST:
+            break
         screen = Screen(problem, centre)
     try_sets(exchanges(_ranked(fits, count), count))
     ranked = _ranked(fits, count)
