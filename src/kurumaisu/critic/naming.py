@@ -108,11 +108,9 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
             best = try_sets([*alone, *_neighbours(problem, screen, nothing, best)])
         if best is centre:
             best = try_sets(_beside_rivals(problem, _ranked(fits, count), count, screened))
-        if best is centre:
+        if best is centre or len(fits) > _MOST:
             break
         centre = best
-        if len(fits) > _MOST:
-            break
         screen = Screen(problem, centre)
     try_sets(exchanges(_ranked(fits, count), count))
     ranked = _ranked(fits, count)
