@@ -18,6 +18,7 @@ from kurumaisu.types import FloatArray
 
 _SCANS, _BEAMS = 40, 120  # that are looked at
 _FAR = 100.0  # [m]
+_FEWEST = 5  # readings of a scan, up to which it says nothing
 _TOLERANCE = (0.15, 0.03)  # [m] and share of the range: an error of pose, mounting or range that is no other world
 _GOOD = 0.8  # share of readings that agree, from which nothing is said
 _HALF = 0.4  # share from which nothing is said unless another reading agrees better
@@ -33,7 +34,7 @@ _SHIFTS = np.setdiff1d(np.arange(-30.0, 30.5, 0.5), [0.0])  # [s]
 
 @dataclass(frozen=True)
 class _View:
-    """Thinned scans: times (k,) [s], bearings (b,) [rad] in the laser's frame, ranges (k, b) [m]."""
+    """Thinned scans: times (k,) [s], bearings (b,) [rad] in the laser's frame, ranges (k, b) [m], none cut off."""
 
     times: FloatArray
     bearings: FloatArray
@@ -120,7 +121,7 @@ class _Check:
     def elsewhere(self, view: _View) -> float:
         """Return the share of the readings that are, from wherever they are taken, of something else than the map's."""
         origins = self.origins(view.times)
-        ranges, expected = uncut(view.ranges), self._expected(origins, view)
+        ranges, expected = view.ranges, self._expected(origins, view)
         found, _ = elsewhere(ranges, expected, _ends(origins, view, expected), many=_MANY, either=True)
         return float(found.sum() / max(np.isfinite(ranges).sum(), 1))
 
@@ -147,16 +148,17 @@ def agree(measured: FloatArray, expected: FloatArray) -> FloatArray:
         known, measured, 0.0
     )
     number = known.sum(axis=1)
-    return np.where(number > 5, (near & known).sum(axis=1) / np.maximum(number, 1), np.nan)
+    return np.where(number > _FEWEST, (near & known).sum(axis=1) / np.maximum(number, 1), np.nan)
 
 
 def _thinned(scan: Series, pose: Series, laser: LaserMount, mean_error: FloatArray) -> _View:
     inside = np.flatnonzero((scan.t >= pose.t[0]) & (scan.t <= pose.t[-1]))
     few = inside[np.unique(np.linspace(0, len(inside) - 1, _SCANS).astype(int))] if len(inside) else inside
     beams = np.unique(np.linspace(0, scan.values.shape[1] - 1, _BEAMS).astype(int))
-    ranges = (scan.values[np.ix_(few, beams)] - mean_error[1]) / mean_error[0]
+    ranges = (uncut(scan.values[np.ix_(few, beams)]) - mean_error[1]) / mean_error[0]
     ranges = np.where(np.isfinite(ranges) & (ranges > 0), ranges, np.nan)
-    return _View(scan.t[few], laser.angle_min + laser.angle_increment * beams, ranges)
+    seen = np.isfinite(ranges).sum(axis=1) > _FEWEST
+    return _View(scan.t[few][seen], laser.angle_min + laser.angle_increment * beams, ranges[seen])
 
 
 def _readings(check: _Check, view: _View) -> Iterator[tuple[float, str]]:
