@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,8 @@ _ALIKE = 0.02  # share by which two readings of the data hardly differ
 _MOVED = 0.75  # least share for a map that was moved
 _MANY = 6  # readings of a place, at least, which says whether there is something else
 _SHIFTS = np.setdiff1d(np.arange(-30.0, 30.5, 0.5), [0.0])  # [s]
+_DRIFTS = np.arange(-5.0, 5.05, 0.1)  # [s] by which a clock may be off at the end of the recording
+CLOCKS = "clocks of scans and poses differ"
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,29 @@ def words(scan: Series, pose: Series, laser: LaserMount, segments: FloatArray, m
     return (
         f"scans and map do not belong together: {share}, and no turn, shift, mirror or scale mends it: another place?"
     )
+
+
+def drifts(
+    runs: Sequence[tuple[Series, Series]], laser: LaserMount, segments: FloatArray, mean_error: FloatArray, zero: float
+) -> bool:
+    """Tell whether a clock that runs fast or slow explains the scans of several runs, as no other shift of it does.
+
+    runs: scans and poses of each; zero [s]: when the clocks agreed. A run alone may look shifted then, by its drift.
+    """
+    scene = Scene(np.ascontiguousarray(segments))
+    parts = [(_Check(scene, pose, laser), _thinned(scan, pose, laser, mean_error)) for scan, pose in runs]
+    span = max(float(scan.t[-1]) for scan, _ in runs) - zero
+
+    def best(by: Callable[[FloatArray], FloatArray]) -> float:
+        """Return how well the scans agree with the map at best, each as much later as `by` has it of a clock's."""
+        shares = [
+            np.mean([check.agreement(replace(view, times=view.times + off * by(view.times))) for check, view in parts])
+            for off in _DRIFTS
+        ]
+        return float(np.max(shares))
+
+    drift = best(lambda times: (times - zero) / span)
+    return drift > _GOOD and drift > best(np.ones_like) + _ALIKE
 
 
 def _mounted(check: _Check, view: _View) -> float:
@@ -220,7 +245,7 @@ def _late(check: _Check, view: _View) -> Iterator[tuple[float, str]]:
         inside = (view.times + by >= first) & (view.times + by <= last)
         if inside.sum() > 0.5 * len(view.times):
             other = _View(view.times[inside] + by, view.bearings, view.ranges[inside])
-            yield check.agreement(other), f"clocks of scans and poses differ: try t of the scans {by:+.3g} s"
+            yield check.agreement(other), f"{CLOCKS}: try t of the scans {by:+.3g} s"
 
 
 def _shuffled(check: _Check, view: _View) -> Iterator[tuple[float, str]]:

@@ -107,7 +107,7 @@ class Statistics:
     def _folds(self) -> FloatArray:
         """Return the folds of the numbers that tell how far readings scatter: the first ones, by groups."""
         known = self._groups.folds
-        return np.r_[known, np.zeros(len(self._told()) - len(known))]
+        return np.asarray(np.r_[known, np.zeros(len(self._told()) - len(known))])
 
     def of_errors(self) -> BoolArray:
         """Return which of the numbers follow how far readings are off their mean."""
