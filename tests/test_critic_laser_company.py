@@ -98,6 +98,21 @@ def test_what_grows_with_the_range_otherwise_than_its_law_is_one_doubt_not_many(
     assert costs[1] < 1.0
 
 
+def test_noise_of_a_footprint_is_noise_by_obliqueness_and_not_by_the_range_as_well():
+    """It grows with the square of the range; the law is alike at any."""
+    ranges = np.array([0.8, 1.4, 1.9, 2.6])
+    nulls = 0.03 * np.random.default_rng(1).standard_normal((50, 4))
+    none, folds = np.zeros(4, dtype=bool), np.log(ranges) - np.mean(np.log(ranges))
+    footprint = np.log1p(0.8 * ranges**2 / np.mean(ranges**2))
+    law = np.full(4, np.mean(footprint))
+    costs = []
+    for known in (folds, np.zeros(4)):
+        likeness = Likeness(nulls, footprint, Kinds(none, none, folds=known), ~none)
+        costs.append(likeness.cost(law) - likeness.cost(footprint))
+    assert costs[0] < 8.0
+    assert costs[1] > 50.0
+
+
 def _forms():
     offset = effects.by_id("laser.offset").parameters[0]
     warmth = effects.by_id("laser.temperature").parameters[0]

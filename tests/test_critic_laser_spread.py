@@ -2,13 +2,14 @@
 """Effects on the scatter: rivals weighed in the company that is found last, far outliers, scans that may speak."""
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from laser_scene import recording
 
 from kurumaisu import effects
-from kurumaisu.critic.laser.deviations import _repeated, grid_step
+from kurumaisu.critic.laser.deviations import BeamNoise, _repeated, grid_step, refined
 from kurumaisu.critic.laser.likeness import Kinds
 from kurumaisu.critic.laser.noise import Layout, ScanNoise
 from kurumaisu.critic.laser.normal import Assembly
@@ -157,6 +158,21 @@ def test_what_errors_of_the_poses_move_is_no_reading_of_something_else(tmp_path)
     assert np.abs(turned / assembly.first.sd)[assembly.geometry].max() > 30
     left = statistics._leftover(turned)[0]
     assert np.nanmax(np.abs(left)) < 1.5
+
+
+def test_how_few_steep_readings_scatter_is_known_for_them():
+    """Noise of a footprint grows with the tangent; walls are seen steeply by one beam in fifty."""
+    rng = np.random.default_rng(6)
+    steep = np.radians(np.where(rng.random((200, 300)) < 0.02, rng.uniform(65, 75, (200, 300)), 40.0))
+    steep = np.where(steep < np.radians(60), np.radians(rng.uniform(0, 50, steep.shape)), steep)
+    ranges = rng.uniform(1.0, 2.5, steep.shape)
+    sd = np.hypot(0.002, 0.0007 * ranges * np.tan(steep))
+    first = BeamNoise(np.full(steep.shape, 0.002), 0.0, np.ones(steep.shape, dtype=bool))
+    seen = SimpleNamespace(ranges=ranges, incidence=steep)
+    left = sd * rng.standard_normal(sd.shape)
+    layout = Layout(np.arange(200.0), np.zeros(200, dtype=int), np.full(200, -1))
+    found = refined(first, first, lambda _: left, seen, layout, 0.001).sd
+    assert np.sqrt(np.mean((sd / found)[steep > np.radians(65)] ** 2)) == pytest.approx(1.0, abs=0.1)
 
 
 def test_scans_at_a_jump_of_the_rates_say_nothing_about_the_scatter(tmp_path):

@@ -186,3 +186,15 @@ def test_a_laser_that_is_mounted_a_little_elsewhere_has_no_other_clock(seed, tmp
     """Before one wall, from a few distances, clocks 22 s apart would do as much: 10 and 18 cm."""
     made = make(Ask("confounded", ("laser.mount_x",), design="wall", family="laser"), seed, tmp_path)
     assert examine(made.recording, load_model(shipped("launch/md100.yaml"))).invalid == []
+
+
+@pytest.mark.parametrize("fault", ["", "another building"])
+def test_readings_that_are_cut_off_say_nothing_about_the_map(fault):
+    """Two in three are, by a laser that is mounted 3 cm elsewhere, too."""
+    rng = np.random.default_rng(9)
+    tables = drives.make(case(None, 0.0), rng)
+    sight = wrong_scans.look(tables, rng, np.array([0.03, -0.03, 0.0]), 0.005)
+    sight = wrong_scans.SPOILT[fault][0](sight, rng) if fault else sight
+    cut = np.nanquantile(sight.scans[:, 1:], 0.35)
+    sight = replace(sight, scans=np.column_stack([sight.scans[:, 0], np.minimum(sight.scans[:, 1:], cut)]))
+    assert bool(sanity.said_of_tables(tables, ["command", "pose"], sight)) == bool(fault)

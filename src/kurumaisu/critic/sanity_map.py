@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from kurumaisu.types import FloatArray
 
 _SCANS, _BEAMS = 40, 120  # that are looked at
 _FAR = 100.0  # [m]
+_FEWEST = 5  # readings of a scan, up to which it says nothing
 _TOLERANCE = (0.15, 0.03)  # [m] and share of the range: an error of pose, mounting or range that is no other world
 _GOOD = 0.8  # share of readings that agree, from which nothing is said
 _HALF = 0.4  # share from which nothing is said unless another reading agrees better
@@ -29,11 +30,13 @@ _ALIKE = 0.02  # share by which two readings of the data hardly differ
 _MOVED = 0.75  # least share for a map that was moved
 _MANY = 6  # readings of a place, at least, which says whether there is something else
 _SHIFTS = np.setdiff1d(np.arange(-30.0, 30.5, 0.5), [0.0])  # [s]
+_DRIFTS = np.arange(-5.0, 5.05, 0.1)  # [s] by which a clock may be off at the end of the recording
+CLOCKS = "clocks of scans and poses differ"
 
 
 @dataclass(frozen=True)
 class _View:
-    """Thinned scans: times (k,) [s], bearings (b,) [rad] in the laser's frame, ranges (k, b) [m]."""
+    """Thinned scans: times (k,) [s], bearings (b,) [rad] in the laser's frame, ranges (k, b) [m], none cut off."""
 
     times: FloatArray
     bearings: FloatArray
@@ -71,6 +74,29 @@ def words(scan: Series, pose: Series, laser: LaserMount, segments: FloatArray, m
     return (
         f"scans and map do not belong together: {share}, and no turn, shift, mirror or scale mends it: another place?"
     )
+
+
+def drifts(
+    runs: Sequence[tuple[Series, Series]], laser: LaserMount, segments: FloatArray, mean_error: FloatArray, zero: float
+) -> bool:
+    """Tell whether a clock that runs fast or slow explains the scans of several runs, as no other shift of it does.
+
+    runs: scans and poses of each; zero [s]: when the clocks agreed. A run alone may look shifted then, by its drift.
+    """
+    scene = Scene(np.ascontiguousarray(segments))
+    parts = [(_Check(scene, pose, laser), _thinned(scan, pose, laser, mean_error)) for scan, pose in runs]
+    span = max(float(scan.t[-1]) for scan, _ in runs) - zero
+
+    def best(by: Callable[[FloatArray], FloatArray]) -> float:
+        """Return how well the scans agree with the map at best, each as much later as `by` has it of a clock's."""
+        shares = [
+            np.mean([check.agreement(replace(view, times=view.times + off * by(view.times))) for check, view in parts])
+            for off in _DRIFTS
+        ]
+        return float(np.max(shares))
+
+    drift = best(lambda times: (times - zero) / span)
+    return drift > _GOOD and drift > best(np.ones_like) + _ALIKE
 
 
 def _mounted(check: _Check, view: _View) -> float:
@@ -120,7 +146,7 @@ class _Check:
     def elsewhere(self, view: _View) -> float:
         """Return the share of the readings that are, from wherever they are taken, of something else than the map's."""
         origins = self.origins(view.times)
-        ranges, expected = uncut(view.ranges), self._expected(origins, view)
+        ranges, expected = view.ranges, self._expected(origins, view)
         found, _ = elsewhere(ranges, expected, _ends(origins, view, expected), many=_MANY, either=True)
         return float(found.sum() / max(np.isfinite(ranges).sum(), 1))
 
@@ -147,16 +173,17 @@ def agree(measured: FloatArray, expected: FloatArray) -> FloatArray:
         known, measured, 0.0
     )
     number = known.sum(axis=1)
-    return np.where(number > 5, (near & known).sum(axis=1) / np.maximum(number, 1), np.nan)
+    return np.where(number > _FEWEST, (near & known).sum(axis=1) / np.maximum(number, 1), np.nan)
 
 
 def _thinned(scan: Series, pose: Series, laser: LaserMount, mean_error: FloatArray) -> _View:
     inside = np.flatnonzero((scan.t >= pose.t[0]) & (scan.t <= pose.t[-1]))
     few = inside[np.unique(np.linspace(0, len(inside) - 1, _SCANS).astype(int))] if len(inside) else inside
     beams = np.unique(np.linspace(0, scan.values.shape[1] - 1, _BEAMS).astype(int))
-    ranges = (scan.values[np.ix_(few, beams)] - mean_error[1]) / mean_error[0]
+    ranges = (uncut(scan.values[np.ix_(few, beams)]) - mean_error[1]) / mean_error[0]
     ranges = np.where(np.isfinite(ranges) & (ranges > 0), ranges, np.nan)
-    return _View(scan.t[few], laser.angle_min + laser.angle_increment * beams, ranges)
+    seen = np.isfinite(ranges).sum(axis=1) > _FEWEST
+    return _View(scan.t[few][seen], laser.angle_min + laser.angle_increment * beams, ranges[seen])
 
 
 def _readings(check: _Check, view: _View) -> Iterator[tuple[float, str]]:
@@ -218,7 +245,7 @@ def _late(check: _Check, view: _View) -> Iterator[tuple[float, str]]:
         inside = (view.times + by >= first) & (view.times + by <= last)
         if inside.sum() > 0.5 * len(view.times):
             other = _View(view.times[inside] + by, view.bearings, view.ranges[inside])
-            yield check.agreement(other), f"clocks of scans and poses differ: try t of the scans {by:+.3g} s"
+            yield check.agreement(other), f"{CLOCKS}: try t of the scans {by:+.3g} s"
 
 
 def _shuffled(check: _Check, view: _View) -> Iterator[tuple[float, str]]:

@@ -17,6 +17,7 @@ OUTLIER = 4.5  # deviations from which a reading does not count
 ELSEWHERE = 25.0
 MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
 _BINS = 6  # of the range, and of the incidence, in which the deviation is estimated
+_FEWEST = 300  # readings of a bin in the tails, whose deviation is then known to a twentieth
 _JOLT = 4.0  # sds among scans from which one of them does not count
 _TOLERATED = 0.1  # share by which a scan may always be noisier than the middle one
 _MILLIMETRE = 1e-3  # [m]
@@ -104,10 +105,18 @@ def _jolted(z: FloatArray, first: BeamNoise, layout: Layout) -> BoolArray:
 
 
 def _factors(left: FloatArray, sd: FloatArray, known: FloatArray, covariate: FloatArray) -> FloatArray:
-    """Return by how much the deviations (k, b) of what is left differ from sd, in bins of a covariate."""
-    bins = np.digitize(covariate, np.nanquantile(known, np.linspace(0, 1, _BINS + 1)[1:-1]))
+    """Return by how much the deviations (k, b) of what is left differ from sd, in bins of a covariate.
+
+    The outer bins are halved, towards the ends, while enough readings are in them: few walls are seen at a steep angle,
+    over which noise may double, and readings that scatter more than is known seem to say what they do not.
+    """
+    levels = np.arange(1, _BINS) / _BINS
+    halved = np.log2(max(np.isfinite(known).sum() / (_BINS * _FEWEST), 1.0))
+    tails = 0.5 ** np.arange(1, int(halved) + 1) / _BINS
+    levels = np.sort(np.r_[tails, levels, 1 - tails])
+    bins = np.digitize(covariate, np.nanquantile(known, levels))
     out = np.ones_like(sd)
-    for i in range(_BINS):
+    for i in range(len(levels) + 1):
         inside = (bins == i) & np.isfinite(known)
         if inside.any():
             out[bins == i] = max(MAD * float(np.median(np.abs(left[inside] / sd[inside]))), 0.05)

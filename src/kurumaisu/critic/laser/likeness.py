@@ -19,8 +19,11 @@ _SILENT = 1e6  # sd of a number that says nothing
 _FAR = 5.0  # sds from which a number pulls no harder: what nothing explains yet must not bend what explains the others
 _DAMPED = 0.02  # share by which the curvature is raised: other draws make the slopes uncertain
 _FORM = 0.1  # share of what an effect does to a number, by which a real effect of that name may do more or less
-# Likewise, from end to end of the ranges or of the incidences: a footprint grows with the range, a law may not.
+# Likewise, from end to end of the ranges or of the incidences.
 _TREND = 0.15
+# Of how far readings scatter likewise, per e-fold of the range, as a share of what it does at any: noise of a footprint
+# grows with the range, a law may not.
+_POWER = 0.5
 
 
 @dataclass(frozen=True)
@@ -28,11 +31,13 @@ class Kinds:
     """Which numbers (m,) are roots of counts, of the same sd, few or many; and which are places, alike in any form.
 
     trends (g, m): from -1 to 1 over numbers of readings from near to far, or from straight to oblique; 0 elsewhere.
+    folds (m,): logs of the ranges at which numbers tell how far readings scatter, less their mean; 0 elsewhere.
     """
 
     counts: BoolArray
     places: BoolArray
     trends: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    folds: FloatArray = field(default_factory=lambda: np.empty(0))
 
 
 class Likeness:
@@ -43,7 +48,7 @@ class Likeness:
 
         kinds: of which they are; heard: numbers that say anything.
         """
-        self._places, self._trends = kinds.places, kinds.trends
+        self._places, self._trends, self._folds = kinds.places, kinds.trends, kinds.folds
         self.offset, self.measured = nulls.mean(axis=0), measured
         spread = nulls.std(axis=0)
         count_sd = np.hypot(np.maximum(spread, _COUNT), _TAILS * np.abs(self.offset))
@@ -96,4 +101,7 @@ class Likeness:
         if len(self._trends):
             along = _TREND * self._trends * done
             slack += along.T @ along
+        if self._folds.any():
+            along = _POWER * self._folds * np.mean(done[self._folds != 0])
+            slack += np.outer(along, along)
         return np.asarray(np.linalg.cholesky(self._covariance + slack))

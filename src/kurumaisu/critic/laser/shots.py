@@ -100,8 +100,7 @@ def gather(recording: Recording, model: Model) -> Shots:
     runs = [run for run in recording.runs if run.name in recording.train and run.scan is not None and _referred(run)]
     chosen = [(i, index) for i, run in enumerate(runs) for index in _within(run)]
     chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, MOST_SCANS).astype(int))]
-    zero = min(float(run.scan.t[0]) for run in runs if run.scan is not None)
-    zero = zero if zero > _DAY else 0.0
+    zero = zero_of(runs)
     tracks, stamps, measured = [], [], []
     names = set.intersection(*(set(run.covariates) for run in runs))
     known: dict[str, list[FloatArray]] = {name: [] for name in sorted(names)}
@@ -130,6 +129,12 @@ def gather(recording: Recording, model: Model) -> Shots:
         zero=zero,
         runs=tuple(run.name for run in runs),
     )
+
+
+def zero_of(runs: Sequence[Run]) -> float:
+    """Return the time 0 of a laser [s] by the clock of its runs: its first scan, where stamps are dates."""
+    first = min(float(run.scan.t[0]) for run in runs if run.scan is not None)
+    return first if first > _DAY else 0.0
 
 
 def _within(run: Run) -> IntArray:

@@ -36,10 +36,14 @@ _LASTS = 0.03  # [m] within which a reading between two sides comes again where 
 
 @dataclass(frozen=True)
 class Groups:
-    """Masks (k, b) by what is known of a beam beforehand, each a part of the readings that are to be expected."""
+    """Masks (k, b) by what is known of a beam beforehand, each a part of the readings that are to be expected.
+
+    folds (g,): logs of the middle range of each that is by the range, less their mean; 0 of the others.
+    """
 
     names: tuple[str, ...]
     masks: tuple[BoolArray, ...]
+    folds: FloatArray
 
 
 class Statistics:
@@ -98,7 +102,12 @@ class Statistics:
     def kinds(self) -> Kinds:
         """Return which of the numbers are roots of counts, which are places of piles, and which follow one another."""
         counts = np.array([count for _, count, _ in self._told()])
-        return Kinds(counts, np.arange(len(counts)) >= len(counts) - _PLACES, _trends(self.names()))
+        return Kinds(counts, np.arange(len(counts)) >= len(counts) - _PLACES, _trends(self.names()), self._folds())
+
+    def _folds(self) -> FloatArray:
+        """Return the folds of the numbers that tell how far readings scatter: the first ones, by groups."""
+        known = self._groups.folds
+        return np.asarray(np.r_[known, np.zeros(len(self._told()) - len(known))])
 
     def of_errors(self) -> BoolArray:
         """Return which of the numbers follow how far readings are off their mean."""
@@ -161,7 +170,10 @@ def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, retu
     for value in np.unique(returns[expected])[:4]:
         names.append(f"return {value:g}")
         masks.append(expected & (returns == value))
-    return Groups(tuple(names), tuple(mask for mask in masks if mask.any()))
+    some = [(name, mask) for name, mask in zip(names, masks, strict=True) if mask.any()]
+    logs = [np.log(np.median(ranges[mask])) if name.startswith("range") else np.nan for name, mask in some]
+    folds = np.nan_to_num(np.array(logs) - np.nanmean(logs))
+    return Groups(tuple(name for name, _ in some), tuple(mask for _, mask in some), folds)
 
 
 def _trends(names: Sequence[str]) -> FloatArray:

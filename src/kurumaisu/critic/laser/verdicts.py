@@ -11,13 +11,14 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.laser import pictures, rivals, still
 from kurumaisu.critic.laser.acting import Acting, acting, cleared, gain_of, refitted
+from kurumaisu.critic.laser.astray import astray
 from kurumaisu.critic.laser.estimates import estimates_of, of_block, with_scatter
 from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.leading import leading, with_lead
 from kurumaisu.critic.laser.normal import Assembly, Normal
 from kurumaisu.critic.laser.pictures import Pictures, misfits, noise_rows
-from kurumaisu.critic.laser.pinned import Pinned
+from kurumaisu.critic.laser.pinned import Pinned, pinned
 from kurumaisu.critic.laser.search import Fitted, Search
 from kurumaisu.critic.laser.shots import gather, missing
 from kurumaisu.critic.laser.simulated import Simulator
@@ -35,7 +36,7 @@ from kurumaisu.critic.replay import extend
 from kurumaisu.critic.smooth_alike import FORM
 from kurumaisu.critic.story import Comparison
 from kurumaisu.critic.verdict import Cause, NextExperiment
-from kurumaisu.params import Model
+from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
@@ -61,6 +62,12 @@ def criticise(
     assembly = Assembly(gather(recording, model), ids)
     progress("laser: estimating the noise")
     normal = assembly.settle(recording.truth)
+    far = astray(assembly.shots, ids)
+    if far is not None:
+        form = next(form for form in assembly.forms if form.id == far.id)
+        (placed,) = pinned(assembly, normal, [form], [far], None, {}, recording.truth).settings
+        worth = (1.0, Search([form], normal.gram).run().best.log_likelihood)
+        return _beside(assembly, normal, placed, worth, recording, model, progress, ids)
     progress("laser: weighing effects")
     found = Search(assembly.forms, normal.gram).run()
     if found.best.forms:
@@ -76,13 +83,9 @@ def criticise(
     lead = leading(assembly, normal, made.fit, fit)
     certain = lead is not None and made.found.p[lead.id] >= NAMED
     if lead is not None and certain and all(own.id != lead.id for own in model.effects):
-        progress(f"laser: looking at the rest beside {lead.id}")
-        rest = criticise(recording, extend(model, [lead]), progress, ids)
-        sds = next(sds for setting, sds in fit.settings if setting is lead)
-        cause = Cause(lead.id, min(made.found.p[lead.id], 1.0), estimates_of(lead, sds), gain_of(made, lead.id))
-        size = size_of(assembly.marks.together([lead])[normal.beam_noise.valid])
-        rest = replace(rest, details=(*rest.details, *_told({lead.id: size}, ())))
-        return with_lead(rest, lead, cause, assembly, normal)
+        placed = next(each for each in fit.settings if each[0] is lead)
+        worth = (min(made.found.p[lead.id], 1.0), gain_of(made, lead.id))
+        return _beside(assembly, normal, placed, worth, recording, model, progress, ids)
     made, fit = cleared(assembly, normal, made, fit, recording.truth)
     progress("laser: weighing effects on the scatter")
     away = 0.0 if made.winner is None else rivals.elsewhere(made.winner, normal.gram)
@@ -104,6 +107,29 @@ def criticise(
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
     shown = misfits(assembly, normal, made.parts())
     return replace(finding, pictures=Pictures(shown, pictures.rivals(made.found), noise_rows(normal), comparison))
+
+
+def _beside(
+    assembly: Assembly,
+    normal: Normal,
+    lead: tuple[EffectSetting, dict[str, float]],
+    worth: tuple[float, float],
+    recording: Recording,
+    model: Model,
+    progress: Progress,
+    ids: frozenset[str] | None,
+) -> LaserFinding:
+    """Return an effect, which must be in place before the rest can be seen, and what is found then.
+
+    lead: its setting, and the sds of what was fitted; worth: its posterior, and the log evidence of it [nat].
+    """
+    setting, sds = lead
+    progress(f"laser: looking at the rest beside {setting.id}")
+    rest = criticise(recording, extend(model, [setting]), progress, ids)
+    cause = Cause(setting.id, worth[0], estimates_of(setting, sds), worth[1])
+    size = size_of(assembly.marks.together([setting])[normal.beam_noise.valid])
+    rest = replace(rest, details=(*rest.details, *_told({setting.id: size}, ())))
+    return with_lead(rest, setting, cause, assembly, normal)
 
 
 def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model: Model) -> NextExperiment | None:
