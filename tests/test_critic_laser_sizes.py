@@ -9,17 +9,18 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu.critic.laser.acting import gain_of
-from kurumaisu.critic.laser.columns import Form
+from kurumaisu.critic.laser.columns import Column, Form
 from kurumaisu.critic.laser.free import Free
 from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.pictures import Part
 from kurumaisu.critic.laser.pinned import pinned
-from kurumaisu.critic.laser.rivals import Rival
-from kurumaisu.critic.laser.search import Fitted
+from kurumaisu.critic.laser.rivals import Rival, weigh
+from kurumaisu.critic.laser.search import Fitted, Search
 from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.verdicts import _spread_of, criticise
 from kurumaisu.critic.smooth import Belief
 from kurumaisu.critic.smooth_alike import FORM
+from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -41,6 +42,24 @@ def test_a_curve_out_of_the_running_does_not_make_a_named_cause_worth_less_than_
         more=None,
     )
     assert gain_of(made, "laser.warmup") == pytest.approx(gain)
+
+
+@pytest.mark.parametrize(("size", "found"), [(0.1, {"laser.quadratic"}), (0.0, set())])
+def test_beside_walls_that_are_where_they_like_an_effect_needs_evidence_only(size, found):
+    """A share of what the walls do, 35 nats here, is asked of nothing beside them: they have no equation."""
+    rng = np.random.default_rng(1)
+    walls = rng.integers(0, 12, 6000)
+    bent = rng.standard_normal(6000)
+    readings = size * bent + 0.8 * rng.standard_normal(12)[walls] + rng.standard_normal(6000)
+    columns = np.column_stack([bent, np.eye(12)[walls], readings])
+    gram = columns.T @ columns
+    own = Column(Parameter("quadratic", "1/m", null=0.0, scale=1.0, lower=-9.0, upper=9.0), False, {})
+    quadratic = Form("laser.quadratic", {}, (own,), 0)
+    free = Free("world.map_error", own.parameter, None, (np.eye(12),), slice(1, 13))
+    winner = weigh(Search([quadratic], gram).run(), [free], gram).winner
+    assert winner is not None
+    assert winner.free is free
+    assert winner.fit.ids == found
 
 
 def test_a_size_is_no_surer_than_the_form_that_it_belongs_to(tmp_path):

@@ -113,7 +113,9 @@ def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:
 
 def _beside(fit: Fitted, free: Free, gram: FloatArray, share: float) -> Rival:
     seen = belief(*beside(fit, free, gram), free.priors)
-    left = FORM * (fit.log_likelihood + seen.nats) if fit.forms else 0.0
+    # Walls that are each where they like have no equation that could be wrong by a share; curves have few knots.
+    doubted = fit.log_likelihood + (seen.nats if free.basis is not None else 0.0)
+    left = FORM * doubted if fit.forms else 0.0
     return Rival(fit, free, seen, fit.score + seen.nats + share - left)
 
 
