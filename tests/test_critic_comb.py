@@ -23,11 +23,15 @@ NOISE = Noise(position_sd=0.005, heading_sd=0.005, sd_v=0.01, sd_lateral=0.003, 
 STEP = "base.dac_quantisation"
 
 
-def problem_with(form, step, seed, cut=0.0, design="rich"):
+def problem_of(seed, faults, ids, design="rich"):
     drives = base_case.draw_drives(design, USUAL, np.random.default_rng(seed), seconds=40.0, rate=10.0)
+    data = base_case.recording("hidden", drives, faults)
+    return Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset(ids))
+
+
+def problem_with(form, step, seed, cut=0.0, design="rich"):
     faults = [BASE[STEP].fault({"size": step, "cut": cut}, form)] if step else []
-    data = base_case.recording("steps", drives, faults)
-    return Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset({STEP}))
+    return problem_of(seed, faults, {STEP}, design)
 
 
 @pytest.mark.parametrize(("form", "phase"), [("plain", 0.0), ("other", 0.5)])
@@ -70,11 +74,8 @@ def test_steps_are_found_although_smooth_effects_together_draw_their_mean():
 
 @pytest.mark.parametrize(("step", "gain", "hopeless"), [(0.0367, 0.0, False), (0.02, 0.3, True)])
 def test_a_comb_is_not_fitted_alone_where_something_else_explains_far_more(step, gain, hopeless):
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
     faults = [BASE[STEP].fault({"size": step, "cut": 0.0}, "plain"), BASE["base.gain_w"].fault({"size": gain}, "plain")]
-    data = base_case.recording("steps", drives, faults)
-    ids = frozenset({STEP, "base.gain_w"})
-    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=ids)
+    problem = problem_of(5, faults, {STEP, "base.gain_w"})
     empty, fits = problem.fit_candidates((), {}), {one: problem.fit_candidates([one], {}) for one in problem.candidates}
     best = max(fits.values(), key=lambda fit: fit.score)
     steps = [one for one in problem.candidates if one.id == STEP]
@@ -126,12 +127,8 @@ def test_a_top_speed_that_only_the_fastest_drives_meet_is_found():
 @pytest.mark.parametrize(("form", "knee"), [("plain", 0.0), ("other", 0.1)])
 def test_a_limit_with_a_round_corner_is_told_from_one_with_a_sharp_one(form, knee):
     """A parabola hides it, a power is fitted; else a curvature of the law stands beside the limit."""
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
     fault = BASE["base.saturation"].fault({"size": 0.3, "axis": 0.0, "top_v": 0.9, "top_w": 1.0}, form)
-    data = base_case.recording("top", drives, [fault])
-    ids = frozenset({"base.saturation", "base.curvature_v"})
-    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=ids)
-    found = naming.search(problem, lambda _: None)
+    found = naming.search(problem_of(5, [fault], {"base.saturation", "base.curvature_v"}), lambda _: None)
     assert found.best.ids == {"base.saturation"}
     assert found.best.start["base.saturation", "knee"] == knee
     assert found.best.start["base.saturation", "inverse_v"] == pytest.approx(1 / 0.63, rel=0.05)
@@ -142,20 +139,16 @@ def jerk_limited(r, s):
     """Ramps whose slope itself comes and goes over `jerk` [s]: means over so long."""
     ramped = base_rates.accel_limit(r, s)
     count = round(s["jerk"] / motion.STEP)
-    means = (
-        np.convolve(np.pad(rate, (count - 1, 0)), np.ones(count) / count, "valid") for rate in (ramped.v, ramped.w)
+    v, w = (
+        np.convolve(np.pad(rate, (count - 1, 0)), np.full(count, 1 / count), "valid") for rate in (ramped.v, ramped.w)
     )
-    return replace(ramped, **dict(zip("vw", means, strict=True)))
+    return replace(ramped, v=v, w=w)
 
 
 @pytest.mark.parametrize(("act", "rounded"), [(base_rates.accel_limit, 0.0), (jerk_limited, 0.04)])
 def test_a_ramp_with_round_corners_is_a_ramp_without_a_delay(act, rounded):
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(6), seconds=40.0, rate=10.0)
     fault = motion.Fault(motion.Form("rates", act), {"size": 0.4, "ratio": 0.8, "jerk": 0.03})
-    data = base_case.recording("ramp", drives, [fault])
-    ids = frozenset({"base.accel_limit", "base.delay"})
-    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=ids)
-    found = naming.search(problem, lambda _: None)
+    found = naming.search(problem_of(6, [fault], {"base.accel_limit", "base.delay"}), lambda _: None)
     assert found.best.ids == {"base.accel_limit"}
     assert found.best.start["base.accel_limit", "round"] == rounded
     assert found.p["base.delay"] < 0.5
@@ -163,11 +156,8 @@ def test_a_ramp_with_round_corners_is_a_ramp_without_a_delay(act, rounded):
 
 def test_a_search_among_ever_more_sets_is_cut_short(monkeypatch):
     """A chair unlike its model in every way would be searched for minutes; what was found until then counts."""
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(8), seconds=40.0, rate=10.0)
     faults = [BASE[f"base.{name}"].fault({"size": size}, "plain") for name, size in (("gain_v", 0.2), ("lag_w", 0.2))]
-    data = base_case.recording("two", drives, faults)
-    ids = frozenset({"base.gain_v", "base.lag_w", "base.lag_v", "base.curvature_v"})
-    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=ids)
+    problem = problem_of(8, faults, {"base.gain_v", "base.lag_w", "base.lag_v", "base.curvature_v"})
     whole = naming.search(problem, lambda _: None)
     monkeypatch.setattr(naming, "_MOST", 1)
     short = naming.search(problem, lambda _: None)
@@ -197,10 +187,8 @@ def test_what_changes_within_a_step_is_known_and_rests_are_rests():
 
 def steps_beside(step, cut, **others):
     """Return a problem of a converter's steps beside smooth effects, and the candidates that hide in it."""
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
     sizes = {STEP: {"size": step, "cut": cut}, **{f"base.{name}": {"size": size} for name, size in others.items()}}
-    data = base_case.recording("steps", drives, [BASE[name].fault(of, "other") for name, of in sizes.items()])
-    problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset(sizes))
+    problem = problem_of(5, [BASE[name].fault(of, "other") for name, of in sizes.items()], sizes)
     form = {"phase": 0.5, "cut": cut, "rests": 0.0}
     rough = [
         one

@@ -80,7 +80,7 @@ def test_what_lags_but_is_no_slower_is_hardly_a_load():
 def test_what_has_a_direction_or_two_peculiarities_has_no_proportion(name, sizes):
     """A slope climbs in any direction, and one axis may be ramped without the other.
 
-    Of three ways in which axes may be ramped three in ten are unusual: with round corners, as these are fitted.
+    Either or both: three ways, and a ramp is fitted with round corners here, which three in ten have beforehand.
     """
     cost, z = cost_of(name, sizes)
     ways = 1 if name == "base.slope" else 3 / 0.3

@@ -43,13 +43,10 @@ def in_turn(made: Decision, held: Gain | None, measure: Callable[[], Gain]) -> G
 
     Only where drives held out decide nothing: nobody may have driven so as to meet what acts, such as a threshold.
     """
-    nats = made.found.nats(made.found.best)
-    if held is None or made.beyond.extension is not None or nats < CERTAIN or confirmed(held, nats):
-        return held
-    if held.log_density_per_sample.hi90 < 0:
+    if held is None or not _unconfirmed(made, held) or held.log_density_per_sample.hi90 < 0:
         return held
     again = measure()
-    return again if confirmed(again, nats) else held
+    return again if confirmed(again, made.found.nats(made.found.best)) else held
 
 
 def unmet(made: Decision, held: Gain | None, drives: Sequence[Drive]) -> bool:
@@ -57,11 +54,15 @@ def unmet(made: Decision, held: Gain | None, drives: Sequence[Drive]) -> bool:
 
     held: what the effects gain on these drives. What would be surprised there by more than chance is refuted.
     """
-    found = made.found
-    if held is None or made.beyond.extension is not None or found.nats(found.best) < CERTAIN:
+    if held is None or not _unconfirmed(made, held) or held.log_density_per_sample.hi90 <= 0:
         return False
-    seen = expected_nats(made.problem, drives, found.best.settings, ())
-    return seen < _MET and held.log_density_per_sample.hi90 > 0
+    return expected_nats(made.problem, drives, made.found.best.settings, ()) < _MET
+
+
+def _unconfirmed(made: Decision, held: Gain) -> bool:
+    """Tell whether effects are certain by the drives they were fitted to, and not confirmed by those held out."""
+    nats = made.found.nats(made.found.best)
+    return made.beyond.extension is None and nats >= CERTAIN and not confirmed(held, nats)
 
 
 def _uncurved(made: Decision, worth: Gain, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain]:

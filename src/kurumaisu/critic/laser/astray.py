@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from scipy.optimize import minimize_scalar
 
@@ -60,6 +62,7 @@ class _Sought:
         out = (0.0, EffectSetting(effect.id, null))
         for p in effect.parameters:
 
+            @cache
             def missed(value: float, name: str = p.name) -> float:
                 return 1 - self.share((EffectSetting(effect.id, {**null, name: value}),))
 

@@ -58,6 +58,11 @@ def criticise(
     if why is not None:
         drive = supplier(model, every_id(), recording.truth) if recording.world is not None else None
         return LaserFinding(refused=why, details=still.words(recording, model), next_experiment=drive)
+
+    def beside(setting: EffectSetting) -> LaserFinding:
+        progress(f"laser: looking at the rest beside {setting.id}")
+        return criticise(recording, extend(model, [setting]), progress, ids)
+
     progress("laser: predicting the scans")
     assembly = Assembly(gather(recording, model), ids)
     progress("laser: estimating the noise")
@@ -67,7 +72,7 @@ def criticise(
         form = next(form for form in assembly.forms if form.id == far.id)
         (placed,) = pinned(assembly, normal, [form], [far], None, {}, recording.truth).settings
         worth = (1.0, Search([form], normal.gram).run().best.log_likelihood)
-        return _beside(assembly, normal, placed, worth, recording, model, progress, ids)
+        return _with_rest(assembly, normal, placed, worth, beside(placed[0]))
     progress("laser: weighing effects")
     found = Search(assembly.forms, normal.gram).run()
     if found.best.forms:
@@ -85,7 +90,7 @@ def criticise(
     if lead is not None and certain and all(own.id != lead.id for own in model.effects):
         placed = next(each for each in fit.settings if each[0] is lead)
         worth = (min(made.found.p[lead.id], 1.0), gain_of(made, lead.id))
-        return _beside(assembly, normal, placed, worth, recording, model, progress, ids)
+        return _with_rest(assembly, normal, placed, worth, beside(placed[0]))
     made, fit = cleared(assembly, normal, made, fit, recording.truth)
     progress("laser: weighing effects on the scatter")
     away = 0.0 if made.winner is None else rivals.elsewhere(made.winner, normal.gram)
@@ -109,23 +114,18 @@ def criticise(
     return replace(finding, pictures=Pictures(shown, pictures.rivals(made.found), noise_rows(normal), comparison))
 
 
-def _beside(
+def _with_rest(
     assembly: Assembly,
     normal: Normal,
     lead: tuple[EffectSetting, dict[str, float]],
     worth: tuple[float, float],
-    recording: Recording,
-    model: Model,
-    progress: Progress,
-    ids: frozenset[str] | None,
+    rest: LaserFinding,
 ) -> LaserFinding:
-    """Return an effect, which must be in place before the rest can be seen, and what is found then.
+    """Return an effect, which must be in place before the rest can be seen, with the rest that was found then.
 
     lead: its setting, and the sds of what was fitted; worth: its posterior, and the log evidence of it [nat].
     """
     setting, sds = lead
-    progress(f"laser: looking at the rest beside {setting.id}")
-    rest = criticise(recording, extend(model, [setting]), progress, ids)
     cause = Cause(setting.id, worth[0], estimates_of(setting, sds), worth[1])
     size = size_of(assembly.marks.together([setting])[normal.beam_noise.valid])
     rest = replace(rest, details=(*rest.details, *_told({setting.id: size}, ())))
