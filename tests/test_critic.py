@@ -116,7 +116,7 @@ def test_a_robot_without_voltages_follows_its_commands(tmp_path, size, volts):
     def grown(series, columns):
         return replace(series, values=series.values * np.where(np.isin(series.columns, columns), size, 1.0))
 
-    data = recording("base.gain_w", -0.1, 94, 40.0)
+    data = recording("base.gain_w", -0.1, 94, 25.0)
     runs = (replace(run, voltage=None, command=grown(run.command, ["v"])) for run in data.runs)
     data = replace(data, runs=tuple(replace(run, pose=grown(run.pose, ["x", "y"])) for run in runs), truth=None)
     criticism = criticise(data)

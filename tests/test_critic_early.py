@@ -16,8 +16,8 @@ from kurumaisu.critic.verdict import Verdict
 from kurumaisu.params import shipped
 
 
-def _made(seed: int, *faults: Fault) -> Recording:
-    drives = draw_drives("rich", USUAL, np.random.default_rng(seed), seconds=60.0, rate=20.0)
+def _made(seed: int, *faults: Fault, seconds: float = 60.0) -> Recording:
+    drives = draw_drives("rich", USUAL, np.random.default_rng(seed), seconds=seconds, rate=20.0)
     return recording("made", drives, list(faults))
 
 
@@ -50,7 +50,7 @@ def test_clocks_that_differ_by_more_are_wrong_data() -> None:
 @pytest.mark.parametrize("cause", ["base.lag_w", "base.accel_limit", "base.gain_v", "base.payload"])
 def test_what_a_chair_does_is_no_clock(cause: str) -> None:
     rng = np.random.default_rng(8)
-    told = _verdict(_made(7, BASE[cause].fault(BASE[cause].draw(rng), "other")))
+    told = _verdict(_made(7, BASE[cause].fault(BASE[cause].draw(rng), "other"), seconds=30.0))
     assert not any("before what asks for it" in problem for problem in told.problems)
     assert cause in [named.id for named in told.causes] + [each for one in told.confounded for each in one]
 
