@@ -10,7 +10,7 @@ from kurumaisu.bench.hidden import Ask, base_case, base_rates, make, motion
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic import naming, replay
+from kurumaisu.critic import naming, neighbours, replay
 from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.noise import Noise
@@ -79,7 +79,7 @@ def test_a_comb_is_not_fitted_alone_where_something_else_explains_far_more(step,
     empty, fits = problem.fit_candidates((), {}), {one: problem.fit_candidates([one], {}) for one in problem.candidates}
     best = max(fits.values(), key=lambda fit: fit.score)
     steps = [one for one in problem.candidates if one.id == STEP]
-    given_up = [one for one in steps if naming.hopeless_alone(problem, one, empty, best)]
+    given_up = [one for one in steps if neighbours.hopeless_alone(problem, one, empty, best)]
     assert (given_up == steps) == hopeless
     assert all(fits[one].log_likelihood < best.log_likelihood - 100 for one in given_up)
 

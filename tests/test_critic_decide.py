@@ -11,7 +11,7 @@ import pytest
 from kurumaisu.bench.hidden import Ask, base_case, make
 from kurumaisu.bench.hidden.noise import Colour, Regime
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic import decide, naming
+from kurumaisu.critic import decide, naming, stuck
 from kurumaisu.critic.catalogue import Term
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import prepare
@@ -114,8 +114,8 @@ def test_a_fit_that_first_values_beat_is_stuck(start, better):
     terms, own = (Term("a", parameter, 0.0), Term("b", parameter, 0.0)), (0.5, 0.2)
     at = {term.key: value for term, value in zip(terms, own, strict=True)}
     fit = SimpleNamespace(terms=terms, start=at, log_likelihood=-2.0)
-    assert naming.begins_better(problem, fit, {(name, "offset"): value for name, value in start.items()}) is better
-    assert not naming.begins_better(problem, SimpleNamespace(terms=()), {("a", "offset"): 0.9})
+    assert stuck.begins_better(problem, fit, {(name, "offset"): value for name, value in start.items()}) is better
+    assert not stuck.begins_better(problem, SimpleNamespace(terms=()), {("a", "offset"): 0.9})
 
 
 @pytest.mark.parametrize(("by_noise", "least", "curved"), [(0.0, 3.0, True), (3.5, 3.0, False), (3.5, 1.0, True)])

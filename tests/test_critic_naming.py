@@ -16,7 +16,7 @@ from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.motion import STEP, Setting
 from kurumaisu.bench.hidden.motion import drive as hidden_drive
 from kurumaisu.bench.hidden.noise import USUAL, draw_rates, draw_reference
-from kurumaisu.critic import explain, naming, replay, sanity
+from kurumaisu.critic import explain, naming, neighbours, replay, sanity, stuck
 from kurumaisu.critic.catalogue import Candidate, Term
 from kurumaisu.critic.decide import Decision
 from kurumaisu.critic.drive import GRID, Drive, prepare
@@ -285,13 +285,35 @@ def test_another_form_is_tried_without_what_stood_in_for_it():
 
     def tried(*needless):
         chosen = frozenset({zero, *needless})
-        fit = SimpleNamespace(candidates=chosen, ids=frozenset(one.id for one in chosen), start={})
-        return {chosen for chosen, _ in naming._neighbours(problem, screen, screen, fit)}
+        start = {("zero", "offset"): 0.4}
+        fit = SimpleNamespace(candidates=chosen, ids=frozenset(one.id for one in chosen), start=start)
+        sets = list(neighbours.neighbours(problem, screen, screen, fit))
+        # From its own size, and from that of the wrong form.
+        assert {len(begin) for chosen, begin in sets if chosen == {other}} in (set(), {0, 1})
+        return {chosen for chosen, _ in sets}
 
     assert frozenset({other}) in tried(ahead)
     assert frozenset({other}) in tried(ahead, turning)  # one in each rate
     assert frozenset({other}) not in tried(turning, also)
     assert frozenset({other, also}) in tried(turning, also)
+
+
+@pytest.mark.parametrize(
+    ("rough", "start", "again"),
+    [
+        (True, {"a": 0.0358}, True),
+        (True, {"a": 0.0186}, False),
+        (True, {"b": 1.0}, False),
+        (False, {"a": 0.0358}, False),
+    ],
+)
+def test_a_comb_is_fitted_once_from_each_tooth_it_may_be_on(rough, start, again):
+    """No fit goes from a step of 18.4 mV to one of 35.8 mV, and before one it may look worse."""
+    terms = Term("a", OFFSET, 0.0, rough=rough), Term("b", OFFSET, 0.0)
+    fit = SimpleNamespace(candidates=frozenset("a"), terms=terms, values=[0.0184, 0.1])
+    begun = set()
+    told = [stuck.other_tooth(fit, {(name, "offset"): size for name, size in start.items()}, begun) for _ in range(2)]
+    assert told == [again, False]
 
 
 def test_what_clips_does_not_hide_what_else_it_may_be():

@@ -9,27 +9,22 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu import effects
 from kurumaisu.critic import stand_ins
-from kurumaisu.critic.catalogue import Candidate, Key, Term
+from kurumaisu.critic.catalogue import Key
 from kurumaisu.critic.evidence import Fit, Problem, log_posterior
 from kurumaisu.critic.exchanged import exchanges
+from kurumaisu.critic.neighbours import CLOSE, Chosen, neighbours
 from kurumaisu.critic.scan import Guess, Screen
 from kurumaisu.critic.stand_ins import Posterior, confounded
-from kurumaisu.critic.teeth import HOPE
-from kurumaisu.types import FloatArray
+from kurumaisu.critic.stuck import begins_better, other_tooth
 
 NAMED, RIVAL = stand_ins.NAMED, stand_ins.RIVAL
 _REFITS = 10  # sets refitted after each scan
 _FEWER = 4  # of fewer effects than the best set has, besides
 _BENT = 0.05  # share of what a set explains by which lines may be off for one effect that does what two do
 _RIVALS = 2  # likely sets besides the best one from which others are looked for
-_CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
 _ROUNDS = 8  # scans at most
 _MOST = 200  # refitted sets from which on none is looked for: where ten effects seem to act, each round has a hundred
-_HOPES = 3.0  # times what lines promise at most, about nothing, that something with a comb of likely values explains
-_HOPELESS = 100.0  # [nat] behind the best set that nothing makes good
-_STUCK = 0.5  # [nat] by which a fit must be beaten by mere first values to be made again
 NULLS = 2000  # draws of the null calibration
 
 
@@ -69,9 +64,6 @@ class Naming:
         return tuple(name for name in sorted(self.best.ids) if self.p[name] >= NAMED)
 
 
-Chosen = frozenset[Candidate]
-
-
 def search(problem: Problem, progress: Callable[[str], None], first: Fit | None = None) -> Naming:
     """Scan sets of effects linearly, refit the promising ones, and go on from the best until it stays the best.
 
@@ -80,11 +72,12 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
     count = len({candidate.id for candidate in problem.candidates})
     empty = problem.fit_candidates((), {})
     fits: dict[Chosen, Fit] = {empty.candidates: empty}
+    begun = set[tuple[Chosen, float]]()
 
     def try_sets(guesses: Iterable[tuple[Chosen, Mapping[Key, float]]]) -> Fit:
         for chosen, start in guesses:
             old = fits.get(chosen)
-            if old is not None and not begins_better(problem, old, start):
+            if old is not None and not (other_tooth(old, start, begun) or begins_better(problem, old, start)):
                 continue
             progress(f"fitting {', '.join(sorted(candidate.id for candidate in chosen))}")
             fit = problem.fit_candidates(chosen, start)
@@ -105,7 +98,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
             alone: list[tuple[Chosen, Mapping[Key, float]]] = [
                 (frozenset({other}), {}) for other in screen.fixed if nothing.mends(other)
             ]
-            best = try_sets([*alone, *_neighbours(problem, screen, nothing, best)])
+            best = try_sets([*alone, *neighbours(problem, screen, nothing, best)])
         if best is centre:
             best = try_sets(_beside_rivals(problem, _ranked(fits, count), count, screened))
         if best is centre or len(fits) > _MOST:
@@ -133,8 +126,8 @@ def _promising(guesses: Sequence[Guess], about: Fit, explained: float) -> list[G
     one it would never be known that fewer suffice. None is worth one where by their lines all leave their bounds.
     """
     best = max((guess.score for guess in guesses), default=0.0)
-    close = [guess for guess in guesses[:_REFITS] if guess.score > best - _CLOSE]
-    far = best - max(_CLOSE, _BENT * explained)
+    close = [guess for guess in guesses[:_REFITS] if guess.score > best - CLOSE]
+    far = best - max(CLOSE, _BENT * explained)
     size = len(about.candidates)
     fewer = [guess for guess in guesses[len(close) :] if len(guess.chosen) < size and guess.score > far]
     # Parts of the fit's set are tried anyway.
@@ -155,107 +148,6 @@ def _beside_rivals(
             guesses = Screen(problem, fit).guesses()
             own = next((guess.score for guess in guesses if guess.chosen == fit.candidates), -np.inf)
             yield from ((guess.chosen, guess.start) for guess in guesses[:_REFITS] if guess.score > own)
-
-
-def begins_better(problem: Problem, fit: Fit, start: Mapping[Key, float]) -> bool:
-    """Tell whether other first values of a set, or of a part of it, explain more than its fit, which stuck half way.
-
-    Else what is needless seems to act, and what stands in for what acts seems not to.
-    """
-    own = fit.start if fit.terms else {}
-    if not any(key in start for key in own):
-        return False
-    values = np.array(
-        [term.parameter.lower if term.fixed else start.get(term.key, own[term.key]) for term in fit.terms]
-    )
-    left = problem.residual(fit.terms, values)
-    return -0.5 * float(left @ left) > fit.log_likelihood + _STUCK
-
-
-def _neighbours(
-    problem: Problem, screen: Screen, nothing: Screen, fit: Fit
-) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
-    """Yield the set without each of its effects, with what can only act or not, and with each rival instead."""
-    kept = fit.start
-    for one in sorted(fit.candidates, key=lambda candidate: candidate.id):
-        yield fit.candidates - {one}, kept
-        for other in problem.candidates:
-            new = other.id not in fit.ids - {one.id} and other not in fit.candidates
-            # What clips or swallows hides its rivals: beside it their columns are empty, without it they are not.
-            alike = screen.related(one, other) or nothing.related(one, other)
-            if new and (screen.mends(other, one) if other.fixed else alike):
-                # What fits one form of a comb is nowhere near what fits another.
-                begin = {key: value for key, value in kept.items() if not other.rough or key[0] != other.id}
-                yield fit.candidates - {one} | {other}, begin
-                if other.id == one.id:  # what stood in for the right form may go with the wrong one
-                    rest = fit.candidates - {one}
-                    yield from ((rest - gone | {other}, begin) for gone in _that_stood_in(rest))
-    for other in screen.fixed:
-        if other.id not in fit.ids and screen.mends(other):
-            yield fit.candidates | {other}, kept
-    for other in problem.candidates:
-        if other.rough and other.id not in fit.ids:
-            if not hopeless_alone(problem, other, nothing.centre, fit):
-                yield frozenset({other}), {}
-            yield fit.candidates | {other}, kept
-    # Its tooth was the best one when less acted beside it.
-    yield from (
-        (fit.candidates, problem.teeth.anew(fit.terms, fit.values, one.id)) for one in fit.candidates if one.rough
-    )
-    yield from _combs(problem, screen, fit)
-
-
-def _that_stood_in(rest: Chosen) -> Iterator[Chosen]:
-    """Yield each effect of some, and each pair of which one shows in the forward speed and the other in the yaw rate.
-
-    Steps of a converter are in both, so for their wrong form two may stand in.
-    """
-    yield from (frozenset({one}) for one in rest)
-    yield from (frozenset({one, other}) for one in rest if _in_v(one) for other in rest if not _in_v(other))
-
-
-def _in_v(candidate: Candidate) -> bool:
-    return getattr(effects.by_id(candidate.id), "shows_in", None) == effects.Rate.V
-
-
-def hopeless_alone(problem: Problem, rough: Candidate, empty: Fit, fit: Fit) -> bool:
-    """Tell whether something rough, even if it explains several times what its best tooth promises, is far behind.
-
-    Nobody asks what is thousands of nats behind, but to find that out would take as long as any other fit.
-    """
-    sizes = [term for term in rough.terms if not term.fixed and not term.shape]
-    if not all(term.rough for term in sizes):
-        return False
-    hope = max(problem.teeth.hope(rough.terms, empty.terms, empty.values), 0.0) * problem.teeth.share * len(sizes)
-    return empty.log_likelihood + _HOPES * hope < fit.log_likelihood - _HOPELESS
-
-
-def _combs(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
-    """Yield what has a comb of likely values beside the part of the set that leaves it most to explain.
-
-    Smooth effects that draw the mean of its steps together leave no tooth that stands out beside all of them.
-    """
-    parts = [(part, *_left(problem, part)) for part in screen.parts()]
-    for other in problem.candidates if parts else ():
-        if not other.rough or other in fit.candidates:
-            continue
-        hopes = [
-            (problem.teeth.hope(other.terms, terms, values), likelihood, part)
-            for part, terms, values, likelihood in parts
-        ]
-        hope, likelihood, part = max(hopes, key=lambda found: found[0] + found[1])
-        if hope > HOPE and likelihood + hope > fit.log_likelihood - _CLOSE:
-            begin = {key: value for key, value in part.start.items() if key[0] != other.id}
-            yield frozenset(each for each in part.chosen if each.id != other.id) | {other}, begin
-
-
-def _left(problem: Problem, part: Guess) -> tuple[tuple[Term, ...], FloatArray, float]:
-    """Return the terms and values of a guess, and its log likelihood when simulated."""
-    ordered = sorted(part.chosen, key=lambda candidate: candidate.id)
-    terms = tuple(term for candidate in ordered for term in candidate.terms)
-    values = np.array([term.parameter.lower if term.fixed else part.start.get(term.key, term.null) for term in terms])
-    left = problem.residual(terms, values)
-    return terms, values, -0.5 * float(left @ left)
 
 
 def _false_alarm(screen: Screen) -> float:
