@@ -82,8 +82,9 @@ class Statistics:
         left, common = self._leftover(error, ends)
         inside = self._trust & np.isfinite(left)
         z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
-        out = [_log(_mean(z[group & inside] ** 2, 1.0)) for group in self._groups.masks]
-        out += _correlations(fluctuating(z, inside, self._stand), inside)
+        free, known = fluctuating(z, inside, self._stand)
+        out = [_log(_mean(free[group & known] ** 2, 1.0)) for group in self._groups.masks]
+        out += _correlations(free, known)
         size = np.abs(left[inside])
         out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > ELSEWHERE)]
         far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
