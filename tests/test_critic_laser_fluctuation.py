@@ -67,7 +67,7 @@ def test_neighbours_correlate_by_what_no_beam_keeps(stands, kept, told):
 
 @pytest.mark.parametrize(("kept", "told"), [(True, False), (False, True)])
 def test_how_far_readings_scatter_is_what_no_beam_keeps(stands, kept, told):
-    """Offsets of beams are as large at any incidence as their draws happen to be: noise that grows with it hid there."""
+    """Offsets of beams are as large at an incidence as their draws happen to be: noise that grows with it hid there."""
     rng, shape = np.random.default_rng(6), stands.residual.shape
     more = stands.first.sd * rng.standard_normal((1, shape[1]) if kept else shape)
     plain, moved = numbers(stands, noise(stands, 5)), numbers(stands, noise(stands, 5) + more)
