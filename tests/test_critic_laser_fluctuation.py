@@ -74,7 +74,9 @@ def test_how_far_readings_scatter_is_what_no_beam_keeps(stands, kept, told):
     by_incidence = [moved[name] - plain[name] for name in plain if name.startswith("spread, incidence")]
     assert (min(by_incidence) > 0.4) == told
     assert (max(by_incidence) > 0.1) == told
-    assert moved["spread of the beams' means"] - plain["spread of the beams' means"] > 0.4
+    name = "spread of the beams' means"
+    assert (moved[name] - plain[name] > 0.8) == kept  # what scatters spreads them by no more than it does by chance
+    assert abs(moved[name] - plain[name]) < 0.3 or kept
 
 
 def test_of_scans_that_stand_alone_goes_what_beams_keep_in_all_of_them():

@@ -108,7 +108,8 @@ class Statistics:
         far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
         out.append(_share((far[:, 1:] & far[:, :-1])[inside[:, 1:]]))
         out += [_log(float(np.mean(common**2))), _correlation(common)]
-        out += [_between(z, inside, np.broadcast_to(np.arange(z.shape[1]), z.shape)), _between(z, inside, self._cells)]
+        beams = np.broadcast_to(np.arange(z.shape[1]), z.shape)
+        out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
         out.append(_share(_mixed(readings) & self._jumps & ~_lasting(readings, self._stand)))
@@ -253,12 +254,15 @@ def _widened(mask: BoolArray) -> BoolArray:
     return np.asarray(maximum_filter1d(mask, 2 * _BESIDE + 1, axis=1, mode="constant"))
 
 
-def _between(z: FloatArray, inside: BoolArray, group: IntArray) -> float:
-    """Return the log of the mean squared group mean, each in deviations of what chance gives it."""
-    count = np.bincount(group[inside])
-    sums = np.bincount(group[inside], z[inside])
-    many = count > 5
-    return _log(_mean(sums[many] ** 2 / count[many], 1.0))
+def _between(z: FloatArray, free: FloatArray, group: IntArray) -> float:
+    """Return the log of the mean squared group mean, each in deviations of what readings that scatter so give it.
+
+    free: what of them scatters. Else any noise would spread means, too, and hide that beams keep something.
+    """
+    count = np.bincount(group)
+    sums, chance = np.bincount(group, z), np.bincount(group, free**2)
+    many = (count > 5) & (chance > 0)
+    return _log(_mean(sums[many] ** 2 / chance[many], 1.0))
 
 
 def _values(readings: FloatArray) -> list[float]:
