@@ -73,7 +73,7 @@ class Assembly:
         self.motion: list[Steady] | None = None
         self.blocked = blocked(shots.measured, self.marks.base)
         somewhere = uncut(shots.measured)
-        self.displaced = displaced(somewhere, self.marks.base, self.hits())
+        self.displaced = displaced(somewhere, self.marks.base, self.hits(), self.marks.seen.incidence)
         # Which readings (k, b) are of what the map has, as far as is known.
         self.mapped = ~self.blocked & ~self.displaced.readings
         others = np.where(self.mapped, somewhere, np.nan)
