@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from kurumaisu.bench.hidden.laser_forms import ar1
 from kurumaisu.critic.laser.jumps import jumps, parted
 
 STAND = np.repeat([-1, 0, 1, 2], 20)
@@ -28,6 +29,12 @@ def test_one_scan_may_be_off_alone_and_stands_that_differ_are_no_jump():
     level = 0.01 * STAND.astype(float)
     level[20] += 0.004
     assert jumps(scans(level), STAND).tolist() == [20]
+
+
+def test_what_wanders_in_all_stands_jumps_in_none():
+    rng = np.random.default_rng(5)
+    level = ar1(80, 0.8, rng) * 0.001
+    assert not len(jumps(scans(level), STAND))
 
 
 def test_what_is_not_known_jumps_nowhere():

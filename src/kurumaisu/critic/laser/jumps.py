@@ -14,6 +14,7 @@ from kurumaisu.types import FloatArray, IntArray
 
 _FEWEST = 6  # scans of a stand that may be split
 _SURE = 6.0  # sds that the two parts of a stand are apart, at least
+_ODD = 3.0  # times as far apart as those of other stands: what wanders has all of them look as if they jumped
 _MOST = 3  # stands that are split: of more, it is noise
 
 
@@ -30,7 +31,8 @@ def jumps(off: FloatArray, stand: IntArray) -> IntArray:
         return np.empty(0, dtype=np.int64)
     noise = max(MAD * float(np.median(steps)) / np.sqrt(2), 1e-6)
     found = [(z / noise, int(own[at])) for own, level in levels.values() for z, at in [_split(level)]]
-    return np.array(sorted(row for z, row in sorted(found, reverse=True)[:_MOST] if z > _SURE), dtype=np.int64)
+    least = max(_SURE, _ODD * float(np.median([z for z, _ in found])))
+    return np.array(sorted(row for z, row in sorted(found, reverse=True)[:_MOST] if z > least), dtype=np.int64)
 
 
 def parted(knots: FloatArray, at: FloatArray, stand: IntArray, jumped: IntArray) -> tuple[FloatArray, FloatArray]:
