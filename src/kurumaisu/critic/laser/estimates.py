@@ -76,6 +76,20 @@ def of_block(winner: Rival, coefficients: FloatArray, normal: Normal) -> tuple[E
     return EffectSetting(free.id, {**nulls, p.name: at}), {p.name: Estimate(at, low, high, p.unit)}
 
 
+def another_map(winner: Rival | None, normal: Normal) -> str | None:
+    """Return words for walls that are surely farther off than an effect on them may have them; None where none are."""
+    p = None if winner is None else winner.free.parameter
+    if winner is None or p is None:
+        return None
+    low = p.null + p.scale * rivals.size(winner, normal.gram)[1]
+    if low < p.upper:
+        return None
+    return (
+        f"scans and map do not belong together, whose walls would be off by {low:.2g} m and more (1 sd), each its own "
+        f"way; another place?"
+    )
+
+
 def with_scatter(
     causes: Sequence[Cause], settings: Mapping[str, EffectSetting], scatter: Sequence[Scatter]
 ) -> tuple[tuple[Cause, ...], tuple[EffectSetting, ...]]:
