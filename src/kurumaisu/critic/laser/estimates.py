@@ -19,6 +19,10 @@ from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
+# Share of the largest size that walls may be off by, beyond which all of them surely are of another map: of rooms about
+# as large, half the walls lie near those of the other one.
+_ANOTHER = 0.5
+
 
 def settings_of(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
     """Return the fitted effects as a model file has them."""
@@ -82,7 +86,7 @@ def another_map(winner: Rival | None, normal: Normal) -> str | None:
     if winner is None or p is None:
         return None
     low = p.null + p.scale * rivals.size(winner, normal.gram)[1]
-    if low < p.upper:
+    if low < _ANOTHER * p.upper:
         return None
     return (
         f"scans and map do not belong together, whose walls would be off by {low:.2g} m and more (1 sd), each its own "
