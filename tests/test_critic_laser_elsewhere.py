@@ -17,6 +17,7 @@ from kurumaisu.params import load_model, shipped
 MODEL = load_model(shipped("launch/md100.yaml"))
 BEARINGS = np.linspace(-1.5, 1.5, 300)
 STEP = BEARINGS[1] - BEARINGS[0]
+OBLIQUE = 0.8 * np.abs(BEARINGS)  # [rad] as beams meet the wall
 
 
 def wall(scans=40):
@@ -33,7 +34,7 @@ def test_a_part_of_a_wall_is_displaced_if_nearly_all_its_readings_are_far_off(of
     measured, ranges, hits = wall()
     part = (hits[:, :, 0] > 1.0) & (hits[:, :, 0] < 2.0)
     measured[part & (np.random.default_rng(2).random(part.shape) < share)] += off
-    found = displaced(measured, ranges, hits)
+    found = displaced(measured, ranges, hits, OBLIQUE)
     assert found.readings.any() == expected
     if expected:
         assert found.readings[part].all()
@@ -46,8 +47,16 @@ def test_a_part_of_a_wall_is_displaced_if_nearly_all_its_readings_are_far_off(of
 def test_where_most_readings_are_off_no_part_of_the_map_is_to_blame():
     measured, ranges, hits = wall()
     measured[hits[:, :, 0] > 1.0] += 0.9
-    assert not displaced(measured, ranges, hits).readings.any()
-    assert not displaced(np.full_like(ranges, np.nan), ranges, hits).readings.any()
+    assert not displaced(measured, ranges, hits, OBLIQUE).readings.any()
+    assert not displaced(np.full_like(ranges, np.nan), ranges, hits, OBLIQUE).readings.any()
+
+
+@pytest.mark.parametrize(("nearer", "expected"), [(0.2, False), (0.5, True)])
+def test_a_beam_along_a_wall_that_is_a_little_nearer_meets_it_much_earlier(nearer, expected):
+    _, ranges, hits = wall()
+    part = hits[:, :, 0] > 6.0  # where 0.2 m nearer is 0.28 m earlier and more
+    measured = ranges * np.where(part, (2.0 - nearer) / 2.0, 1.0)
+    assert displaced(measured, ranges, hits, OBLIQUE).readings.any() == expected
 
 
 def person(measured, ranges, scans, width=20, depth=1.0):

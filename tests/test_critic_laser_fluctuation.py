@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What differs from scan to scan is noise; what all scans of a stand share is a miss of something, and no scatter."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.critic.laser.free import _curves
 from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, _Likelihood, wary_of, whitened
 from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.scan_fit import fluctuating
@@ -65,17 +68,47 @@ def test_neighbours_correlate_by_what_no_beam_keeps(stands, kept, told):
     assert (found["correlation of beams 1 apart"] > 0.08) == told
 
 
+@pytest.mark.parametrize(("kept", "told"), [(True, False), (False, True)])
+def test_how_far_readings_scatter_is_what_no_beam_keeps(stands, kept, told):
+    """Offsets of beams are as large at an incidence as their draws happen to be: noise that grows with it hid there."""
+    rng, shape = np.random.default_rng(6), stands.residual.shape
+    more = stands.first.sd * rng.standard_normal((1, shape[1]) if kept else shape)
+    plain, moved = numbers(stands, noise(stands, 5)), numbers(stands, noise(stands, 5) + more)
+    by_incidence = [moved[name] - plain[name] for name in plain if name.startswith("spread, incidence")]
+    assert (min(by_incidence) > 0.4) == told
+    assert (max(by_incidence) > 0.1) == told
+    name = "spread of the beams' means"
+    assert (moved[name] - plain[name] > 0.8) == kept  # what scatters spreads them by no more than it does by chance
+    assert abs(moved[name] - plain[name]) < 0.3 or kept
+
+
+def test_a_curve_over_the_time_jumps_where_all_readings_do(stands):
+    shots, times = stands.shots, stands.shots.stamps
+    stand = np.flatnonzero(stands.layout.stand == 3)
+    measured = shots.measured + 0.002 * (np.arange(len(times)) > stand[3])[:, np.newaxis]
+    knots = {
+        free.basis.covariate: free.basis.knots
+        for free, _ in _curves(replace(shots, measured=measured), stands.marks)
+        if free.whole
+    }
+    assert {times[stand[3]], times[stand[4]]} <= set(knots["time"])
+    assert len(knots["heading"]) < len(knots["time"])  # stands that jump have the one heading still
+
+
 def test_of_scans_that_stand_alone_goes_what_beams_keep_in_all_of_them():
     rng = np.random.default_rng(1)
     z, inside = rng.standard_normal((9, 50)), rng.random((9, 50)) < 0.9
     stand = np.array([-1, -1, -1, 0, 0, 0, 0, 1, -1])
-    out = fluctuating(z, inside, stand)
+    inside[3:6, 0] = False
+    out, known = fluctuating(z, inside, stand)
     for group in ([0, 1, 2, 7, 8], [3, 4, 5, 6]):
+        whole = inside[group].all(axis=0)
         np.testing.assert_allclose(out[group].sum(axis=0), 0, atol=1e-12)
         np.testing.assert_allclose(
-            np.diff(out[group][:, inside[group].all(axis=0)], axis=0),
-            np.diff(z[group][:, inside[group].all(axis=0)], axis=0),
+            (out[group] ** 2).sum(axis=0)[whole], len(group) * z[group].var(axis=0, ddof=1)[whole]
         )
+    assert inside[6, 0]
+    assert not known[6, 0]  # it has nothing to differ from
     assert (out[~inside] == 0).all()
 
 

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
+from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.laser.acting import gain_of
 from kurumaisu.critic.laser.columns import Column, Form
+from kurumaisu.critic.laser.estimates import another_map
+from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.free import Free
+from kurumaisu.critic.laser.merge import with_laser
 from kurumaisu.critic.laser.normal import Assembly
 from kurumaisu.critic.laser.pictures import Part
 from kurumaisu.critic.laser.pinned import pinned
@@ -20,6 +24,8 @@ from kurumaisu.critic.laser.shots import gather
 from kurumaisu.critic.laser.verdicts import _spread_of, criticise
 from kurumaisu.critic.smooth import Belief
 from kurumaisu.critic.smooth_alike import FORM
+from kurumaisu.critic.story import Story
+from kurumaisu.critic.verdict import Verdict
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -60,6 +66,26 @@ def test_beside_walls_that_are_where_they_like_an_effect_needs_evidence_only(siz
     assert winner is not None
     assert winner.free is free
     assert winner.fit.ids == found
+
+
+@pytest.mark.parametrize(("off", "told"), [(0.05, False), (0.8, True)])
+def test_walls_that_are_farther_off_than_an_error_of_the_map_are_of_another_one(off, told):
+    """Such walls are not named, and nothing else is, be the rest as it may."""
+    sd = Parameter("sd", "m", null=0.0, scale=0.005, lower=0.0, upper=0.2)
+    free = Free("world.map_error", sd, None, (np.eye(12),), slice(0, 12))
+    walls = off / sd.scale * np.random.default_rng(1).standard_normal(12)
+    gram = np.vstack([np.column_stack([np.eye(12), walls]), np.append(walls, walls @ walls)])
+    words = another_map(Rival(NONE, free, Belief(100.0, np.eye(12)), 100.0), SimpleNamespace(gram=gram))
+    assert (words is not None) == told
+    assert another_map(None, SimpleNamespace(gram=gram)) is None
+    if words is not None:
+        story = Story("", "", "", (), "", {})
+        found = with_laser(
+            Criticism(Verdict("none", problems=("a note",)), story, MODEL, ()), LaserFinding(wrong=words)
+        )
+        assert (found.verdict.verdict, found.verdict.causes) == ("invalid_data", ())
+        assert found.verdict.problems == (words, "a note")
+        assert "another place" in found.story.headline
 
 
 def test_a_size_is_no_surer_than_the_form_that_it_belongs_to(tmp_path):

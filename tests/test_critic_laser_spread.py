@@ -9,7 +9,7 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu import effects
-from kurumaisu.critic.laser.deviations import BeamNoise, _repeated, grid_step, refined
+from kurumaisu.critic.laser.deviations import BeamNoise, _repeated, refined
 from kurumaisu.critic.laser.likeness import Kinds
 from kurumaisu.critic.laser.noise import Layout, ScanNoise
 from kurumaisu.critic.laser.normal import Assembly
@@ -18,6 +18,7 @@ from kurumaisu.critic.laser.simulated import Simulator
 from kurumaisu.critic.laser.spread import ScatterSearch, _weighed
 from kurumaisu.critic.laser.spread_fit import Piece, ScatterFit
 from kurumaisu.critic.laser.statistics import Statistics, _lasting, _mixed, _spacing
+from kurumaisu.critic.laser.steps import grid_step
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

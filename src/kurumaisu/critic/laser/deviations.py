@@ -20,7 +20,6 @@ _BINS = 6  # of the range, and of the incidence, in which the deviation is estim
 _FEWEST = 300  # readings of a bin in the tails, whose deviation is then known to a twentieth
 _JOLT = 4.0  # sds among scans from which one of them does not count
 _TOLERATED = 0.1  # share by which a scan may always be noisier than the middle one
-_MILLIMETRE = 1e-3  # [m]
 _MANY = 10  # readings of a beam, and beams, from which their offsets are estimated
 
 
@@ -72,12 +71,6 @@ def refined(
     kept = np.where(beam.valid & (np.abs(z) < OUTLIER), left, np.nan)
     sd = sd * _repeated(grid, first.sd, sd, layout)
     return replace(beam, sd=sd, rho=rho, valid=valid, own_sd=_own_sd(kept, sd))
-
-
-def grid_step(measured: FloatArray) -> float:
-    """Return the usual step [m] between the values that readings have, to a millimetre."""
-    values = np.unique(np.rint(measured[np.isfinite(measured)] / _MILLIMETRE))
-    return _MILLIMETRE * float(np.median(np.diff(values))) if len(values) > 1 else _MILLIMETRE
 
 
 def _repeated(grid: float, noise: FloatArray, sd: FloatArray, layout: Layout) -> FloatArray:

@@ -44,13 +44,14 @@ class Displaced:
             yield Unknown(CHANNEL, _COVARIATES[axis], shape, 1.0)
 
 
-def displaced(measured: FloatArray, expected: FloatArray, hits: FloatArray) -> Displaced:
+def displaced(measured: FloatArray, expected: FloatArray, hits: FloatArray, incidence: FloatArray) -> Displaced:
     """Return where a part of the map is not what stands there.
 
-    measured, expected (k, b) [m], NaN where there is none; hits (k, b, 2) [m]: what beams meet by the map.
+    measured, expected (k, b) [m], NaN where there is none; hits (k, b, 2) [m]: what beams meet by the map, incidence
+    (k, b) [rad]: and how obliquely.
     """
     off = measured - expected
-    readings, bad = elsewhere(measured, expected, hits)
+    readings, bad = elsewhere(measured, expected, hits, incidence=incidence)
     none = Displaced(np.zeros_like(readings), np.zeros(2), np.zeros(2), 0.0)
     seen = np.isfinite(off)
     share = float(readings.sum() / max(seen.sum(), 1))
@@ -66,16 +67,23 @@ def displaced(measured: FloatArray, expected: FloatArray, hits: FloatArray) -> D
 
 
 def elsewhere(
-    measured: FloatArray, expected: FloatArray, hits: FloatArray, *, many: int = _MANY, either: bool = False
+    measured: FloatArray,
+    expected: FloatArray,
+    hits: FloatArray,
+    *,
+    incidence: FloatArray | float = 0.0,
+    many: int = _MANY,
+    either: bool = False,
 ) -> tuple[BoolArray, IntArray]:
     """Return which readings (k, b) are expected in cells where nearly all are of something else, and the cells (n, 2).
 
     many: readings of such a cell, at least; either: a wall that was moved is farther from one side, nearer from the
-    other; other arguments as of displaced.
+    other; other arguments as of displaced: how obliquely need not be known.
     """
     off = measured - expected
     seen = np.isfinite(off)
-    side = np.where(np.abs(np.nan_to_num(off)) > _FAR, np.sign(np.nan_to_num(off)), 0.0)
+    moved = np.nan_to_num(off * np.cos(incidence))  # along a wall, one a little nearer is met much earlier
+    side = np.where(np.abs(moved) > _FAR, np.sign(moved), 0.0)
     cells, index = np.unique(np.floor(hits[seen] / _CELL).astype(np.int64), axis=0, return_inverse=True)
     index = index.ravel()
     counts = np.bincount(index, minlength=len(cells))

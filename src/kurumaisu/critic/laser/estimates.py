@@ -19,6 +19,10 @@ from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
+# Share of the largest size that walls may be off by, beyond which all of them surely are of another map: of rooms about
+# as large, half the walls lie near those of the other one.
+_ANOTHER = 0.5
+
 
 def settings_of(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
     """Return the fitted effects as a model file has them."""
@@ -74,6 +78,20 @@ def of_block(winner: Rival, coefficients: FloatArray, normal: Normal) -> tuple[E
     at, low, high = (float(np.clip(p.null + p.scale * x, p.lower, p.upper)) for x in rivals.size(winner, normal.gram))
     nulls = {each.name: each.null for each in effects.by_id(free.id).parameters}
     return EffectSetting(free.id, {**nulls, p.name: at}), {p.name: Estimate(at, low, high, p.unit)}
+
+
+def another_map(winner: Rival | None, normal: Normal) -> str | None:
+    """Return words for walls that are surely farther off than an effect on them may have them; None where none are."""
+    p = None if winner is None else winner.free.parameter
+    if winner is None or p is None:
+        return None
+    low = p.null + p.scale * rivals.size(winner, normal.gram)[1]
+    if low < _ANOTHER * p.upper:
+        return None
+    return (
+        f"scans and map do not belong together, whose walls would be off by {low:.2g} m and more (1 sd), each its own "
+        f"way; another place?"
+    )
 
 
 def with_scatter(

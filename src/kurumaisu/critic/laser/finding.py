@@ -16,7 +16,8 @@ class LaserFinding:
 
     causes: named and material; confounded: sets of which one acts; unknown: what is in no catalogue; settings: what
     extends the model; details, pictures: for the report; small: certain, but they do not matter; refused: why there
-    is no laser criticism, None where there is; next_experiment: what supplies what the scans lack.
+    is no laser criticism, None where there is; next_experiment: what supplies what the scans lack; wrong: what must be
+    mended before anything is said, None where nothing must.
     """
 
     causes: tuple[Cause, ...] = ()
@@ -28,3 +29,4 @@ class LaserFinding:
     small: tuple[str, ...] = ()
     refused: str | None = None
     next_experiment: NextExperiment | None = None
+    wrong: str | None = None

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from kurumaisu import effects
 from kurumaisu.critic.laser.columns import Marks
+from kurumaisu.critic.laser.jumps import jumps, parted
 from kurumaisu.critic.laser.shots import Look, Shots
+from kurumaisu.critic.laser.sought import stands
 from kurumaisu.critic.laser.walls import Rays
 from kurumaisu.critic.smooth_basis import Basis, knots_of, priors_of
 from kurumaisu.effects import Echoes, Parameter
@@ -124,6 +126,8 @@ def _slope(shots: Shots, ranges: FloatArray) -> FloatArray:
 def _curves(shots: Shots, marks: Marks) -> Iterator[tuple[Free, FloatArray]]:
     echoes = echoes_of(shots, marks.seen)
     known = np.isfinite(marks.base)
+    stand = stands(shots)
+    jumped = jumps(np.where(np.isfinite(shots.measured), shots.measured, np.nan) - marks.base, stand)
     for name, of in effects.RANGE_COVARIATES.items():
         at = np.asarray(of(echoes), dtype=float)
         values = at[known]
@@ -133,10 +137,11 @@ def _curves(shots: Shots, marks: Marks) -> Iterator[tuple[Free, FloatArray]]:
         knots = _knots(at[:, 0] if whole else values[:: max(len(values) // _SAMPLES, 1)])
         if len(knots) < 3:
             continue
+        knots, places = parted(knots, at[:, 0], stand, jumped) if whole else (knots, knots)
         few = values[:: max(len(values) // _SAMPLES, 1)]
         matrix = np.column_stack([np.interp(few, knots, row) for row in np.eye(len(knots))])
         low, high = np.quantile(few, [0.025, 0.975])
-        priors = tuple(priors_of(knots, matrix))
+        priors = tuple(priors_of(places, matrix))
         basis = Basis(name, knots, {}, priors, float(low), float(high))
         columns = basis.matrix(at.ravel()).reshape(*at.shape, len(knots))
         yield Free(effects.smooth_range_id(name), None, basis, priors, slice(0), whole), columns

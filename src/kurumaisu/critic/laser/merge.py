@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from kurumaisu.critic.explain import Criticism
 from kurumaisu.critic.laser.finding import LaserFinding
-from kurumaisu.critic.verdict import Kind
-from kurumaisu.critic.words import named
+from kurumaisu.critic.verdict import Kind, Verdict
+from kurumaisu.critic.words import named, wrong
 
 _NOTHING_SAID = "none"
 _PLACES = {"hit x": "x of the walls", "hit y": "y of the walls"}
@@ -17,6 +17,10 @@ _TOLD = 4  # ids in a sentence; the verdict has them all
 
 def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
     """Return a criticism of the base with what the scans say besides."""
+    if finding.wrong is not None:
+        verdict = Verdict("invalid_data", problems=(finding.wrong, *criticism.verdict.problems))
+        told = replace(criticism.story, headline=wrong([finding.wrong]), details=(finding.wrong,))
+        return replace(criticism, verdict=verdict, story=told, settings=())
     criticism = _with_drive(criticism, finding)
     verdict, story = criticism.verdict, criticism.story
     if finding.refused is not None:

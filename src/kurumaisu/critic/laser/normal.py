@@ -12,7 +12,7 @@ import numpy as np
 from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
 from kurumaisu.critic.laser.blocked import blocked, told
 from kurumaisu.critic.laser.columns import Form, Marks
-from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, grid_step, near, refined
+from kurumaisu.critic.laser.deviations import MAD, OUTLIER, BeamNoise, near, refined
 from kurumaisu.critic.laser.displaced import displaced
 from kurumaisu.critic.laser.free import blocks
 from kurumaisu.critic.laser.noise import (
@@ -30,6 +30,7 @@ from kurumaisu.critic.laser.other_forms import OtherForm
 from kurumaisu.critic.laser.path import Sight, Steady, steady
 from kurumaisu.critic.laser.shots import Shots, look, own_with, predict, rows_of
 from kurumaisu.critic.laser.sought import moved, stands
+from kurumaisu.critic.laser.steps import grid_step, regular
 from kurumaisu.critic.laser.strangers import strangers
 from kurumaisu.critic.laser.trust import hats, trusted, trusted_place, uncut
 from kurumaisu.critic.verdict import Unknown
@@ -72,7 +73,7 @@ class Assembly:
         self.motion: list[Steady] | None = None
         self.blocked = blocked(shots.measured, self.marks.base)
         somewhere = uncut(shots.measured)
-        self.displaced = displaced(somewhere, self.marks.base, self.hits())
+        self.displaced = displaced(somewhere, self.marks.base, self.hits(), self.marks.seen.incidence)
         # Which readings (k, b) are of what the map has, as far as is known.
         self.mapped = ~self.blocked & ~self.displaced.readings
         others = np.where(self.mapped, somewhere, np.nan)
@@ -101,7 +102,7 @@ class Assembly:
         self.shots = shots
         self.marks = Marks(shots)
         self.poses = self._by_pose((1.0,) if roughly else (-1.0, 1.0))
-        self.residual = shots.measured - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
+        self.residual = regular(shots.measured) - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
 
     def _trust(self) -> BeamNoise:
         one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base

@@ -40,17 +40,21 @@ def steepest(ranges: FloatArray, angles: FloatArray) -> FloatArray:
     return np.stack([np.ones_like(along), along, along, reach * along], axis=-1)
 
 
-def fluctuating(z: FloatArray, inside: BoolArray, stand: IntArray) -> FloatArray:
-    """Return what of some numbers (k, b) differs from scan to scan; inside (k, b): which of them count; stand (k,).
+def fluctuating(z: FloatArray, inside: BoolArray, stand: IntArray) -> tuple[FloatArray, BoolArray]:
+    """Return what of some numbers (k, b) differs from scan to scan, as far as if nothing were common, and where (k, b).
 
-    What a beam reads in all scans of a stand, an offset of its own or a rough wall leaves: neighbours may share it, but
-    it is no noise. Scans that stand alone, as in a drive, have what a beam keeps in all of them taken out.
+    inside (k, b): which of them count; stand (k,). What a beam reads in all scans of a stand, an offset of its own or a
+    rough wall leaves: neighbours may share it, and by it readings may be farther off here than there, but it is no
+    noise. Scans that stand alone, as in a drive, have what a beam keeps in all of them taken out.
     """
     _, group, count = np.unique(stand, return_inverse=True, return_counts=True)
     group = np.where((stand >= 0) & (count[group] > 1), group + 1, 0)
     member = (np.arange(len(count) + 1)[:, np.newaxis] == group).astype(float)
-    mean = (member @ np.where(inside, z, 0.0)) / np.maximum(member @ inside, 1.0)
-    return np.where(inside, z - mean[group], 0.0)
+    number = member @ inside
+    mean = (member @ np.where(inside, z, 0.0)) / np.maximum(number, 1.0)
+    lost = np.sqrt(number / np.maximum(number - 1, 1.0))  # what is off a mean of two is off by less than each
+    known = np.asarray(inside & (number > 1)[group])
+    return np.where(known, (z - mean[group]) * lost[group], 0.0), known
 
 
 class ScanFit:

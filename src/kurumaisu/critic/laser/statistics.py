@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -17,6 +18,8 @@ from kurumaisu.critic.laser.scan_fit import ScanFit, basis_of, fluctuating, stee
 from kurumaisu.critic.laser.trust import piles, within
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
+_ALONG = ("range", "incidence")  # in whose order readings are grouped, from near to far and from straight to oblique
+_PARTS = 4  # groups of either, and of reflectances at most
 _CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
 _FAR = 6.0  # deviations of an outlier
 _WITHIN = 3.0  # sds of errors of poses, within which a reading may be one that is cut off
@@ -38,12 +41,27 @@ _LASTS = 0.03  # [m] within which a reading between two sides comes again where 
 class Groups:
     """Masks (k, b) by what is known of a beam beforehand, each a part of the readings that are to be expected.
 
-    folds (g,): logs of the middle range of each that is by the range, less their mean; 0 of the others.
+    kinds: by what each is, names: what a reader calls it; folds (g,): logs of the middle range of each that is by the
+    range, less their mean; 0 of the others.
     """
 
+    kinds: tuple[str, ...]
     names: tuple[str, ...]
     masks: tuple[BoolArray, ...]
     folds: FloatArray
+
+
+@dataclass(frozen=True)
+class Told:
+    """A number: what a reader calls it, whether it is the root of a count, and whether it follows readings' errors.
+
+    group: of the readings that it is of, None of all.
+    """
+
+    name: str
+    count: bool
+    off: bool
+    group: int | None = None
 
 
 class Statistics:
@@ -82,14 +100,16 @@ class Statistics:
         left, common = self._leftover(error, ends)
         inside = self._trust & np.isfinite(left)
         z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
-        out = [_log(_mean(z[group & inside] ** 2, 1.0)) for group in self._groups.masks]
-        out += _correlations(fluctuating(z, inside, self._stand), inside)
+        free, known = fluctuating(z, inside, self._stand)
+        out = [_log(_mean(free[group & known] ** 2, 1.0)) for group in self._groups.masks]
+        out += _correlations(free, known)
         size = np.abs(left[inside])
         out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > ELSEWHERE)]
         far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
         out.append(_share((far[:, 1:] & far[:, :-1])[inside[:, 1:]]))
         out += [_log(float(np.mean(common**2))), _correlation(common)]
-        out += [_between(z, inside, np.broadcast_to(np.arange(z.shape[1]), z.shape)), _between(z, inside, self._cells)]
+        beams = np.broadcast_to(np.arange(z.shape[1]), z.shape)
+        out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
         out.append(_share(_mixed(readings) & self._jumps & ~_lasting(readings, self._stand)))
@@ -97,12 +117,13 @@ class Statistics:
 
     def names(self) -> list[str]:
         """Return what a reader calls the numbers, in their order."""
-        return [name for name, *_ in self._told()]
+        return [one.name for one in self._told()]
 
     def kinds(self) -> Kinds:
         """Return which of the numbers are roots of counts, which are places of piles, and which follow one another."""
-        counts = np.array([count for _, count, _ in self._told()])
-        return Kinds(counts, np.arange(len(counts)) >= len(counts) - _PLACES, _trends(self.names()), self._folds())
+        counts = np.array([one.count for one in self._told()])
+        places = np.arange(len(counts)) >= len(counts) - _PLACES
+        return Kinds(counts, places, _trends(self._told(), self._groups.kinds), self._folds())
 
     def _folds(self) -> FloatArray:
         """Return the folds of the numbers that tell how far readings scatter: the first ones, by groups."""
@@ -111,32 +132,29 @@ class Statistics:
 
     def of_errors(self) -> BoolArray:
         """Return which of the numbers follow how far readings are off their mean."""
-        return np.array([off for *_, off in self._told()])
+        return np.array([one.off for one in self._told()])
 
-    def _told(self) -> list[tuple[str, bool, bool]]:
-        """Return the numbers' names, whether each is a root of a count, and whether it follows readings' errors."""
-        groups = [
-            f"reflectance {at}" if kind == "return" else f"{kind} {int(at) + 1} of 4"
-            for kind, at in (name.split() for name in self._groups.names)
-        ]
+    def _told(self) -> list[Told]:
+        """Return what the numbers are, in their order."""
+        groups = list(enumerate(self._groups.names))
         return [
-            *((f"spread, {name}", False, True) for name in groups),
-            *((f"correlation of beams {lag} apart", False, True) for lag in (1, 2, 4)),
-            *((f"readings more than {far:g} sd off", True, True) for far in (3, 4.5, _FAR, ELSEWHERE)),
-            (f"neighbours more than {_FAR:g} sd off", True, True),
-            ("spread of whole scans", False, True),
-            ("correlation of whole scans", False, True),
-            ("spread of the beams' means", False, True),
-            ("spread of the places' means", False, True),
-            *((f"missing readings, {name}", True, False) for name in groups),
-            ("readings without return", True, True),
-            ("readings inside jumps", True, True),
-            ("different values", False, False),
-            ("readings of the least value", True, True),
-            ("readings of the greatest value", True, True),
-            ("step between values", False, False),
-            ("least value at which readings pile up", False, False),
-            ("greatest value at which readings pile up", False, False),
+            *(Told(f"spread, {name}", count=False, off=True, group=i) for i, name in groups),
+            *(Told(f"correlation of beams {lag} apart", count=False, off=True) for lag in (1, 2, 4)),
+            *(Told(f"readings more than {far:g} sd off", count=True, off=True) for far in (3, 4.5, _FAR, ELSEWHERE)),
+            Told(f"neighbours more than {_FAR:g} sd off", count=True, off=True),
+            Told("spread of whole scans", count=False, off=True),
+            Told("correlation of whole scans", count=False, off=True),
+            Told("spread of the beams' means", count=False, off=True),
+            Told("spread of the places' means", count=False, off=True),
+            *(Told(f"missing readings, {name}", count=True, off=False, group=i) for i, name in groups),
+            Told("readings without return", count=True, off=True),
+            Told("readings inside jumps", count=True, off=True),
+            Told("different values", count=False, off=False),
+            Told("readings of the least value", count=True, off=True),
+            Told("readings of the greatest value", count=True, off=True),
+            Told("step between values", count=False, off=False),
+            Told("least value at which readings pile up", count=False, off=False),
+            Told("greatest value at which readings pile up", count=False, off=False),
         ]
 
     def _piles(self, ends: tuple[float, float]) -> list[float]:
@@ -160,30 +178,26 @@ class Statistics:
 
 
 def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, returns: FloatArray) -> Groups:
-    names, masks = [], []
-    for name, values, count in (("range", ranges, 4), ("incidence", incidence, 4)):
-        cuts = np.quantile(values[expected], np.linspace(0, 1, count + 1)[1:-1])
+    found: list[tuple[str, str, BoolArray]] = []
+    for kind, values in zip(_ALONG, (ranges, incidence), strict=True):
+        cuts = np.quantile(values[expected], np.linspace(0, 1, _PARTS + 1)[1:-1])
         bins = np.digitize(values, cuts)
-        for i in range(count):
-            names.append(f"{name} {i}")
-            masks.append(expected & (bins == i))
-    for value in np.unique(returns[expected])[:4]:
-        names.append(f"return {value:g}")
-        masks.append(expected & (returns == value))
-    some = [(name, mask) for name, mask in zip(names, masks, strict=True) if mask.any()]
-    logs = [np.log(np.median(ranges[mask])) if name.startswith("range") else np.nan for name, mask in some]
-    folds = np.nan_to_num(np.array(logs) - np.nanmean(logs))
-    return Groups(tuple(name for name, _ in some), tuple(mask for _, mask in some), folds)
+        found += [(kind, f"{kind} {i + 1} of {_PARTS}", expected & (bins == i)) for i in range(_PARTS)]
+    for value in np.unique(returns[expected])[:_PARTS]:
+        found.append(("reflectance", f"reflectance {value:g}", expected & (returns == value)))
+    kinds, names, masks = zip(*(each for each in found if each[2].any()), strict=True)
+    logs = [np.log(np.median(ranges[m])) if kind == "range" else np.nan for kind, m in zip(kinds, masks, strict=True)]
+    return Groups(kinds, names, masks, np.nan_to_num(np.array(logs) - np.nanmean(logs)))
 
 
-def _trends(names: Sequence[str]) -> FloatArray:
-    """Return weights (g, m) from -1 to 1 over each numbers' groups of ranges, and of incidences."""
-    starts = [f"{what}, {of} " for what in ("spread", "missing readings") for of in ("range", "incidence")]
-    out = np.zeros((len(starts), len(names)))
-    for row, start in zip(out, starts, strict=True):
-        own = [i for i, name in enumerate(names) if name.startswith(start)]
-        row[own] = np.linspace(-1.0, 1.0, len(own))
-    return out
+def _trends(told: Sequence[Told], kinds: Sequence[str]) -> FloatArray:
+    """Return weights (g, m) from -1 to 1 over each numbers' groups of ranges, and of incidences; kinds: of groups."""
+    out = []
+    for off, kind in product((True, False), _ALONG):
+        own = [i for i, one in enumerate(told) if one.group is not None and (one.off, kinds[one.group]) == (off, kind)]
+        out.append(np.zeros(len(told)))
+        out[-1][own] = np.linspace(-1.0, 1.0, len(own))
+    return np.array(out)
 
 
 def _cells(assembly: Assembly) -> IntArray:
@@ -240,12 +254,15 @@ def _widened(mask: BoolArray) -> BoolArray:
     return np.asarray(maximum_filter1d(mask, 2 * _BESIDE + 1, axis=1, mode="constant"))
 
 
-def _between(z: FloatArray, inside: BoolArray, group: IntArray) -> float:
-    """Return the log of the mean squared group mean, each in deviations of what chance gives it."""
-    count = np.bincount(group[inside])
-    sums = np.bincount(group[inside], z[inside])
-    many = count > 5
-    return _log(_mean(sums[many] ** 2 / count[many], 1.0))
+def _between(z: FloatArray, free: FloatArray, group: IntArray) -> float:
+    """Return the log of the mean squared group mean, each in deviations of what readings that scatter so give it.
+
+    free: what of them scatters. Else any noise would spread means, too, and hide that beams keep something.
+    """
+    count = np.bincount(group)
+    sums, chance = np.bincount(group, z), np.bincount(group, free**2)
+    many = (count > 5) & (chance > 0)
+    return _log(_mean(sums[many] ** 2 / chance[many], 1.0))
 
 
 def _values(readings: FloatArray) -> list[float]:

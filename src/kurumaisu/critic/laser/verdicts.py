@@ -12,7 +12,7 @@ from kurumaisu import effects
 from kurumaisu.critic.laser import pictures, rivals, still
 from kurumaisu.critic.laser.acting import Acting, acting, cleared, gain_of, refitted
 from kurumaisu.critic.laser.astray import astray
-from kurumaisu.critic.laser.estimates import estimates_of, of_block, with_scatter
+from kurumaisu.critic.laser.estimates import another_map, estimates_of, of_block, with_scatter
 from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.leading import leading, with_lead
@@ -82,6 +82,8 @@ def criticise(
         found = Search(assembly.forms, normal.gram).run()
     normal = assembly.full(normal)
     made = acting(assembly, normal, found)
+    if (wrong := another_map(made.winner, normal)) is not None:
+        return LaserFinding(wrong=wrong)
     made = made.beside(assembly, normal)
     progress("laser: fitting what acts")
     fit = refitted(assembly, normal, made, recording.truth)
