@@ -88,10 +88,11 @@ def _make_wrong(ask: Ask, seed: int, folder: Path | None, rng: np.random.Generat
     name = ask.ids[0] if ask.ids else str(names[rng.integers(len(names))])
     wrong = WRONG[name]
     good = replace(ask, kind="null", ids=())
-    null = (make_laser(good, seed, _given(folder, ask)) if wrong.laser else make_base(good, seed)).null
-    found = spoilt(null, name, rng)
+    right = make_laser(good, seed, _given(folder, ask)) if wrong.laser else make_base(good, seed)
+    found = spoilt(right.null, name, rng)
     if name == "wrong map":
         other = _given(folder, ask) / f"hidden_{seed}_wrong.world"
         other.write_text(world_text("another room", draw_room(np.random.default_rng([seed, 41]))), encoding="utf-8")
         found = replace(found, world=other)
-    return Case(found, null, Truth("wrong", problem=name), seed)
+    truth = Truth("wrong", problem=name, background=right.truth.background)
+    return Case(found, right.null, truth, seed)
