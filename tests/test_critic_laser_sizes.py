@@ -68,16 +68,18 @@ def test_beside_walls_that_are_where_they_like_an_effect_needs_evidence_only(siz
     assert winner.fit.ids == found
 
 
-@pytest.mark.parametrize(("off", "told"), [(0.05, False), (0.8, True)])
-def test_walls_that_are_farther_off_than_an_error_of_the_map_are_of_another_one(off, told):
-    """Such walls are not named, and nothing else is, be the rest as it may."""
+@pytest.mark.parametrize(
+    ("off", "lacking", "told"), [(0.05, 0.0, False), (0.1, 0.01, False), (0.1, 0.2, True), (0.8, 0.0, True)]
+)
+def test_walls_that_are_farther_off_than_an_error_of_the_map_are_of_another_one(off, lacking, told):
+    """Such walls are not named, and nothing else is, be the rest as it may; what the map lacks speaks for it, too."""
     sd = Parameter("sd", "m", null=0.0, scale=0.005, lower=0.0, upper=0.2)
     free = Free("world.map_error", sd, None, (np.eye(12),), slice(0, 12))
     walls = off / sd.scale * np.random.default_rng(1).standard_normal(12)
     gram = np.vstack([np.column_stack([np.eye(12), walls]), np.append(walls, walls @ walls)])
-    words = another_map(Rival(NONE, free, Belief(100.0, np.eye(12)), 100.0), SimpleNamespace(gram=gram))
+    words = another_map(Rival(NONE, free, Belief(100.0, np.eye(12)), 100.0), SimpleNamespace(gram=gram), lacking)
     assert (words is not None) == told
-    assert another_map(None, SimpleNamespace(gram=gram)) is None
+    assert another_map(None, SimpleNamespace(gram=gram), lacking) is None
     if words is not None:
         story = Story("", "", "", (), "", {})
         found = with_laser(

@@ -20,8 +20,9 @@ from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 # Share of the largest size that walls may be off by, beyond which all of them surely are of another map: of rooms about
-# as large, half the walls lie near those of the other one.
-_ANOTHER = 0.5
+# as large, half the walls lie near those of the other one. The same where the map lacks a part of what is there, too.
+_ANOTHER, _ANOTHER_LACKS = 0.4, 0.2
+_LACKS = 0.05  # share of readings of that part, at least
 
 
 def settings_of(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
@@ -80,13 +81,16 @@ def of_block(winner: Rival, coefficients: FloatArray, normal: Normal) -> tuple[E
     return EffectSetting(free.id, {**nulls, p.name: at}), {p.name: Estimate(at, low, high, p.unit)}
 
 
-def another_map(winner: Rival | None, normal: Normal) -> str | None:
-    """Return words for walls that are surely farther off than an effect on them may have them; None where none are."""
+def another_map(winner: Rival | None, normal: Normal, lacking: float) -> str | None:
+    """Return words for walls that are surely farther off than a map's errors; None where none are.
+
+    lacking: share of the readings that are of something else than the map has there.
+    """
     p = None if winner is None else winner.free.parameter
     if winner is None or p is None:
         return None
     low = p.null + p.scale * rivals.size(winner, normal.gram)[1]
-    if low < _ANOTHER * p.upper:
+    if low < (_ANOTHER_LACKS if lacking > _LACKS else _ANOTHER) * p.upper:
         return None
     return (
         f"scans and map do not belong together, whose walls would be off by {low:.2g} m and more (1 sd), each its own "

@@ -82,7 +82,7 @@ def criticise(
         found = Search(assembly.forms, normal.gram).run()
     normal = assembly.full(normal)
     made = acting(assembly, normal, found)
-    if (wrong := another_map(made.winner, normal)) is not None:
+    if (wrong := another_map(made.winner, normal, float(assembly.displaced.readings.mean()))) is not None:
         return LaserFinding(wrong=wrong)
     made = made.beside(assembly, normal)
     progress("laser: fitting what acts")
