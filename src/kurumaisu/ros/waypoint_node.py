@@ -25,6 +25,7 @@ class WaypointNode:
         self._route = route
         self._driver = Driver(route)
         self._start: float | None = None
+        self._heard: float | None = None
         self._end: float | None = None
         self._publisher = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         rospy.Subscriber("ground_truth", Odometry, self._on_pose, queue_size=1)
@@ -32,8 +33,11 @@ class WaypointNode:
     def _on_pose(self, message: Odometry) -> None:
         now = message.header.stamp.to_sec()
         self._start = now if self._start is None else self._start
+        # The first word that a base hears must be rest, and it may come to listen late.
+        if self._heard is None and self._publisher.get_num_connections() > 0:
+            self._heard = now
         command = Twist()
-        if now - self._start >= self._route.pause:
+        if self._heard is not None and now - self._heard >= self._route.pause:
             command.linear.x, command.angular.z = self._driver.command(planar(message.pose.pose))
         self._publisher.publish(command)
         if self._driver.done and self._end is None:
