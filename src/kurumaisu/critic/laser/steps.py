@@ -26,11 +26,13 @@ def regular(measured: FloatArray) -> FloatArray:
     A grid of 9.97 mm beats with one of 1 mm: over 0.4 m of the range the message is off by half a millimetre either
     way, which is no wave of the laser's.
     """
+    if grid_step(measured) < _COARSE * _MILLIMETRE:
+        return measured
     known = np.isfinite(measured)
     values, index = np.unique(np.rint(measured[known] / _MILLIMETRE), return_inverse=True)
-    steps = np.diff(values)
-    if len(values) < _FEWEST or np.median(steps) < _COARSE:
+    if len(values) < _FEWEST:
         return measured
+    steps = np.diff(values)
     near = steps[steps < _ADJACENT * np.median(steps)]
     places = np.concatenate([[0.0], np.cumsum(np.rint(steps / near.mean()))])
     even = np.polyval(np.polyfit(places, values, 1), places)
