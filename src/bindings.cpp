@@ -135,22 +135,24 @@ void bindKalman(py::module_& m) {
       .def(py::init([](const Eigen::MatrixXd& poses, const Eigen::VectorXd& times,
                        const Eigen::VectorXd& activity, const Eigen::VectorXd& rolling,
                        const k::Track::Ways& ways, double position_sd, double heading_sd,
-                       const Eigen::Matrix<double, 2, 3>& process_sd, const Eigen::Vector2d& process_tau) {
+                       const Eigen::Matrix<double, 2, 3>& process_sd, const Eigen::Vector2d& process_tau,
+                       double lasting, double lasting_tau) {
              const k::Colour fast{process_sd.row(0).transpose(), process_tau[0]};
              const k::Colour slow{process_sd.row(1).transpose(), process_tau[1]};
              return k::Whitener({poses, times, activity, rolling, ways},
-                                {position_sd, heading_sd, fast, slow});
+                                {position_sd, heading_sd, fast, slow, lasting, lasting_tau});
            }),
            py::arg("poses"), py::arg("times"), py::arg("activity"), py::arg("rolling"), py::arg("ways"),
            py::kw_only(), py::arg("position_sd"), py::arg("heading_sd"), py::arg("process_sd"),
-           py::arg("process_tau"),
+           py::arg("process_tau"), py::arg("lasting") = 0.0, py::arg("lasting_tau") = 1.0,
            "For poses (n + 1, 3) at times (n + 1,); activity (n,): factors on the noise of the rates, whose "
            "two colours "
            "are rows of process_sd (2, 3); rolling (n,): on such noise of each increment alone; ways (n, 8): "
            "means of "
            "the heading's cosine and sine and of the way x, y ahead, in the frame of each increment's first "
            "pose, and "
-           "by how much each grows from end to end.")
+           "by how much each grows from end to end. lasting: share of the variance of the poses' errors that lasts for "
+           "lasting_tau [s].")
       .def("whiten", &k::Whitener::whiten, py::arg("columns"),
            "Whitened columns (3 n, m) of increment residuals.")
       .def("gram", &k::Whitener::gram, py::arg("columns"),

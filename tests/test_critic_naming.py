@@ -324,7 +324,7 @@ def test_what_clips_does_not_hide_what_else_it_may_be():
     noise = draw_rates(USUAL, round((stamps[-1] + 3.0) / STEP), rng)
     setting = Setting(command, np.zeros(3), stamps, noise)
     poses, _ = hidden_drive(setting, [BASE["base.dead_zone_v"].fault({"size": 0.05}, "plain")])
-    run = run_of("one speed", setting, poses + draw_reference(USUAL, len(stamps), rng))
+    run = run_of("one speed", setting, poses + draw_reference(USUAL, stamps, rng))
     ids = frozenset({"base.saturation", "base.dead_zone_v", "base.gain_v"})
     problem = Problem([prepare(run, MODEL)], MODEL, NOISE, ids=ids)
     top = problem.fit(["base.saturation"], {})

@@ -11,7 +11,7 @@ from kurumaisu.bench.hidden.base_case import Scale, draw_drives, gates
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.drives import rich
 from kurumaisu.bench.hidden.motion import STEP, Setting, drive, integrate
-from kurumaisu.bench.hidden.noise import REGIMES, Colour, Regime, draw_rates
+from kurumaisu.bench.hidden.noise import REGIMES, Colour, Regime, draw_rates, draw_reference
 from kurumaisu.bench.hidden.sizing import left_beside, size_for
 from kurumaisu.bench.hidden.unknown import STRANGE_BASE
 from kurumaisu.bench.hidden.whitening import Path, Whitener, deviation
@@ -56,6 +56,14 @@ def test_the_noise_of_the_rates_is_what_was_asked_for(name):
     lag = round(0.1 / STEP)
     kept = np.sum([np.square(colour.sd) * np.exp(-0.1 / colour.tau) for colour in regime.colours], axis=0)
     np.testing.assert_allclose((noise[lag:] * noise[:-lag]).mean(axis=0), kept, atol=0.15 * asked.max())
+
+
+def test_the_errors_of_the_reference_are_what_was_asked_for():
+    regime, stamps = REGIMES["lasting"], np.arange(0, 40_000, 0.1)
+    errors = draw_reference(regime, stamps, np.random.default_rng(1))
+    np.testing.assert_allclose(errors.var(axis=0), regime.reference_variance, rtol=0.05)
+    kept = regime.lasting * np.exp(-0.5 / regime.lasting_tau)
+    np.testing.assert_allclose((errors[5:] * errors[:-5]).mean(axis=0), kept * regime.reference_variance, rtol=0.1)
 
 
 def test_arcs_end_where_geometry_says():
@@ -142,9 +150,10 @@ def nominal_of(setting):
     return drive(setting, ())[0]
 
 
-def test_the_noise_whitens_to_unit_white():
+@pytest.mark.parametrize("name", ["two colours", "lasting"])
+def test_the_noise_whitens_to_unit_white(name):
     """What the drives of a null deviate from their noise-free twins is what the filter expects."""
-    regime = REGIMES["two colours"]
+    regime = REGIMES[name]
     drives = draw_drives("rich", regime, np.random.default_rng(4), seconds=40.0)
     scale = Scale(drives)
     left = [

@@ -15,6 +15,8 @@ NOISE = {
     "heading_sd": 0.004,
     "process_sd": [[0.03, 0.008, 0.05], [0.0, 0.0, 0.0]],
     "process_tau": [0.4, 3.0],
+    "lasting": 0.0,
+    "lasting_tau": 0.8,
 }
 
 
@@ -63,6 +65,8 @@ def joint_covariance(times, poses, noise, activity, rolling, ways):
     """Of all increments' residuals, by numerical derivatives of the increments and quadrature of the OU processes."""
     n = len(times) - 1
     sds = [noise["position_sd"], noise["position_sd"], noise["heading_sd"]]
+    shared = noise["lasting"] * np.exp(-abs(times[:, None] - times) / noise["lasting_tau"])
+    same_pose = shared + (1 - noise["lasting"]) * np.eye(n + 1)
     by_pose = np.zeros((3 * n, 3 * (n + 1)))
     step = 1e-6
     for j in range(3 * (n + 1)):
@@ -72,7 +76,7 @@ def joint_covariance(times, poses, noise, activity, rolling, ways):
         by_pose[:, j] = (
             (geometry.between(up[:-1], up[1:]) - geometry.between(down[:-1], down[1:])) / (2 * step)
         ).ravel()
-    cov = by_pose @ np.diag(np.tile(np.square(sds), n + 1)) @ by_pose.T
+    cov = by_pose @ np.kron(same_pose, np.diag(np.square(sds))) @ by_pose.T
     motions = [motion(way) for way in ways]
     for j in range(n):
         for k in range(n):
@@ -97,10 +101,11 @@ def joint_covariance(times, poses, noise, activity, rolling, ways):
     ids=["steady", "gated", "rolling"],
 )
 @pytest.mark.parametrize("count", [1, 2, 11])  # columns go through the filter several at a time
-def test_against_the_joint_covariance(slow, activity, rolling, count):
+@pytest.mark.parametrize("lasting", [0.0, 0.6])
+def test_against_the_joint_covariance(slow, activity, rolling, count, lasting):
     times, poses = run(6, 1)
     columns = np.random.default_rng(2).normal(size=(18, count))
-    noise = {**NOISE, "process_sd": [NOISE["process_sd"][0], slow]}
+    noise = {**NOISE, "process_sd": [NOISE["process_sd"][0], slow], "lasting": lasting}
     ways = arcs(poses)
     factors = [np.array(each, dtype=float) for each in (activity, rolling)]
     whitener = Whitener(poses, times, *factors, ways, **noise)
@@ -133,6 +138,9 @@ def test_short_steps_do_not_cancel():
         ({"ways": np.full((6, 8), np.nan)}, "one finite row per increment"),
         ({"process_tau": [0.0, 1.0]}, "positive"),
         ({"process_tau": [1.0, 0.0]}, "positive"),
+        ({"lasting": 1.0}, "share below 1"),
+        ({"lasting": -0.1}, "share below 1"),
+        ({"lasting_tau": 0.0}, "lasting_tau positive"),
         ({"process_sd": [[0.1, -0.1, 0.1], [0.0, 0.0, 0.0]]}, "positive"),
         ({"process_sd": [[0.1, 0.1, 0.1], [0.0, -0.1, 0.0]]}, "positive"),
     ],

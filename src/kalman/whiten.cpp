@@ -63,12 +63,16 @@ void check(const Track& track, const MotionNoise& noise) {
       !(noise.fast.sd.array() > 0).all() || !(noise.slow.sd.array() >= 0).all()) {
     throw std::invalid_argument("every noise parameter must be positive");
   }
+  if (!(noise.lasting >= 0 && noise.lasting < 1 && noise.lasting_tau > 0)) {
+    throw std::invalid_argument("lasting must be a share below 1, and lasting_tau positive");
+  }
 }
 
 /// What a step needs of the processes.
 template <int kColours>
 struct Processes {
-  explicit Processes(const MotionNoise& noise) : colours{noise.fast, noise.slow} {
+  explicit Processes(const MotionNoise& noise)
+      : colours{noise.fast, noise.slow}, lasting_tau(noise.lasting_tau) {
     for (int c = 0; c < kColours; ++c) {
       for (int i = 0; i < 3; ++i) variance[3 * c + i] = colours[c].sd[i] * colours[c].sd[i];
     }
@@ -79,33 +83,43 @@ struct Processes {
     if (std::abs(next - dt) <= kRounding * next) return;
     dt = next;
     for (int c = 0; c < kColours; ++c) steps[c] = ouStep(dt, colours[c].tau);
+    lasting_keep = std::exp(-dt / lasting_tau);
   }
 
   static constexpr double kRounding = 1e-12;
   std::array<Colour, 2> colours;
   std::array<double, std::size_t{3} * kColours> variance;
+  double lasting_tau;
   double dt = 0.0;
+  double lasting_keep = 0.0;  // share of a lasting error that is there a step later
   std::array<OuStep, kColours> steps{};
 };
 
 /// The filter's covariance, step by step. Rows are a little longer than needed, for the machine takes some at once.
-template <int kColours>
+/// Its state: white errors of the pose, errors of the rates, and errors of the pose that last, if any.
+template <int kColours, bool kLasting>
 class Covariance {
  public:
-  static constexpr int kSize = 3 + 3 * kColours;
+  static constexpr int kRates = 3, kLong = 3 + 3 * kColours, kSize = kLong + (kLasting ? 3 : 0);
 
-  explicit Covariance(const MotionNoise& noise)
-      : pose_{noise.position_sd * noise.position_sd, noise.position_sd * noise.position_sd,
-              noise.heading_sd * noise.heading_sd},
-        processes_(noise) {
-    for (int i = 0; i < 3; ++i) cov_[i][i] = pose_[i];
-    for (int i = 3; i < kSize; ++i) cov_[i][i] = processes_.variance[i - 3];
+  explicit Covariance(const MotionNoise& noise) : processes_(noise) {
+    const double sd[] = {noise.position_sd, noise.position_sd, noise.heading_sd};
+    for (int i = 0; i < 3; ++i) {
+      white_[i] = (1 - noise.lasting) * sd[i] * sd[i];
+      long_[i] = noise.lasting * sd[i] * sd[i];
+      cov_[i][i] = white_[i];
+      if constexpr (kLasting) cov_[kLong + i][kLong + i] = long_[i];
+    }
+    for (int i = kRates; i < kLong; ++i) cov_[i][i] = processes_.variance[i - kRates];
   }
 
   /// Goes on by an increment of dt [s], and tells what that does to any column, and its log variances. Returns false
   /// where its covariance is singular.
   KURUMAISU_INLINE bool advance(const Jacobians& j, double dt, Whitener::Step<kSize>& step, double* logs) {
     processes_.advance(dt);
+    for (int i = 0; i < 3; ++i) {
+      fresh_[i] = kLasting ? (1 - processes_.lasting_keep * processes_.lasting_keep) * long_[i] : 0.0;
+    }
     see(j, step);
     double root[3][3];
     if (!cholesky(step, j, root)) return false;
@@ -138,8 +152,9 @@ class Covariance {
         step.seen[r][i] = j.from(r, i);
         for (int c = 0; c < kColours; ++c) {
           const OuStep& ou = processes_.steps[c];
-          step.seen[r][3 + 3 * c + i] = ou.reach * j.motion(r, i) + ou.late * j.late(r, i);
+          step.seen[r][kRates + 3 * c + i] = ou.reach * j.motion(r, i) + ou.late * j.late(r, i);
         }
+        if constexpr (kLasting) step.seen[r][kLong + i] = j.from(r, i) + processes_.lasting_keep * j.to(r, i);
       }
       for (int i = 0; i < kRow; ++i) seen_[r][i] = 0.0;
       for (int k = 0; k < kSize; ++k) {
@@ -169,7 +184,7 @@ class Covariance {
         double sum = 0.0;
         for (int i = 0; i < kSize; ++i) sum += step.seen[r][i] * seen_[s][i];
         for (int i = 0; i < 3; ++i) {
-          sum += pose_[i] * j.to(r, i) * j.to(s, i) + spread[i] * j.motion(r, i) * j.motion(s, i) +
+          sum += (white_[i] + fresh_[i]) * j.to(r, i) * j.to(s, i) + spread[i] * j.motion(r, i) * j.motion(s, i) +
                  late[i] * j.late(r, i) * j.late(s, i) +
                  both[i] * (j.motion(r, i) * j.late(s, i) + j.late(r, i) * j.motion(s, i)) +
                  whole[i] * j.rolling(r, i) * j.rolling(s, i);
@@ -186,15 +201,21 @@ class Covariance {
   KURUMAISU_INLINE void cross(const Jacobians& j, Whitener::Step<kSize>& step) {
     for (int i = 0; i < 3; ++i) step.keep[i] = 0.0;
     for (int r = 0; r < 3; ++r) {
-      for (int i = 0; i < 3; ++i) cross_[r][i] = pose_[i] * j.to(r, i);
+      for (int i = 0; i < 3; ++i) {
+        cross_[r][i] = white_[i] * j.to(r, i);
+        if constexpr (kLasting) {
+          step.keep[kLong + i] = processes_.lasting_keep;
+          cross_[r][kLong + i] = processes_.lasting_keep * seen_[r][kLong + i] + fresh_[i] * j.to(r, i);
+        }
+      }
       for (int c = 0; c < kColours; ++c) {
         const OuStep& ou = processes_.steps[c];
-        for (int i = 3 + 3 * c; i < 6 + 3 * c; ++i) {
-          const int axis = i - 3 - 3 * c;
+        for (int axis = 0; axis < 3; ++axis) {
+          const int i = kRates + 3 * c + axis;
           step.keep[i] = ou.decay;
           cross_[r][i] =
               ou.decay * seen_[r][i] +
-              processes_.variance[i - 3] * (ou.cov * j.motion(r, axis) + ou.cov_late * j.late(r, axis));
+              processes_.variance[i - kRates] * (ou.cov * j.motion(r, axis) + ou.cov_late * j.late(r, axis));
         }
       }
     }
@@ -210,26 +231,30 @@ class Covariance {
         cov_[k][i] = own * keep[i] * cov_[k][i] - (a * gained_[0][i] + b * gained_[1][i] + c * gained_[2][i]);
       }
     }
-    for (int i = 0; i < 3; ++i) cov_[i][i] += pose_[i];
-    for (int i = 3; i < kSize; ++i)
-      cov_[i][i] += processes_.steps[(i - 3) / 3].var_u * processes_.variance[i - 3];
+    for (int i = 0; i < 3; ++i) {
+      cov_[i][i] += white_[i];
+      if constexpr (kLasting) cov_[kLong + i][kLong + i] += fresh_[i];
+    }
+    for (int i = kRates; i < kLong; ++i) {
+      cov_[i][i] += processes_.steps[(i - kRates) / 3].var_u * processes_.variance[i - kRates];
+    }
   }
 
   alignas(64) double cov_[kSize][kRow] = {};
   alignas(64) double seen_[3][kRow] = {};
   alignas(64) double cross_[3][kRow] = {};
   alignas(64) double gained_[3][kRow] = {};
-  std::array<double, 3> pose_;
+  double white_[3], long_[3];  // variances of the reference's errors
+  double fresh_[3] = {};       // of what is new in those that last
   Processes<kColours> processes_;
 };
 
-template <int kColours>
-KURUMAISU_INLINE std::vector<Whitener::Step<3 + 3 * kColours>> filterAll(const Track& track,
-                                                                         const MotionNoise& noise,
-                                                                         Eigen::MatrixX3d& log_determinants) {
+template <int kColours, bool kLasting>
+KURUMAISU_INLINE auto filterAll(const Track& track, const MotionNoise& noise,
+                                Eigen::MatrixX3d& log_determinants) {
   const auto& [poses, times, activity, rolling, ways] = track;
-  Covariance<kColours> covariance(noise);
-  std::vector<Whitener::Step<3 + 3 * kColours>> steps(static_cast<std::size_t>(poses.rows() - 1));
+  Covariance<kColours, kLasting> covariance(noise);
+  std::vector<Whitener::Step<decltype(covariance)::kSize>> steps(static_cast<std::size_t>(poses.rows() - 1));
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
     Jacobians j = jacobians(poses.row(at).transpose(), poses.row(at + 1).transpose(), ways.row(at));
@@ -247,12 +272,22 @@ KURUMAISU_INLINE std::vector<Whitener::Step<3 + 3 * kColours>> filterAll(const T
 
 KURUMAISU_WIDE std::vector<Whitener::Step<6>> filterOne(const Track& track, const MotionNoise& noise,
                                                         Eigen::MatrixX3d& log_determinants) {
-  return filterAll<1>(track, noise, log_determinants);
+  return filterAll<1, false>(track, noise, log_determinants);
 }
 
 KURUMAISU_WIDE std::vector<Whitener::Step<9>> filterTwo(const Track& track, const MotionNoise& noise,
                                                         Eigen::MatrixX3d& log_determinants) {
-  return filterAll<2>(track, noise, log_determinants);
+  return filterAll<2, false>(track, noise, log_determinants);
+}
+
+KURUMAISU_WIDE std::vector<Whitener::Step<9>> filterOneLasting(const Track& track, const MotionNoise& noise,
+                                                               Eigen::MatrixX3d& log_determinants) {
+  return filterAll<1, true>(track, noise, log_determinants);
+}
+
+KURUMAISU_WIDE std::vector<Whitener::Step<12>> filterTwoLasting(const Track& track, const MotionNoise& noise,
+                                                                Eigen::MatrixX3d& log_determinants) {
+  return filterAll<2, true>(track, noise, log_determinants);
 }
 
 constexpr Eigen::Index kLane = 8;  // columns that go through a step side by side
@@ -350,6 +385,11 @@ KURUMAISU_WIDE void whitenSteps(const std::vector<Whitener::Step<9>>& steps,
   whitenAll(steps, columns, out);
 }
 
+KURUMAISU_WIDE void whitenSteps(const std::vector<Whitener::Step<12>>& steps,
+                                const Eigen::Ref<const Rows>& columns, Rows& out) {
+  whitenAll(steps, columns, out);
+}
+
 KURUMAISU_WIDE void gramOfSteps(const std::vector<Whitener::Step<6>>& steps,
                                 const Eigen::Ref<const Rows>& columns, Rows& out) {
   gramOfAll(steps, columns, out);
@@ -360,12 +400,24 @@ KURUMAISU_WIDE void gramOfSteps(const std::vector<Whitener::Step<9>>& steps,
   gramOfAll(steps, columns, out);
 }
 
+KURUMAISU_WIDE void gramOfSteps(const std::vector<Whitener::Step<12>>& steps,
+                                const Eigen::Ref<const Rows>& columns, Rows& out) {
+  gramOfAll(steps, columns, out);
+}
+
 }  // namespace
 
 Whitener::Whitener(const Track& track, const MotionNoise& noise) {
   check(track, noise);
   log_determinants_.resize(track.poses.rows() - 1, 3);
-  if ((noise.slow.sd.array() > 0).any()) {
+  const bool two = (noise.slow.sd.array() > 0).any();
+  if (noise.lasting > 0) {
+    if (two) {
+      steps_ = filterTwoLasting(track, noise, log_determinants_);
+    } else {
+      steps_ = filterOneLasting(track, noise, log_determinants_);
+    }
+  } else if (two) {
     steps_ = filterTwo(track, noise, log_determinants_);
   } else {
     steps_ = filterOne(track, noise, log_determinants_);

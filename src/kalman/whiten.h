@@ -22,6 +22,8 @@ struct MotionNoise {
   double heading_sd;   ///< reference pose [rad]
   Colour fast;
   Colour slow;
+  double lasting = 0.0;      ///< share of the variance of the reference's errors that lasts; the rest is white
+  double lasting_tau = 1.0;  ///< for how long it lasts [s]
 };
 
 /// Where a robot was, and how it went from pose to pose.
@@ -44,7 +46,7 @@ using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMaj
 /// Whitens columns of residual increments: L^-1 X with L L' the joint covariance of all increments of a run.
 ///
 /// The error of pose k is shared by the increments k - 1 and k; it lives in the map frame, so its share rotates with
-/// the robot. What the filter does depends on no column: it is worked out once, O(n), for any number of columns.
+/// the robot. A part of it may last for longer: such of a map, or of a filter in the reference. What the filter does depends on no column: it is worked out once, O(n), for any number of columns.
 class Whitener {
  public:
   /// Throws std::invalid_argument for shapes that do not fit, times that do not increase, or noise that is not
@@ -72,12 +74,9 @@ class Whitener {
   };
 
  private:
-  using OneColour = std::vector<Step<6>>;
-  using TwoColours = std::vector<Step<9>>;
-
   void requireRows(const Eigen::Ref<const Rows>& columns) const;
 
-  std::variant<OneColour, TwoColours> steps_;
+  std::variant<std::vector<Step<6>>, std::vector<Step<9>>, std::vector<Step<12>>> steps_;
   Eigen::MatrixX3d log_determinants_;
 };
 

@@ -136,7 +136,7 @@ def _run(name: str, command: FloatArray, fault: Fault, rng: np.random.Generator)
     noise = draw_rates(USUAL, round((stamps[-1] + 3.0) / STEP), rng)
     setting = Setting(command, np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)]), stamps, noise)
     poses, _ = drive(setting, (fault,))
-    run = run_of(name, setting, poses + draw_reference(USUAL, len(stamps), rng))
+    run = run_of(name, setting, poses + draw_reference(USUAL, stamps, rng))
     return replace(run, name=name)
 
 

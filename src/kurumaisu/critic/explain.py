@@ -177,6 +177,12 @@ def _noise(problem: Problem) -> tuple[Noise, ...]:
             ("yaw rate, slower part", n.slow_w, "rad/s"),
             ("time constant of the slower part", n.slow_tau, "s"),
         )
+    if n.lasting:
+        rows += (
+            ("reference position, lasting part", n.lasting * n.position_sd, "m"),
+            ("reference heading, lasting part", n.lasting * n.heading_sd, "rad"),
+            ("time constant of the lasting part", n.lasting_tau, "s"),
+        )
     return tuple(Noise(name, value, float("nan"), float("nan"), unit) for name, value, unit in rows)
 
 

@@ -28,7 +28,8 @@ class Noise:
     position_sd [m], heading_sd [rad]: white; sd_v [m/s], sd_lateral [m/s], sd_w [rad/s]: stationary sd of
     Ornstein-Uhlenbeck processes of time constant tau [s]; slow_...: the same of a second, slower one, 0: none;
     growth: by how much they grow with the rates, as a share per Drive.pace; rest: share of a moving chair's noise that
-    one at rest has.
+    one at rest has; lasting: how many times as large as the white errors of the reference are such that last for
+    lasting_tau [s].
     """
 
     position_sd: float
@@ -43,14 +44,24 @@ class Noise:
     slow_tau: float = 3.0
     growth: float = 0.0
     rest: float = 0.02
+    lasting: float = 0.0
+    lasting_tau: float = 2.0
+
+    @property
+    def louder(self) -> float:
+        """How many times as large as the white errors of the reference all its errors together are."""
+        return float(np.hypot(1.0, self.lasting))
 
 
 # Where the search for the noise starts, and how far from there a value remains plausible (natural log, 1 sd).
 START = Noise(position_sd=0.01, heading_sd=0.005, sd_v=0.02, sd_lateral=0.005, sd_w=0.03, tau=0.3)
-_SLOW = replace(START, slow_v=0.005, slow_lateral=0.001, slow_w=0.01, growth=0.3)
-_SPREAD = dict.fromkeys(vars(START), 2.0) | {"tau": 1.0, "slow_tau": 0.7, "growth": 1.0, "rest": 1.0}
-_FLOOR = dict.fromkeys(vars(START), 1e-5) | {"tau": 0.02, "slow_tau": 0.5, "growth": 1e-4, "rest": START.rest}
-_CEILING = dict.fromkeys(vars(START), 3.0) | {"sd_w": 10.0, "tau": 20.0, "slow_tau": 20.0, "growth": 30.0, "rest": 1.0}
+_SLOW = replace(START, slow_v=0.005, slow_lateral=0.001, slow_w=0.01, growth=0.3, lasting=1.0)
+_SPREAD = dict.fromkeys(vars(START), 2.0) | dict.fromkeys(("tau", "growth", "rest", "lasting", "lasting_tau"), 1.0)
+_SPREAD |= {"slow_tau": 0.7}
+_FLOOR = dict.fromkeys(vars(START), 1e-5)
+_FLOOR |= {"tau": 0.02, "slow_tau": 0.5, "growth": 1e-4, "rest": START.rest, "lasting": 0.05, "lasting_tau": 0.1}
+_CEILING = dict.fromkeys(vars(START), 3.0) | dict.fromkeys(("tau", "slow_tau", "lasting_tau"), 20.0)
+_CEILING |= {"sd_w": 10.0, "growth": 30.0, "rest": 1.0, "lasting": 10.0}
 ONE_COLOUR = ("position_sd", "heading_sd", "sd_v", "sd_lateral", "sd_w", "tau")
 _SECOND = ("slow_v", "slow_lateral", "slow_w", "slow_tau")
 _GROWN = (0.3, 1.0, 3.0)  # from which growth is searched for: from a single one the search sticks half way
@@ -60,6 +71,9 @@ _HINTED = 0.5  # [nat] more, at least
 _GROWING = ("sd_v", "sd_lateral", "sd_w", "slow_v", "slow_lateral", "slow_w")
 _RESTLESS = (0.1, 0.3, 1.0)  # shares of its noise that a chair at rest may have, which are tried
 _HINTS = (0.1, 0.5, 1.0, 3.0)  # of a second colour's usual size
+_LASTING = ("lasting", "lasting_tau")
+_HINTED_LASTING = (0.5, 1.0)
+_HINTED_TAU = (0.5, 2.0, 8.0)  # [s]
 _WORTH = 4.0  # [nat] from which a second colour is believed: it has four parameters; noise at rest, too
 _SAME = 0.03  # share of a column beyond those before it that makes it one of its own
 
@@ -73,13 +87,15 @@ def whitener(drive: Drive, noise: Noise) -> Whitener:
         np.maximum(drive.activity, noise.rest) * grown,
         drive.rolling * grown,
         drive.ways,
-        position_sd=noise.position_sd,
-        heading_sd=noise.heading_sd,
+        position_sd=noise.position_sd * noise.louder,
+        heading_sd=noise.heading_sd * noise.louder,
         process_sd=[
             [noise.sd_v, noise.sd_lateral, noise.sd_w],
             [noise.slow_v, noise.slow_lateral, noise.slow_w],
         ],
         process_tau=[noise.tau, noise.slow_tau],
+        lasting=(noise.lasting / noise.louder) ** 2,
+        lasting_tau=noise.lasting_tau,
     )
 
 
@@ -126,14 +142,40 @@ class Scatter:
         self._truth = truth
 
     def estimate(self, start: Noise = START) -> Estimate:
-        """Return the noise of one colour, or of two where they explain more; of a chair at rest as much as it has."""
-        one = self._restless(self._best(replace(start, slow_v=0.0, slow_lateral=0.0, slow_w=0.0), _free(start)))
+        """Return the noise of one colour, or of two where they explain more; of a chair at rest as much as it has.
+
+        The reference's errors are white, or last where that explains more.
+        """
+        plain = replace(start, slow_v=0.0, slow_lateral=0.0, slow_w=0.0, lasting=0.0)
+        one = self._restless(self._lasting(self._best(plain, _free(plain))))
         second = start if start.slow_v else _SLOW
         slow = {name: getattr(second, name) for name in _SECOND}
         if not self._hints_at(one.noise, slow):
             return one
         two = self._best(replace(one.noise, **slow), (*_free(one.noise), *_SECOND))
-        return two if two.cost < one.cost - _WORTH else one
+        if two.cost >= one.cost - _WORTH:
+            return one
+        return two if two.noise.lasting else self._lasting(two)
+
+    def _lasting(self, white: Estimate) -> Estimate:
+        """Return the noise of a reference whose errors last for longer than one pose, if that explains more."""
+        tried = (
+            self._as_known(replace(white.noise, lasting=size, lasting_tau=tau))
+            for size in _HINTED_LASTING
+            for tau in _HINTED_TAU
+        )
+        cost, start = min(((self._cost(noise), noise) for noise in tried), key=itemgetter(0))
+        if cost > self._cost(white.noise):
+            return white
+        found = self._best(start, (*_free(start), *(_SECOND if start.slow_v else ())))
+        return found if found.cost < white.cost - _WORTH else white
+
+    def _as_known(self, noise: Noise) -> Noise:
+        """Return noise with all errors of the reference as large as they are known to be, if they are."""
+        if self._truth is None:
+            return noise
+        position_sd, heading_sd = np.maximum(self._truth, _FLOOR["position_sd"]) / noise.louder
+        return replace(noise, position_sd=float(position_sd), heading_sd=float(heading_sd))
 
     def _restless(self, still: Estimate) -> Estimate:
         """Return the noise of a chair that fluctuates at rest, too, if that explains more."""
@@ -181,15 +223,13 @@ class Scatter:
 
     def _best(self, start: Noise, names: Sequence[str]) -> Estimate:
         if self._truth is not None:
-            known = np.maximum(self._truth, _FLOOR["position_sd"])
-            start = replace(start, position_sd=float(known[0]), heading_sd=float(known[1]))
             names = [name for name in names if name not in ("position_sd", "heading_sd")]
         centre = np.log([getattr(_SLOW, name) for name in names])
         spread = np.array([_SPREAD[name] for name in names])
         bounds = np.log([[_FLOOR[name], _CEILING[name]] for name in names])
 
         def noise_at(log_values: FloatArray) -> Noise:
-            return replace(start, **dict(zip(names, np.exp(log_values).tolist(), strict=True)))
+            return self._as_known(replace(start, **dict(zip(names, np.exp(log_values).tolist(), strict=True))))
 
         def cost(log_values: FloatArray) -> float:
             distance = (log_values - centre) / spread
@@ -213,7 +253,8 @@ class Scatter:
 
 def _free(noise: Noise) -> tuple[str, ...]:
     """Return what is searched for in noise of one colour."""
-    return (*ONE_COLOUR, "rest") if noise.rest > START.rest else ONE_COLOUR
+    rest = ("rest",) if noise.rest > START.rest else ()
+    return (*ONE_COLOUR, *rest, *(_LASTING if noise.lasting else ()))
 
 
 def _grown(noise: Noise, growth: float) -> Noise:

@@ -43,7 +43,7 @@ def draw_drives(
         start = np.array([*rng.uniform(-2, 2, 2), rng.uniform(-np.pi, np.pi)])
         noise = draw_rates(regime, round((seconds + _TAIL + 2.0) / STEP), rng)
         settings.append(Setting(command, start, stamps, noise))
-        errors.append(draw_reference(regime, len(stamps), rng))
+        errors.append(draw_reference(regime, stamps, rng))
     return Drives(tuple(settings), tuple(errors), regime)
 
 

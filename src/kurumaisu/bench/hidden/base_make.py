@@ -14,7 +14,7 @@ from kurumaisu.bench.hidden.base_case import Scale, draw_drives, recording
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.case import FAINTEST, Ask, Case, Known, Truth
 from kurumaisu.bench.hidden.motion import Fault, Sizes, drive
-from kurumaisu.bench.hidden.noise import REGIMES, draw_regime
+from kurumaisu.bench.hidden.noise import REGIMES, draw_lasting, draw_regime
 from kurumaisu.types import FloatArray
 
 Z_RANGE = (FAINTEST, 60.0)
@@ -28,7 +28,7 @@ def make_base(ask: Ask, seed: int) -> Case:
     """Return a case of the base: nothing, one id, two or three, drawn at random unless the ask names them."""
     what, where, how = (np.random.default_rng([seed, i]) for i in range(3))
     ids = ask.ids or _random_ids(_COUNT[ask.kind], what)
-    regime = REGIMES[ask.regime] if ask.regime else draw_regime(how)
+    regime = REGIMES[ask.regime] if ask.regime else draw_lasting(draw_regime(how), how)
     drives = draw_drives(ask.design, regime, where)
     scale = Scale(drives)
     worth = {name: ask.z or float(np.exp(what.uniform(*np.log(Z_RANGE)))) for name in ids}

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -22,11 +22,21 @@ class Colour:
 
 @dataclass(frozen=True)
 class Regime:
-    """All noise of a drive: parts of the rates', and white errors of the reference's position [m], heading [rad]."""
+    """All noise of a drive: parts of the rates', and errors of the reference's position [m], heading [rad].
+
+    lasting: share of the variance of these errors that lasts for lasting_tau [s], the rest is white.
+    """
 
     colours: tuple[Colour, ...]
     position_sd: float
     heading_sd: float
+    lasting: float = 0.0
+    lasting_tau: float = 1.0
+
+    @property
+    def reference_variance(self) -> FloatArray:
+        """Variances (3,) of the errors of the reference's x, y, heading."""
+        return np.square([self.position_sd, self.position_sd, self.heading_sd])
 
 
 USUAL = Regime((Colour((0.010, 0.003, 0.020), 0.3),), 0.005, 0.005)
@@ -37,6 +47,7 @@ REGIMES: dict[str, Regime] = {
     "poor reference": Regime((Colour((0.010, 0.003, 0.020), 0.3),), 0.020, 0.020),
     "quiet": Regime((Colour((0.004, 0.001, 0.008), 0.15),), 0.001, 0.002),
     "two colours": Regime((Colour((0.010, 0.003, 0.025), 0.1), Colour((0.008, 0.002, 0.010), 3.0)), 0.005, 0.005),
+    "lasting": Regime((Colour((0.010, 0.003, 0.020), 0.3),), 0.010, 0.008, 0.7, 3.0),
 }
 
 
@@ -53,6 +64,13 @@ def draw_regime(rng: np.random.Generator) -> Regime:
     return Regime(colours, between(0.001, 0.02), between(0.001, 0.02))
 
 
+def draw_lasting(regime: Regime, rng: np.random.Generator) -> Regime:
+    """Return one regime in four with a reference that errs for longer than one pose, as one matched to a map does."""
+    if rng.random() < 0.75:
+        return regime
+    return replace(regime, lasting=rng.uniform(0.2, 0.9), lasting_tau=float(np.exp(rng.uniform(*np.log([0.5, 20.0])))))
+
+
 def draw_rates(regime: Regime, cells: int, rng: np.random.Generator) -> FloatArray:
     """Return noise (cells, 3) of v, u, w; exact on the grid, stationary from its first cell on."""
     total = np.zeros((cells, 3))
@@ -64,6 +82,14 @@ def draw_rates(regime: Regime, cells: int, rng: np.random.Generator) -> FloatArr
     return total
 
 
-def draw_reference(regime: Regime, count: int, rng: np.random.Generator) -> FloatArray:
-    """Return errors (count, 3) of the reference's poses."""
-    return rng.standard_normal((count, 3)) * [regime.position_sd, regime.position_sd, regime.heading_sd]
+def draw_reference(regime: Regime, stamps: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return errors (n, 3) of the reference's poses at stamps (n,) [s]."""
+    unit = rng.standard_normal((len(stamps), 3))
+    if regime.lasting:
+        kept = np.zeros(3)
+        kicks = rng.standard_normal(unit.shape)
+        for k, gap in enumerate(np.diff(stamps, prepend=-np.inf)):
+            keep = np.exp(-gap / regime.lasting_tau)
+            kept = keep * kept + np.sqrt(1 - keep**2) * kicks[k]
+            unit[k] = np.sqrt(1 - regime.lasting) * unit[k] + np.sqrt(regime.lasting) * kept
+    return np.asarray(unit * np.sqrt(regime.reference_variance))

@@ -37,7 +37,10 @@ def noise_of(regime: Regime) -> Noise:
     if len(regime.colours) > 1:
         other = regime.colours[1]
         noise |= dict(zip(("slow_v", "slow_lateral", "slow_w"), other.sd, strict=True)) | {"slow_tau": other.tau}
-    return Noise(regime.position_sd, regime.heading_sd, **noise)
+    if regime.lasting:
+        noise |= {"lasting": float(np.sqrt(regime.lasting / (1 - regime.lasting))), "lasting_tau": regime.lasting_tau}
+    white = np.sqrt(1 - regime.lasting)
+    return Noise(white * regime.position_sd, white * regime.heading_sd, **noise)
 
 
 def _density(case: Case, known: Known) -> float:

@@ -14,7 +14,7 @@ from kurumaisu.bench.hidden.case import Ask, Case, Truth
 from kurumaisu.bench.hidden.laser_catalogue import LASER
 from kurumaisu.bench.hidden.laser_worth import MEANS, LaserScale
 from kurumaisu.bench.hidden.motion import Sizes
-from kurumaisu.bench.hidden.noise import REGIMES, USUAL, draw_regime
+from kurumaisu.bench.hidden.noise import REGIMES, USUAL, draw_lasting, draw_regime
 from kurumaisu.bench.hidden.rooms import world_text
 from kurumaisu.bench.hidden.tours import draw_tour
 from kurumaisu.bench.hidden.unknown import STRANGE_BASE, STRANGE_LASER, Strange
@@ -25,7 +25,7 @@ def strange_base(ask: Ask, seed: int) -> Case:
     what, where, how = (np.random.default_rng([seed, 20 + i]) for i in range(3))
     name = ask.ids[0] if ask.ids else str(what.choice(list(STRANGE_BASE)))
     strange = STRANGE_BASE[name]
-    regime = REGIMES[ask.regime] if ask.regime else draw_regime(how)
+    regime = REGIMES[ask.regime] if ask.regime else draw_lasting(draw_regime(how), how)
     drives = base_case.draw_drives(ask.design, regime, where)
     scale = base_case.Scale(drives)
     columns = sizing.rival_columns(scale, sizing.RIVALS)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a signal in measured poses is worth against known noise: its whitened norm z.
 
-A small change of a drive is a deviation of poses from a nominal path. The known noise makes deviations, too: white ones
-of the reference, and the integral of Ornstein-Uhlenbeck rates along the path. Both are linear, so a Kalman filter that
+A small change of a drive is a deviation of poses from a nominal path. The known noise makes deviations, too: errors of
+the reference, white ones and such that last, and the integral of Ornstein-Uhlenbeck rates along the path. Both are linear, so a Kalman filter that
 knows the noise turns any deviation into unit white noise; z is the norm of what it makes of a noise-free signal.
 z squared is twice the expected log likelihood ratio of somebody who knows everything but the signal's presence.
 """
@@ -37,10 +37,13 @@ class Whitener:
     def __init__(self, path: Path, regime: Regime) -> None:
         """Work out gains for all runs at once."""
         runs, n, _ = path.poses.shape
-        size = 3 + 3 * len(regime.colours)
-        observed = np.diag([regime.position_sd**2, regime.position_sd**2, regime.heading_sd**2])
+        size = _size(regime)
+        observed = np.diag((1 - regime.lasting) * regime.reference_variance)
+        lasting = regime.lasting * regime.reference_variance
         state = np.zeros((runs, size, size))
-        state[:] = np.diag([_VAGUE**2] * 3 + [sd**2 for colour in regime.colours for sd in colour.sd])
+        state[:] = np.diag([_VAGUE**2] * 3 + [sd**2 for colour in regime.colours for sd in colour.sd] + [*lasting])
+        self._see = see = np.zeros((3, size))
+        see[:, :3] = see[:, -3:] = np.eye(3)
         self._moves: list[FloatArray] = []
         self._gains: list[FloatArray] = []
         self._roots: list[FloatArray] = []
@@ -50,10 +53,10 @@ class Whitener:
                 move, added = _transition(path, regime, k)
                 state = move @ state @ move.transpose(0, 2, 1) + added
                 self._moves.append(move)
-            innovation = state[:, :3, :3] + observed
+            innovation = see @ state @ see.T + observed
             root = np.linalg.inv(np.linalg.cholesky(innovation))
-            gain = state[:, :, :3] @ (root.transpose(0, 2, 1) @ root)
-            state = state - gain @ state[:, :3, :]
+            gain = state @ see.T @ (root.transpose(0, 2, 1) @ root)
+            state = state - gain @ see @ state
             state = (state + state.transpose(0, 2, 1)) / 2
             self._gains.append(gain)
             self._roots.append(root)
@@ -67,7 +70,7 @@ class Whitener:
         for k in range(n):
             if k:
                 state = self._moves[k - 1] @ state
-            surprise = deviations[:, k] - state[:, :3]
+            surprise = deviations[:, k] - self._see @ state
             out[k] = self._roots[k] @ surprise
             state = state + self._gains[k] @ surprise
         return out[1:].reshape(-1, columns)
@@ -82,7 +85,7 @@ class Whitener:
                 surprise = np.linalg.solve(self._roots[k], white[:, k])
             else:
                 surprise = np.zeros_like(white[:, 0])
-            out[:, k] = state[:, :3] + surprise
+            out[:, k] = self._see @ state + surprise
             state = state + self._gains[k] @ surprise
         return out
 
@@ -110,11 +113,11 @@ def _body_steps(poses: FloatArray) -> FloatArray:
 def _transition(path: Path, regime: Regime, k: int) -> tuple[FloatArray, FloatArray]:
     """Return what happens to the state from pose k - 1 to pose k, and the covariance that noise adds, per run.
 
-    The state: deviation of x, y, heading; then v, u, w of each colour.
+    The state: deviation of x, y, heading; then v, u, w of each colour; then the reference's errors that last.
     """
     before, after = path.poses[:, k - 1], path.poses[:, k]
     t = path.times[k] - path.times[k - 1]
-    runs, size = len(before), 3 + 3 * len(regime.colours)
+    runs, size = len(before), _size(regime)
     across = after[:, :2] - before[:, :2]
     middle = (before[:, 2] + after[:, 2]) / 2
     spread = np.zeros((runs, 3, 3))  # from the integrals of v, u, w over the step to the deviation
@@ -137,4 +140,11 @@ def _transition(path: Path, regime: Regime, k: int) -> tuple[FloatArray, FloatAr
         added[:, :3, at] = colour.tau * (1 - keep) ** 2 * spread @ variance
         added[:, at, :3] = added[:, :3, at].transpose(0, 2, 1)
         added[:, :3, :3] += integral * spread @ variance @ spread.transpose(0, 2, 1)
+    kept = np.exp(-t / regime.lasting_tau)
+    move[:, -3:, -3:] = kept * np.eye(3)
+    added[:, -3:, -3:] = (1 - kept**2) * np.diag(regime.lasting * regime.reference_variance)
     return move, added
+
+
+def _size(regime: Regime) -> int:
+    return 3 + 3 * len(regime.colours) + 3
