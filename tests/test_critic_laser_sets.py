@@ -10,6 +10,7 @@ from kurumaisu.critic.laser.columns import Column, Form
 from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.free import Free
 from kurumaisu.critic.laser.grids import grid_of
+from kurumaisu.critic.laser.one_clock import one_clock
 from kurumaisu.critic.laser.reframed import from_base_link
 from kurumaisu.critic.laser.search import Search
 from kurumaisu.critic.laser.trust import trusted_place
@@ -100,3 +101,20 @@ def test_what_shifts_no_point_is_left_alone():
     clock = Cause("base.clock_scale", 1.0, {"scale": Estimate(0.05, 0.04, 0.06, "1")}, 50.0)
     finding = LaserFinding(causes=(late,))
     assert from_base_link((clock,), finding, Recording("none", (), ()), MODEL, None) == (finding, ())
+
+
+@pytest.mark.parametrize(
+    ("first", "delay", "named"),
+    [(42.0, -0.0168, False), (42.0, 0.02, True), (42.0, -0.01, True), (0.0, 0.0004, True)],
+    ids=["they agreed at the first scan", "a delay beside a drift", "they agreed before", "the scans begin at time 0"],
+)
+def test_clocks_that_agree_at_the_first_scan_are_no_delay(first, delay, named):
+    """Beams are fired at t - delay - skew t: that is t where t is minus delay / skew."""
+    late = Cause("laser.latency", 1.0, {"delay": Estimate(delay, delay - 4e-4, delay + 4e-4, "s")}, 50.0)
+    drift = Cause("laser.clock_skew", 1.0, {"skew": Estimate(4e-4, 3.9e-4, 4.1e-4, "1")}, 50.0)
+    settings = (EffectSetting("laser.latency", {"delay": delay}), EffectSetting("laser.clock_skew", {"skew": 4e-4}))
+    told = one_clock(LaserFinding(causes=(late, drift), settings=settings), first + np.arange(9.0))
+    assert [cause.id for cause in told.causes] == ["laser.latency", "laser.clock_skew"][1 - named :]
+    assert told.settings == settings
+    assert bool(told.details) != named
+    assert one_clock(LaserFinding(causes=(late,)), first + np.arange(9.0)).causes == (late,)

@@ -17,6 +17,7 @@ from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.laser.lacking import lacking
 from kurumaisu.critic.laser.leading import leading, with_lead
 from kurumaisu.critic.laser.normal import Assembly, Normal
+from kurumaisu.critic.laser.one_clock import one_clock
 from kurumaisu.critic.laser.pictures import Pictures, misfits, noise_rows
 from kurumaisu.critic.laser.pinned import Pinned, pinned
 from kurumaisu.critic.laser.search import Fitted, Search
@@ -105,7 +106,7 @@ def criticise(
         scatter = with_whole_scans(scatter, seen, fit.normal.scan_noise, recording, ids)
         scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made), own)
     heard = beyond(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])), own)
-    finding = _finding(assembly, normal, made, fit, heard)
+    finding = one_clock(_finding(assembly, normal, made, fit, heard), assembly.shots.stamps)
     slight = tuple(each.setting.id for each in scatter if each not in heard)
     words = tuple(
         f"{name}: detectable, but it does not matter beside what single readings scatter by." for name in slight
@@ -131,7 +132,7 @@ def _with_rest(
     cause = Cause(setting.id, worth[0], estimates_of(setting, sds), worth[1])
     size = size_of(assembly.marks.together([setting])[normal.beam_noise.valid])
     rest = replace(rest, details=(*rest.details, *_told({setting.id: size}, ())))
-    return with_lead(rest, setting, cause, assembly, normal)
+    return one_clock(with_lead(rest, setting, cause, assembly, normal), assembly.shots.stamps)
 
 
 def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model: Model) -> NextExperiment | None:

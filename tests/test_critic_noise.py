@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The noise that is estimated, on drives whose noise the bench's generator drew."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kurumaisu import geometry
+from kurumaisu.bench.hidden.base_case import draw_drives, recording
+from kurumaisu.bench.hidden.motion import drive
+from kurumaisu.bench.hidden.noise import REGIMES
+from kurumaisu.critic.drive import prepare
+from kurumaisu.critic.noise import Scatter
+from kurumaisu.params import load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+
+
+def estimated(regime, seed, truth=None):
+    """Return the noise of three drives of a minute about what they do without any."""
+    drawn = draw_drives("rich", regime, np.random.default_rng(seed), seconds=60.0, rate=10.0)
+    made = [prepare(run, MODEL) for run in recording("drawn", drawn, ()).runs]
+    left = []
+    for one, setting in zip(made, drawn.settings, strict=True):
+        poses = drive(replace(setting, noise=None), ())[0][np.searchsorted(setting.stamps, one.times - 1e-6)]
+        left.append(one.measured - geometry.between(poses[:-1], poses[1:]))
+        left[-1][:, 2] = geometry.wrap(left[-1][:, 2])
+    nothing = [np.empty((rest.size, 0)) for rest in left]
+    return Scatter(made, left, nothing, truth).estimate().noise
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_errors_of_the_reference_that_last_are_no_noise_of_the_motion(known):
+    regime = REGIMES["lasting"]
+    truth = (regime.position_sd, regime.heading_sd) if known else None
+    found = estimated(regime, 1, truth)
+    assert found.position_sd * found.louder == pytest.approx(regime.position_sd, rel=1e-9 if known else 0.25)
+    assert found.heading_sd * found.louder == pytest.approx(regime.heading_sd, rel=1e-9 if known else 0.25)
+    assert (found.lasting / found.louder) ** 2 == pytest.approx(regime.lasting, abs=0.15)
+    assert regime.lasting_tau / 2 < found.lasting_tau < regime.lasting_tau * 2
+    assert found.sd_lateral < 2 * regime.colours[0].sd[1]
+    assert found.rest < 0.1
+
+
+@pytest.mark.parametrize("name", ["usual", "slow", "rough", "poor reference", "quiet", "two colours"])
+def test_white_errors_of_the_reference_do_not_last(name):
+    found = estimated(REGIMES[name], 2)
+    assert found.lasting < 0.3
+    assert found.position_sd == pytest.approx(REGIMES[name].position_sd, rel=0.2)
