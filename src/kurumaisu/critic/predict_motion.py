@@ -88,7 +88,8 @@ def motion_ahead(drive: Drive, paths: Known, noise: Noise, t0: float, t1: float)
 
 def _past(drive: Drive, noise: Noise, t0: float) -> list[int]:
     """Return rows up to t0, in order, the last one first chosen, as far apart as those the noise was estimated on."""
-    tau = max(noise.tau, noise.slow_tau if noise.slow_v or noise.slow_w else 0.0)
+    slow = noise.slow_tau if noise.slow_v or noise.slow_w else 0.0
+    tau = max(noise.tau, slow, noise.lasting_tau if noise.lasting else 0.0)
     since = t0 - max(_MEMORY * tau, _LEAST_MEMORY, 3 * POSE_INTERVAL[drive.source])
     least = POSE_INTERVAL[drive.source] * (1 - _SAME)
     rows: list[int] = []

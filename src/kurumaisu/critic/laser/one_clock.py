@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A clock that runs fast or slow, from when on nobody knows: where it agreed later than at 0, a delay is a part of it."""
+"""A clock that runs fast or slow, nobody knows from when on: if it agreed later than at 0, a delay is a part of it."""
 
 from __future__ import annotations
 
