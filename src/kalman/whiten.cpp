@@ -184,8 +184,8 @@ class Covariance {
         double sum = 0.0;
         for (int i = 0; i < kSize; ++i) sum += step.seen[r][i] * seen_[s][i];
         for (int i = 0; i < 3; ++i) {
-          sum += (white_[i] + fresh_[i]) * j.to(r, i) * j.to(s, i) + spread[i] * j.motion(r, i) * j.motion(s, i) +
-                 late[i] * j.late(r, i) * j.late(s, i) +
+          sum += (white_[i] + fresh_[i]) * j.to(r, i) * j.to(s, i) +
+                 spread[i] * j.motion(r, i) * j.motion(s, i) + late[i] * j.late(r, i) * j.late(s, i) +
                  both[i] * (j.motion(r, i) * j.late(s, i) + j.late(r, i) * j.motion(s, i)) +
                  whole[i] * j.rolling(r, i) * j.rolling(s, i);
         }

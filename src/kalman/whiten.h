@@ -22,7 +22,7 @@ struct MotionNoise {
   double heading_sd;   ///< reference pose [rad]
   Colour fast;
   Colour slow;
-  double lasting = 0.0;      ///< share of the variance of the reference's errors that lasts; the rest is white
+  double lasting = 0.0;  ///< share of the variance of the reference's errors that lasts; the rest is white
   double lasting_tau = 1.0;  ///< for how long it lasts [s]
 };
 
