@@ -3,8 +3,8 @@
 
 A small change of a drive is a deviation of poses from a nominal path. The known noise makes deviations, too: errors of
 the reference, white ones and such that last, and the integral of Ornstein-Uhlenbeck rates along the path. All are
-linear, so a Kalman filter that knows the noise turns any deviation into unit white noise; z is the norm of what it makes of a
-noise-free signal.
+linear, so a Kalman filter that knows the noise turns any deviation into unit white noise; z is the norm of what it
+makes of a noise-free signal.
 z squared is twice the expected log likelihood ratio of somebody who knows everything but the signal's presence.
 """
 
