@@ -247,7 +247,8 @@ def slope(p, drive):
     for speed, w in zip(drive.v, drive.w, strict=True):
         middle = heading + w * drive.dt / 2
         uphill = p["climb_x"] * math.cos(middle) + p["climb_y"] * math.sin(middle)
-        v.append(speed - uphill if max(abs(speed), abs(w)) > 1e-3 else speed)
+        twice = 2 * math.sqrt((50 * speed) ** 2 + (25 * w) ** 2)
+        v.append(speed - uphill * (1 - 2 / (math.exp(min(twice, 700)) + 1)))
         heading += w * drive.dt
     return v, _still(len(v)), drive.w
 

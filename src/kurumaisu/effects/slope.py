@@ -7,9 +7,14 @@ import numpy as np
 
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 
+_CREEPS = 0.02, 0.04  # [m/s], [rad/s] up to which the motors and their gears hold a chair more and more
+
 
 class Slope(Effect):
-    """Forward speed less what the climb costs; a chair at rest is held by its brakes."""
+    """Forward speed less what the climb costs; a chair at rest is held by its brakes.
+
+    One that comes to rest slowly is held before it does: it would roll down for as long as its last turn dies away.
+    """
 
     id = "base.slope"
     stage = Stage.FLOOR
@@ -18,7 +23,10 @@ class Slope(Effect):
         Parameter("climb_y", "m/s", null=0.0, scale=0.02, lower=-0.5, upper=0.5),
     )
     sentence = "the chair is slower in one direction than in the opposite one, as on a slope"
-    formula = "v − climb_x · cos(θ) − climb_y · sin(θ) while moving; θ: heading in the map"
+    formula = (
+        "v − g · (climb_x · cos(θ) + climb_y · sin(θ)); θ: heading in the map; "
+        "g = tanh(√((v / 0.02 m/s)² + (w / 0.04 rad/s)²))"
+    )
     source = "a wheelchair's model with gravity on inclines, 2016; 10-40 mm/s"
     shows_in = Rate.V
     follows = Follows.V
@@ -33,4 +41,5 @@ class Slope(Effect):
         # A sum of turns drifts away from where a chair on a real floor heads: better what was measured.
         heading = motion.known.get("heading", after - motion.w * motion.dt / 2)
         loss = self.values["climb_x"] * np.cos(heading) + self.values["climb_y"] * np.sin(heading)
-        return replace(motion, v=motion.v - motion.moving * loss)
+        rolls = np.tanh(np.hypot(motion.v / _CREEPS[0], motion.w / _CREEPS[1]))
+        return replace(motion, v=motion.v - rolls * loss)
