@@ -152,8 +152,7 @@ void bindKalman(py::module_& m) {
            "the heading's cosine and sine and of the way x, y ahead, in the frame of each increment's first "
            "pose, and "
            "by how much each grows from end to end. lasting: share of the variance of the poses' errors that "
-           "lasts for "
-           "lasting_tau [s].")
+           "lasts for lasting_tau [s].")
       .def("whiten", &k::Whitener::whiten, py::arg("columns"),
            "Whitened columns (3 n, m) of increment residuals.")
       .def("gram", &k::Whitener::gram, py::arg("columns"),

@@ -46,7 +46,8 @@ using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMaj
 /// Whitens columns of residual increments: L^-1 X with L L' the joint covariance of all increments of a run.
 ///
 /// The error of pose k is shared by the increments k - 1 and k; it lives in the map frame, so its share rotates with
-/// the robot. A part of it may last for longer: such of a map, or of a filter in the reference. What the filter does depends on no column: it is worked out once, O(n), for any number of columns.
+/// the robot. A part of it may last for longer, as errors of a map do. What the filter does depends on no column: it is
+/// worked out once, O(n), for any number of columns.
 class Whitener {
  public:
   /// Throws std::invalid_argument for shapes that do not fit, times that do not increase, or noise that is not
