@@ -87,6 +87,12 @@ def test_what_may_act_beside_a_set_is_no_member_of_it():
     assert confounded(beside) == (("c", "d"),)
 
 
+def test_what_does_the_same_is_in_a_set_though_two_of_them_act_together_as_often():
+    """At one speed any two effects of it explain the drives as well as one."""
+    alike = posterior((0.2, "a"), (0.2, "b"), (0.15, "c"), (0.15, "d"), (0.15, "a d"), (0.15, "b c"))
+    assert confounded(alike) == (tuple("abcd"),)
+
+
 def test_a_set_has_what_is_left_out_together_more_often_than_one_time_in_twenty():
     assert confounded(posterior((0.85, "b"), (0.05, "c"), (0.035, "d"), (0.035, "e"), (0.03, "f"))) == (tuple("bcde"),)
     assert confounded(posterior((0.5, "b"), (0.46, "c"), (0.021, "d"), (0.019, "e"))) == (("b", "c"),)

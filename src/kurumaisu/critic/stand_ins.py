@@ -61,6 +61,8 @@ def confounded(posterior: Posterior, p: Mapping[str, float] | None = None) -> tu
         group = _alone(posterior, name)
         if posterior.any_of(group) < NAMED:
             group = _with_others(posterior, name, group)
+        if posterior.any_of(group) < NAMED:
+            group = group | _exchanged(posterior, name)
         meeting = [other for other in merged if other & group]
         merged = [other for other in merged if not other & group] + [group.union(*meeting)]
     told = (group for group in merged if len(group) > 1 and posterior.any_of(group) >= NAMED)
@@ -94,6 +96,17 @@ def _alone(posterior: Posterior, name: str) -> set[str]:
             own = (other for other in fit.ids - best.ids if posterior.instead(name, other))
             group |= {other for other in own if posterior.p[other] >= MEMBER}
     return group
+
+
+def _exchanged(posterior: Posterior, name: str) -> frozenset[str]:
+    """Return the effects that do in the place of one nearly as likely what it does, though they act beside it as often.
+
+    Where many do, as at a single speed, any two of them explain the drives as well.
+    """
+    without = posterior.ranked[0].ids - {name}
+    pairs = zip(posterior.ranked, posterior.weights, strict=True)
+    likely = (fit.ids - without for fit, w in pairs if without < fit.ids and _RATHER * w > posterior.weights[0])
+    return frozenset[str]().union(*(own for own in likely if len(own) == 1))
 
 
 def _with_others(posterior: Posterior, name: str, group: set[str]) -> set[str]:
