@@ -3,15 +3,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from kurumaisu import effects
 from kurumaisu.critic.laser.finding import LaserFinding
-from kurumaisu.critic.verdict import Estimate
+from kurumaisu.critic.verdict import Cause
+from kurumaisu.effects.laser.base import BeamEffect, Beams
 from kurumaisu.types import FloatArray
 
-_SKEW, _DELAY = "laser.clock_skew", "laser.latency"
 _NEAR = 5.0  # [s] of the first scan: so long before or after it a recording may have begun
 _SURE = 1.8  # times half of a 90 % interval: three standard deviations
+_LATER = 1000.0  # [s] at which a clock's drift is looked at
+_NONE = 1e-9  # [s] a shift that is none
+
+
+@dataclass(frozen=True)
+class _Clock:
+    """By how much a cause moves the time of a scan: at [s] time 0; growth [1] from then on; half of its interval [s]."""
+
+    at: float
+    growth: float
+    half: float
 
 
 def one_clock(finding: LaserFinding, stamps: FloatArray) -> LaserFinding:
@@ -19,18 +33,32 @@ def one_clock(finding: LaserFinding, stamps: FloatArray) -> LaserFinding:
 
     stamps [s] of the scans, since time 0 of the laser. The model keeps the delay: its clocks agree at time 0.
     """
-    causes = {cause.id: cause for cause in finding.causes}
     first = float(stamps.min())
-    if first < _NEAR or not {_SKEW, _DELAY} <= set(causes):
+    clocks = {cause.id: _clock(cause) for cause in finding.causes}
+    drifts = [(name, clock) for name, clock in clocks.items() if clock and abs(clock.growth) * _LATER > _NONE]
+    delays = [(name, clock) for name, clock in clocks.items() if clock and abs(clock.growth) * _LATER <= _NONE]
+    if first < _NEAR or len(drifts) != 1 or len(delays) != 1:
         return finding
-    skew, delay = causes[_SKEW].parameters["skew"], causes[_DELAY].parameters["delay"]
-    # Beams are fired at t - delay - skew t, which is t at this time.
-    agreed = -delay.estimate / skew.estimate
-    if abs(agreed - first) > _NEAR + _SURE * _half(delay) / abs(skew.estimate):
+    (drifting, drift), (late, delay) = *drifts, *delays
+    agreed = -(delay.at + drift.at) / drift.growth
+    if abs(agreed - first) > _NEAR + _SURE * delay.half / abs(drift.growth):
         return finding
-    told = f"{_SKEW}: the clocks agreed {agreed:.3g} s after time 0; the delay in the model says so."
-    return replace(finding, causes=tuple(c for c in finding.causes if c.id != _DELAY), details=(*finding.details, told))
+    told = f"{drifting}: the clocks agreed {agreed:.3g} s after time 0; the delay in the model says so."
+    return replace(finding, causes=tuple(c for c in finding.causes if c.id != late), details=(*finding.details, told))
 
 
-def _half(estimate: Estimate) -> float:
-    return (estimate.hi90 - estimate.lo90) / 2
+def _clock(cause: Cause) -> _Clock | None:
+    """Return what a cause does to the time of a whole scan; None if that is nothing."""
+    kind = effects.by_id(cause.id)
+    if not issubclass(kind, BeamEffect):
+        return None
+    effect, none = kind, np.zeros(1)
+
+    def shift(stamp: float, end: str = "estimate") -> float:
+        values = {name: float(getattr(one, end)) for name, one in cause.parameters.items()}
+        fired = Beams(stamp, np.array([stamp]), np.zeros(3), 0.0, none, none)
+        return float(effect(values, np.random.default_rng(0)).apply(fired).times[0]) - stamp
+
+    at, growth = shift(0.0), (shift(_LATER) - shift(0.0)) / _LATER
+    half = abs(shift(0.0, "hi90") - shift(0.0, "lo90")) / 2
+    return _Clock(at, growth, half) if max(abs(at), abs(growth) * _LATER) > _NONE else None
