@@ -21,7 +21,7 @@ _NONE = 1e-9  # [s] a shift that is none
 
 @dataclass(frozen=True)
 class _Clock:
-    """By how much a cause moves the time of a scan: at [s] time 0; growth [1] from then on; half of its interval [s]."""
+    """By how much a cause moves the time of a scan: at [s] time 0; growth [1] since then; half of its interval [s]."""
 
     at: float
     growth: float
