@@ -10,7 +10,7 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.laser.finding import LaserFinding
 from kurumaisu.critic.verdict import Cause
-from kurumaisu.effects.laser.base import BeamEffect, Beams
+from kurumaisu.effects import BeamEffect, Beams
 from kurumaisu.types import FloatArray
 
 _NEAR = 5.0  # [s] of the first scan: so long before or after it a recording may have begun
