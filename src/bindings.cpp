@@ -144,7 +144,7 @@ void bindKalman(py::module_& m) {
            }),
            py::arg("poses"), py::arg("times"), py::arg("activity"), py::arg("rolling"), py::arg("ways"),
            py::kw_only(), py::arg("position_sd"), py::arg("heading_sd"), py::arg("process_sd"),
-           py::arg("process_tau"), py::arg("lasting") = 0.0, py::arg("lasting_tau") = 1.0,
+           py::arg("process_tau"), py::arg("lasting"), py::arg("lasting_tau"),
            "For poses (n + 1, 3) at times (n + 1,); activity (n,): factors on the noise of the rates, whose "
            "two colours "
            "are rows of process_sd (2, 3); rolling (n,): on such noise of each increment alone; ways (n, 8): "

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kurumaisu import geometry
 from kurumaisu.bench.hidden.base_case import draw_drives, recording
 from kurumaisu.bench.hidden.motion import drive
 from kurumaisu.bench.hidden.noise import REGIMES
+from kurumaisu.bench.hidden.oracle import errors
 from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.noise import Scatter
 from kurumaisu.params import load_model, shipped
@@ -21,11 +21,10 @@ def estimated(regime, seed, truth=None):
     """Return the noise of three drives of a minute about what they do without any."""
     drawn = draw_drives("rich", regime, np.random.default_rng(seed), seconds=60.0, rate=10.0)
     made = [prepare(run, MODEL) for run in recording("drawn", drawn, ()).runs]
-    left = []
-    for one, setting in zip(made, drawn.settings, strict=True):
-        poses = drive(replace(setting, noise=None), ())[0][np.searchsorted(setting.stamps, one.times - 1e-6)]
-        left.append(one.measured - geometry.between(poses[:-1], poses[1:]))
-        left[-1][:, 2] = geometry.wrap(left[-1][:, 2])
+    left = [
+        errors(one, setting.stamps, drive(replace(setting, noise=None), ())[0])
+        for one, setting in zip(made, drawn.settings, strict=True)
+    ]
     nothing = [np.empty((rest.size, 0)) for rest in left]
     return Scatter(made, left, nothing, truth).estimate().noise
 

@@ -22,8 +22,8 @@ struct MotionNoise {
   double heading_sd;   ///< reference pose [rad]
   Colour fast;
   Colour slow;
-  double lasting = 0.0;  ///< share of the variance of the reference's errors that lasts; the rest is white
-  double lasting_tau = 1.0;  ///< for how long it lasts [s]
+  double lasting;      ///< share of the variance of the reference's errors that lasts; the rest is white
+  double lasting_tau;  ///< for how long it lasts [s]
 };
 
 /// Where a robot was, and how it went from pose to pose.
@@ -74,10 +74,13 @@ class Whitener {
     std::array<double, 6> lower;                   ///< innovation to whitened: rows of a lower triangle
   };
 
+  /// All increments: of one colour, of two or of one beside lasting errors, and of two beside them.
+  using Steps = std::variant<std::vector<Step<6>>, std::vector<Step<9>>, std::vector<Step<12>>>;
+
  private:
   void requireRows(const Eigen::Ref<const Rows>& columns) const;
 
-  std::variant<std::vector<Step<6>>, std::vector<Step<9>>, std::vector<Step<12>>> steps_;
+  Steps steps_;
   Eigen::MatrixX3d log_determinants_;
 };
 

@@ -78,8 +78,8 @@ class Whitener:
         heading_sd: float,
         process_sd: Sequence[Sequence[float]],
         process_tau: Sequence[float],
-        lasting: float = 0.0,
-        lasting_tau: float = 1.0,
+        lasting: float,
+        lasting_tau: float,
     ) -> None: ...
     def whiten(self, columns: FloatArray) -> FloatArray: ...
     def gram(self, columns: FloatArray) -> FloatArray: ...

@@ -56,12 +56,17 @@ class Noise:
 # Where the search for the noise starts, and how far from there a value remains plausible (natural log, 1 sd).
 START = Noise(position_sd=0.01, heading_sd=0.005, sd_v=0.02, sd_lateral=0.005, sd_w=0.03, tau=0.3)
 _SLOW = replace(START, slow_v=0.005, slow_lateral=0.001, slow_w=0.01, growth=0.3, lasting=1.0)
-_SPREAD = dict.fromkeys(vars(START), 2.0) | dict.fromkeys(("tau", "growth", "rest", "lasting", "lasting_tau"), 1.0)
-_SPREAD |= {"slow_tau": 0.7}
-_FLOOR = dict.fromkeys(vars(START), 1e-5)
-_FLOOR |= {"tau": 0.02, "slow_tau": 0.5, "growth": 1e-4, "rest": START.rest, "lasting": 0.05, "lasting_tau": 0.1}
-_CEILING = dict.fromkeys(vars(START), 3.0) | dict.fromkeys(("tau", "slow_tau", "lasting_tau"), 20.0)
-_CEILING |= {"sd_w": 10.0, "growth": 30.0, "rest": 1.0, "lasting": 10.0}
+_LASTING = ("lasting", "lasting_tau")
+_SPREAD = dict.fromkeys(vars(START), 2.0) | dict.fromkeys(("tau", "growth", "rest", *_LASTING), 1.0) | {"slow_tau": 0.7}
+_FLOOR = {
+    **dict.fromkeys(vars(START), 1e-5),
+    **{"tau": 0.02, "slow_tau": 0.5, "growth": 1e-4, "rest": START.rest, "lasting": 0.05, "lasting_tau": 0.1},
+}
+_CEILING = {
+    **dict.fromkeys(vars(START), 3.0),
+    **dict.fromkeys(("tau", "slow_tau", "lasting_tau"), 20.0),
+    **{"sd_w": 10.0, "growth": 30.0, "rest": 1.0, "lasting": 10.0},
+}
 ONE_COLOUR = ("position_sd", "heading_sd", "sd_v", "sd_lateral", "sd_w", "tau")
 _SECOND = ("slow_v", "slow_lateral", "slow_w", "slow_tau")
 _GROWN = (0.3, 1.0, 3.0)  # from which growth is searched for: from a single one the search sticks half way
@@ -71,10 +76,10 @@ _HINTED = 0.5  # [nat] more, at least
 _GROWING = ("sd_v", "sd_lateral", "sd_w", "slow_v", "slow_lateral", "slow_w")
 _RESTLESS = (0.1, 0.3, 1.0)  # shares of its noise that a chair at rest may have, which are tried
 _HINTS = (0.1, 0.5, 1.0, 3.0)  # of a second colour's usual size
-_LASTING = ("lasting", "lasting_tau")
-_HINTED_LASTING = (0.5, 1.0)
-_HINTED_TAU = (0.5, 2.0, 8.0)  # [s]
-_WORTH = 4.0  # [nat] from which a second colour is believed: it has four parameters; noise at rest, too
+_HINTED_LASTING = (0.5, 1.0)  # of what lasts, which are tried with each time constant [s]
+_HINTED_TAU = (0.5, 2.0, 8.0)
+# [nat] from which a second colour is believed: it has four parameters; noise at rest and errors that last, too
+_WORTH = 4.0
 _SAME = 0.03  # share of a column beyond those before it that makes it one of its own
 
 

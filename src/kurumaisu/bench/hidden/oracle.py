@@ -8,10 +8,11 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.bench.hidden.case import Case, Known
 from kurumaisu.bench.hidden.noise import Regime
-from kurumaisu.critic.drive import prepare
+from kurumaisu.critic.drive import Drive, prepare
 from kurumaisu.critic.noise import Noise, whitened
 from kurumaisu.critic.verdict import Gain
 from kurumaisu.params import load_model, shipped
+from kurumaisu.types import FloatArray
 
 _SAME = 1e-6  # [s]
 
@@ -37,10 +38,18 @@ def noise_of(regime: Regime) -> Noise:
     if len(regime.colours) > 1:
         other = regime.colours[1]
         noise |= dict(zip(("slow_v", "slow_lateral", "slow_w"), other.sd, strict=True)) | {"slow_tau": other.tau}
-    if regime.lasting:
-        noise |= {"lasting": float(np.sqrt(regime.lasting / (1 - regime.lasting))), "lasting_tau": regime.lasting_tau}
     white = np.sqrt(1 - regime.lasting)
-    return Noise(white * regime.position_sd, white * regime.heading_sd, **noise)
+    lasts = float(np.sqrt(regime.lasting) / white)
+    sds = white * regime.position_sd, white * regime.heading_sd
+    return Noise(*sds, **noise, lasting=lasts, lasting_tau=regime.lasting_tau)
+
+
+def errors(drive: Drive, stamps: FloatArray, poses: FloatArray) -> FloatArray:
+    """Return what is measured of a drive's increments less what poses (n, 3) at stamps (n,) say, (m, 3)."""
+    truth = poses[np.searchsorted(stamps, drive.times - _SAME)]
+    left = drive.measured - geometry.between(truth[:-1], truth[1:])
+    left[:, 2] = geometry.wrap(left[:, 2])
+    return left
 
 
 def _density(case: Case, known: Known) -> float:
@@ -50,9 +59,7 @@ def _density(case: Case, known: Known) -> float:
     for run, poses in zip(case.recording.runs, known.poses, strict=True):
         assert run.pose is not None
         drive = prepare(run, model)
-        truth = poses[np.searchsorted(run.pose.t, drive.times - _SAME)]
-        left = drive.measured - geometry.between(truth[:-1], truth[1:])
-        left[:, 2] = geometry.wrap(left[:, 2])
+        left = errors(drive, run.pose.t, poses)
         white, log_variances = whitened(drive, left.reshape(-1, 1), noise)
         total -= 0.5 * float(np.sum(white**2) + np.sum(log_variances) + white.size * np.log(2 * np.pi))
         count += len(left)

@@ -34,10 +34,12 @@ def one_clock(finding: LaserFinding, stamps: FloatArray) -> LaserFinding:
     stamps [s] of the scans, since time 0 of the laser. The model keeps the delay: its clocks agree at time 0.
     """
     first = float(stamps.min())
+    if first < _NEAR:
+        return finding
     clocks = {cause.id: _clock(cause) for cause in finding.causes}
     drifts = [(name, clock) for name, clock in clocks.items() if clock and abs(clock.growth) * _LATER > _NONE]
     delays = [(name, clock) for name, clock in clocks.items() if clock and abs(clock.growth) * _LATER <= _NONE]
-    if first < _NEAR or len(drifts) != 1 or len(delays) != 1:
+    if len(drifts) != 1 or len(delays) != 1:
         return finding
     (drifting, drift), (late, delay) = *drifts, *delays
     agreed = -(delay.at + drift.at) / drift.growth
@@ -49,15 +51,13 @@ def one_clock(finding: LaserFinding, stamps: FloatArray) -> LaserFinding:
 
 def _clock(cause: Cause) -> _Clock | None:
     """Return what a cause does to the time of a whole scan; None if that is nothing."""
-    kind = effects.by_id(cause.id)
-    if not issubclass(kind, BeamEffect):
+    effect = effects.by_id(cause.id)
+    if not issubclass(effect, BeamEffect):
         return None
-    effect, none = kind, np.zeros(1)
 
     def shift(stamp: float, end: str = "estimate") -> float:
         values = {name: float(getattr(one, end)) for name, one in cause.parameters.items()}
-        fired = Beams(stamp, np.array([stamp]), np.zeros(3), 0.0, none, none)
-        return float(effect(values, np.random.default_rng(0)).apply(fired).times[0]) - stamp
+        return float(effect(values, np.random.default_rng(0)).apply(Beams.single(stamp)).times[0]) - stamp
 
     at, growth = shift(0.0), (shift(_LATER) - shift(0.0)) / _LATER
     half = abs(shift(0.0, "hi90") - shift(0.0, "lo90")) / 2

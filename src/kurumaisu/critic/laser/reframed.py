@@ -95,7 +95,5 @@ def _placed_by(name: str, model: Model) -> _Place | None:
         origin = Reference(np.zeros(()), np.zeros(3), np.zeros(3))
         return lambda values: effect(values, context).apply(origin).poses
     if issubclass(effect, BeamEffect):
-        none = np.zeros(1)
-        still = Beams(0.0, none, np.zeros(3), 0.0, none, none)
-        return lambda values: effect(values, rng).apply(still).mount
+        return lambda values: effect(values, rng).apply(Beams.single()).mount
     return None

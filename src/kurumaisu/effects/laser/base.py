@@ -44,6 +44,11 @@ class Beams:
     bearings: FloatArray
     elevations: FloatArray
 
+    @classmethod
+    def single(cls, stamp: float = 0.0) -> Beams:
+        """Return one beam, straight ahead from base_link and fired at its stamp, to see what becomes of it."""
+        return cls(stamp, np.array([stamp]), np.zeros(3), 0.0, np.zeros(1), np.zeros(1))
+
 
 @dataclass(frozen=True)
 class Echoes:
