@@ -97,7 +97,7 @@ def test_a_backdrop_has_the_correlations_that_were_asked_for():
 
 
 def test_z_is_that_of_a_dense_covariance():
-    """One stop, few beams: pose errors, common mode and correlated neighbours as one dense matrix."""
+    """One stop, few beams: pose errors, common mode and correlated neighbours as one dense matrix of all scans."""
     backdrop = Backdrop(beam_rho=0.4, common_sd=0.001, common_rho=0.7)
     tour = draw_tour("wall", replace(USUAL, position_sd=0.003, heading_sd=0.004), np.random.default_rng(7))
     scale = LaserScale(tour, backdrop)
@@ -109,18 +109,19 @@ def test_z_is_that_of_a_dense_covariance():
         scale.nominal, normal=scale.nominal.normal[pick][:, keep], box=scale.nominal.box[pick][:, keep], **part
     )
     scale._seen = scale._seen[pick][:, keep]
-    scale.count = 1.0
-    signal = 0.004 * part["ranges"]
+    assert scale.count == 5
+    looked = 0.004 * part["ranges"]
+    signal = np.repeat(looked, 5, axis=0)
     scans, beams = signal.shape
-    sd = np.hypot(part["sd"], 0.001 / np.sqrt(12))
+    sd = np.hypot(np.repeat(part["sd"], 5, axis=0), 0.001 / np.sqrt(12))
     neighbours = np.kron(np.eye(scans), 0.4 ** np.abs(np.subtract.outer(np.arange(beams), np.arange(beams))))
     covariance = np.diag(sd.ravel()) @ neighbours @ np.diag(sd.ravel())
     common = 0.001**2 * 0.7 ** np.abs(np.subtract.outer(np.arange(scans), np.arange(scans)))
     covariance += np.kron(common, np.ones((beams, beams)))
-    pose = scale._pose_columns()[..., :3].reshape(-1, 3)
+    pose = np.repeat(scale._pose_columns()[..., :3], 5, axis=0).reshape(-1, 3)
     covariance += pose @ np.diag([0.003**2, 0.003**2, 0.004**2]) @ pose.T
     z = np.sqrt(signal.ravel() @ np.linalg.solve(covariance, signal.ravel()))
-    assert np.sqrt(scale.gram(signal[..., None])[0, 0]) == pytest.approx(z, rel=1e-3)
+    assert np.sqrt(scale.gram(looked[..., None])[0, 0]) == pytest.approx(z, rel=1e-3)
 
 
 def test_what_a_pose_error_does_is_its_derivative():

@@ -11,7 +11,7 @@ import numpy as np
 
 from kurumaisu.bench.hidden.backdrop import BACKDROPS, Backdrop, draw_backdrop
 from kurumaisu.bench.hidden.base_case import run_of
-from kurumaisu.bench.hidden.case import APART, Ask, Case, Truth
+from kurumaisu.bench.hidden.case import APART, FAINTEST, Ask, Case, Truth
 from kurumaisu.bench.hidden.laser_catalogue import LASER
 from kurumaisu.bench.hidden.laser_worth import MEANS, LaserScale, odd_z, spread_z
 from kurumaisu.bench.hidden.motion import Fault, Sizes
@@ -24,6 +24,7 @@ from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
 from kurumaisu.types import FloatArray
 
 MATERIAL = 0.6e-3  # [m] least root mean square of a change of the mean readings, unless a z is asked for
+_TOURS = 8  # drawn at most for a fault to show
 _SAME = 3.0  # a rival that leaves less than this z explains the signal
 
 
@@ -47,16 +48,20 @@ def make_laser(ask: Ask, seed: int, folder: Path) -> Case:
     design = ask.design or ("drive" if moving else str(where.choice(["room", "room", "drive"])))
     if ask.design is None and {"laser.warmup", "laser.temperature"} & set(ids):
         design = "room"
-    tour = draw_tour(design, regime, where)
-    scale = LaserScale(tour, backdrop)
-    sizes = {name: _sizes(name, scale, ask, what) for name in ids}
+    for _ in range(_TOURS):  # on some, the largest size that there is hardly shows
+        tour = draw_tour(design, regime, where)
+        scale = LaserScale(tour, backdrop)
+        sizes = {name: _sizes(name, scale, ask, what) for name in ids}
+        truth = _truth(ask, scale, sizes, _without(backdrop, ids))
+        if ask.z is not None or not ids or truth.z >= FAINTEST:
+            break
     faults = [LASER[name].fault(sizes[name], ask.form) for name in ids]
     folder.mkdir(parents=True, exist_ok=True)
     draw = Draw(int(how.integers(2**31)), _without(backdrop, ids), folder / f"hidden_{seed}.world")
     draw.world.write_text(world_text(f"hidden {seed}", tour.room), encoding="utf-8")
     null = recording(f"hidden {seed}", tour, (), draw)
     found = recording(f"hidden {seed}", tour, faults, draw) if faults else null
-    return Case(found, null, _truth(ask, scale, sizes, draw.backdrop), seed)
+    return Case(found, null, truth, seed)
 
 
 def recording(name: str, tour: Tour, faults: Sequence[Fault], draw: Draw) -> Recording:
@@ -154,11 +159,12 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
     plain = [scale.signal(LASER[name].fault(sizes[name], "plain")) for name in means]
     others = [name for name in MEANS if name not in ids and (scale.tour.moving or not LASER[name].moving)]
     rivals = scale.rivals(others, ids)
-    gram = scale.gram(np.concatenate([np.stack([*own, *plain], axis=-1), *rivals.values()], axis=-1))
+    gram = scale.gram(np.concatenate([np.stack([*own, *plain], axis=-1), *(columns for _, columns in rivals)], axis=-1))
     at, rest = 2 * len(means), dict[str, float]()
-    for name, columns in rivals.items():
+    for name, columns in rivals:
         those = list(range(at, at + columns.shape[-1]))
-        rest[name] = min(left(gram, len(means), [*_all_but(len(means), i), *those]) for i in range(len(means)))
+        least = min(left(gram, len(means), [*_all_but(len(means), i), *those]) for i in range(len(means)))
+        rest[name] = min(least, rest.get(name, least))
         at += columns.shape[-1]
     nearest = min(rest, key=lambda name: rest[name])
     alone = {name: left(gram, [i], _all_but(len(means), i)) for i, name in enumerate(means)}

@@ -105,12 +105,8 @@ class LaserScale:
 
     def _without_poses(self, signals: FloatArray) -> FloatArray:
         """Return the products of whitened signals without what errors of poses and of whole scans explain."""
-        # Stops stand still, so one scan says what all of its stop do; scans of a drive have each a pose of their own.
-        weight = 1.0 if self.tour.moving else self.count
-        k = signals.shape[2]
-        products = weight * self._products(signals)
-        rest = self._taken(products, k)
-        return np.asarray(products[:, :k, :k].sum(axis=0) - rest) * (self.count if self.tour.moving else 1.0)
+        k, products = signals.shape[2], self.count * self._products(signals)
+        return np.asarray(products[:, :k, :k].sum(axis=0) - self._taken(products, k))
 
     def _taken(self, products: FloatArray, k: int) -> FloatArray:
         """Return the products' part that errors of poses and of whole scans explain, (k, k)."""
@@ -128,18 +124,19 @@ class LaserScale:
         outer = np.zeros((size, k))
         np.add.at(outer, place, products[:, k : k + effects, :k])
         position, heading = self.tour.truth
-        prior = np.tile([position**-2, position**-2, heading**-2], groups * own // 3)
+        # A stop has one pose; of the scans of a drive that one stands for, each has its own.
+        poses = self.count if self.tour.moving else 1.0
+        prior = np.tile([poses / position**2, poses / position**2, poses / heading**2], groups * own // 3)
         whole = sparse.diags(prior) if not common else sparse.block_diag([sparse.diags(prior), self._whole(scans)])
         solved = splu(sparse.csc_matrix(inner + whole)).solve(outer)
         return np.asarray(outer.T @ solved)
 
-    def _whole(self, scans: int) -> sparse.spmatrix:
-        """Return the precision of the scans' common mode among the scans looked at."""
-        keep = self._backdrop.common_rho ** (EVERY if self.tour.moving else 1)
-        middle = np.full(scans, 1 + keep**2)
-        middle[[0, -1]] = 1.0
-        side = np.full(scans - 1, -keep)
-        return sparse.diags([side, middle, side], [-1, 0, 1]) / ((1 - keep**2) * self._backdrop.common_sd**2)
+    def _whole(self, scans: int) -> FloatArray:
+        """Return the precision (scans, scans) of the mean common mode of the scans that each looked at stands for."""
+        each = round(self.count)
+        every = np.arange(scans * each)
+        common = self._backdrop.common_sd**2 * self._backdrop.common_rho ** np.abs(np.subtract.outer(every, every))
+        return np.asarray(np.linalg.inv(common.reshape(scans, each, scans, each).mean(axis=(1, 3))))
 
     def _pose_columns(self) -> FloatArray:
         """Return what errors of poses and 1 m of a whole scan do, (s, b, 4), or (s, b, 10) of a drive.
@@ -162,20 +159,21 @@ class LaserScale:
             rigid = (hats[:, :, None] * rigid[:, :, None, :]).reshape(*ux.shape, 9)
         return np.concatenate([rigid, np.ones_like(ux)[..., None]], axis=-1)
 
-    def rivals(self, names: Sequence[str], hidden: Sequence[str] = ()) -> dict[str, FloatArray]:
-        """Return the signals (s, b, k) of rivals at typical sizes, those with a free shape in several.
+    def rivals(self, names: Sequence[str], hidden: Sequence[str] = ()) -> list[tuple[str, FloatArray]]:
+        """Return the signals (s, b, k) of rivals at typical sizes, k that any sum of is one; by name, which may recur.
 
         hidden: what they are rivals of, which no rival may have in it.
         """
-        out = {}
+        out = []
         for name in names:
             if name == "world.map_error":
-                out[name] = self._walls()
-            else:
-                faults = [LASER[name].fault(shape, "plain") for shape in _shapes(name)]
+                out.append((name, self._walls()))
+                continue
+            for shapes in _shapes(name):
+                faults = [LASER[name].fault(shape, "plain") for shape in shapes]
                 if name in _BESIDE and _BESIDE[name] not in hidden:
                     faults.append(LASER[_BESIDE[name]].fault({"size": 1e-3}, "plain"))
-                out[name] = np.stack([self.signal(fault) for fault in faults], axis=-1)
+                out.append((name, np.stack([self.signal(fault) for fault in faults], axis=-1)))
         return out
 
     def _walls(self) -> FloatArray:
@@ -190,18 +188,19 @@ class LaserScale:
         return np.stack(columns, axis=-1)
 
 
-def _shapes(name: str) -> list[Sizes]:
+def _shapes(name: str) -> list[list[Sizes]]:
+    """Return sizes of a rival: of each inner list any sum is one, of two inner lists none is."""
     hidden = LASER[name]
     base = {"size": hidden.typical, **hidden.extra(np.random.default_rng(0))}
     free = {
-        "laser.warmup": [{"tau": tau} for tau in (200.0, 600.0, 1800.0)],
+        "laser.warmup": [[{"tau": tau}] for tau in (200.0, 600.0, 2400.0)],
         "laser.cyclic": [
-            {"wavelength": wave, "phase": phase} for wave in (0.8, 1.4, 2.5) for phase in (0.0, np.pi / 2)
+            [{"wavelength": wave, "phase": phase} for phase in (0.0, np.pi / 2)] for wave in (0.8, 1.4, 2.5)
         ],
-        "laser.tilt": [{"bearing": bearing} for bearing in (0.0, np.pi / 4, np.pi / 2)],
-        "laser.beam_bias": [{"phase": phase} for phase in (0.0, np.pi / 2)],
+        "laser.tilt": [[{"bearing": bearing} for bearing in (0.0, np.pi / 4, np.pi / 2)]],
+        "laser.beam_bias": [[{"phase": phase} for phase in (0.0, np.pi / 2)]],
     }
-    return [{**base, **shape} for shape in free.get(name, [{}])]
+    return [[{**base, **shape} for shape in shapes] for shapes in free.get(name, [[{}]])]
 
 
 def _unchained(columns: FloatArray, rho: float) -> FloatArray:
