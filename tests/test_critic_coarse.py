@@ -20,7 +20,7 @@ def fit_of(sizes, nats):
     return SimpleNamespace(
         candidates=frozenset(sizes),
         ids=frozenset(sizes),
-        terms=tuple(SimpleNamespace(fixed=name == "sign") for name in sizes),
+        sizes=sum(name != "sign" for name in sizes),
         score=score,
         log_likelihood=0.5 * sum(z**2 for z in sizes.values()),
     )

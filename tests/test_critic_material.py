@@ -15,10 +15,11 @@ def worth(gain, sd):
     ("gain", "nats", "free", "counts"),
     [
         (2.0, 3.0, False, True),  # by its own interval
-        (1.0, 7.0, False, False),
-        (1.0, 9.0, False, True),  # likely is enough
+        (1.0, 4.0, False, False),
+        (1.0, 6.0, False, True),  # likely is enough
         (0.5, 9.0, False, False),
-        (0.5, 25.0, False, True),  # it must only not lose
+        (1.0, 7.0, True, False),
+        (0.5, 13.0, False, True),  # it must only not lose
         (-0.1, 25.0, False, False),
         (0.5, 25.0, True, False),  # a free curve may fit what comes once
         (1.0, 25.0, True, True),

@@ -40,9 +40,13 @@ OFFSET = Parameter("offset", "V", null=0.0, scale=0.01, lower=-0.5, upper=0.5)
 NOISE = Noise(position_sd=0.005, heading_sd=0.005, sd_v=0.01, sd_lateral=0.003, sd_w=0.02, tau=0.3)
 
 
-def posterior(*sets):
-    """Return the posterior of sets given as (weight, names)."""
-    ranked = [SimpleNamespace(ids=frozenset(names.split())) for _, names in sets]
+def posterior(*sets, explains=()):
+    """Return the posterior of sets given as (weight, names); explains: log likelihood of each, else ever less."""
+    explained = explains or [-10.0 * i for i in range(len(sets))]
+    ranked = [
+        SimpleNamespace(ids=frozenset(names.split()), log_likelihood=nats, sizes=1)
+        for (_, names), nats in zip(sets, explained, strict=True)
+    ]
     return Posterior(ranked, np.array([weight for weight, _ in sets]))
 
 
@@ -52,6 +56,12 @@ def test_one_for_one_stand_ins_make_a_set():
 
 def test_what_needs_others_beside_it_is_in_no_set_where_others_do():
     assert confounded(posterior((0.55, "b"), (0.4, "c"), (0.05, "d e"))) == (("b", "c"),)
+
+
+@pytest.mark.parametrize(("nats", "told"), [(39.0, ("b", "c", "d")), (37.0, ("b", "c"))])
+def test_an_unlikely_form_that_explains_as_much_belongs_to_the_set(nats, told):
+    sets = (0.55, "a b"), (0.44, "a c"), (0.005, "a d"), (0.005, "a b e")
+    assert confounded(posterior(*sets, explains=(40.0, 40.0, nats, 42.0))) == (told,)
 
 
 def test_two_that_stand_in_for_three_are_a_set_rather_than_nothing():
@@ -237,7 +247,7 @@ def test_what_is_certain_or_confirmed_is_kept():
 
 @pytest.mark.parametrize(
     ("held", "nats", "turned", "kept"),
-    [(-0.01, 50.0, 0.2, 0.2), (-0.01, 50.0, -0.02, -0.01), (-0.01, 15.0, 0.2, -0.01), (-0.1, 50.0, 0.2, -0.1)],
+    [(-0.01, 50.0, 0.2, 0.2), (-0.01, 50.0, -0.02, -0.01), (-0.01, 11.0, 0.2, -0.01), (-0.1, 50.0, 0.2, -0.1)],
 )
 def test_where_drives_held_out_decide_nothing_each_is_left_out_in_turn(held, nats, turned, kept):
     made = decision({"a": 1.0}, fit_of("a", nats))
@@ -246,7 +256,7 @@ def test_where_drives_held_out_decide_nothing_each_is_left_out_in_turn(held, nat
 
 @pytest.mark.parametrize(
     ("held", "nats", "seen", "silent"),
-    [(-0.01, 50.0, 1.0, True), (-0.1, 50.0, 1.0, False), (-0.01, 15.0, 1.0, False), (-0.01, 50.0, 9.0, False)],
+    [(-0.01, 50.0, 1.0, True), (-0.1, 50.0, 1.0, False), (-0.01, 11.0, 1.0, False), (-0.01, 50.0, 9.0, False)],
 )
 def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatch, held, nats, seen, silent):
     """Whatever they gain, if it is no loss beyond chance."""
@@ -260,8 +270,8 @@ def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatc
 def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, without, best):
     """It took all their probability; where nobody would be told of it, they are weighed by themselves."""
     monkeypatch.setattr("kurumaisu.critic.smooth_explain.told", lambda *_: told)
-    twins = [SimpleNamespace(**vars(fit_of(name, 40.0)), log_likelihood=44.0, terms=()) for name in "ab"]
-    nothing = SimpleNamespace(**vars(fit_of("", 0.0)), log_likelihood=0.0, terms=())
+    twins = [SimpleNamespace(**vars(fit_of(name, 40.0)), log_likelihood=44.0, sizes=1) for name in "ab"]
+    nothing = SimpleNamespace(**vars(fit_of("", 0.0)), log_likelihood=0.0, sizes=0)
     found = Naming((*twins, nothing), {"a": 0.0, "b": 0.0}, (), 0.0)
     curved = Beyond(Rivalry((), 5.0, {}, {}, 0.0), SimpleNamespace(), 0.0)
     made = Decision(SimpleNamespace(), found, Growth(0.0, 0.0, NOISE), curved)

@@ -69,11 +69,7 @@ def _simpler(found: Naming, name: str, odds: float) -> float:
     first, other = (max(side, key=lambda fit: worth(found, fit), default=None) for side in sides)
     if first is None or other is None or odds < worth(found, first) - worth(found, other) - _NEAR:
         return 0.0  # a curve is nearer than any other set
-    if _fitted(first) >= _fitted(other):
+    if first.sizes >= other.sizes:
         return 0.0
     costs = [fit.log_likelihood - worth(found, fit) for fit in (other, first)]
     return max(costs[0] - costs[1], 0.0)
-
-
-def _fitted(fit: Fit) -> int:
-    return sum(not term.fixed for term in fit.terms)

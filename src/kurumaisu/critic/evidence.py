@@ -51,6 +51,11 @@ class Fit:
         return frozenset(candidate.id for candidate in self.candidates)
 
     @property
+    def sizes(self) -> int:
+        """Return how many values were fitted."""
+        return sum(not term.fixed for term in self.terms)
+
+    @property
     def start(self) -> dict[Key, float]:
         """Return the values by term, from which another fit may start."""
         return {term.key: float(value) for term, value in zip(self.terms, self.values, strict=True)}

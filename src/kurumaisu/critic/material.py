@@ -19,11 +19,12 @@ from kurumaisu.types import FloatArray, IntArray
 MATERIAL = 0.005  # share of the way (or of the turn) from which an effect matters to a driver
 FELT = 0.1  # share of what is uncertain anyway, per increment, from which an effect matters to a prediction
 _SAME = 1e-6  # [s] less than any clock resolves: stamps of equal spacing differ by rounding
-STRONG = 8.0  # [nat] of evidence from which _LIKELY will do
+# [nat] of evidence from which _LIKELY will do, of effects and of a free curve
+_STRONG, STRONG_CURVE = 5.0, 8.0
 # [nat] over nothing: were the noise twice as large as estimated, a quarter of it would still be beyond doubt.
 NO_NOISE = 50.0
 _LIKELY = 0.84  # standard deviations: a gain with a probability of 0.8
-CERTAIN = 20.0  # [nat] of evidence from which data held out need but gain
+CERTAIN = 12.0  # [nat] of evidence from which data held out need but gain
 HORIZON = 2.0  # [s] over which ways and turns are compared
 
 
@@ -39,7 +40,7 @@ def confirmed(worth: Gain | None, nats: float, *, free: bool = False) -> bool:
     gain = worth.log_density_per_sample
     sd = max(gain.hi90 - gain.lo90, 1e-12) / (2 * NORMAL90)
     least = 0.0 if nats >= CERTAIN and not free else _LIKELY * sd
-    return gain.lo90 > 0 or (nats >= STRONG and gain.gain > least)
+    return gain.lo90 > 0 or (nats >= (STRONG_CURVE if free else _STRONG) and gain.gain > least)
 
 
 def nearer(worth: Gain | None, channels: Sequence[str]) -> bool:

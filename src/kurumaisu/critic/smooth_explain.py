@@ -20,7 +20,7 @@ from kurumaisu.critic.material import (
     HORIZON,
     MATERIAL,
     NO_NOISE,
-    STRONG,
+    STRONG_CURVE,
     confirmed,
     felt_share,
     moved_share,
@@ -111,7 +111,7 @@ def _held(made: Decision, worth: Gain | None) -> bool:
     assert made.beyond.extension is not None
     nats = _nats(made.found, made.beyond)
     rate = effects.CHANNELS[made.beyond.extension.curve.channel].rate
-    return confirmed(worth, nats, free=True) or (nats >= STRONG and nearer(worth, (_SEEN_IN[rate],)))
+    return confirmed(worth, nats, free=True) or (nats >= STRONG_CURVE and nearer(worth, (_SEEN_IN[rate],)))
 
 
 def _no_noise(made: Decision) -> bool:

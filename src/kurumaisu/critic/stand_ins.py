@@ -19,6 +19,7 @@ RIVAL = 0.05  # posterior from which an effect counts as a rival of another
 MEMBER = 0.02
 _LEFT_OUT = 0.05  # posterior of all that a set may be without
 _RATHER = 3.0  # ratio of odds from which one effect acts in the place of another rather than beside it
+_AS_GOOD = 2.0  # [nat] by which what explains as much may explain less: the truth itself does once in 44, by chance
 _TINY = 1e-9  # posterior of what no set has
 
 
@@ -67,7 +68,7 @@ def confounded(posterior: Posterior, p: Mapping[str, float] | None = None) -> tu
         merged = [other for other in merged if not other & group] + [group.union(*meeting)]
     told = (group for group in merged if len(group) > 1 and posterior.any_of(group) >= NAMED)
     kept = [group for group in told if len(group) <= _MOST or _needed(posterior, group)]
-    return tuple(tuple(sorted(_likeliest(posterior, group))) for group in kept)
+    return tuple(tuple(sorted(_likeliest(posterior, group) | _as_good(posterior, group))) for group in kept)
 
 
 def _likeliest(posterior: Posterior, group: set[str]) -> set[str]:
@@ -76,6 +77,23 @@ def _likeliest(posterior: Posterior, group: set[str]) -> set[str]:
     left_out = np.cumsum([posterior.p[name] for name in ordered])
     few = min(int(np.searchsorted(left_out, _LEFT_OUT, side="right")), len(ordered) - 2)
     return set(ordered[few:])
+
+
+def _as_good(posterior: Posterior, group: set[str]) -> set[str]:
+    """Return what explains the drives as well as a member of the best set does, in its place.
+
+    Before the data it may be the less likely, of an unusual form or of any size: nobody who drove so could know.
+    """
+    best = posterior.ranked[0]
+    places = [best.ids - {name} for name in best.ids & group]
+    good = [fit for fit in posterior.ranked if _explained(fit) > _explained(best) - _AS_GOOD]
+    own = (fit.ids - place for fit in good for place in places if place < fit.ids)
+    return {name for names in own if len(names) == 1 for name in names}
+
+
+def _explained(fit: Fit) -> float:
+    """Return the log likelihood [nat], less what any size that is fitted explains of noise."""
+    return fit.log_likelihood - 0.5 * fit.sizes
 
 
 def _needed(posterior: Posterior, group: set[str]) -> bool:
