@@ -12,7 +12,7 @@ import numpy as np
 from kurumaisu.bench.hidden import sizing
 from kurumaisu.bench.hidden.base_case import Scale, draw_drives, recording
 from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.case import FAINTEST, Ask, Case, Known, Truth
+from kurumaisu.bench.hidden.case import APART, FAINTEST, Ask, Case, Known, Truth
 from kurumaisu.bench.hidden.motion import Fault, Sizes, drive
 from kurumaisu.bench.hidden.noise import REGIMES, draw_lasting, draw_regime
 from kurumaisu.types import FloatArray
@@ -112,6 +112,8 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
     left = _left(heard, ids, faults, own)
     nearest = min(left, key=lambda name: left[name])
     also = {"base.saturation": sizing.left_by_clips(heard, whole)} if ask.kind == "confounded" else {}
+    single = len(ids) == 1 and BASE[ids[0]].scaled
+    near = tuple(name for name, rest in (left | also).items() if rest < APART) if single else ()
     return Truth(
         ask.kind,
         ids,
@@ -122,6 +124,7 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
         rival=nearest,
         z_form=sizing.left_beside(whole - usual, {"usual": usual_own})["usual"],
         accepted=_accepted(ids, left | also),
+        near=near,
     )
 
 

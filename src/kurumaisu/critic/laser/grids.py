@@ -9,7 +9,10 @@ import numpy as np
 
 from kurumaisu.effects import Parameter
 
-_LONG = 2.0**1.5  # times the usual value, the longest time that is tried: in a short recording it looks like for ever
+# Times the usual value, the longest time that is tried: for one more like for ever there is no source, and all that
+# stays the same would be a set with it. The shortest is a part of the usual one, or of a short recording.
+_LONG = 2.0**1.5
+_SHORT = 1 / 16
 _HALF_TURN = 8  # directions in half a turn of two parameters that act by their squares
 
 
@@ -30,8 +33,8 @@ def grid_of(parameter: Parameter, span: float) -> list[float]:
     The longest time comes first: of shapes that are alike the first is kept, and that one is most like a constant.
     """
     if parameter.unit == "s":
-        longest = max(4 * span, _LONG * parameter.null)
-        values = longest * 2.0 ** -np.arange(0, np.log2(16 * longest / span) + 0.1, 0.5)
+        longest, shortest = _LONG * parameter.null, _SHORT * min(span, parameter.null)
+        values = longest * 2.0 ** -np.arange(0, np.log2(longest / shortest) + 0.1, 0.5)
     elif parameter.lower > 0:
         values = parameter.null * 2.0 ** np.arange(-3, 1.6, 0.25)
     else:
