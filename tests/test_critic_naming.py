@@ -44,7 +44,7 @@ def posterior(*sets, explains=()):
     """Return the posterior of sets given as (weight, names); explains: log likelihood of each, else ever less."""
     explained = explains or [-10.0 * i for i in range(len(sets))]
     ranked = [
-        SimpleNamespace(ids=frozenset(names.split()), log_likelihood=nats, sizes=1)
+        SimpleNamespace(ids=frozenset(names.split()), log_likelihood=nats, sizes=1, terms=())
         for (_, names), nats in zip(sets, explained, strict=True)
     ]
     return Posterior(ranked, np.array([weight for weight, _ in sets]))
@@ -58,10 +58,20 @@ def test_what_needs_others_beside_it_is_in_no_set_where_others_do():
     assert confounded(posterior((0.55, "b"), (0.4, "c"), (0.05, "d e"))) == (("b", "c"),)
 
 
-@pytest.mark.parametrize(("nats", "told"), [(39.0, ("b", "c", "d")), (37.0, ("b", "c"))])
-def test_an_unlikely_form_that_explains_as_much_belongs_to_the_set(nats, told):
-    sets = (0.55, "a b"), (0.44, "a c"), (0.005, "a d"), (0.005, "a b e")
+@pytest.mark.parametrize(
+    ("p", "nats", "told"), [(0.005, 39.0, ("b", "c", "d")), (0.005, 37.0, ("b", "c")), (0.001, 39.0, ("b", "c"))]
+)
+def test_what_explains_as_much_belongs_to_the_set_unless_it_is_very_unlikely(p, nats, told):
+    sets = (0.55, "a b"), (0.44, "a c"), (p, "a d"), (0.01 - p, "a b e")
     assert confounded(posterior(*sets, explains=(40.0, 40.0, nats, 42.0))) == (told,)
+
+
+@pytest.mark.parametrize(("sd", "told"), [(0.1, ("b", "c", "d")), (0.01, ("b", "c"))])
+def test_of_many_sizes_one_explains_as_much_by_chance(sd, told):
+    made = posterior((0.55, "b"), (0.44, "c"), (0.01, "d"), (0.0, ""), explains=(50.0, 50.0, 50.0, 0.0))
+    made.ranked[2].terms = (Term("d", OFFSET, 0.0),)
+    made.ranked[2].values, made.ranked[2].sds = np.array([1.0]), np.array([sd])
+    assert confounded(made) == (told,)
 
 
 def test_two_that_stand_in_for_three_are_a_set_rather_than_nothing():
@@ -270,8 +280,8 @@ def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatc
 def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, without, best):
     """It took all their probability; where nobody would be told of it, they are weighed by themselves."""
     monkeypatch.setattr("kurumaisu.critic.smooth_explain.told", lambda *_: told)
-    twins = [SimpleNamespace(**vars(fit_of(name, 40.0)), log_likelihood=44.0, sizes=1) for name in "ab"]
-    nothing = SimpleNamespace(**vars(fit_of("", 0.0)), log_likelihood=0.0, sizes=0)
+    twins = [SimpleNamespace(**vars(fit_of(name, 40.0)), log_likelihood=44.0, sizes=1, terms=()) for name in "ab"]
+    nothing = SimpleNamespace(**vars(fit_of("", 0.0)), log_likelihood=0.0, sizes=0, terms=())
     found = Naming((*twins, nothing), {"a": 0.0, "b": 0.0}, (), 0.0)
     curved = Beyond(Rivalry((), 5.0, {}, {}, 0.0), SimpleNamespace(), 0.0)
     made = Decision(SimpleNamespace(), found, Growth(0.0, 0.0, NOISE), curved)

@@ -20,6 +20,7 @@ MEMBER = 0.02
 _LEFT_OUT = 0.05  # posterior of all that a set may be without
 _RATHER = 3.0  # ratio of odds from which one effect acts in the place of another rather than beside it
 _AS_GOOD = 2.0  # [nat] by which what explains as much may explain less: the truth itself does once in 44, by chance
+_CLOSELY = 3.0  # times as closely as what it explains shows, from which a size is met by chance
 _TINY = 1e-9  # posterior of what no set has
 
 
@@ -80,15 +81,25 @@ def _likeliest(posterior: Posterior, group: set[str]) -> set[str]:
 
 
 def _as_good(posterior: Posterior, group: set[str]) -> set[str]:
-    """Return what explains the drives as well as a member of the best set does, in its place.
+    """Return what explains the drives as well as a member of the best set does, in its place, though less likely.
 
-    Before the data it may be the less likely, of an unusual form or of any size: nobody who drove so could know.
+    Before the data its form may have been the less likely one: nobody who drove so could know. What has a size for
+    everything, as a converter has steps, does so by chance.
     """
     best = posterior.ranked[0]
     places = [best.ids - {name} for name in best.ids & group]
     good = [fit for fit in posterior.ranked if _explained(fit) > _explained(best) - _AS_GOOD]
-    own = (fit.ids - place for fit in good for place in places if place < fit.ids)
-    return {name for names in own if len(names) == 1 for name in names}
+    own = ((fit, fit.ids - place) for fit in good for place in places if place < fit.ids)
+    likely = ((fit, name) for fit, (name, *more) in own if not more and posterior.p[name] >= MEMBER / 10)
+    return {name for fit, name in likely if not _by_chance(posterior, fit, name)}
+
+
+def _by_chance(posterior: Posterior, fit: Fit, name: str) -> bool:
+    """Tell whether a size of an effect must be met far more closely than what it explains would show."""
+    nothing = next((other for other in posterior.ranked if not other.ids), fit)
+    z = np.sqrt(2 * max(fit.log_likelihood - nothing.log_likelihood, 0.0))
+    sizes = [i for i, term in enumerate(fit.terms) if term.id == name and not (term.fixed or term.shape)]
+    return any(abs(fit.values[i] - fit.terms[i].null) > _CLOSELY * z * fit.sds[i] for i in sizes)
 
 
 def _explained(fit: Fit) -> float:
