@@ -21,6 +21,7 @@ def fit_of(sizes, nats):
         candidates=frozenset(sizes),
         ids=frozenset(sizes),
         sizes=sum(name != "sign" for name in sizes),
+        terms=(),
         score=score,
         log_likelihood=0.5 * sum(z**2 for z in sizes.values()),
     )
