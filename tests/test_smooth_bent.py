@@ -12,11 +12,12 @@ from kurumaisu.critic.drive import prepare
 from kurumaisu.critic.evidence import Problem
 from kurumaisu.critic.naming import Naming
 from kurumaisu.critic.smooth_alike import Likeness
-from kurumaisu.critic.smooth_basis import knots_of
+from kurumaisu.critic.smooth_basis import Basis, knots_of
 from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.critic.smooth_known import informed
 from kurumaisu.critic.smooth_search import compare
 from kurumaisu.critic.smooth_waves import girth
+from kurumaisu.effects import Motion
 
 GIRTH = 1.137  # [m]
 
@@ -89,3 +90,18 @@ def test_a_speed_that_is_one_but_for_rounding_is_followed_by_nothing():
     speeds[:5] = 0.2
     assert len(knots_of(speeds)) == 0
     assert len(knots_of(np.linspace(0.2, 0.5, 1000))) == 8
+
+
+def test_speeds_that_an_effect_has_moved_beyond_all_knots_bend_nothing():
+    """A single speed, and its curves' prior had no size: the evidence was not a number."""
+    at = np.linspace(0.40, 0.41, 1000)
+    knots = knots_of(at)
+    basis = Basis("v", knots, {}, (), 0.40, 0.41)
+
+    def moving_at(speeds):
+        return Motion(0.01, speeds, np.zeros(len(speeds)))
+
+    assert basis.fine([moving_at(at - 0.05)]) is None
+    fine = basis.fine([moving_at(at)])
+    assert all(np.isfinite(prior).all() for prior in fine.priors)
+    assert len(fine.knots) == 22

@@ -66,10 +66,15 @@ class Basis:
         knots = np.interp(at, np.arange(count), self.knots)
         return replace(self, knots=knots, priors=())
 
-    def fine(self, motions: Sequence[effects.Motion]) -> Basis:
-        """Return the curves over the same that bend more often, with their prior over these motions."""
+    def fine(self, motions: Sequence[effects.Motion]) -> Basis | None:
+        """Return the curves over the same that bend more often, with their prior over these motions.
+
+        None where these do not vary in it between the knots: effects may have moved a single speed beyond them.
+        """
         finer = self.finer(_FINE)
         matrix = finer.matrix(np.concatenate([finer.samples(motion)[motion.moving] for motion in motions]))
+        if np.ptp(matrix, axis=0).max() <= _ROUNDING:
+            return None
         return replace(finer, priors=tuple(priors_of(finer.knots, matrix)))
 
     def parameters(self, coefficients: FloatArray) -> dict[str, float]:

@@ -19,8 +19,8 @@ from kurumaisu.critic.smooth import Belief, Curve, belief, columns, taken_up
 def bent(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[tuple[Curve, Belief]]:
     """Yield, for each of the curves beside a fit that can bend, the one that does so more often, and its evidence."""
     motions = [replay.motion(drive, problem.model, fit.settings) for drive in problem.drives]
-    usual = [curve for curve in curves if curve.basis.size > 1]
-    finer = [replace(curve, basis=curve.basis.fine(motions)) for curve in usual]
+    fine = [(curve, curve.basis.fine(motions)) for curve in curves if curve.basis.size > 1]
+    finer = [replace(curve, basis=basis) for curve, basis in fine if basis is not None]
     y, own = taken_up(problem, fit)
     free = columns(problem, fit.settings, finer)
     free -= own @ (own.T @ free)
