@@ -129,6 +129,10 @@ def test_what_the_catalogue_explains_is_left_to_it():
     blind = compare(problem, Naming((empty,), {}, (), 1.0))
     assert blind.winner.curve.channel in ("w", "w_gain")
     assert blind.least < rivalry.least  # beside nothing there is no other form that a curve might draw
+    strong = Naming(
+        (replace(right, log_likelihood=empty.log_likelihood + 12000.0), empty), {"base.gain_w": 1.0}, (), 0.0
+    )
+    assert compare(problem, strong).least > 5 * rivalry.least  # what its equation misses looks like curves
     assert false_alarm(problem, blind) == 0.0
 
 

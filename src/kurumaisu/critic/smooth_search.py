@@ -113,7 +113,7 @@ def compare(problem: Problem, found: Naming, also: frozenset[Candidate] = frozen
         curves[rival.curve.id] = curves.get(rival.curve.id, 0.0) + float(np.exp(rival.worth - total))
     lead = beyond[0].worth - own if beyond else -np.inf
     nothing = float(sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if not fit.ids))
-    least = _BEYOND if found.best.ids else _OVER_NOTHING
+    least = _BEYOND * doubt if found.best.ids else _OVER_NOTHING
     return Rivalry(tuple(beyond), lead, curves, _odds(acting, found.p), nothing, least)
 
 
