@@ -124,6 +124,17 @@ def test_z_is_that_of_a_dense_covariance():
     assert np.sqrt(scale.gram(looked[..., None])[0, 0]) == pytest.approx(z, rel=1e-3)
 
 
+def test_a_tour_on_which_the_largest_size_hardly_shows_is_drawn_again(tmp_path):
+    """On the first wall of this seed, one that is off by the most there is has z 3."""
+    assert make(Ask("confounded", ("world.map_error",)), 50352, tmp_path).truth.z >= 5
+
+
+def test_an_offset_is_no_sum_of_warm_ups(tmp_path):
+    """In ten minutes each of them dies away, though a sum of three hardly does."""
+    truth = make(Ask("single", ("laser.offset",), z=70.0, regime="clean", design="room"), 12, tmp_path).truth
+    assert "laser.warmup" not in truth.near
+
+
 def test_what_a_pose_error_does_is_its_derivative():
     tour = draw_tour("room", USUAL, np.random.default_rng(8))
     scale = LaserScale(tour, CLEAN)

@@ -20,7 +20,8 @@ from kurumaisu.critic.smooth_designs import Designs
 from kurumaisu.critic.smooth_jumps import jumps, over_own
 from kurumaisu.types import FloatArray
 
-_BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
+# [nat] by which a curve must beat the best set of the catalogue, as many times more as evidence beside that is doubted
+_BEYOND = 3.0
 # The same where the catalogue has nothing: what effects of other forms leave is no danger then, and draws of noise are
 # asked besides.
 _OVER_NOTHING = 1.0

@@ -112,8 +112,7 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
     left = _left(heard, ids, faults, own)
     nearest = min(left, key=lambda name: left[name])
     also = {"base.saturation": sizing.left_by_clips(heard, whole)} if ask.kind == "confounded" else {}
-    single = len(ids) == 1 and BASE[ids[0]].scaled
-    near = tuple(name for name, rest in (left | also).items() if rest < APART) if single else ()
+    alike = left | also if len(ids) == 1 and BASE[ids[0]].scaled else {}
     return Truth(
         ask.kind,
         ids,
@@ -123,8 +122,8 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
         z_rival=left[nearest],
         rival=nearest,
         z_form=sizing.left_beside(whole - usual, {"usual": usual_own})["usual"],
-        accepted=_accepted(ids, left | also),
-        near=near,
+        accepted=(ids, *((name,) for name in _below(alike, _SAME))),
+        near=_below(alike, APART),
     )
 
 
@@ -152,8 +151,6 @@ def _alone(names: Sequence[str], own: FloatArray) -> dict[str, float]:
     return {name: sizing.left_beside(own[:, i], {"": others[i]})[""] for i, name in enumerate(names)}
 
 
-def _accepted(ids: tuple[str, ...], left: dict[str, float]) -> tuple[tuple[str, ...], ...]:
-    """Return the truth, and for a single id those rivals that leave nothing that could be seen."""
-    if len(ids) > 1 or not BASE[ids[0]].scaled:
-        return (ids,)
-    return (ids, *((name,) for name, rest in left.items() if rest < _SAME))
+def _below(left: dict[str, float], z: float) -> tuple[str, ...]:
+    """Return the rivals that leave less than a z."""
+    return tuple(name for name, rest in left.items() if rest < z)

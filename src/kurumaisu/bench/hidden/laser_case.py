@@ -48,16 +48,17 @@ def make_laser(ask: Ask, seed: int, folder: Path) -> Case:
     design = ask.design or ("drive" if moving else str(where.choice(["room", "room", "drive"])))
     if ask.design is None and {"laser.warmup", "laser.temperature"} & set(ids):
         design = "room"
+    around = _without(backdrop, ids)
     for _ in range(_TOURS):  # on some, the largest size that there is hardly shows
         tour = draw_tour(design, regime, where)
         scale = LaserScale(tour, backdrop)
         sizes = {name: _sizes(name, scale, ask, what) for name in ids}
-        truth = _truth(ask, scale, sizes, _without(backdrop, ids))
+        truth = _truth(ask, scale, sizes, around)
         if ask.z is not None or not ids or truth.z >= FAINTEST:
             break
     faults = [LASER[name].fault(sizes[name], ask.form) for name in ids]
     folder.mkdir(parents=True, exist_ok=True)
-    draw = Draw(int(how.integers(2**31)), _without(backdrop, ids), folder / f"hidden_{seed}.world")
+    draw = Draw(int(how.integers(2**31)), around, folder / f"hidden_{seed}.world")
     draw.world.write_text(world_text(f"hidden {seed}", tour.room), encoding="utf-8")
     null = recording(f"hidden {seed}", tour, (), draw)
     found = recording(f"hidden {seed}", tour, faults, draw) if faults else null
@@ -159,13 +160,7 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
     plain = [scale.signal(LASER[name].fault(sizes[name], "plain")) for name in means]
     others = [name for name in MEANS if name not in ids and (scale.tour.moving or not LASER[name].moving)]
     rivals = scale.rivals(others, ids)
-    gram = scale.gram(np.concatenate([np.stack([*own, *plain], axis=-1), *(columns for _, columns in rivals)], axis=-1))
-    at, rest = 2 * len(means), dict[str, float]()
-    for name, columns in rivals:
-        those = list(range(at, at + columns.shape[-1]))
-        least = min(left(gram, len(means), [*_all_but(len(means), i), *those]) for i in range(len(means)))
-        rest[name] = min(least, rest.get(name, least))
-        at += columns.shape[-1]
+    gram, rest = beside_rivals(scale, np.stack([*own, *plain], axis=-1), len(means), rivals)
     nearest = min(rest, key=lambda name: rest[name])
     alone = {name: left(gram, [i], _all_but(len(means), i)) for i, name in enumerate(means)}
     same = tuple((name,) for name, z in rest.items() if z < _SAME) if len(ids) == 1 else ()
@@ -179,6 +174,23 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
         accepted=(ids, *same),
         near=tuple(name for name, z in rest.items() if z < APART) if len(ids) == 1 else (),
     )
+
+
+def beside_rivals(
+    scale: LaserScale, signals: FloatArray, count: int, rivals: Sequence[tuple[str, FloatArray]]
+) -> tuple[FloatArray, dict[str, float]]:
+    """Return the gram of signals (s, b, n) and all rivals' columns, and the least that each rival leaves, by name.
+
+    The first `count` signals are hidden together; a rival, as LaserScale.rivals has them, takes the place of one.
+    """
+    gram = scale.gram(np.concatenate([signals, *(columns for _, columns in rivals)], axis=-1))
+    at, rest = signals.shape[-1], dict[str, float]()
+    for name, columns in rivals:
+        those = range(at, at + columns.shape[-1])
+        least = min(left(gram, count, [*_all_but(count, i), *those]) for i in range(count))
+        rest[name] = min(least, rest.get(name, least))
+        at += columns.shape[-1]
+    return gram, rest
 
 
 def _odd(name: str, scale: LaserScale, sizes: Sizes, form: str) -> float:

@@ -160,8 +160,9 @@ class LaserScale:
         return np.concatenate([rigid, np.ones_like(ux)[..., None]], axis=-1)
 
     def rivals(self, names: Sequence[str], hidden: Sequence[str] = ()) -> list[tuple[str, FloatArray]]:
-        """Return the signals (s, b, k) of rivals at typical sizes, k that any sum of is one; by name, which may recur.
+        """Return rivals by name with their signals (s, b, k) at typical sizes, of which any sum is that rival.
 
+        A name comes more than once where it has shapes whose sum is none, such as two time constants.
         hidden: what they are rivals of, which no rival may have in it.
         """
         out = []
@@ -189,7 +190,7 @@ class LaserScale:
 
 
 def _shapes(name: str) -> list[list[Sizes]]:
-    """Return sizes of a rival: of each inner list any sum is one, of two inner lists none is."""
+    """Return sizes of a rival: any sum of what those of one inner list do is one, none across two inner lists."""
     hidden = LASER[name]
     base = {"size": hidden.typical, **hidden.extra(np.random.default_rng(0))}
     free = {

@@ -55,16 +55,11 @@ def strange_laser(ask: Ask, seed: int, folder: Path) -> Case:
     sizes = strange.draw(what)
     own = scale.signal(strange.fault(sizes, "plain"))[..., None]
     rivals = scale.rivals([name for name in MEANS if not LASER[name].moving])
-    gram = scale.gram(np.concatenate([own, *(columns for _, columns in rivals)], axis=-1))
+    gram, rest = laser_case.beside_rivals(scale, own, 1, rivals)
     outside = laser_case.left(gram, 1, range(1, len(gram)))
     factor = max(wanted_z(ask, what) / outside, laser_case.MATERIAL / laser_case.rms(own))
     sizes["size"] *= factor
-    rest: dict[str, float] = {}
-    at = 1
-    for rival, columns in rivals:
-        least = factor * laser_case.left(gram, 1, range(at, at + columns.shape[-1]))
-        rest[rival] = min(least, rest.get(rival, least))
-        at += columns.shape[-1]
+    rest = {rival: factor * least for rival, least in rest.items()}
     folder.mkdir(parents=True, exist_ok=True)
     draw = laser_case.Draw(int(how.integers(2**31)), backdrop, folder / f"hidden_{seed}.world")
     draw.world.write_text(world_text(f"hidden {seed}", tour.room), encoding="utf-8")

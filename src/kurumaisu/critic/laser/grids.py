@@ -9,10 +9,9 @@ import numpy as np
 
 from kurumaisu.effects import Parameter
 
-# Times the usual value, the longest time that is tried: for one more like for ever there is no source, and all that
-# stays the same would be a set with it. The shortest is a part of the usual one, or of a short recording.
-_LONG = 2.0**1.5
-_SHORT = 1 / 16
+# Times the usual value, the longest time that is tried: longer ones have no source, and every offset would be a set
+# with one. The shortest that is tried, as a share of the usual value or of a short recording.
+_LONG, _SHORT = 2.0**1.5, 1 / 16
 _HALF_TURN = 8  # directions in half a turn of two parameters that act by their squares
 
 
