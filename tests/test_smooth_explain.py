@@ -51,7 +51,7 @@ def test_evidence_is_over_nothing_where_an_effect_may_be_it_as_well(winner, nats
 @pytest.mark.parametrize(("least", "verdict"), [(50.0, "unknown"), (1e9, "none")])
 def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, least, verdict):
     """Nothing is extended by what did not hold, and no curve is certain."""
-    recording = hidden.make(hidden.KINDS["gully"], 40.0, 1010, seconds=40.0, runs=2).recording
+    recording = hidden.make(hidden.KINDS["carpet edge"], 30.0, 1003, seconds=30.0, runs=2).recording
     monkeypatch.setattr(smooth_explain, "confirmed", lambda worth, nats, free: False)
     monkeypatch.setattr(smooth_explain, "nearer", lambda worth, channels: False)
     monkeypatch.setattr(smooth_explain, "NO_NOISE", least)

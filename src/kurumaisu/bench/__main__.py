@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
 import sys
 from collections.abc import Sequence
 
@@ -45,6 +46,7 @@ def main(arguments: Sequence[str]) -> int:
         asked = f"no benchmark {arguments[0]!r}; " if arguments else ""
         print(f"scripts/bench: {asked}there are: {', '.join(there)}", file=sys.stderr)
         return 2
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # figures are of one core; --jobs uses others
     status: int = importlib.import_module(f"kurumaisu.bench.{arguments[0]}").main(arguments[1:])
     return status
 

@@ -110,6 +110,8 @@ WORLD: tuple[type[WorldEffect], ...] = (MapError,)
 
 # What the simulator can run.
 ALL: tuple[type[Mechanism], ...] = (*BASE, *LASER, *WORLD)
+_BY_ID = {effect.id: effect for effect in ALL}
+_PLACES = {effect.id: place for place, effect in enumerate(ALL)}
 
 
 @dataclass(frozen=True)
@@ -132,9 +134,9 @@ _Acting = TypeVar("_Acting", bound=Mechanism)
 
 def by_id(name: str) -> type[Mechanism]:
     """Return the effect of an id, be it a smooth one. Raise Error when it is neither that nor in the catalogue."""
-    for effect in ALL:
-        if effect.id == name:
-            return effect
+    known = _BY_ID.get(name)
+    if known is not None:
+        return known
     smooth = smooth_of(name)
     if smooth is not None:
         return smooth
@@ -217,7 +219,7 @@ def _chosen(settings: tuple[EffectSetting, ...]) -> list[tuple[type[Mechanism], 
     if twice:
         raise Error(f"effects: {twice[0]!r} is given twice")
     found = [(by_id(setting.id), setting.parameters) for setting in settings]
-    return sorted(found, key=lambda pair: (ALL.index(pair[0]), "") if pair[0] in ALL else (len(ALL), pair[0].id))
+    return sorted(found, key=lambda pair: (_PLACES.get(pair[0].id, len(ALL)), pair[0].id))
 
 
 __all__ = [
