@@ -153,3 +153,11 @@ def test_slow_noise_is_heard_where_noise_about_a_curve_lacks_it():
 
     assert by_noise(0.3) > 10
     assert by_noise(1.0) < 5  # what fits better than the truth by chance, with seven parameters
+
+
+def test_a_chair_that_never_turns_has_no_one_cause():
+    """Whatever swallows all of it may be of any size beyond some, so none is worth less than what has no size."""
+    case = make(Ask("confounded", ("base.dac_zero_s",), None, "other"), 54088)
+    found = criticise(case.recording, shipped("launch/md100.yaml"), lambda _: None).verdict
+    assert found.causes == ()
+    assert any({"base.dac_zero_s", "base.dead_zone_w", "base.steering_law"} <= set(group) for group in found.confounded)

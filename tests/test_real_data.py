@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kurumaisu.critic import explain
 from kurumaisu.critic.job import Job, criticise
 from kurumaisu.critic.laser.still import repeatability
 from kurumaisu.critic.reading import read_recording
@@ -70,6 +71,14 @@ def test_sena_is_too_short_to_name_anything(tmp_path):
     assert (found.verdict.verdict, found.verdict.causes) == ("none", ())
     assert "27 intervals between poses are too few" in found.story.headline
     assert "dac_quantisation" not in str(found.story)  # the steps of a converter are in the odometry, if there are any
+
+
+def test_too_little_names_nothing_though_drives_held_out_confirm_it(tmp_path, monkeypatch):
+    """The noise of so few intervals is not known well enough to confirm anything."""
+    monkeypatch.setattr(explain, "confirmed", lambda *_: True)
+    found = criticise(Job(needs(sena.FOLDER / sena.LOG), tmp_path), lambda _: None)
+    assert (found.verdict.verdict, found.verdict.causes, found.verdict.confounded) == ("none", (), ())
+    assert "27 intervals between poses are too few" in found.story.headline
 
 
 def test_a_recording_that_is_not_there_is_an_error_that_names_it(tmp_path, capsys):

@@ -25,6 +25,7 @@ from kurumaisu.types import FloatArray
 _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
 _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
 _ROUGH_DERIVATIVE = 1e-4  # the same of what has a comb of likely values: right between its teeth
+_AT_WILL = float(np.log(2.0))  # [nat] of a size beyond some, which every other one is
 _ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
 
 
@@ -236,6 +237,8 @@ class Problem:
         for i in loud:
             moved[i] = terms[i].null
         signal = float(np.linalg.norm(self.residual(terms, moved) - solution.residual))
+        if signal > Z_USUAL and _at_will(terms, solution, loud):
+            return _AT_WILL
         if len(loud) == 2:
             return float(occam_plane(np.array(signal)))
         p = terms[loud[0]].parameter
@@ -289,6 +292,12 @@ def covariance(gram: FloatArray) -> FloatArray:
     A weak prior of 1000 steps keeps it finite where the data do not determine a parameter at all.
     """
     return np.asarray(np.linalg.inv(gram + 1e-6 * np.eye(len(gram))))
+
+
+def _at_will(terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> bool:
+    """Tell whether the fit is as good whatever the sizes of an effect are: more swallows no more than all there is."""
+    sizes = np.array([(solution.values[i] - terms[i].null) / (terms[i].step * terms[i].parameter.scale) for i in loud])
+    return bool((np.linalg.norm(solution.slopes[:, loud], axis=0) * np.abs(sizes) < 1).all())
 
 
 def _proportion(terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> float:

@@ -89,7 +89,7 @@ def criticism(
     nats = found.nats(best)
     # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
     held = confirmed(worth, nats) or (nats >= NO_NOISE and nearer(worth, tuple(CHANNELS)))
-    gains = held or made.unmet
+    gains = found.enough and (held or made.unmet)
     felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     told = tuple(group for group in found.confounded if not best.ids & set(group) or matters & set(group))

@@ -47,9 +47,14 @@ def nearer(worth: Gain | None, channels: Sequence[str]) -> bool:
     """Return whether drives held out are simulated nearer to what was measured in one of some channels, in none less.
 
     What a curve or an equation leaves of something strong is no normal noise: a few surprises may cost all that the
-    density gains.
+    density gains. Where they cost so much for sure, the chair must also come nearer to where it came.
     """
-    errors = [worth.channels[name].rmse for name in channels if name in worth.channels] if worth is not None else []
+    if worth is None:
+        return False
+    path = next(iter(worth.rmse.values()), None)  # over the shortest horizon
+    if worth.log_density_per_sample.hi90 < 0 and path is not None and path.gain < 0:
+        return False
+    errors = [worth.channels[name].rmse for name in channels if name in worth.channels]
     known = [error for error in errors if error is not None]
     return any(error.lo90 > 0 for error in known) and all(error.hi90 > 0 for error in known)
 

@@ -35,6 +35,8 @@ def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[st
     if verdict.verdict == "confounded":
         group = " or ".join(verdict.confounded[0])
         return f"Something is missing in the model, but these drives cannot tell which: {group}."
+    if not found.enough:
+        return "Nothing can be named: too little was recorded to tell effects from noise."
     listed = ", ".join(sorted(found.best.ids))
     if found.best.ids and verdict.gain is None:
         return f"Nothing can be named: {listed} is suspected, but too little was recorded to test it on data held out."
@@ -42,8 +44,6 @@ def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[st
         return f"Nothing can be named: {listed} fits these drives, but does not hold on data held out."
     if found.best.ids and not matters:
         return f"Nothing that matters: {listed} is detectable, but too small to gain anything."
-    if not found.enough:
-        return "Nothing can be named: too little was recorded to tell effects from noise."
     # Nothing is near where nothing of the base was looked for.
     nearest = max(found.p, key=lambda name: found.p[name], default=None)
     if nearest is not None and found.p[nearest] >= naming.RIVAL:

@@ -133,10 +133,10 @@ def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[F
         log_det += more
         lead = grams[rows[0]].shared
         total += rest[:, lead:, lead:].sum(axis=0)
-        for k, part in zip(rows, rest, strict=True):
-            index = [k, *(scans + 3 * layout.places[k] + i for i in range(lead - 1))]
-            inner[np.ix_(index, index)] += part[:lead, :lead]
-            cross[index] += part[:lead, lead:]
+        kept = scans + 3 * layout.places[rows, np.newaxis] + np.arange(lead - 1)
+        index = np.column_stack([rows, kept])
+        np.add.at(inner, (index[:, :, np.newaxis], index[:, np.newaxis]), rest[:, :lead, :lead])
+        np.add.at(cross, index, rest[:, :lead, lead:])
     factor = cho_factor(inner + prior)
     log_det += 2 * float(np.log(np.diag(factor[0])).sum()) - prior_log_det
     return total - cross.T @ cho_solve(factor, cross), log_det
