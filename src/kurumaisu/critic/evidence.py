@@ -26,6 +26,7 @@ _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
 _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
 _ROUGH_DERIVATIVE = 1e-4  # the same of what has a comb of likely values: right between its teeth
 _AT_WILL = float(np.log(2.0))  # [nat] of a size beyond some, which every other one is
+_LARGER = 0.5  # by this share such sizes are made larger, to see it
 _ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
 
 
@@ -237,12 +238,22 @@ class Problem:
         for i in loud:
             moved[i] = terms[i].null
         signal = float(np.linalg.norm(self.residual(terms, moved) - solution.residual))
-        if signal > Z_USUAL and _at_will(terms, solution, loud):
+        if signal > Z_USUAL and self._at_will(terms, solution, loud):
             return _AT_WILL
         if len(loud) == 2:
             return float(occam_plane(np.array(signal)))
         p = terms[loud[0]].parameter
         return float(occam(np.array(signal), 1 if terms[loud[0]].null in (p.lower, p.upper) else 2)) * len(loud)
+
+    def _at_will(self, terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> bool:
+        """Tell whether the fit is as good with larger sizes of an effect: nothing swallows more than all there is."""
+        null = np.array([term.null for term in terms])
+        sizes = (solution.values - null) / np.array([term.step * term.parameter.scale for term in terms])
+        if (np.linalg.norm(solution.slopes[:, loud], axis=0) * np.abs(sizes[loud]) > 1).any():
+            return False
+        larger = solution.values + _LARGER * np.where(np.isin(np.arange(len(terms)), loud), solution.values - null, 0.0)
+        larger = np.clip(larger, [t.parameter.lower for t in terms], [t.parameter.upper for t in terms])
+        return float(np.linalg.norm(self.residual(terms, larger) - solution.residual)) < 1
 
     def _within(self, terms: Sequence[Term], solution: solve.Solution, chosen: Sequence[Candidate]) -> float:
         """Return the part of the log determinant that an effect with two amplitudes has by itself: z counts it."""
@@ -292,12 +303,6 @@ def covariance(gram: FloatArray) -> FloatArray:
     A weak prior of 1000 steps keeps it finite where the data do not determine a parameter at all.
     """
     return np.asarray(np.linalg.inv(gram + 1e-6 * np.eye(len(gram))))
-
-
-def _at_will(terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> bool:
-    """Tell whether the fit is as good whatever the sizes of an effect are: more swallows no more than all there is."""
-    sizes = np.array([(solution.values[i] - terms[i].null) / (terms[i].step * terms[i].parameter.scale) for i in loud])
-    return bool((np.linalg.norm(solution.slopes[:, loud], axis=0) * np.abs(sizes) < 1).all())
 
 
 def _proportion(terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> float:
