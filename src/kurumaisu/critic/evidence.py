@@ -247,12 +247,12 @@ class Problem:
 
     def _at_will(self, terms: Sequence[Term], solution: solve.Solution, loud: Sequence[int]) -> bool:
         """Tell whether the fit is as good with larger sizes of an effect: nothing swallows more than all there is."""
-        null = np.array([term.null for term in terms])
-        sizes = (solution.values - null) / np.array([term.step * term.parameter.scale for term in terms])
-        if (np.linalg.norm(solution.slopes[:, loud], axis=0) * np.abs(sizes[loud]) > 1).any():
-            return False
-        larger = solution.values + _LARGER * np.where(np.isin(np.arange(len(terms)), loud), solution.values - null, 0.0)
-        larger = np.clip(larger, [t.parameter.lower for t in terms], [t.parameter.upper for t in terms])
+        larger = np.array(solution.values)
+        for i in loud:
+            p, size = terms[i].parameter, solution.values[i] - terms[i].null
+            if np.linalg.norm(solution.slopes[:, i]) * abs(size / (terms[i].step * p.scale)) > 1:
+                return False
+            larger[i] = np.clip(larger[i] + _LARGER * size, p.lower, p.upper)
         return float(np.linalg.norm(self.residual(terms, larger) - solution.residual)) < 1
 
     def _within(self, terms: Sequence[Term], solution: solve.Solution, chosen: Sequence[Candidate]) -> float:

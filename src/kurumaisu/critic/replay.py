@@ -8,12 +8,10 @@ from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from kurumaisu import effects, geometry
-from kurumaisu._core import AxisLaw
 from kurumaisu.critic.drive import GRID, Drive
 from kurumaisu.critic.recording import Recording, Series
 from kurumaisu.params import EffectSetting, Model, follow_commands, load_model
@@ -52,13 +50,9 @@ def _sayable(model: Model, command: Series) -> bool:
 
 def extend(model: Model, settings: Sequence[EffectSetting]) -> Model:
     """Return the model with these effects in place of its own of the same id."""
-    return replace(model, effects=_extended(model, completed(model, settings)))
-
-
-def _extended(model: Model, whole: Sequence[EffectSetting]) -> tuple[EffectSetting, ...]:
-    """Return the model's effects, with these in place of those of the same id."""
+    whole = completed(model, settings)
     given = {setting.id for setting in whole}
-    return (*(own for own in model.effects if own.id not in given), *whole)
+    return replace(model, effects=(*(own for own in model.effects if own.id not in given), *whole))
 
 
 def completed(model: Model, settings: Sequence[EffectSetting]) -> tuple[EffectSetting, ...]:
@@ -92,14 +86,6 @@ def increments(drive: Drive, model: Model, settings: Sequence[EffectSetting]) ->
     """Return the simulated body increments between the reference's times, (m, 3)."""
     at = seen(drive, model, settings)
     return geometry.between(at[:-1], at[1:])
-
-
-class _Chair(NamedTuple):
-    """What a plant needs to know of a model: to copy all of it would take as long as to drive."""
-
-    translation: AxisLaw
-    steering: AxisLaw
-    effects: tuple[EffectSetting, ...]
 
 
 class Increments:
@@ -143,9 +129,9 @@ def seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> Float
 
 
 def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:
-    extended = _extended(model, completed(model, settings))
-    mean = tuple(own for own in extended if own.id not in _random())
-    chair = plant.Plant(_Chair(model.translation, model.steering, mean), GRID, _UNUSED)
+    extended = extend(model, settings)
+    mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in _random()))
+    chair = plant.Plant(mean, GRID, _UNUSED)
     # The grid begins at the first pose, or a little before it, unless the drive is a part of a longer one.
     heading = float(drive.poses[0, 2]) if drive.heading is None else drive.heading
     return chair, chair.from_rates(drive.v, drive.w, heading, drive.known)
