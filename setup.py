@@ -8,7 +8,7 @@ setup(
         package_dir={"": "src"},
         package_data={
             "kurumaisu.bench": ["drivers/*.cpp", "drivers/*.h"],
-            "kurumaisu.critic": ["*.json", "*.html"],
+            "kurumaisu.critic": ["report/*.html", "values/*.json"],
             "kurumaisu.viewer": ["page/*"],
             "kurumaisu": ["py.typed"],
         },

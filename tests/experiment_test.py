@@ -19,7 +19,7 @@ from kurumaisu.srv import SetPose
 from nav_msgs.msg import Odometry
 from std_srvs.srv import SetBool
 
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.experiments import samples, shipped_script
 from kurumaisu.experiments.timeline import PERIOD
 from kurumaisu.ros.rotation import quaternion_of

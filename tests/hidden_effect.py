@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.sim.joystick import joystick
 from kurumaisu.types import FloatArray
 

@@ -3,8 +3,8 @@
 
 import numpy as np
 
-from kurumaisu.critic.story import Bins, Misfit, Moments, Noise, Overlay, Rival, Story
-from kurumaisu.critic.verdict import (
+from kurumaisu.critic.values.story import Bins, Misfit, Moments, Noise, Overlay, Rival, Story
+from kurumaisu.critic.values.verdict import (
     Cause,
     Estimate,
     Gain,

@@ -11,7 +11,7 @@ from kurumaisu.bench import critic, critic_floors, critic_table
 from kurumaisu.bench.hidden.baselines import BASELINES
 from kurumaisu.bench.hidden.case import Truth
 from kurumaisu.bench.hidden.score import score, scored_names
-from kurumaisu.critic.verdict import Cause, Verdict
+from kurumaisu.critic.values.verdict import Cause, Verdict
 
 OPTIONS = argparse.Namespace(draws=2, seed=0, jobs=1, log=None)
 

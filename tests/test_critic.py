@@ -10,11 +10,14 @@ from hidden_effect import recording, recording_of
 from scipy.integrate import trapezoid
 
 from kurumaisu import geometry
-from kurumaisu.critic import drive, explain, pipeline, prior, replay
-from kurumaisu.critic.material import nearer
-from kurumaisu.critic.recording import Series
-from kurumaisu.critic.reference import with_reference
-from kurumaisu.critic.verdict import read_verdict
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.channels.base import drive, replay
+from kurumaisu.critic.data.reference import with_reference
+from kurumaisu.critic.heldout.materiality import nearer
+from kurumaisu.critic.judge import explain
+from kurumaisu.critic.values import prior
+from kurumaisu.critic.values.recording import Series
+from kurumaisu.critic.values.verdict import read_verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 

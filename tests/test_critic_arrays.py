@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from hidden_effect import recording
 
-from kurumaisu.critic.arrays import criticise_arrays, recording_of
-from kurumaisu.critic.clean import Faults
-from kurumaisu.critic.meta import Meta
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.recording import Fan
-from kurumaisu.critic.rolling import Rolled, Rolling
-from kurumaisu.critic.window import Heard, Window
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.app.arrays import criticise_arrays, recording_of
+from kurumaisu.critic.app.watch import Rolled, Rolling
+from kurumaisu.critic.app.window import Heard, Window
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.meta import Meta
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.values.recording import Fan
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 

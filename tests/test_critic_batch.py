@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 from hidden_effect import recording
 
-from kurumaisu.critic import batch
-from kurumaisu.critic.cli import main
-from kurumaisu.critic.display import Display, Plain, Terminal
-from kurumaisu.critic.job import Job, Outcome
-from kurumaisu.critic.worker import Progress, Worker
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.app import batch
+from kurumaisu.critic.app.cli import main
+from kurumaisu.critic.app.display import Display, Plain, Terminal
+from kurumaisu.critic.app.job import Job, Outcome
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.processes.worker import Progress, Worker
 from kurumaisu.errors import Error
 
 QUICK = ["--only", "base.gain_v", "--quiet"]

@@ -11,16 +11,17 @@ import pytest
 from kurumaisu.bench.hidden import Ask, base_case, make
 from kurumaisu.bench.hidden.noise import Colour, Regime
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic import decide, naming, stuck
-from kurumaisu.critic.catalogue import Term
-from kurumaisu.critic.decide import Decision
-from kurumaisu.critic.drive import prepare
-from kurumaisu.critic.evidence import Problem
-from kurumaisu.critic.naming import Naming
-from kurumaisu.critic.noise import START, Growth
+from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.engine import refit, search
+from kurumaisu.critic.engine.catalogue import Term
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.judge import decide
+from kurumaisu.critic.judge.decide import Decision
+from kurumaisu.critic.noise.base_noise import START, Growth
 from kurumaisu.critic.pipeline import criticise
-from kurumaisu.critic.smooth_judge import Beyond
-from kurumaisu.critic.smooth_search import Rivalry
+from kurumaisu.critic.unknown.beyond_catalogue import Beyond
+from kurumaisu.critic.unknown.comparison import Rivalry
 from kurumaisu.effects import Parameter
 from kurumaisu.params import load_model, shipped
 
@@ -63,7 +64,7 @@ def judged(monkeypatch):
         asked.append(" ".join(sorted(found.best.ids)))
         return answers[asked[-1]]
 
-    monkeypatch.setattr(naming, "search", lambda *_: found_of("wrong"))
+    monkeypatch.setattr(search, "search", lambda *_: found_of("wrong"))
     monkeypatch.setattr(decide.smooth_judge, "hinted", lambda *_: None)
     monkeypatch.setattr(decide, "_judged", judge)
     return asked, answers
@@ -114,8 +115,8 @@ def test_a_fit_that_first_values_beat_is_stuck(start, better):
     terms, own = (Term("a", parameter, 0.0), Term("b", parameter, 0.0)), (0.5, 0.2)
     at = {term.key: value for term, value in zip(terms, own, strict=True)}
     fit = SimpleNamespace(terms=terms, start=at, log_likelihood=-2.0)
-    assert stuck.begins_better(problem, fit, {(name, "offset"): value for name, value in start.items()}) is better
-    assert not stuck.begins_better(problem, SimpleNamespace(terms=()), {("a", "offset"): 0.9})
+    assert refit.begins_better(problem, fit, {(name, "offset"): value for name, value in start.items()}) is better
+    assert not refit.begins_better(problem, SimpleNamespace(terms=()), {("a", "offset"): 0.9})
 
 
 @pytest.mark.parametrize(("by_noise", "least", "curved"), [(0.0, 3.0, True), (3.5, 3.0, False), (3.5, 1.0, True)])

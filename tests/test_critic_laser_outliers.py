@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.laser.verdicts import criticise
+from kurumaisu.critic.judge.scan_verdict import criticise
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

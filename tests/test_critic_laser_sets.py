@@ -6,17 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kurumaisu.critic.laser.columns import Column, Form
-from kurumaisu.critic.laser.finding import LaserFinding
-from kurumaisu.critic.laser.free import Free
-from kurumaisu.critic.laser.grids import grid_of
-from kurumaisu.critic.laser.one_clock import one_clock
-from kurumaisu.critic.laser.reframed import from_base_link
-from kurumaisu.critic.laser.search import Search
-from kurumaisu.critic.laser.trust import trusted_place
-from kurumaisu.critic.laser.twins import twins
-from kurumaisu.critic.recording import Recording, Run, Series
-from kurumaisu.critic.verdict import Cause, Estimate
+from kurumaisu.critic.channels.ranges.scans.valid_readings import trusted_place
+from kurumaisu.critic.channels.ranges.search.confounding import twins
+from kurumaisu.critic.channels.ranges.search.effect_sets import Search
+from kurumaisu.critic.channels.ranges.signals.coefficient_blocks import Free
+from kurumaisu.critic.channels.ranges.signals.effect_columns import Column, Form
+from kurumaisu.critic.channels.ranges.signals.shape_grids import grid_of
+from kurumaisu.critic.judge.clock_drift import one_clock
+from kurumaisu.critic.judge.reference_point import from_base_link
+from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.recording import Recording, Run, Series
+from kurumaisu.critic.values.verdict import Cause, Estimate
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped
 

@@ -8,24 +8,24 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.explain import Criticism
-from kurumaisu.critic.laser.acting import gain_of
-from kurumaisu.critic.laser.columns import Column, Form
-from kurumaisu.critic.laser.estimates import another_map
-from kurumaisu.critic.laser.finding import LaserFinding
-from kurumaisu.critic.laser.free import Free
-from kurumaisu.critic.laser.merge import with_laser
-from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.pictures import Part
-from kurumaisu.critic.laser.pinned import pinned
-from kurumaisu.critic.laser.rivals import Rival, weigh
-from kurumaisu.critic.laser.search import Fitted, Search
-from kurumaisu.critic.laser.shots import gather
-from kurumaisu.critic.laser.verdicts import _spread_of, criticise
-from kurumaisu.critic.smooth import Belief
-from kurumaisu.critic.smooth_alike import FORM
-from kurumaisu.critic.story import Story
-from kurumaisu.critic.verdict import Verdict
+from kurumaisu.critic.channels.ranges.scans.beams import gather
+from kurumaisu.critic.channels.ranges.search.block_evidence import Rival, weigh
+from kurumaisu.critic.channels.ranges.search.effect_sets import Fitted, Search
+from kurumaisu.critic.channels.ranges.search.mean_effects import gain_of
+from kurumaisu.critic.channels.ranges.search.misfits import Part
+from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.channels.ranges.search.parameter_fit import pinned
+from kurumaisu.critic.channels.ranges.signals.coefficient_blocks import Free
+from kurumaisu.critic.channels.ranges.signals.effect_columns import Column, Form
+from kurumaisu.critic.judge.explain import Criticism
+from kurumaisu.critic.judge.merge import with_laser
+from kurumaisu.critic.judge.scan_estimates import another_map
+from kurumaisu.critic.judge.scan_verdict import _spread_of, criticise
+from kurumaisu.critic.unknown.curves import Belief
+from kurumaisu.critic.unknown.effect_likeness import FORM
+from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.story import Story
+from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped
 

@@ -10,13 +10,14 @@ from laser_scene import recording
 
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.critic import pipeline, sanity_jumps
-from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
-from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, whitened
-from kurumaisu.critic.laser.path import Sight, likeliest, steady
-from kurumaisu.critic.laser.standing import steadied
-from kurumaisu.critic.laser.verdicts import criticise
-from kurumaisu.critic.recording import Series
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.channels.ranges.noise.beam_offsets import Crossed, crossed, without_beams
+from kurumaisu.critic.channels.ranges.noise.scan_noise import Gram, Layout, ScanNoise, whitened
+from kurumaisu.critic.channels.ranges.poses.likeliest_path import Sight, likeliest, steady
+from kurumaisu.critic.channels.ranges.scans.standstill import steadied
+from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.sanity import pose_jumps
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.effects import Echoes
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -94,7 +95,7 @@ def test_the_temperature_that_was_recorded_is_followed():
 
 
 def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 80)
+    monkeypatch.setattr("kurumaisu.critic.channels.ranges.scans.beams.MOST_SCANS", 80)
     case = make(Ask("single", ("laser.tilt",), 40.0, regime="clean", design="room"), 1002, tmp_path)
     finding = criticise(case.recording, MODEL, say)
     assert [cause.id for cause in finding.causes] == ["laser.tilt"]
@@ -105,7 +106,7 @@ def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypa
 
 
 def test_one_wall_does_not_tell_the_mounting_from_the_map(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 60)
+    monkeypatch.setattr("kurumaisu.critic.channels.ranges.scans.beams.MOST_SCANS", 60)
     case = make(Ask("confounded", ("laser.mount_x",), 16.0, regime="clean"), 301, tmp_path)
     finding = criticise(case.recording, MODEL, say)
     assert finding.confounded == (("laser.mount_x", "world.map_error"),)
@@ -226,4 +227,4 @@ def test_a_chair_that_was_carried_has_not_jumped(pause, jumps):
     times = 0.1 * np.arange(40)
     times[20:] += pause
     places = np.repeat([[0.0, 0.0, 0.0], [1.5, 0.5, 1.0]], 20, axis=0) + 0.0005 * rng.standard_normal((40, 3))
-    assert bool(sanity_jumps.words(Series(times, places, ("x", "y", "theta")))) == jumps
+    assert bool(pose_jumps.words(Series(times, places, ("x", "y", "theta")))) == jumps

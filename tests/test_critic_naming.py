@@ -16,22 +16,25 @@ from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.motion import STEP, Setting
 from kurumaisu.bench.hidden.motion import drive as hidden_drive
 from kurumaisu.bench.hidden.noise import USUAL, draw_rates, draw_reference
-from kurumaisu.critic import explain, naming, neighbours, replay, sanity, stuck
-from kurumaisu.critic.catalogue import Candidate, Term
-from kurumaisu.critic.decide import Decision
-from kurumaisu.critic.drive import GRID, Drive, prepare
-from kurumaisu.critic.evidence import Problem
-from kurumaisu.critic.naming import Naming
-from kurumaisu.critic.noise import Growth, Noise, Scatter, whitener
-from kurumaisu.critic.pruned import in_turn, pruned, unmet
-from kurumaisu.critic.scan import Screen
-from kurumaisu.critic.smooth import Belief
-from kurumaisu.critic.smooth_alike import FORM, Likeness
-from kurumaisu.critic.smooth_designs import Designs
-from kurumaisu.critic.smooth_judge import Beyond, undecided
-from kurumaisu.critic.smooth_search import Rivalry
-from kurumaisu.critic.stand_ins import Posterior, confounded
-from kurumaisu.critic.verdict import Gain, LogDensityGain
+from kurumaisu.critic.channels.base import replay
+from kurumaisu.critic.channels.base.drive import GRID, Drive, prepare
+from kurumaisu.critic.engine import neighbouring_sets, refit, search
+from kurumaisu.critic.engine.catalogue import Candidate, Term
+from kurumaisu.critic.engine.confounding import Posterior, confounded
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.engine.linear_screening import Screen
+from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.judge import explain
+from kurumaisu.critic.judge.decide import Decision
+from kurumaisu.critic.judge.held_out_pruning import in_turn, pruned, unmet
+from kurumaisu.critic.noise.base_noise import Growth, Noise, Scatter, whitener
+from kurumaisu.critic.sanity import examination
+from kurumaisu.critic.unknown.beyond_catalogue import Beyond, undecided
+from kurumaisu.critic.unknown.comparison import Rivalry
+from kurumaisu.critic.unknown.curves import Belief
+from kurumaisu.critic.unknown.designs import Designs
+from kurumaisu.critic.unknown.effect_likeness import FORM, Likeness
+from kurumaisu.critic.values.verdict import Gain, LogDensityGain
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -270,7 +273,7 @@ def test_where_drives_held_out_decide_nothing_each_is_left_out_in_turn(held, nat
 )
 def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatch, held, nats, seen, silent):
     """Whatever they gain, if it is no loss beyond chance."""
-    monkeypatch.setattr("kurumaisu.critic.pruned.expected_nats", lambda *_: seen)
+    monkeypatch.setattr("kurumaisu.critic.judge.held_out_pruning.expected_nats", lambda *_: seen)
     made = decision({"a": 1.0}, fit_of("a", nats))
     assert unmet(made, gain(held), ()) is silent
     assert not unmet(made, None, ())
@@ -279,7 +282,7 @@ def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatc
 @pytest.mark.parametrize(("told", "without", "best"), [(True, 0.2, ""), (False, 0.2, "a"), (False, -0.1, "")])
 def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, without, best):
     """It took all their probability; where nobody would be told of it, they are weighed by themselves."""
-    monkeypatch.setattr("kurumaisu.critic.smooth_explain.told", lambda *_: told)
+    monkeypatch.setattr("kurumaisu.critic.judge.explain_unknown.told", lambda *_: told)
     twins = [SimpleNamespace(**vars(fit_of(name, 40.0)), log_likelihood=44.0, sizes=1, terms=()) for name in "ab"]
     nothing = SimpleNamespace(**vars(fit_of("", 0.0)), log_likelihood=0.0, sizes=0, terms=())
     found = Naming((*twins, nothing), {"a": 0.0, "b": 0.0}, (), 0.0)
@@ -297,7 +300,7 @@ def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, 
 def test_another_steering_law_is_neither_a_unit_nor_a_sign(seed):
     """By the other law of V_s the chair hardly turns, and more like the volts' steps than like the rates asked for."""
     case = make(Ask("single", ("base.steering_law",), form="other", family="base"), seed)
-    assert sanity.examine(case.recording, MODEL).invalid == []
+    assert examination.examine(case.recording, MODEL).invalid == []
 
 
 def test_another_form_is_tried_without_what_stood_in_for_it():
@@ -313,7 +316,7 @@ def test_another_form_is_tried_without_what_stood_in_for_it():
         chosen = frozenset({zero, *needless})
         start = {("zero", "offset"): 0.4}
         fit = SimpleNamespace(candidates=chosen, ids=frozenset(one.id for one in chosen), start=start)
-        sets = list(neighbours.neighbours(problem, screen, screen, fit))
+        sets = list(neighbouring_sets.neighbours(problem, screen, screen, fit))
         # From its own size, and from that of the wrong form.
         assert {len(begin) for chosen, begin in sets if chosen == {other}} in (set(), {0, 1})
         return {chosen for chosen, _ in sets}
@@ -338,7 +341,7 @@ def test_a_comb_is_fitted_once_from_each_tooth_it_may_be_on(rough, start, again)
     terms = Term("a", OFFSET, 0.0, rough=rough), Term("b", OFFSET, 0.0)
     fit = SimpleNamespace(candidates=frozenset("a"), terms=terms, values=[0.0184, 0.1])
     begun = set()
-    told = [stuck.other_tooth(fit, {(name, "offset"): size for name, size in start.items()}, begun) for _ in range(2)]
+    told = [refit.other_tooth(fit, {(name, "offset"): size for name, size in start.items()}, begun) for _ in range(2)]
     assert told == [again, False]
 
 
@@ -354,7 +357,7 @@ def test_what_clips_does_not_hide_what_else_it_may_be():
     ids = frozenset({"base.saturation", "base.dead_zone_v", "base.gain_v"})
     problem = Problem([prepare(run, MODEL)], MODEL, NOISE, ids=ids)
     top = problem.fit(["base.saturation"], {})
-    found = naming.search(problem, lambda _: None, top)
+    found = search.search(problem, lambda _: None, top)
     best = {next(iter(fit.ids)): fit for fit in reversed(found.fits) if len(fit.ids) == 1}
     assert {"base.dead_zone_v", "base.gain_v"} <= set(found.confounded[0])
     # That the top speed lies just below the one that was driven would be chance.

@@ -10,8 +10,8 @@ from kurumaisu.bench.hidden.base_case import draw_drives, recording
 from kurumaisu.bench.hidden.motion import drive
 from kurumaisu.bench.hidden.noise import REGIMES
 from kurumaisu.bench.hidden.oracle import errors
-from kurumaisu.critic.drive import prepare
-from kurumaisu.critic.noise import Scatter
+from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.noise.base_noise import Scatter
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

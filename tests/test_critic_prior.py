@@ -8,10 +8,11 @@ from scipy.integrate import trapezoid
 from kurumaisu.bench.hidden import Ask, base_case, make
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import USUAL
-from kurumaisu.critic import naming, prior
-from kurumaisu.critic.drive import prepare
-from kurumaisu.critic.evidence import Problem
-from kurumaisu.critic.noise import Noise
+from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.engine import search
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.noise.base_noise import Noise
+from kurumaisu.critic.values import prior
 from kurumaisu.params import load_model, shipped
 
 GRAM = np.array([[900.0, 300.0], [300.0, 2500.0]])  # of columns per usual size
@@ -94,6 +95,6 @@ def test_one_effect_that_does_what_two_do_is_fitted_though_lines_tell_little_of_
     more = ("payload", "delay", "curvature_v", "gain_v", "dead_zone_v", "understeer", "battery_sag", "lag_v")
     ids = frozenset(f"base.{name}" for name in more)
     problem = problem_of(case.recording.runs, quiet, ids)
-    monkeypatch.setattr(naming, "_REFITS", 1)
-    found = naming.search(problem, lambda _: None, problem.fit(["base.delay", "base.curvature_v"], {}))
+    monkeypatch.setattr(search, "_REFITS", 1)
+    found = search.search(problem, lambda _: None, problem.fit(["base.delay", "base.curvature_v"], {}))
     assert found.best.ids == {"base.payload"}

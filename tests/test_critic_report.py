@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 from stories import full_story, full_verdict
 
-from kurumaisu.critic.digits import odds, quantities, with_interval
-from kurumaisu.critic.display import cells, cut, printable
-from kurumaisu.critic.figures import misfit_svg, shown_points
-from kurumaisu.critic.job import Job, Outcome
-from kurumaisu.critic.misfit import explained
-from kurumaisu.critic.pictures import comparison_picture, misfit_picture, overlay_picture, thinned
-from kurumaisu.critic.report import write_report
-from kurumaisu.critic.results import summary, table
-from kurumaisu.critic.story import Bins, Comparison, Moments, Overlay
-from kurumaisu.critic.verdict import Cause, Estimate, Verdict, grouped
-from kurumaisu.critic.words import named, wrong
+from kurumaisu.critic.app.display import cells, cut, printable
+from kurumaisu.critic.app.job import Job, Outcome
+from kurumaisu.critic.app.results import summary, table
+from kurumaisu.critic.judge.misfit import explained
+from kurumaisu.critic.judge.sentences import named, wrong
+from kurumaisu.critic.report.figures import misfit_svg, shown_points
+from kurumaisu.critic.report.page import write_report
+from kurumaisu.critic.report.pictures import comparison_picture, misfit_picture, overlay_picture, thinned
+from kurumaisu.critic.values.digits import odds, quantities, with_interval
+from kurumaisu.critic.values.story import Bins, Comparison, Moments, Overlay
+from kurumaisu.critic.values.verdict import Cause, Estimate, Verdict, grouped
 
 NOWHERE = ["", "", "", ""]  # a mean is of no single moment
 NBSP = "\N{NO-BREAK SPACE}"

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic import misfit
-from kurumaisu.critic.drive import GRID, Drive
-from kurumaisu.critic.evidence import Problem
-from kurumaisu.critic.explain import overlays
-from kurumaisu.critic.laser.verdicts import criticise
-from kurumaisu.critic.noise import START
-from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.channels.base.drive import GRID, Drive
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.judge import misfit
+from kurumaisu.critic.judge.explain import overlays
+from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.noise.base_noise import START
+from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import EffectSetting, follow_commands, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

@@ -6,9 +6,9 @@ import numpy as np
 from kurumaisu.bench.hidden import base_case
 from kurumaisu.bench.hidden.noise import Colour, Regime
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic import replay
-from kurumaisu.critic.drive import GRID, Drive, prepare
-from kurumaisu.critic.noise import whitener
+from kurumaisu.critic.channels.base import replay
+from kurumaisu.critic.channels.base.drive import GRID, Drive, prepare
+from kurumaisu.critic.noise.base_noise import whitener
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

@@ -17,7 +17,7 @@ from kurumaisu.bench.hidden.rooms import corners, draw_room, edges, world_text
 from kurumaisu.bench.hidden.scanning import expected
 from kurumaisu.bench.hidden.tours import draw_tour
 from kurumaisu.bench.hidden.write import TABLES, write_case
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.world import load_world
 
 

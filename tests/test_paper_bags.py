@@ -9,8 +9,8 @@ from recordings import Bag
 
 from kurumaisu import map_command
 from kurumaisu.bench import paper_scans
-from kurumaisu.critic import cli
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.app import cli
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.paper import drive
 from kurumaisu.paper.options import load_options
 from kurumaisu.ros import calibrate_command, paper_command

@@ -9,8 +9,8 @@ import yaml
 from test_paper_wall import DISTANCES, FOUR, recorded, scans
 
 from kurumaisu.bench import paper as bench
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.rehearse import write
+from kurumaisu.critic.experiment.rehearse import write
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.errors import Error
 from kurumaisu.experiments import load_script
 from kurumaisu.paper import advice, drive, held_out

@@ -3,8 +3,8 @@
 
 import pytest
 
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.rehearse import write
+from kurumaisu.critic.experiment.rehearse import write
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.errors import Error
 from kurumaisu.paper import conjecture
 from kurumaisu.paper.options import load_options

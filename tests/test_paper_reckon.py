@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kurumaisu._core import AxisLaw, Branch
-from kurumaisu.critic.recording import Series
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.errors import Error
 from kurumaisu.paper import dac_line
 from kurumaisu.paper.reckon import Reckoner, compare, heading, seconds

@@ -15,7 +15,7 @@ import pytest
 import rosbag
 
 from kurumaisu.bench.processes import master, program, running
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 from kurumaisu.paper import drive
 from kurumaisu.params import shipped

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from scipy.stats import binom
 
-from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
+from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.experiments import load_script
 from kurumaisu.paper import bench_wall, laser_file, laser_law
@@ -223,7 +223,7 @@ def test_paper_wall_on_the_simulator_agrees_with_equation_4_twice_the_same(tmp_p
 
 def test_figure_12_fails_where_the_wall_is_not_that_of_equation_4(tmp_path, capsys):
     """Scans of a recording whose noise is another one."""
-    from kurumaisu.critic.rehearse import write
+    from kurumaisu.critic.experiment.rehearse import write
 
     bench_wall.write_model(MODEL, OPTIONS.wall, tmp_path / "bench.yaml")
     rng = np.random.default_rng(3)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from recordings import BEAMS, PACKAGE, assert_same, full_run, series
 
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.recording import Run
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.values.recording import Run
 from kurumaisu.errors import Error
 
 

@@ -13,7 +13,7 @@ import yaml
 from recordings import full_run, write_bag
 
 from kurumaisu import _slam, map_command, maps, slam
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose
 from kurumaisu.params import shipped

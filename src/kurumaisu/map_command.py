@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu import slam, slam_score
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.reference import scan_log
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.data.reference import scan_log
 from kurumaisu.errors import Error, one_line
 from kurumaisu.geometry import interpolate
 from kurumaisu.maps import draw_map, save_map

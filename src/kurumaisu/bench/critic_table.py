@@ -23,8 +23,8 @@ from kurumaisu.bench.hidden.score import SURE, Score, calibration_error, score, 
 from kurumaisu.bench.processes import cpu_time
 from kurumaisu.bench.table import Table, share
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.verdict import Verdict
+from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 

@@ -22,7 +22,7 @@ from kurumaisu.bench.hidden.noise import USUAL
 from kurumaisu.bench.processes import cpu_time
 from kurumaisu.bench.table import Table
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.recording import Recording, Run
+from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.params import shipped
 
 _RATE = 50.0  # [Hz]

@@ -17,8 +17,8 @@ from kurumaisu.bench.hidden.motion import STEP, Fault, Setting, drive
 from kurumaisu.bench.hidden.noise import USUAL, draw_rates, draw_reference
 from kurumaisu.bench.table import Table, share
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.recording import Recording, Run
-from kurumaisu.critic.verdict import Verdict
+from kurumaisu.critic.values.recording import Recording, Run
+from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.experiments import samples, shipped_script
 from kurumaisu.experiments.timeline import PERIOD
 from kurumaisu.params import shipped

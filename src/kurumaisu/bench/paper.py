@@ -15,7 +15,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from kurumaisu.bench.table import Table, share
-from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.experiments import samples
 from kurumaisu.paper import drive, law
 from kurumaisu.paper.options import Options, load_options

@@ -15,9 +15,9 @@ import numpy as np
 
 from kurumaisu._core import integrate
 from kurumaisu.bench.table import Table, share
-from kurumaisu.critic.recording import Recording, Run, Series
-from kurumaisu.critic.rehearsal import Rehearsal
-from kurumaisu.critic.rehearse import manner
+from kurumaisu.critic.experiment.rehearsal import Rehearsal
+from kurumaisu.critic.experiment.rehearse import manner
+from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.paper import drive, identify
 from kurumaisu.paper.law import BranchFit
 from kurumaisu.paper.options import Options, load_options

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.bench.table import Table, share
-from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
+from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 from kurumaisu.paper import laser_law
 from kurumaisu.paper.options import Options, load_options
 from kurumaisu.paper.wall import ahead_of, places_of

@@ -13,12 +13,12 @@ import numpy as np
 
 from kurumaisu.bench import drives, wrong_data, wrong_scans
 from kurumaisu.bench.table import Table, share
-from kurumaisu.critic import sanity
-from kurumaisu.critic.checks import check_run
-from kurumaisu.critic.clean import Faults, clean
-from kurumaisu.critic.clean import Table as Rows
-from kurumaisu.critic.read_csv import REQUIRED
-from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.data.clean import Faults, clean
+from kurumaisu.critic.data.clean import Table as Rows
+from kurumaisu.critic.data.consistency import check_run
+from kurumaisu.critic.data.csv_reader import REQUIRED
+from kurumaisu.critic.sanity import examination
+from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import load_model, shipped
 
 
@@ -89,7 +89,7 @@ def said_of_tables(tables: drives.Tables, given: Sequence[str], sight: wrong_sca
             wrong_scans.write_world(world, sight.walls)
         check_run(run, laser, faults)
         recording = Recording("r", (run,), train=(run.name,), world=world, laser=laser)
-        return [*faults.invalid, *sanity.examine(recording, load_model(shipped("launch/md100.yaml"))).invalid]
+        return [*faults.invalid, *examination.examine(recording, load_model(shipped("launch/md100.yaml"))).invalid]
 
 
 def run_of(tables: drives.Tables, parts: Sequence[str], faults: Faults) -> Run:

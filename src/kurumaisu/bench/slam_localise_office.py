@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu import slam
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 from kurumaisu.geometry import between, compose, interpolate
 from kurumaisu.types import FloatArray

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.bench.drives import Tables
-from kurumaisu.critic.recording import LaserMount
+from kurumaisu.critic.values.recording import LaserMount
 from kurumaisu.types import FloatArray
 
 MOUNT = LaserMount(0.3, 0.0, 0.0, -2.086214, 4 * 0.006135923, 171)

@@ -10,10 +10,10 @@ import numpy as np
 import yaml
 
 from kurumaisu import effects
-from kurumaisu.critic import cli
-from kurumaisu.critic.job import Job
-from kurumaisu.critic.recording import Run, Series
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.app import cli
+from kurumaisu.critic.app.job import Job
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
 from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
 from kurumaisu.sim.joystick import joystick

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from kurumaisu.critic.recording import Run
+from kurumaisu.critic.values.recording import Run
 from kurumaisu.errors import Error
 from kurumaisu.paper import law
 from kurumaisu.paper.correlation import correlations

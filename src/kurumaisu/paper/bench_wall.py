@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 
 from kurumaisu import settings
-from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.experiments import Place, Script
 from kurumaisu.experiments.script import Box
 from kurumaisu.paper import drawing

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic.recording import Recording, Series
-from kurumaisu.critic.reference import with_reference
+from kurumaisu.critic.data.reference import with_reference
+from kurumaisu.critic.values.recording import Recording, Series
 from kurumaisu.errors import Error
 from kurumaisu.paper import bench_wall, commands, commands_wall, drawing, held_out, held_out_laser, laser_file
 from kurumaisu.paper.options import load_options

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.paper import drive, identify, law_file
 from kurumaisu.paper.options import load_options
 from kurumaisu.params import load_model

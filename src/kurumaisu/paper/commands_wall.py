@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from kurumaisu._core import LaserError
-from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.errors import Error
 from kurumaisu.paper import bench_wall, conjecture, drawing, figures_wall, laser_file, laser_law
 from kurumaisu.paper.commands import read_all

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from kurumaisu._core import LaserError
-from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.paper import laser_law
 from kurumaisu.paper.laser_law import LaserLaw
 from kurumaisu.paper.options import Options

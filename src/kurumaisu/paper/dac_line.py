@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu._core import AxisLaw
-from kurumaisu.critic.recording import Series
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.errors import Error
 from kurumaisu.paper import drawing
 from kurumaisu.types import FloatArray

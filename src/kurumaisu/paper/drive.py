@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.rehearsal import Rehearsal
-from kurumaisu.critic.rehearse import manner
+from kurumaisu.critic.experiment.rehearsal import Rehearsal
+from kurumaisu.critic.experiment.rehearse import manner
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.experiments import Script, load_script
 from kurumaisu.params import Model, shipped
 from kurumaisu.sim.settings import load_dynamics, with_effects

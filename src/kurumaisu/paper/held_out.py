@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu import _core, geometry
 from kurumaisu._core import AxisInverse
-from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.paper.samples import Samples
 from kurumaisu.params import Model

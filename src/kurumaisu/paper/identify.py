@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kurumaisu._core import AxisLaw
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.reference import with_reference
+from kurumaisu.critic.data.reference import with_reference
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.errors import Error
 from kurumaisu.paper import figures_drive, law
 from kurumaisu.paper.correlation import Correlations, correlations

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.paper.options import Drive
 from kurumaisu.types import BoolArray, FloatArray, IntArray

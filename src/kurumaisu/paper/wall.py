@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.recording import Recording, Run
+from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.errors import Error
 from kurumaisu.paper.options import Wall
 from kurumaisu.params import Laser

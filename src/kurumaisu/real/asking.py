@@ -8,12 +8,12 @@ from pathlib import Path
 
 import yaml
 
-from kurumaisu.critic import cli
-from kurumaisu.critic.arrays import run_of
-from kurumaisu.critic.clean import Faults
-from kurumaisu.critic.job import Job
-from kurumaisu.critic.verdict import Verdict
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.app import cli
+from kurumaisu.critic.app.arrays import run_of
+from kurumaisu.critic.app.job import Job
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 

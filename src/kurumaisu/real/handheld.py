@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.real.asking import ask, there
 
 

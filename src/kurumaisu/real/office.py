@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.real.asking import ask, there
 from kurumaisu.real.by_hand import least_squares
 

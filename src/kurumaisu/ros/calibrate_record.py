@@ -13,7 +13,7 @@ import rosgraph
 import rospy
 from nav_msgs.msg import Odometry
 
-from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper import advice

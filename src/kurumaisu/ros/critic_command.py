@@ -13,8 +13,8 @@ from kurumaisu.errors import Error, failed
 # Other commands, by the first word, and where their main is.
 _PARTS = {
     "experiment": "kurumaisu.ros.experiment",
-    "plan": "kurumaisu.critic.plan",
-    "rehearse": "kurumaisu.critic.rehearse",
+    "plan": "kurumaisu.critic.experiment.plan",
+    "rehearse": "kurumaisu.critic.experiment.rehearse",
     "watch": "kurumaisu.ros.critic_watch",
 }
 
@@ -27,7 +27,7 @@ def main() -> int:
     if name in _PARTS:
         command: Callable[[Sequence[str]], int] = import_module(_PARTS[name]).main
         return _told(command, arguments)
-    from kurumaisu.critic import cli
+    from kurumaisu.critic.app import cli
 
     return cli.main()
 

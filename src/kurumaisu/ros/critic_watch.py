@@ -17,16 +17,16 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, LaserScan, Temperature
 
-from kurumaisu.critic import messages
-from kurumaisu.critic.checks import check_run, usable
-from kurumaisu.critic.clean import Faults
-from kurumaisu.critic.meta import Meta, read_meta, recording_of_meta
-from kurumaisu.critic.options import add_effects, whole_number
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.results import causes
-from kurumaisu.critic.rolling import Rolled, Rolling
-from kurumaisu.critic.selection import effect_ids
-from kurumaisu.critic.window import Heard, Window
+from kurumaisu.critic.app.options import add_effects, whole_number
+from kurumaisu.critic.app.results import causes
+from kurumaisu.critic.app.watch import Rolled, Rolling
+from kurumaisu.critic.app.window import Heard, Window
+from kurumaisu.critic.data import messages
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.consistency import check_run, usable
+from kurumaisu.critic.data.meta import Meta, read_meta, recording_of_meta
+from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.selection import effect_ids
 from kurumaisu.errors import Error, one_line
 from kurumaisu.msg import Voltages
 from kurumaisu.params import load_model, shipped

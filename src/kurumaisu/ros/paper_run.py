@@ -16,7 +16,7 @@ from pathlib import Path
 import roslib.packages
 
 from kurumaisu.children import interrupt
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 from kurumaisu.paper import bench_wall, dac_line
 from kurumaisu.paper.dac_line import Point

@@ -15,7 +15,7 @@ import rosgraph
 import rospy
 
 from kurumaisu.children import interrupt
-from kurumaisu.critic.split_bag import numbered
+from kurumaisu.critic.data.bag_parts import numbered
 from kurumaisu.errors import Error
 from kurumaisu.ros.experiment_ground import publishers
 

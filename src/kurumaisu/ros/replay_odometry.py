@@ -12,7 +12,7 @@ import rosbag
 import rospy
 from nav_msgs.msg import Odometry
 
-from kurumaisu.critic.split_bag import parts_of
+from kurumaisu.critic.data.bag_parts import parts_of
 from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper import reckon

@@ -14,7 +14,7 @@ from kurumaisu.bench.hidden.drives import DESIGNS
 from kurumaisu.bench.hidden.motion import STEP, Fault, Setting, drive
 from kurumaisu.bench.hidden.noise import Regime, draw_rates, draw_reference
 from kurumaisu.bench.hidden.whitening import Path, Whitener, deviation
-from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.types import FloatArray
 
 RUNS, SECONDS = 3, 60.0

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import norm
 
 from kurumaisu.bench.hidden import laws
-from kurumaisu.critic.recording import Recording, Run
+from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.types import FloatArray
 
 _LEVEL = 0.01  # of false alarms that a test allows itself, over all its columns

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from kurumaisu.bench.hidden.noise import Regime
-from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.types import FloatArray
 
 STRONG, APART = 10.0, 6.0  # z from which an id must be found, and be told from its nearest rival

@@ -20,7 +20,7 @@ from kurumaisu.bench.hidden.rooms import world_text
 from kurumaisu.bench.hidden.scanning import ANGLE_MIN, ANGLE_STEP, BEAMS, MOUNT, expected, read
 from kurumaisu.bench.hidden.sizing import scaled_to
 from kurumaisu.bench.hidden.tours import Tour, draw_tour
-from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
+from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 from kurumaisu.types import FloatArray
 
 MATERIAL = 0.6e-3  # [m] least root mean square of a change of the mean readings, unless a z is asked for

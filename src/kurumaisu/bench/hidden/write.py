@@ -12,8 +12,8 @@ import numpy as np
 import yaml
 
 from kurumaisu.bench.hidden.case import Truth
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.errors import Error
 
 Lines = list[str]

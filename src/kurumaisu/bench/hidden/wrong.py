@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.types import FloatArray
 
 Change = Callable[[Run, np.random.Generator], Run]

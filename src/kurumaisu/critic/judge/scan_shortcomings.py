@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What scans lack to tell effects apart, and which drive supplies it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly
+from kurumaisu.types import FloatArray
+
+_FLAT = 0.02  # [m] what the ends of beams on one wall scatter by across it
+_MOVED = 0.05  # [m] between the places of a laser, at least
+_DISTANCES = 1.2  # ratio of the farthest to the nearest reading, at least
+
+
+def lacking(assembly: Assembly) -> list[str]:
+    """Return sentences about what the scans did not see, with the scripted drive that shows it."""
+    seen, trust = assembly.marks.seen, assembly.geometry
+    if not trust.any():
+        return ["laser: no beam meets a wall of the map well inside; record room_poses in a room that is mapped."]
+    bearings = np.array([each.bearings for each in seen.beams])
+    angle = seen.origins[..., 2] + bearings
+    reach = np.where(trust, seen.level, 0.0)[..., np.newaxis]
+    ends = seen.origins[..., :2] + reach * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    out = []
+    if _across(ends[trust]) < _FLAT:
+        out.append(
+            "laser: only one wall was seen, where an offset, the mounting along its normal and the place of the wall "
+            "are one and the same; room_poses shows others."
+        )
+    if np.ptp(seen.origins[..., :2].reshape(-1, 2), axis=0).max() < _MOVED:
+        out.append("laser: all scans are from one place; room_poses or wall_five_distances change it.")
+    ranges = seen.ranges[trust]
+    if float(np.quantile(ranges, 0.98)) < _DISTANCES * float(np.quantile(ranges, 0.02)):
+        out.append("laser: all walls are about as far, so no effect of the range shows; drive wall_five_distances.")
+    return out
+
+
+def _across(points: FloatArray) -> float:
+    """Return the rms distance [m] of points (n, 2) from the line through them."""
+    centred = points - points.mean(axis=0)
+    return float(np.sqrt(max(np.linalg.eigvalsh(centred.T @ centred / len(points))[0], 0.0)))

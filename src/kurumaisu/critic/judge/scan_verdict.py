@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Laser criticism from a recording to causes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic.channels.base.replay import extend
+from kurumaisu.critic.channels.ranges.scans import repeatability
+from kurumaisu.critic.channels.ranges.scans.beams import gather, missing
+from kurumaisu.critic.channels.ranges.scans.valid_readings import trusted_place
+from kurumaisu.critic.channels.ranges.search import block_evidence
+from kurumaisu.critic.channels.ranges.search import misfits as pictures
+from kurumaisu.critic.channels.ranges.search.confounding import Groups, joined, twins
+from kurumaisu.critic.channels.ranges.search.dominant_effect import leading, with_lead
+from kurumaisu.critic.channels.ranges.search.effect_sets import Fitted, Search
+from kurumaisu.critic.channels.ranges.search.far_size import astray
+from kurumaisu.critic.channels.ranges.search.mean_effects import Acting, acting, cleared, gain_of, refitted
+from kurumaisu.critic.channels.ranges.search.misfits import Pictures, misfits, noise_rows
+from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly, Normal
+from kurumaisu.critic.channels.ranges.search.parameter_fit import Pinned, pinned
+from kurumaisu.critic.channels.scatter.common_offset import beyond, own_sd, with_whole_scans
+from kurumaisu.critic.channels.scatter.scatter_fit import ScatterFit
+from kurumaisu.critic.channels.scatter.scatter_search import Scatter, ScatterSearch
+from kurumaisu.critic.channels.scatter.simulation import Simulator
+from kurumaisu.critic.channels.scatter.statistics import Statistics
+from kurumaisu.critic.engine.search import NAMED, RIVAL
+from kurumaisu.critic.judge.clock_drift import one_clock
+from kurumaisu.critic.judge.scan_estimates import another_map, estimates_of, of_block, with_scatter
+from kurumaisu.critic.judge.scan_experiment import every_id, supplier
+from kurumaisu.critic.judge.scan_shortcomings import lacking
+from kurumaisu.critic.judge.unknown_readings import unknowns
+from kurumaisu.critic.unknown.effect_likeness import FORM
+from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.story import Comparison
+from kurumaisu.critic.values.verdict import Cause, NextExperiment
+from kurumaisu.params import EffectSetting, Model
+from kurumaisu.types import FloatArray
+
+MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
+# Share of what single readings scatter by, from which it matters that whole scans are off together: what neighbours
+# have in common beyond the simplest equation for it moves the mean of a scan as well.
+_HEARD = 0.06
+_SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
+Progress = Callable[[str], None]
+
+
+def criticise(
+    recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None = None
+) -> LaserFinding:
+    """Return what the scans of a recording say against a model, or why they cannot.
+
+    ids: the effects that may be named; None for all.
+    """
+    why = missing(recording)
+    if why is not None:
+        drive = supplier(model, every_id(), recording.truth) if recording.world is not None else None
+        return LaserFinding(refused=why, details=repeatability.words(recording, model), next_experiment=drive)
+
+    def beside(setting: EffectSetting) -> LaserFinding:
+        progress(f"laser: looking at the rest beside {setting.id}")
+        return criticise(recording, extend(model, [setting]), progress, ids)
+
+    progress("laser: predicting the scans")
+    assembly = Assembly(gather(recording, model), ids)
+    progress("laser: estimating the noise")
+    normal = assembly.settle(recording.truth)
+    far = astray(assembly.shots, ids)
+    if far is not None:
+        form = next(form for form in assembly.forms if form.id == far.id)
+        (placed,) = pinned(assembly, normal, [form], [far], None, {}, recording.truth).settings
+        worth = (1.0, Search([form], normal.gram).run().best.log_likelihood)
+        return _with_rest(assembly, normal, placed, worth, beside(placed[0]))
+    progress("laser: weighing effects")
+    found = Search(assembly.forms, normal.gram).run()
+    if found.best.forms:
+        assembly.refine(found.best.forms, normal.beam_noise, normal.wary)
+        shaped = [form for form in assembly.forms if form.start in {each.start for each in found.best.forms}]
+        normal = assembly.settle(recording.truth, shaped)
+        found = Search(assembly.forms, normal.gram).run()
+    normal = assembly.full(normal)
+    made = acting(assembly, normal, found)
+    if (wrong := another_map(made.winner, normal, float(assembly.displaced.readings.mean()))) is not None:
+        return LaserFinding(wrong=wrong)
+    made = made.beside(assembly, normal)
+    progress("laser: fitting what acts")
+    fit = refitted(assembly, normal, made, recording.truth)
+    lead = leading(assembly, normal, made.fit, fit)
+    certain = lead is not None and made.found.p[lead.id] >= NAMED
+    if lead is not None and certain and all(own.id != lead.id for own in model.effects):
+        placed = next(each for each in fit.settings if each[0] is lead)
+        worth = (min(made.found.p[lead.id], 1.0), gain_of(made, lead.id))
+        return _with_rest(assembly, normal, placed, worth, beside(placed[0]))
+    made, fit = cleared(assembly, normal, made, fit, recording.truth)
+    progress("laser: weighing effects on the scatter")
+    away = 0.0 if made.winner is None else block_evidence.elsewhere(made.winner, normal.gram)
+    scatter, comparison = (
+        ([], ()) if fit.assembly.strange else _scatter(assembly, fit, ids, strange=made.curve, away=away)
+    )
+    own = own_sd(model.effects)
+    if not made.curve and not fit.assembly.strange:
+        seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, own)
+        scatter = with_whole_scans(scatter, seen, fit.normal.scan_noise, recording, ids)
+        scatter = beyond(scatter, FORM * _spread_of(assembly, normal, made), own)
+    heard = beyond(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])), own)
+    finding = one_clock(_finding(assembly, normal, made, fit, heard), assembly.shots.stamps)
+    slight = tuple(each.setting.id for each in scatter if each not in heard)
+    words = tuple(
+        f"{name}: detectable, but it does not matter beside what single readings scatter by." for name in slight
+    )
+    finding = replace(finding, small=(*finding.small, *slight), details=(*finding.details, *words))
+    finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
+    shown = misfits(assembly, normal, made.parts())
+    return replace(finding, pictures=Pictures(shown, pictures.rivals(made.found), noise_rows(normal), comparison))
+
+
+def _with_rest(
+    assembly: Assembly,
+    normal: Normal,
+    lead: tuple[EffectSetting, dict[str, float]],
+    worth: tuple[float, float],
+    rest: LaserFinding,
+) -> LaserFinding:
+    """Return an effect, which must be in place before the rest can be seen, with the rest that was found then.
+
+    lead: its setting, and the sds of what was fitted; worth: its posterior, and the log evidence of it [nat].
+    """
+    setting, sds = lead
+    cause = Cause(setting.id, worth[0], estimates_of(setting, sds), worth[1])
+    size = size_of(assembly.marks.together([setting])[normal.beam_noise.valid])
+    rest = replace(rest, details=(*rest.details, *_told({setting.id: size}, ())))
+    return one_clock(with_lead(rest, setting, cause, assembly, normal), assembly.shots.stamps)
+
+
+def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model: Model) -> NextExperiment | None:
+    """Return the experiment that tells apart what the scans cannot, or that supplies what they lack."""
+    open_ids = sorted({name for group in finding.confounded for name in group})
+    if not open_ids and not lacking(assembly):
+        return None
+    return supplier(model, open_ids or every_id(), recording.truth)
+
+
+def _scatter(
+    assembly: Assembly, fit: Pinned, ids: frozenset[str] | None, *, strange: bool, away: float
+) -> tuple[list[Scatter], tuple[Comparison, ...]]:
+    """Return the effects on how readings scatter about the best fit of their mean, and what they mend.
+
+    strange: something that is in no catalogue acts on the mean. A curve misses steps and edges of it, nobody can say
+    how far, so that errors about it say nothing of scatter. away [m]: by how far ends of walls may be elsewhere.
+    """
+    rows = fit.assembly.smooth_rows(_SCATTERED)
+    few = fit.assembly.thinned(rows)
+    few.geometry &= trusted_place(few.shots, few.marks.seen, few.marks.base, away)
+    statistics = Statistics(few, fit.normal.scan_noise)
+    means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
+    means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
+    measured = few.shots.measured
+    seen = statistics.of(measured, np.where(np.isfinite(measured), fit.left[rows], np.nan))
+    heard = ~statistics.of_errors() | (not strange)
+    simulate = Simulator(few, statistics, fit.missed[rows])
+    search = ScatterSearch(ScatterFit(simulate, seen, sorted(means), ids, heard))
+    found = search.run()
+    return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
+
+
+def _finding(assembly: Assembly, normal: Normal, made: Acting, fit: Pinned, scatter: list[Scatter]) -> LaserFinding:
+    p = made.p
+    sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
+    settings = {setting.id: setting for setting, _ in fit.settings}
+    estimates = {setting.id: estimates_of(setting, sds) for setting, sds in fit.settings}
+    if made.winner is not None:
+        free = made.winner.free
+        valid = normal.beam_noise.valid
+        sizes[free.id] = size_of(assembly.columns[valid][:, free.span] @ made.coefficients)
+        settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
+    matters = {name for name, size in sizes.items() if size >= MATERIAL}
+    settings = {name: setting for name, setting in settings.items() if name in matters}
+    curve = made.winner is not None and made.curve and made.winner.free.id in matters
+    gains = {name: gain_of(made, name) for name in settings if p.get(name, 0.0) >= NAMED}
+    # A curve is what one covariate shows of a thing nobody knows: what it leaves may be as much, and looks like others.
+    least = made.winner.belief.nats if made.winner is not None and curve else -np.inf
+    causes = tuple(
+        Cause(name, min(p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
+    )
+    # Of the scans as they are seen with what acts: a laser that is askew looks past the ends of walls.
+    unknown = tuple(fit.assembly.told())
+    unknown += tuple(unknowns(made.weighed, normal.gram)) if curve else ()
+    groups = () if curve else _confused(assembly, normal, made, causes)
+    confounded = tuple(group for group in groups if matters & set(group))
+    causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
+    small = tuple(name for name in sizes if name not in matters and p.get(name, 0.0) >= NAMED)
+    details = (_noise_told(assembly, normal), *lacking(assembly), *_told(sizes, small))
+    causes, added = with_scatter(causes, settings, scatter)
+    confounded += tuple(group for group in map(_set_of, scatter) if group)
+    return LaserFinding(causes, confounded, unknown, added, details, small=small)
+
+
+def _set_of(scatter: Scatter) -> tuple[str, ...]:
+    """Return the effects of which one makes readings scatter so, where it is not certain which."""
+    every = {scatter.setting.id: scatter.p, **scatter.rivals}
+    group = tuple(sorted(name for name, p in every.items() if p >= RIVAL or name == scatter.setting.id))
+    certain = len(group) > 1 and sum(every[name] for name in group) >= NAMED
+    return group if certain and scatter.p < NAMED else ()
+
+
+def _confused(assembly: Assembly, normal: Normal, made: Acting, causes: Sequence[Cause]) -> Groups:
+    # Of a set, too: what explains the readings as well as its likeliest member belongs to it.
+    open_ids = {name for group in made.found.confounded for name in group}
+    later = made.more.found.best.ids if made.more is not None else frozenset()
+    names = [*(cause.id for cause in causes if cause.id not in later), *sorted((open_ids & made.fit.ids) - later)]
+    groups = joined(made.found.confounded, twins(made.found, made.winner, assembly.free, normal.gram, names))
+    return groups if made.more is None else joined(groups, made.more.groups)
+
+
+def _noise_told(assembly: Assembly, normal: Normal) -> str:
+    noise, beam = normal.scan_noise, normal.beam_noise
+    return (
+        f"laser: {normal.readings} readings of {len(assembly.shots.stamps)} scans; noise of neighbours correlates by "
+        f"{beam.rho:.2f}, of whole scans {1e3 * noise.common_sd:.2g} mm over {noise.common_tau:.2g} s, of "
+        f"single beams {1e3 * beam.own_sd:.2g} mm, of the reference {1e3 * noise.position_sd:.2g} mm and "
+        f"{1e3 * noise.heading_sd:.2g} mrad."
+    )
+
+
+def _told(sizes: Mapping[str, float], small: Sequence[str]) -> list[str]:
+    return [
+        f"{name}: changes the readings where it acts by {1e3 * size:.2g} mm"
+        f"{': detectable, but it does not matter' if name in small else ''}."
+        for name, size in sorted(sizes.items())
+    ]
+
+
+def _rms(assembly: Assembly, normal: Normal, fit: Fitted, name: str) -> float:
+    valid = normal.beam_noise.valid
+    change, start = np.zeros(int(valid.sum())), 0
+    for form in fit.forms:
+        stop = start + len(form.columns)
+        if form.id == name:
+            change = assembly.columns[valid][:, form.span] @ fit.coefficients[start:stop]
+        start = stop
+    return size_of(change)
+
+
+def size_of(change: FloatArray) -> float:
+    """Return how far [m] an effect moves the readings that it moves: of dark walls, say, not divided by all."""
+    power = change.astype(float) ** 2
+    return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))
+
+
+def _spread_of(assembly: Assembly, normal: Normal, made: Acting) -> float:
+    """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others.
+
+    In the curves that some of it may follow instead no scans are off together.
+    """
+    valid, blocks = normal.beam_noise.valid, {free.id for free in assembly.free}
+    parts = [part for part in made.parts() if part.id in blocks or effects.by_id(part.id).empirical]
+    parts = [part for part in parts if part.id not in made.others]
+    moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in parts]
+    return float(np.std(sum(moved))) if moved else 0.0
