@@ -11,7 +11,7 @@ from scipy.integrate import trapezoid
 
 from kurumaisu import geometry
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.channels.base import drive, replay
+from kurumaisu.critic.base import drive, replay
 from kurumaisu.critic.data.reference import with_reference
 from kurumaisu.critic.heldout.materiality import nearer
 from kurumaisu.critic.judge import explain

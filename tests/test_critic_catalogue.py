@@ -10,7 +10,7 @@ from hidden_effect import recording, recording_of
 from scipy import optimize
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine import least_squares
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Problem

@@ -11,7 +11,7 @@ import pytest
 from kurumaisu.bench.hidden import Ask, base_case, make
 from kurumaisu.bench.hidden.noise import Colour, Regime
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine import refit, search
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Problem

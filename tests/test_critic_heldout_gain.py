@@ -19,12 +19,12 @@ from kurumaisu.bench.hidden.noise import USUAL
 from kurumaisu.bench.hidden.oracle import gain_share, noise_of
 from kurumaisu.critic.app.job import Outcome
 from kurumaisu.critic.app.results import summary
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import prepare, split
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import prepare, split
 from kurumaisu.critic.heldout import drive_gain, scan_gain, slam_gain
 from kurumaisu.critic.heldout.corrected_scans import corrected
 from kurumaisu.critic.heldout.extension_gain import Extension, with_laser_gain, with_slam
-from kurumaisu.critic.judge.explain import Criticism
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import (
     Gain,

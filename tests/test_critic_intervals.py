@@ -10,7 +10,7 @@ import pytest
 from kurumaisu.bench.hidden import base_case
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import USUAL
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.judge import intervals

@@ -10,12 +10,12 @@ import pytest
 from laser_scene import neighbours, recording
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.channels.ranges.noise.scan_noise import Gram, Layout, ScanNoise, marginal, whitened
-from kurumaisu.critic.channels.ranges.scans.beams import gather
-from kurumaisu.critic.channels.ranges.scans.repeatability import repeatability
-from kurumaisu.critic.channels.ranges.search.effect_sets import Search, confusion
-from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.ranges.noise.scan_noise import Gram, Layout, ScanNoise, marginal, whitened
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.repeatability import repeatability
+from kurumaisu.critic.ranges.search.effect_sets import Search, confusion
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 from kurumaisu.world import load_world

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.channels.ranges.scans.blocked_beams import blocked, told
 from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.ranges.scans.blocked_beams import blocked, told
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

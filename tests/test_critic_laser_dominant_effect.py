@@ -4,7 +4,7 @@
 import pytest
 
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.critic.channels.base.replay import extend
+from kurumaisu.critic.base.replay import extend
 from kurumaisu.critic.judge import scan_verdict
 from kurumaisu.params import EffectSetting, load_model, shipped
 

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.ranges.noise.scan_noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate
-from kurumaisu.critic.channels.ranges.search.effect_sets import Search
-from kurumaisu.critic.channels.ranges.signals.effect_columns import Column, Form
-from kurumaisu.critic.channels.scatter.common_offset import beyond, own_sd, with_whole_scans
-from kurumaisu.critic.channels.scatter.likelihood import Kinds, Likeness
-from kurumaisu.critic.channels.scatter.scatter_fit import ScatterFit
-from kurumaisu.critic.channels.scatter.scatter_search import Scatter, ScatterSearch
 from kurumaisu.critic.judge.scan_verdict import size_of
+from kurumaisu.critic.ranges.noise.scan_noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate
+from kurumaisu.critic.ranges.search.effect_sets import Search
+from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
+from kurumaisu.critic.scatter.common_offset import beyond, own_sd, with_whole_scans
+from kurumaisu.critic.scatter.likelihood import Kinds, Likeness
+from kurumaisu.critic.scatter.scatter_fit import ScatterFit
+from kurumaisu.critic.scatter.scatter_search import Scatter, ScatterSearch
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import NORMAL90
 from kurumaisu.params import EffectSetting

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.channels.ranges.scans.beams import gather
-from kurumaisu.critic.channels.ranges.search.far_size import astray
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.search.far_size import astray
 from kurumaisu.critic.sanity.examination import examine
 from kurumaisu.params import load_model, shipped
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.channels.ranges.search.block_evidence import Rival
-from kurumaisu.critic.channels.ranges.search.effect_sets import Fitted
-from kurumaisu.critic.channels.ranges.search.false_seconds import company, forms_beside
-from kurumaisu.critic.channels.ranges.signals.coefficient_blocks import Free
-from kurumaisu.critic.channels.ranges.signals.effect_columns import Form
-from kurumaisu.critic.channels.ranges.signals.form_error import OtherForm, other_form, without
 from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.ranges.search.block_evidence import Rival
+from kurumaisu.critic.ranges.search.effect_sets import Fitted
+from kurumaisu.critic.ranges.search.false_seconds import company, forms_beside
+from kurumaisu.critic.ranges.signals.coefficient_blocks import Free
+from kurumaisu.critic.ranges.signals.effect_columns import Form
+from kurumaisu.critic.ranges.signals.form_error import OtherForm, other_form, without
 from kurumaisu.critic.unknown.curves import Belief
 from kurumaisu.critic.unknown.effect_likeness import FORM
 from kurumaisu.params import load_model, shipped

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from laser_scene import FIRST, INCREMENT, recording
 
-from kurumaisu.critic.channels.ranges.scans.beams import gather
-from kurumaisu.critic.channels.ranges.scans.valid_readings import edges
-from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly
-from kurumaisu.critic.channels.ranges.signals.form_error import of_beams
 from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.valid_readings import edges
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.ranges.signals.form_error import of_beams
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.channels.ranges.scans.beams import gather
-from kurumaisu.critic.channels.ranges.scans.map_changes import displaced
-from kurumaisu.critic.channels.ranges.scans.passing_objects import strangers
-from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.map_changes import displaced
+from kurumaisu.critic.ranges.scans.passing_objects import strangers
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

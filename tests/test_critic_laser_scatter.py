@@ -9,16 +9,16 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.ranges.noise.reading_noise import BeamNoise, _repeated, refined
-from kurumaisu.critic.channels.ranges.noise.scan_noise import Layout, ScanNoise
-from kurumaisu.critic.channels.ranges.scans.beams import gather
-from kurumaisu.critic.channels.ranges.scans.range_step import grid_step
-from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly
-from kurumaisu.critic.channels.scatter.likelihood import Kinds
-from kurumaisu.critic.channels.scatter.scatter_fit import Piece, ScatterFit
-from kurumaisu.critic.channels.scatter.scatter_search import ScatterSearch, _weighed
-from kurumaisu.critic.channels.scatter.simulation import Simulator
-from kurumaisu.critic.channels.scatter.statistics import Statistics, _lasting, _mixed, _spacing
+from kurumaisu.critic.ranges.noise.reading_noise import BeamNoise, _repeated, refined
+from kurumaisu.critic.ranges.noise.scan_noise import Layout, ScanNoise
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.range_step import grid_step
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.scatter.likelihood import Kinds
+from kurumaisu.critic.scatter.scatter_fit import Piece, ScatterFit
+from kurumaisu.critic.scatter.scatter_search import ScatterSearch, _weighed
+from kurumaisu.critic.scatter.simulation import Simulator
+from kurumaisu.critic.scatter.statistics import Statistics, _lasting, _mixed, _spacing
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kurumaisu.critic.channels.ranges.scans.valid_readings import trusted_place
-from kurumaisu.critic.channels.ranges.search.confounding import twins
-from kurumaisu.critic.channels.ranges.search.effect_sets import Search
-from kurumaisu.critic.channels.ranges.signals.coefficient_blocks import Free
-from kurumaisu.critic.channels.ranges.signals.effect_columns import Column, Form
-from kurumaisu.critic.channels.ranges.signals.shape_grids import grid_of
 from kurumaisu.critic.judge.clock_drift import one_clock
 from kurumaisu.critic.judge.reference_point import from_base_link
+from kurumaisu.critic.ranges.scans.valid_readings import trusted_place
+from kurumaisu.critic.ranges.search.confounding import twins
+from kurumaisu.critic.ranges.search.effect_sets import Search
+from kurumaisu.critic.ranges.signals.coefficient_blocks import Free
+from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
+from kurumaisu.critic.ranges.signals.shape_grids import grid_of
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import Cause, Estimate

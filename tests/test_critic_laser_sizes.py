@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.channels.ranges.scans.beams import gather
-from kurumaisu.critic.channels.ranges.search.block_evidence import Rival, weigh
-from kurumaisu.critic.channels.ranges.search.effect_sets import Fitted, Search
-from kurumaisu.critic.channels.ranges.search.mean_effects import gain_of
-from kurumaisu.critic.channels.ranges.search.misfits import Part
-from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly
-from kurumaisu.critic.channels.ranges.search.parameter_fit import pinned
-from kurumaisu.critic.channels.ranges.signals.coefficient_blocks import Free
-from kurumaisu.critic.channels.ranges.signals.effect_columns import Column, Form
-from kurumaisu.critic.judge.explain import Criticism
 from kurumaisu.critic.judge.merge import with_laser
 from kurumaisu.critic.judge.scan_estimates import another_map
 from kurumaisu.critic.judge.scan_verdict import _spread_of, criticise
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.search.block_evidence import Rival, weigh
+from kurumaisu.critic.ranges.search.effect_sets import Fitted, Search
+from kurumaisu.critic.ranges.search.mean_effects import gain_of
+from kurumaisu.critic.ranges.search.misfits import Part
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.ranges.search.parameter_fit import pinned
+from kurumaisu.critic.ranges.signals.coefficient_blocks import Free
+from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
 from kurumaisu.critic.unknown.curves import Belief
 from kurumaisu.critic.unknown.effect_likeness import FORM
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import Verdict

@@ -9,15 +9,15 @@ from laser_scene import recording
 
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.critic.channels.ranges.scans.beams import gather
-from kurumaisu.critic.channels.ranges.scans.standstill import held, steadied
-from kurumaisu.critic.channels.ranges.scans.valid_readings import hats
-from kurumaisu.critic.channels.ranges.search.effect_sets import Search
-from kurumaisu.critic.channels.ranges.signals.effect_columns import Column, Form, Marks
-from kurumaisu.critic.channels.scatter.likelihood import Kinds
-from kurumaisu.critic.channels.scatter.scatter_fit import ScatterFit
-from kurumaisu.critic.channels.scatter.scatter_search import ScatterSearch
 from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.standstill import held, steadied
+from kurumaisu.critic.ranges.scans.valid_readings import hats
+from kurumaisu.critic.ranges.search.effect_sets import Search
+from kurumaisu.critic.ranges.signals.effect_columns import Column, Form, Marks
+from kurumaisu.critic.scatter.likelihood import Kinds
+from kurumaisu.critic.scatter.scatter_fit import ScatterFit
+from kurumaisu.critic.scatter.scatter_search import ScatterSearch
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -104,7 +104,7 @@ def test_what_a_form_leaves_is_not_one_more_effect():
 
 
 def test_a_delay_is_measured_where_it_acts(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.channels.ranges.scans.beams.MOST_SCANS", 120)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 120)
     case = make(Ask("single", ("laser.latency",), None, family="laser"), 121, tmp_path)
     finding = criticise(case.recording, MODEL, say)
     assert [cause.id for cause in finding.causes] == ["laser.latency"]

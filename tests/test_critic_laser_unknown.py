@@ -11,11 +11,11 @@ from laser_scene import recording
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.channels.ranges.noise.beam_offsets import Crossed, crossed, without_beams
-from kurumaisu.critic.channels.ranges.noise.scan_noise import Gram, Layout, ScanNoise, whitened
-from kurumaisu.critic.channels.ranges.poses.likeliest_path import Sight, likeliest, steady
-from kurumaisu.critic.channels.ranges.scans.standstill import steadied
 from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.ranges.noise.beam_offsets import Crossed, crossed, without_beams
+from kurumaisu.critic.ranges.noise.scan_noise import Gram, Layout, ScanNoise, whitened
+from kurumaisu.critic.ranges.poses.likeliest_path import Sight, likeliest, steady
+from kurumaisu.critic.ranges.scans.standstill import steadied
 from kurumaisu.critic.sanity import pose_jumps
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.effects import Echoes
@@ -95,7 +95,7 @@ def test_the_temperature_that_was_recorded_is_followed():
 
 
 def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.channels.ranges.scans.beams.MOST_SCANS", 80)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 80)
     case = make(Ask("single", ("laser.tilt",), 40.0, regime="clean", design="room"), 1002, tmp_path)
     finding = criticise(case.recording, MODEL, say)
     assert [cause.id for cause in finding.causes] == ["laser.tilt"]
@@ -106,7 +106,7 @@ def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypa
 
 
 def test_one_wall_does_not_tell_the_mounting_from_the_map(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.channels.ranges.scans.beams.MOST_SCANS", 60)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 60)
     case = make(Ask("confounded", ("laser.mount_x",), 16.0, regime="clean"), 301, tmp_path)
     finding = criticise(case.recording, MODEL, say)
     assert finding.confounded == (("laser.mount_x", "world.map_error"),)

@@ -16,8 +16,8 @@ from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.motion import STEP, Setting
 from kurumaisu.bench.hidden.motion import drive as hidden_drive
 from kurumaisu.bench.hidden.noise import USUAL, draw_rates, draw_reference
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import GRID, Drive, prepare
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, Drive, prepare
 from kurumaisu.critic.engine import neighbouring_sets, refit, search
 from kurumaisu.critic.engine.catalogue import Candidate, Term
 from kurumaisu.critic.engine.confounding import Posterior, confounded

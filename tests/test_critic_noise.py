@@ -10,7 +10,7 @@ from kurumaisu.bench.hidden.base_case import draw_drives, recording
 from kurumaisu.bench.hidden.motion import drive
 from kurumaisu.bench.hidden.noise import REGIMES
 from kurumaisu.bench.hidden.oracle import errors
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.noise.base_noise import Scatter
 from kurumaisu.params import load_model, shipped
 

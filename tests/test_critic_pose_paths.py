@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from kurumaisu import geometry
-from kurumaisu.critic.channels.base.drive import GRID, Drive
-from kurumaisu.critic.channels.base.pose_paths import ways
+from kurumaisu.critic.base.drive import GRID, Drive
+from kurumaisu.critic.base.pose_paths import ways
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 
 STEP = 0.0005  # [s]

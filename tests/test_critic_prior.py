@@ -8,7 +8,7 @@ from scipy.integrate import trapezoid
 from kurumaisu.bench.hidden import Ask, base_case, make
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import USUAL
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import Noise

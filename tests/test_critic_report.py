@@ -16,11 +16,11 @@ from stories import full_story, full_verdict
 from kurumaisu.critic.app.display import cells, cut, printable
 from kurumaisu.critic.app.job import Job, Outcome
 from kurumaisu.critic.app.results import summary, table
-from kurumaisu.critic.judge.misfit import explained
 from kurumaisu.critic.judge.sentences import named, wrong
 from kurumaisu.critic.report.figures import misfit_svg, shown_points
 from kurumaisu.critic.report.page import write_report
 from kurumaisu.critic.report.pictures import comparison_picture, misfit_picture, overlay_picture, thinned
+from kurumaisu.critic.values.binned_means import explained
 from kurumaisu.critic.values.digits import odds, quantities, with_interval
 from kurumaisu.critic.values.story import Bins, Comparison, Moments, Overlay
 from kurumaisu.critic.values.verdict import Cause, Estimate, Verdict, grouped

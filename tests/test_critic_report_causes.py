@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.channels.base.drive import GRID, Drive
+from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.judge import misfit
 from kurumaisu.critic.judge.explain import overlays

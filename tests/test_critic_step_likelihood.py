@@ -10,8 +10,8 @@ from kurumaisu.bench.hidden import Ask, base_case, base_rates, make, motion
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine import neighbouring_sets, search
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import Noise

@@ -6,8 +6,8 @@ import numpy as np
 from kurumaisu.bench.hidden import base_case
 from kurumaisu.bench.hidden.noise import Colour, Regime
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import GRID, Drive, prepare
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, Drive, prepare
 from kurumaisu.critic.noise.base_noise import whitener
 from kurumaisu.params import load_model, shipped
 

@@ -7,7 +7,7 @@ from kurumaisu.bench.hidden import base_case
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.catalogue import Candidate, Term
 from kurumaisu.critic.engine.evidence import Fit, Problem

@@ -15,9 +15,9 @@ from kurumaisu.bench.hidden import make as hidden_make
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import REGIMES
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.covariates import informed
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.engine.search import Naming

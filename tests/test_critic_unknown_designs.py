@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import START
 from kurumaisu.critic.unknown.designs import Designs

@@ -7,9 +7,9 @@ from scipy.sparse import csr_array
 
 from kurumaisu.bench.hidden import base_case
 from kurumaisu.bench.hidden.noise import USUAL
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import prepare, split
-from kurumaisu.critic.channels.base.sensitivity import Sensitivity
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import prepare, split
+from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.unknown import periods
 from kurumaisu.effects import smooth_id
 from kurumaisu.params import EffectSetting, load_model, shipped

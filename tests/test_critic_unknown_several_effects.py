@@ -8,7 +8,7 @@ from kurumaisu.bench.hidden import base_case
 from kurumaisu.bench.hidden.base_catalogue import BASE
 from kurumaisu.bench.hidden.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.engine.search import search
 from kurumaisu.critic.unknown import comparison

@@ -8,8 +8,8 @@ import pytest
 import unknown_effects as hidden
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base.covariates import informed
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.engine.search import Naming
 from kurumaisu.critic.unknown import sentences, shapes

@@ -9,7 +9,7 @@ import pytest
 from kurumaisu.bench.critic_table import Ask
 from kurumaisu.bench.hidden.make import make
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.channels.base.replay import model_of
+from kurumaisu.critic.base.replay import model_of
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import shipped
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from kurumaisu.critic.channels.base.drive import from_voltages
+from kurumaisu.critic.base.drive import from_voltages
 from kurumaisu.critic.sanity import examination
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import load_model, shipped

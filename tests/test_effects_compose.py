@@ -8,7 +8,7 @@ import pytest
 
 from kurumaisu.bench.hidden import base_case
 from kurumaisu.bench.hidden.noise import REGIMES
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise import base_noise

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from kurumaisu.critic.app.job import Job, criticise
-from kurumaisu.critic.channels.ranges.scans.repeatability import repeatability
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.judge import explain
+from kurumaisu.critic.ranges.scans.repeatability import repeatability
 from kurumaisu.errors import Error
 from kurumaisu.real import by_hand, mines, sena, urg_log, warthog
 from kurumaisu.real.__main__ import main

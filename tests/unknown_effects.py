@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from kurumaisu.critic.channels.base.drive import prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import follow_commands, load_model, shipped

@@ -14,7 +14,7 @@ from kurumaisu.bench.hidden import Ask, Case, make, names_of
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.bench.table import Table, share
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.channels.base.drive import Drive, prepare_all
+from kurumaisu.critic.base.drive import Drive, prepare_all
 from kurumaisu.critic.predict.motion import motion_ahead
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import NORMAL90

@@ -7,17 +7,16 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic.channels.base.covariates import informed
-from kurumaisu.critic.channels.base.drive import Drive, driven, prepare
-from kurumaisu.critic.channels.base.replay import model_of
+from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.drive import Drive, driven, prepare
+from kurumaisu.critic.base.replay import model_of
 from kurumaisu.critic.data.elapsed import timed
 from kurumaisu.critic.data.long_runs import bounded
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment import proposal as next_experiment
 from kurumaisu.critic.heldout import drive_gain, extension_gain
 from kurumaisu.critic.judge import excitation, explain, explain_unknown
-from kurumaisu.critic.judge.decide import Decision, Progress, decide, scatter
-from kurumaisu.critic.judge.explain import Criticism
+from kurumaisu.critic.judge.decide import Decision, decide, scatter
 from kurumaisu.critic.judge.extended_model import write_extended
 from kurumaisu.critic.judge.forecast import forecast_of
 from kurumaisu.critic.judge.held_out_pruning import in_turn, pruned, unmet
@@ -30,6 +29,8 @@ from kurumaisu.critic.predict.motion import Settings
 from kurumaisu.critic.processes.laser_process import aside
 from kurumaisu.critic.report.page import write_report
 from kurumaisu.critic.sanity import early_stamps, examination
+from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.selection import beside_odometry
 from kurumaisu.critic.values.verdict import Gain, write_verdict

@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu._core import AxisLaw, Branch
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.judge.explain import Criticism
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import EffectSetting, Model, shipped
 from kurumaisu.riddles import lab

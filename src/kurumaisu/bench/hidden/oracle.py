@@ -8,7 +8,7 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.bench.hidden.case import Case, Known
 from kurumaisu.bench.hidden.noise import Regime
-from kurumaisu.critic.channels.base.drive import Drive, prepare
+from kurumaisu.critic.base.drive import Drive, prepare
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 from kurumaisu.critic.values.verdict import Gain
 from kurumaisu.params import load_model, shipped

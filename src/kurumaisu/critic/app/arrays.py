@@ -16,7 +16,7 @@ from kurumaisu.critic.data.csv_reader import OPTIONAL, QUERY, REQUIRED, check_qu
 from kurumaisu.critic.data.meta import Meta, recording_of_meta
 from kurumaisu.critic.data.reading import require_use, split
 from kurumaisu.critic.data.reference import with_reference
-from kurumaisu.critic.judge.explain import Criticism
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording, Run, Series, run_of_parts
 from kurumaisu.critic.values.selection import effect_ids
 from kurumaisu.errors import Error

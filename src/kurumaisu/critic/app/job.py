@@ -12,7 +12,7 @@ from pathlib import Path
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.data.reference import with_reference
-from kurumaisu.critic.judge.explain import Criticism
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error, one_line
 from kurumaisu.params import shipped

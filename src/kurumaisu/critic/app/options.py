@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import argparse
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from pathlib import Path
 
-from kurumaisu.params import shipped
+from kurumaisu.critic.values.version import version
 
 _DESCRIPTION = """\
 Say what a model gets wrong about a measured robot: replay the recording through the model, name what is missing, or
@@ -70,11 +69,6 @@ def add_effects(parser: argparse.ArgumentParser) -> None:
     for option, words in (("--only", "look only for"), ("--without", "do not look for")):
         words = f"{words} these effects, by id or pattern like base.lag_*; may be given again"
         parser.add_argument(option, type=name_list, action="extend", default=[], metavar="IDS", help=words)
-
-
-def version() -> str:
-    """Return the package's version."""
-    return str(ElementTree.parse(shipped("package.xml")).findtext("version"))
 
 
 def name_list(text: str) -> tuple[str, ...]:

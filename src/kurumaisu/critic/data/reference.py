@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kurumaisu.critic.channels.base.drive import driven
+from kurumaisu.critic.base.drive import driven
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped

@@ -11,8 +11,8 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu._core import Whitener
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine import least_squares
 from kurumaisu.critic.engine.catalogue import (
     Candidate,

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import GRID, Drive
-from kurumaisu.critic.channels.base.sensitivity import Sensitivity
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, Drive
+from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.engine.catalogue import Term, settings_of
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 from kurumaisu.effects import Motion

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import Drive, prepare
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import Drive, prepare
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import Noise

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.ranges.scans.beams import laser_of, shapes
+from kurumaisu.critic.ranges.scans.beams import laser_of, shapes
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.effects import Beams, Echoes
 from kurumaisu.params import EffectSetting, Laser, Model

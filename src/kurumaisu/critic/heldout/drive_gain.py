@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import Drive, pieces, split
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import Drive, pieces, split
 from kurumaisu.critic.heldout import noise_floor
 from kurumaisu.critic.heldout.materiality import spans
 from kurumaisu.critic.noise.base_noise import Noise, whitened

@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from kurumaisu.critic.channels.ranges.scans.beams import missing
 from kurumaisu.critic.heldout import scan_gain, slam_gain
-from kurumaisu.critic.judge.explain import Criticism
 from kurumaisu.critic.predict.motion import Forecast, Settings
 from kurumaisu.critic.predict.scan_poses import Places, joined
+from kurumaisu.critic.ranges.scans.beams import missing
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.story import Overlay
 from kurumaisu.critic.values.verdict import ChannelGain, Gain

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import whitened
 from kurumaisu.critic.values.verdict import NORMAL90, Gain

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.heldout.materiality import spans
 from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.critic.predict.motion import motion_ahead

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.ranges.scans.beams import Shots, missing
 from kurumaisu.critic.heldout.drive_gain import log_density_gain, rmse_gain
 from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.predict.scan import Expected, Joint, ScanModel, scattered
 from kurumaisu.critic.predict.scan_cache import Expectations
 from kurumaisu.critic.predict.scan_poses import Places, chosen, joined
+from kurumaisu.critic.ranges.scans.beams import Shots, missing
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import ChannelGain
 from kurumaisu.params import EffectSetting, Model

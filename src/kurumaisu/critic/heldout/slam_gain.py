@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kurumaisu import geometry, slam_score
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.covariates import beside
-from kurumaisu.critic.channels.base.drive import Drive, driven, prepare_all
-from kurumaisu.critic.channels.ranges.scans.beams import laser_of
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.covariates import beside
+from kurumaisu.critic.base.drive import Drive, driven, prepare_all
 from kurumaisu.critic.heldout.corrected_scans import Corrected, corrected
 from kurumaisu.critic.heldout.drive_gain import rmse_gain
+from kurumaisu.critic.ranges.scans.beams import laser_of
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import SlamGain
 from kurumaisu.errors import Error

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine import coarsened_posterior, form_error_fit, search, uncertain_effects
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout import drive_gain
@@ -18,11 +18,11 @@ from kurumaisu.critic.predict import parameter_doubt
 from kurumaisu.critic.unknown import beyond_catalogue, comparison, joint_fit
 from kurumaisu.critic.unknown.joint_fit import Extension
 from kurumaisu.critic.values.prior import odds
+from kurumaisu.critic.values.progress import Progress
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 _ANEW = 1  # times at most that all is judged anew, because other effects act than those about which the noise was taken
-Progress = Callable[[str], None]
 Truth = tuple[float, float] | None
 
 

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.catalogue import Term, catalogue
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment import design
 from kurumaisu.critic.experiment.proposal import DECIDED
 from kurumaisu.critic.judge.decide import Decision
-from kurumaisu.critic.judge.explain import Criticism
 from kurumaisu.critic.noise import base_noise
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.verdict import NextExperiment
 from kurumaisu.experiments import Script
 from kurumaisu.params import Model

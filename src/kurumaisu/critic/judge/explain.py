@@ -5,16 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
 
-from kurumaisu.critic.app.options import version
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.covariates import informed
-from kurumaisu.critic.channels.base.drive import Drive, prepare
-from kurumaisu.critic.channels.base.restarted_path import PICTURE, RESTART, restarted
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.drive import Drive, prepare
+from kurumaisu.critic.base.restarted_path import PICTURE, RESTART, restarted
 from kurumaisu.critic.engine import search, uncertain_effects
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.engine.search import Naming
@@ -24,10 +23,11 @@ from kurumaisu.critic.heldout.materiality import FELT, MATERIAL, NO_NOISE, confi
 from kurumaisu.critic.judge import intervals, misfit, sentences
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
-from kurumaisu.critic.predict.predictions import Prediction
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.story import Misfit, Noise, Overlay, Story
 from kurumaisu.critic.values.verdict import Cause, Estimate, Gain, Kind, Verdict
+from kurumaisu.critic.values.version import version
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -35,17 +35,6 @@ from kurumaisu.types import FloatArray
 # At usual rates, from which growing noise is named: alone, where less is no matter, and beside something else, which in
 # another form than ours leaves residuals that grow with the rates, too.
 _GROWTH_ALONE, _GROWTH_BESIDE = 0.2, 0.4
-
-
-@dataclass(frozen=True)
-class Criticism:
-    """Everything that the critic has to say. settings: what extends the model; predictions: what was asked for."""
-
-    verdict: Verdict
-    story: Story
-    model: Model
-    settings: tuple[EffectSetting, ...]
-    predictions: tuple[Prediction, ...] = ()
 
 
 def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Criticism:

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import GRID, Drive
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.engine.search import Naming
 from kurumaisu.critic.experiment.proposal import Proposal
@@ -27,12 +27,13 @@ from kurumaisu.critic.heldout.materiality import (
 )
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.decide import Decision
-from kurumaisu.critic.judge.explain import Criticism
 from kurumaisu.critic.judge.extended_model import process_noise
-from kurumaisu.critic.judge.misfit import bins, moments
+from kurumaisu.critic.judge.misfit import moments
 from kurumaisu.critic.unknown import sentences, shapes
 from kurumaisu.critic.unknown.beyond_catalogue import Beyond
 from kurumaisu.critic.unknown.joint_fit import Extension, extend
+from kurumaisu.critic.values.binned_means import bins
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.story import Misfit, Rival
 from kurumaisu.critic.values.verdict import NORMAL90, Gain, Unknown

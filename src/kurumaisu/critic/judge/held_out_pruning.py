@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Fit
 from kurumaisu.critic.heldout.materiality import CERTAIN, confirmed, expected_nats
 from kurumaisu.critic.judge import explain_unknown

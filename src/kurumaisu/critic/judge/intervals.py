@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from kurumaisu import effects, geometry
-from kurumaisu.critic.channels.base import replay
+from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout.materiality import HORIZON, spans

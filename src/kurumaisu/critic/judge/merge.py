@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kurumaisu.critic.judge.explain import Criticism
 from kurumaisu.critic.judge.sentences import named, wrong
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.verdict import Kind, Verdict
 

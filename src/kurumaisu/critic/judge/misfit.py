@@ -9,19 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base.drive import GRID, Drive
+from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.values.story import Bins, Misfit, Moments
-from kurumaisu.critic.values.verdict import NORMAL90
+from kurumaisu.critic.values.binned_means import FOLLOWED, bins, explained
+from kurumaisu.critic.values.story import Misfit, Moments
 from kurumaisu.effects import Follows, Rate
 from kurumaisu.geometry import wrap
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
-_BINS = 15  # at most
-_FEWEST = 5  # points of which a mean has an interval
 _CHANGE = 0.5  # [s] over which a change of the input is taken
-FOLLOWED = 0.3  # share of an effect that means over a covariate must explain, to be drawn over it
 _CLEARLY = 0.15  # of that share, by which another covariate must be better than the usual one
 _NOTEWORTHY = 4.0  # standard errors from which a remaining correlation is said
 
@@ -142,27 +139,6 @@ def _followed(covariates: Sequence[Covariate], usual: str, added: FloatArray) ->
     share = {each.name: explained(each.values, added) for each in covariates}
     best = max(covariates, key=lambda each: share[each.name] + (_CLEARLY if each.name == usual else 0.0))
     return best if share[best.name] >= FOLLOWED else None
-
-
-def explained(x: FloatArray, y: FloatArray) -> float:
-    """Return the share of the sum of squares of y that means in bins of x explain."""
-    means = bins(x, y, 1)
-    return 1.0 - float(np.mean((y - np.interp(x, means.centre, means.mean)) ** 2) / max(np.mean(y**2), 1e-300))
-
-
-def bins(x: FloatArray, y: FloatArray, fewest: int = _FEWEST) -> Bins:
-    """Return means of y in bins of x of equal width; bins with fewer points are left out."""
-    count = int(np.clip(len(x) // (2 * _FEWEST), 3, _BINS))
-    low, high = np.quantile(x, [0.005, 0.995])
-    index = np.clip(np.floor((x - low) / max(high - low, 1e-12) * count), 0, count - 1)
-    rows = []
-    for i in np.unique(index):
-        inside = index == i
-        if inside.sum() >= fewest:
-            error = NORMAL90 * y[inside].std() / np.sqrt(inside.sum())
-            rows.append((x[inside].mean(), y[inside].mean(), y[inside].mean() - error, y[inside].mean() + error))
-    centre, mean, lo, hi = np.array(rows).reshape(-1, 4).T
-    return Bins(centre, mean, lo, hi)
 
 
 def _correlation(a: FloatArray, b: FloatArray) -> float:

@@ -8,14 +8,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.ranges.search import block_evidence
-from kurumaisu.critic.channels.ranges.search.block_evidence import Rival
-from kurumaisu.critic.channels.ranges.search.effect_sets import Fitted
-from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly, Normal
-from kurumaisu.critic.channels.scatter.scatter_search import Scatter
 from kurumaisu.critic.engine.search import NAMED
+from kurumaisu.critic.ranges.search import block_evidence
+from kurumaisu.critic.ranges.search.block_evidence import Rival
+from kurumaisu.critic.ranges.search.normal_equations import Normal
+from kurumaisu.critic.scatter.scatter_search import Scatter
 from kurumaisu.critic.values.verdict import NORMAL90, Cause, Estimate
-from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
@@ -23,40 +21,6 @@ from kurumaisu.types import FloatArray
 # as large, half the walls lie near those of the other one. The same where the map lacks a part of what is there, too.
 _ANOTHER, _ANOTHER_LACKS = 0.4, 0.2
 _LACKS = 0.05  # share of readings of that part, at least
-
-
-def settings_of(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
-    """Return the fitted effects as a model file has them."""
-    out, start = [], 0
-    for form in fit.forms:
-        at = fit.coefficients[start : start + len(form.columns)]
-        start += len(form.columns)
-        effect = effects.by_id(form.id)
-        if len(form.columns) > 1 and form.columns[0].beside:
-            out.append(EffectSetting(form.id, {**assembly.marks.null(effect), **assembly.marks.joined(form, at)}))
-            continue
-        values = assembly.marks.null(effect)
-        for column, coefficient in zip(form.columns, at.tolist(), strict=True):
-            if column.squared:
-                values |= _squared(effect, form.at, coefficient)
-            else:
-                values[column.parameter.name] += column.parameter.scale * coefficient
-        shape = {} if form.columns[0].squared else form.at
-        values |= shape
-        # Two effects that nearly cancel are fitted as sums, which no bound stops.
-        within = {p.name: float(np.clip(values[p.name], p.lower, p.upper)) for p in effect.parameters}
-        out.append(EffectSetting(form.id, within))
-    return out
-
-
-def _squared(effect: type[Mechanism], signs: Mapping[str, float], coefficient: float) -> dict[str, float]:
-    """Return the parameters that act by their squares together, for their common square in units of their scales."""
-    size = float(np.sqrt(max(coefficient, 0.0)))
-    return {
-        p.name: float(np.clip(p.null + signs[p.name] * size * p.scale, p.lower, p.upper))
-        for p in effect.parameters
-        if p.name in signs
-    }
 
 
 def estimates_of(setting: EffectSetting, sds: Mapping[str, float]) -> dict[str, Estimate]:

@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.ranges.noise.scan_noise import ScanNoise
-from kurumaisu.critic.channels.ranges.scans.beams import gather, look, predict
-from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly, Normal
-from kurumaisu.critic.channels.ranges.signals.effect_columns import Form
 from kurumaisu.critic.experiment.proposal import DECIDED
+from kurumaisu.critic.ranges.noise.scan_noise import ScanNoise
+from kurumaisu.critic.ranges.scans.beams import gather, look, predict
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, Normal
+from kurumaisu.critic.ranges.signals.effect_columns import Form
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import NextExperiment
 from kurumaisu.experiments import Script, names, shipped_script

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.types import FloatArray
 
 _FLAT = 0.02  # [m] what the ends of beams on one wall scatter by across it

@@ -9,33 +9,33 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base.replay import extend
-from kurumaisu.critic.channels.ranges.scans import repeatability
-from kurumaisu.critic.channels.ranges.scans.beams import gather, missing
-from kurumaisu.critic.channels.ranges.scans.valid_readings import trusted_place
-from kurumaisu.critic.channels.ranges.search import block_evidence
-from kurumaisu.critic.channels.ranges.search import misfits as pictures
-from kurumaisu.critic.channels.ranges.search.confounding import Groups, joined, twins
-from kurumaisu.critic.channels.ranges.search.dominant_effect import leading, with_lead
-from kurumaisu.critic.channels.ranges.search.effect_sets import Fitted, Search
-from kurumaisu.critic.channels.ranges.search.far_size import astray
-from kurumaisu.critic.channels.ranges.search.mean_effects import Acting, acting, cleared, gain_of, refitted
-from kurumaisu.critic.channels.ranges.search.misfits import Pictures, misfits, noise_rows
-from kurumaisu.critic.channels.ranges.search.normal_equations import Assembly, Normal
-from kurumaisu.critic.channels.ranges.search.parameter_fit import Pinned, pinned
-from kurumaisu.critic.channels.scatter.common_offset import beyond, own_sd, with_whole_scans
-from kurumaisu.critic.channels.scatter.scatter_fit import ScatterFit
-from kurumaisu.critic.channels.scatter.scatter_search import Scatter, ScatterSearch
-from kurumaisu.critic.channels.scatter.simulation import Simulator
-from kurumaisu.critic.channels.scatter.statistics import Statistics
+from kurumaisu.critic.base.replay import extend
 from kurumaisu.critic.engine.search import NAMED, RIVAL
 from kurumaisu.critic.judge.clock_drift import one_clock
 from kurumaisu.critic.judge.scan_estimates import another_map, estimates_of, of_block, with_scatter
 from kurumaisu.critic.judge.scan_experiment import every_id, supplier
 from kurumaisu.critic.judge.scan_shortcomings import lacking
 from kurumaisu.critic.judge.unknown_readings import unknowns
+from kurumaisu.critic.ranges.scans import repeatability
+from kurumaisu.critic.ranges.scans.beams import gather, missing
+from kurumaisu.critic.ranges.scans.valid_readings import trusted_place
+from kurumaisu.critic.ranges.search import block_evidence
+from kurumaisu.critic.ranges.search import misfits as pictures
+from kurumaisu.critic.ranges.search.confounding import Groups, joined, twins
+from kurumaisu.critic.ranges.search.dominant_effect import leading, with_lead
+from kurumaisu.critic.ranges.search.effect_sets import Fitted, Search
+from kurumaisu.critic.ranges.search.far_size import astray
+from kurumaisu.critic.ranges.search.mean_effects import Acting, acting, cleared, gain_of, refitted
+from kurumaisu.critic.ranges.search.misfits import misfits, noise_rows
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, Normal
+from kurumaisu.critic.ranges.search.parameter_fit import Pinned, pinned
+from kurumaisu.critic.scatter.common_offset import beyond, own_sd, with_whole_scans
+from kurumaisu.critic.scatter.scatter_fit import ScatterFit
+from kurumaisu.critic.scatter.scatter_search import Scatter, ScatterSearch
+from kurumaisu.critic.scatter.simulation import Simulator
+from kurumaisu.critic.scatter.statistics import Statistics
 from kurumaisu.critic.unknown.effect_likeness import FORM
-from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.story import Comparison
 from kurumaisu.critic.values.verdict import Cause, NextExperiment

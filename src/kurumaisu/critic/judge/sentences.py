@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.engine.search import Naming

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.channels.ranges.search import block_evidence
-from kurumaisu.critic.channels.ranges.search.block_evidence import Rival, Weighed
+from kurumaisu.critic.ranges.search import block_evidence
+from kurumaisu.critic.ranges.search.block_evidence import Rival, Weighed
 from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.unknown.shapes import grid, shape_of
+from kurumaisu.critic.values.laser_finding import CHANNEL
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import FloatArray
 
-CHANNEL = "laser.bias"
 _LISTED = 3
 _UNITS = {"range": "m", "hit_x": "m", "hit_y": "m", "time": "s"}  # all others are angles
 

@@ -15,7 +15,7 @@ from scipy.linalg import qr
 from scipy.special import expit
 
 from kurumaisu._core import Whitener
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.noise.minimiser import lowest
 from kurumaisu.critic.values.prior import occam
 from kurumaisu.types import FloatArray

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.channels.base.drive import POSE_INTERVAL, Drive
+from kurumaisu.critic.base.drive import POSE_INTERVAL, Drive
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray

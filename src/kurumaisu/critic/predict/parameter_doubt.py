@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Fit, Problem, covariance
 from kurumaisu.critic.unknown.joint_fit import Extension

@@ -5,18 +5,18 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic.channels.base.covariates import beside
-from kurumaisu.critic.channels.base.drive import driven, prepare_all
-from kurumaisu.critic.channels.ranges.scans.beams import missing
+from kurumaisu.critic.base.covariates import beside
+from kurumaisu.critic.base.drive import driven, prepare_all
 from kurumaisu.critic.predict.motion import Forecast, motion_ahead
 from kurumaisu.critic.predict.reference_path import Paths
 from kurumaisu.critic.predict.scan_matching import trained
 from kurumaisu.critic.predict.scan_poses import Places
+from kurumaisu.critic.ranges.scans.beams import missing
+from kurumaisu.critic.values.prediction import Prediction
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model
@@ -27,22 +27,6 @@ CHANNELS = ("dx", "dy", "dtheta")
 RANGE = "range"
 FILE = "prediction.csv"
 Settings = tuple[EffectSetting, ...]
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """Of one run: times t0, t1 [s]; means and sds (n,), nan where nothing is predicted; of channels, or of beams."""
-
-    run: str
-    t0: float
-    t1: float
-    means: FloatArray
-    sds: FloatArray
-
-    @property
-    def is_scan(self) -> bool:
-        """Tell whether these are ranges."""
-        return self.t0 == self.t1
 
 
 def asked(recording: Recording) -> tuple[Run, ...]:

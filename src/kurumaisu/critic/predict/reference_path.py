@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import GRID, Drive
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.ranges.scans.beams import Look, Shots, look, predict, thin
-from kurumaisu.critic.channels.ranges.scans.valid_readings import trusted_place
+from kurumaisu.critic.ranges.scans.beams import Look, Shots, look, predict, thin
+from kurumaisu.critic.ranges.scans.valid_readings import trusted_place
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray
 

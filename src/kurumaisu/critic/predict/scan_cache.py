@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.ranges.scans.beams import Look, Shots
 from kurumaisu.critic.predict.scan import Expected, looks, seen_from, undrawn
+from kurumaisu.critic.ranges.scans.beams import Look, Shots
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import IntArray
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.channels.ranges.scans.beams import Shots, Track, rows_of
 from kurumaisu.critic.predict.scan import ScanModel, expected, fit_scatter
 from kurumaisu.critic.predict.scan_poses import Places, joined
+from kurumaisu.critic.ranges.scans.beams import Shots, Track, rows_of
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray, IntArray

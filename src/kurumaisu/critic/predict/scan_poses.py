@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.channels.base.covariates import beside
-from kurumaisu.critic.channels.base.drive import Drive, driven, prepare_all
-from kurumaisu.critic.channels.ranges.scans.beams import Shots, Track, gather, thin
+from kurumaisu.critic.base.covariates import beside
+from kurumaisu.critic.base.drive import Drive, driven, prepare_all
 from kurumaisu.critic.predict.motion import Forecast, motion_ahead
 from kurumaisu.critic.predict.reference_path import Paths
+from kurumaisu.critic.ranges.scans.beams import Shots, Track, gather, thin
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray

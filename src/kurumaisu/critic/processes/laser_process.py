@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from kurumaisu.critic.channels.ranges.scans.beams import missing
 from kurumaisu.critic.judge.scan_verdict import criticise
 from kurumaisu.critic.processes.worker import Progress, Worker
+from kurumaisu.critic.ranges.scans.beams import missing
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import Model, load_model

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine import coarsened_posterior, search
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.judge.decide import Progress
+from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.types import FloatArray
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.critic.channels.base.drive import from_voltages
-from kurumaisu.critic.channels.ranges.scans.beams import laser_of, zero_of
+from kurumaisu.critic.base.drive import from_voltages
 from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.ranges.scans.beams import laser_of, zero_of
 from kurumaisu.critic.sanity import (
     headings,
     input_match,

@@ -10,8 +10,8 @@ import numpy as np
 
 from kurumaisu import geometry
 from kurumaisu._core import Scene
-from kurumaisu.critic.channels.ranges.scans.map_changes import FEW, elsewhere
-from kurumaisu.critic.channels.ranges.scans.valid_readings import uncut
+from kurumaisu.critic.ranges.scans.map_changes import FEW, elsewhere
+from kurumaisu.critic.ranges.scans.valid_readings import uncut
 from kurumaisu.critic.sanity.map_placement import nearest_maps
 from kurumaisu.critic.values.recording import LaserMount, Series
 from kurumaisu.types import FloatArray

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import GRID, prepare
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, prepare
 from kurumaisu.critic.sanity import input_match, rates
 from kurumaisu.critic.sanity.input_match import Match
 from kurumaisu.critic.sanity.rates import Rates

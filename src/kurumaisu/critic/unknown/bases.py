@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import Drive
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 

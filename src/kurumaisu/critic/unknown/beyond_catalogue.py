@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base import replay
+from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine import coarsened_posterior, search
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.engine.search import Naming

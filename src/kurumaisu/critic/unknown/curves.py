@@ -15,9 +15,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.drive import Drive
-from kurumaisu.critic.channels.base.sensitivity import Sensitivity
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import Drive
+from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.unknown.bases import Basis, bases
 from kurumaisu.critic.unknown.offset import CHANNELS, level

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base import replay
+from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.unknown.curves import Curve, Design, columns
 from kurumaisu.types import FloatArray

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.critic.channels.base import replay
+from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.unknown.curves import Belief, Curve, belief, columns, taken_up
 

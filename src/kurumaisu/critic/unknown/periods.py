@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.sensitivity import Sensitivity
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray

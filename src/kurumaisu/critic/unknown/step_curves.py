@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic.channels.base import replay
+from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.unknown.bases import FINER, Basis
 from kurumaisu.critic.unknown.curves import Belief, Curve, beliefs, columns, taken_up

@@ -5,9 +5,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kurumaisu.critic.channels.ranges.search.misfits import NO_PICTURES, Pictures
+from kurumaisu.critic.values.story import Comparison, Misfit, Noise, Rival
 from kurumaisu.critic.values.verdict import Cause, NextExperiment, Unknown
 from kurumaisu.params import EffectSetting
+
+CHANNEL = "laser.bias"  # that of what is outside the catalogue
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """What a finding adds to the report."""
+
+    misfits: tuple[Misfit, ...] = ()
+    rivals: tuple[Rival, ...] = ()
+    noise: tuple[Noise, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
+
+
+NO_PICTURES = Pictures()
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from kurumaisu import settings
 from kurumaisu.critic.app.options import name_list
-from kurumaisu.critic.channels.base.replay import model_of
+from kurumaisu.critic.base.replay import model_of
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.view.album import read_album
 from kurumaisu.critic.view.tape import Showing

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.channels.ranges.scans.walls import Rays
+from kurumaisu.critic.ranges.scans.walls import Rays
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.critic.view.spool import Spool
 from kurumaisu.params import Laser

@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.channels.base import replay
-from kurumaisu.critic.channels.base.covariates import informed
-from kurumaisu.critic.channels.base.drive import prepare
-from kurumaisu.critic.channels.base.restarted_path import PICTURE, RESTART, restarted
-from kurumaisu.critic.channels.ranges.scans.beams import laser_of
-from kurumaisu.critic.channels.ranges.scans.walls import Rays, walls_at
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.base.restarted_path import PICTURE, RESTART, restarted
+from kurumaisu.critic.ranges.scans.beams import laser_of
+from kurumaisu.critic.ranges.scans.walls import Rays, walls_at
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.critic.view.album import Album, span
 from kurumaisu.critic.view.scans import Scans
