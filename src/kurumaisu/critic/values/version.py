@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from xml.etree import ElementTree
 
-from kurumaisu.settings import shipped
+from kurumaisu.params import shipped
 
 
 def version() -> str:
