@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 
-from kurumaisu.bench import next_experiment as bench
+from kurumaisu.bench.critic import next_experiment as bench
 from kurumaisu.critic import design, plan, rehearse
 from kurumaisu.critic.design import Prediction, divergence, left_over
 from kurumaisu.critic.reading import read_recording

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kurumaisu.bench import drives, sanity, wrong_data, wrong_scans
+from kurumaisu.bench.critic import drives, sanity, wrong_data, wrong_scans
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic import sanity_fit, sanity_input, sanity_rates, sanity_rows, sanity_stamps
 from kurumaisu.critic.reading import read_recording

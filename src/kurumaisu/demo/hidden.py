@@ -15,8 +15,8 @@ from kurumaisu.critic.job import Job
 from kurumaisu.critic.recording import Run, Series
 from kurumaisu.critic.write_csv import write_csv_run
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
-from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
-from kurumaisu.sim.joystick import joystick
+from kurumaisu.sim.chair.joystick import joystick
+from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator, Command
 from kurumaisu.sim.settings import load_dynamics, with_effects
 from kurumaisu.world import load_world
 
