@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the server has said: world, map, newest state and scans, and the trails that we keep of it.
 
-import {decode} from "./decode.js";
-import {News} from "./dom.js";
+import {decode} from "../server/decode.js";
+import {News} from "../common/dom.js";
 import {prepare} from "./shapes.js";
 import {Trail} from "./trail.js";
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // One effect: its switch, and behind the arrow its sliders.
 
-import {make, newest, setText} from "./dom.js";
+import {make, newest, setText} from "../common/dom.js";
 import {slider} from "./slider.js";
 
 export class EffectRow {

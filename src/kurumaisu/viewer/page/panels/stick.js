@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The stick on the screen and the keys that do the same.
 
-import {byId, fixed, make, setPressed, setText} from "./dom.js";
-import {Drive} from "./drive.js";
+import {byId, fixed, make, setPressed, setText} from "../common/dom.js";
+import {Drive} from "./dead_man.js";
 
 const KEYS = {
   ArrowUp: [1, 0], KeyW: [1, 0], ArrowDown: [-1, 0], KeyS: [-1, 0],

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Choosing, moving and turning bodies; measuring; telling the localization where the chair is.
 
-import {newest, short} from "./dom.js";
-import {label} from "./draw_names.js";
-import {covers} from "./shapes.js";
+import {newest, short} from "../common/dom.js";
+import {label} from "./names.js";
+import {covers} from "../scene/shapes.js";
 
 const HANDLE = 26; // [px] from a body's edge to the handle that turns it
 const GRIP = {mouse: 10, pen: 12, touch: 22}; // [px] radius in which handle and small bodies are hit

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A number as a slider and a field. Bounds are far apart and what matters is near zero, so the slider is finer there.
 
-import {make, short} from "./dom.js";
+import {make, short} from "../common/dom.js";
 
 const STEPS = 1000;
 const BEND = 3; // power of the slider's law

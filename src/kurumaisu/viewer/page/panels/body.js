@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The chosen body in numbers: the way to choose and place one without a mouse.
 
-import {byId, degrees, fixed, make, radians, setText} from "./dom.js";
+import {byId, degrees, fixed, make, radians, setText} from "../common/dom.js";
 
 export class BodyPanel {
   /** ask(name, values): a command; say(text): for those who do not see the picture. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Pause, step, speed, reset, seed, record, emergency stop: what the simulator or the robot is told.
 
-import {byId, make, setPressed, setText} from "./dom.js";
+import {byId, make, setPressed, setText} from "../common/dom.js";
 
 export class Transport {
   /** ask(name, values): a command, failures are said elsewhere; stick: to be let go at a stop; say(text). */

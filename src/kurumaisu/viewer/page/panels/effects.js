@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The catalogue of effects: search, switches, and a model file of what acts.
 
-import {byId, make, setText} from "./dom.js";
+import {byId, make, setText} from "../common/dom.js";
 import {EffectRow} from "./effect_row.js";
-import {download} from "./files.js";
+import {download} from "../common/download.js";
 
 const FAMILIES = {base: "The base", laser: "The laser", world: "The world"};
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // In the critic's report, where the viewer serves it: a point leads to its moment and place.
 
-import {ask} from "./channel.js";
-import {fragment, largest, pictures, quantity, told} from "./report_data.js";
+import {ask} from "../common/channel.js";
+import {fragment, largest, pictures, quantity, told} from "./data.js";
 
 const VIEWER = "kurumaisu-viewer"; // the window that the viewer is in
 const NEAR = 12; // of the picture's own coordinates: points are found from so far

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A recording: play, hold, any moment of it.
 
-import {byId, fixed, newest, setText} from "./dom.js";
+import {byId, fixed, newest, setText} from "../common/dom.js";
 
 const NUDGE = 0.1; // [s] of a key
 

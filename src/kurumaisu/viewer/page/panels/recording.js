@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The runs of a recording, and their ways from beginning to end.
 
-import {byId, make} from "./dom.js";
+import {byId, make} from "../common/dom.js";
 
 const DASHES = {odom: [7, 4]};
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the critic's report says is furthest off: where on the map, and when.
 
-import {byId, make, setText} from "./dom.js";
-import {fragment, largest, pictures, quantity, told} from "./report_data.js";
+import {byId, make, setText} from "../common/dom.js";
+import {fragment, largest, pictures, quantity, told} from "../report/data.js";
 
 // Of the report's page only the data are wanted; its styles may not act here, and each would be complained about.
 const STYLES = /<(style)\b[^>]*>[^]*?<\/\1>|\bstyle="[^"]*"/g;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What is shown and how. The controls of the page hold the values to begin with.
 
-import {News, byId, setPressed} from "./dom.js";
+import {News, byId, setPressed} from "../common/dom.js";
 
 /** News: "change". */
 export class Options extends News {

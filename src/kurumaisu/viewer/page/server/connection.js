@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The line to the server: connects, says who we are, reconnects, and pairs commands with replies.
 
-import {News} from "./dom.js";
+import {News} from "../common/dom.js";
 
 const VERSION = 1;
 const WAITS = [250, 500, 1000, 2000, 4000, 8000]; // [ms] between attempts, the last one for good

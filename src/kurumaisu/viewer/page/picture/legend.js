@@ -2,10 +2,10 @@
 // Scale bar and colour scale, in the picture itself: a saved picture needs them as well.
 
 import {BUCKETS} from "./colors.js";
-import {fixed, short} from "./dom.js";
-import {label} from "./draw_names.js";
-import {niceLength} from "./draw_ground.js";
-import {strongest} from "./draw_scans.js";
+import {fixed, short} from "../common/dom.js";
+import {label} from "./names.js";
+import {niceLength} from "./ground.js";
+import {strongest} from "./scans.js";
 
 const LEFT = 14; // [px]
 const BOTTOM = 16;

@@ -4,13 +4,13 @@
 
 import {Camera} from "./camera.js";
 import {readColors} from "./colors.js";
-import {drawBodies, drawMarks} from "./draw_bodies.js";
-import {drawGrid, drawWalls} from "./draw_ground.js";
-import {drawLegend} from "./draw_legend.js";
-import {drawMap} from "./draw_map.js";
-import {drawNames} from "./draw_names.js";
-import {drawFans, drawScans} from "./draw_scans.js";
-import {drawParticles, drawPoses, drawTrails} from "./draw_traces.js";
+import {drawBodies, drawMarks} from "./bodies.js";
+import {drawGrid, drawWalls} from "./ground.js";
+import {drawLegend} from "./legend.js";
+import {drawMap} from "./map.js";
+import {drawNames} from "./names.js";
+import {drawFans, drawScans} from "./scans.js";
+import {drawParticles, drawPoses, drawTrails} from "./traces.js";
 
 export class Picture {
   camera = new Camera();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The frame: tabs, theme, help.
 
-import {byId, make, setText} from "./dom.js";
+import {byId, make, setText} from "../common/dom.js";
 
 const THEMES = ["auto", "light", "dark"];
 const STORE = "kurumaisu.theme";

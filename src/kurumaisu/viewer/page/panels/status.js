@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Readings, the state of the line, notes of the source, and messages to the user.
 
-import {byId, fixed, make, setText} from "./dom.js";
+import {byId, fixed, make, setText} from "../common/dom.js";
 
 const STALE = 2000; // [ms] without news: said
 const LOOK = 500; // [ms] between looks at that

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Who may do what: a command that the source does not know has no control; one that is not ours is there, and says why not.
 
-import {News} from "./dom.js";
+import {News} from "../common/dom.js";
 
 const OFF = "Not connected";
 const ASKING = "Asking for control";
