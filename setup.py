@@ -9,7 +9,7 @@ setup(
         package_data={
             "kurumaisu.bench": ["drivers/*.cpp", "drivers/*.h"],
             "kurumaisu.critic": ["report/*.html", "values/*.json"],
-            "kurumaisu.viewer": ["page/*"],
+            "kurumaisu.viewer": ["page/*", "page/*/*"],
             "kurumaisu": ["py.typed"],
         },
     )

@@ -33,7 +33,7 @@ def running():
 @pytest.fixture
 def page(running):
     """A client of it, which may only look."""
-    from kurumaisu.bench.viewer_page import Page
+    from kurumaisu.bench.speed.viewer.page import Page
 
     one = Page(running.server.address)
     yield one

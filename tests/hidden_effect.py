@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu.critic.values.recording import Recording, Run, Series
-from kurumaisu.sim.joystick import joystick
+from kurumaisu.sim.chair.joystick import joystick
 from kurumaisu.types import FloatArray
 
 # id: from, to, of either sign

@@ -20,8 +20,8 @@ from nav_msgs.srv import SetMap
 from std_srvs.srv import Empty
 
 from kurumaisu.geometry import wrap
-from kurumaisu.ros.testing import Topic, deviation, pose_of, wait_for
-from kurumaisu.ros.testing_room import BEAMS, STEP, WALLS, Room, ranges_at, transform, truth
+from kurumaisu.ros.testing.nodes import Topic, deviation, pose_of, wait_for
+from kurumaisu.ros.testing.room import BEAMS, STEP, WALLS, Room, ranges_at, transform, truth
 
 DEADLINE = 40.0  # [s] of the wall clock
 EDGE, MARGIN = 0.05, 0.525  # [m] the walls lie in the middle of their cells

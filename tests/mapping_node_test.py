@@ -30,10 +30,10 @@ from std_srvs.srv import Trigger
 
 from kurumaisu.geometry import between, compose, wrap
 from kurumaisu.map_file import read_map
-from kurumaisu.ros.map_messages import map_of
+from kurumaisu.ros.maps.messages import map_of
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import Topic, wait_for
-from kurumaisu.ros.testing_room import BEAMS, SPEED_ERROR, STEP, WALLS, Room, ranges_at, truth
+from kurumaisu.ros.testing.nodes import Topic, wait_for
+from kurumaisu.ros.testing.room import BEAMS, SPEED_ERROR, STEP, WALLS, Room, ranges_at, truth
 from kurumaisu.slam_score import distance_to_walls
 
 DEADLINE = 40.0  # [s] of the wall clock, for any one thing to happen

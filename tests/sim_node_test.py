@@ -19,7 +19,7 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, SetBool
 
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import PATIENCE, Topic, pose_of, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, pose_of, wait_for
 
 STEP = rospy.Duration(0, 10_000_000)
 
@@ -37,7 +37,7 @@ class BadConfiguration:
         name = f"bad_{self.id().rsplit('.', 1)[-1]}"
         rospy.set_param(f"/{name}", values)
         # Not rosrun: in a workspace it finds scripts several times and asks which.
-        node = [sys.executable, "-c", "from kurumaisu.ros.sim_node import main; main()"]
+        node = [sys.executable, "-c", "from kurumaisu.ros.sim.node import main; main()"]
         command = [*node, f"__name:={name}", "/clock:=/bad_clock", "scan:=bad_scan"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
         return done.returncode, done.stdout + done.stderr

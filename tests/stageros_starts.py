@@ -14,7 +14,7 @@ import rosmaster.master
 from sensor_msgs.msg import LaserScan
 from stageros_rig import ONE, Stageros
 
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
 
 
 class RealTime(unittest.TestCase):

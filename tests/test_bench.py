@@ -6,7 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from kurumaisu.bench import __main__, agreement_beams, base, chair, peers, rays, robots, sim, ways
+from kurumaisu.bench import __main__, peers
+from kurumaisu.bench.accuracy.stage import beams
+from kurumaisu.bench.speed import base, chair, rays, robots, sim, ways
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
@@ -104,4 +106,4 @@ def test_a_peer_that_is_not_there(tmp_path):
 def test_agreement_leaves_out_jumps_but_no_slopes():
     slope = [np.array([value, value]) for value in (5.0, 4.8, 4.9, 5.1, 5.2)]  # here, right2, right, left, left2
     slope[3][1] = 7.0
-    assert agreement_beams._edges(slope, 0.02).tolist() == [False, True]
+    assert beams._edges(slope, 0.02).tolist() == [False, True]

@@ -22,7 +22,12 @@ from kurumaisu.critic.processes.worker import Progress, Worker
 from kurumaisu.errors import Error
 
 QUICK = ["--only", "base.gain_v", "--quiet"]
-CRITIC = [sys.executable, "-P", "-c", "import sys; from kurumaisu.ros.critic_command import main; sys.exit(main())"]
+CRITIC = [
+    sys.executable,
+    "-P",
+    "-c",
+    "import sys; from kurumaisu.ros.tools.critic_command import main; sys.exit(main())",
+]
 
 
 @pytest.fixture(scope="module")

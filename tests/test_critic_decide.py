@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import Ask, base_case, make
-from kurumaisu.bench.hidden.noise import Colour, Regime
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.generator.noise import Colour, Regime
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine import refit, search
@@ -142,7 +143,7 @@ def test_noise_about_nothing_hides_no_weak_turn_by_the_heading():
 
 def test_slow_noise_is_heard_where_noise_about_a_curve_lacks_it():
     regime = Regime((Colour((0.01, 0.002, 0.01), 0.2), Colour((0.01, 0.001, 0.03), 3.0)), 0.002, 0.002)
-    data = base_case.recording("null", base_case.draw_drives("rich", regime, np.random.default_rng(1), rate=5.0), ())
+    data = recordings.recording("null", recordings.draw_drives("rich", regime, np.random.default_rng(1), rate=5.0), ())
     model, own = load_model(shipped("launch/md100.yaml")), noise_of(regime)
     problem = Problem([prepare(run, model) for run in data.runs], model, own, ids=frozenset({"base.gain_v"}))
     nothing = problem.fit_candidates((), {})

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden.base_case import draw_drives, recording
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.motion import Fault
-from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.base.recordings import draw_drives, recording
+from kurumaisu.bench.hidden.generator.motion import Fault
+from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.sanity import early_stamps
 from kurumaisu.critic.values.recording import Recording

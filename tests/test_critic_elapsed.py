@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import base_case
-from kurumaisu.bench.hidden.motion import Fault, Form
-from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.generator.motion import Fault, Form
+from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.data.elapsed import timed
 from kurumaisu.critic.values.recording import Recording, Run, Series
@@ -58,12 +58,12 @@ def test_one_run_and_what_was_measured_and_runs_without_times_are_left_alone():
 def criticised(change):
     """Return the verdict about runs with restarting clocks, rates changed by the time since the first one began."""
     rng = np.random.default_rng(3)
-    drives = base_case.draw_drives("rich", USUAL, rng, seconds=SPAN, rate=10.0)
+    drives = recordings.draw_drives("rich", USUAL, rng, seconds=SPAN, rate=10.0)
     runs = []
     for i, (setting, error) in enumerate(zip(drives.settings, drives.errors, strict=True)):
         fault = Fault(Form("floor", lambda r, _, begun=i * SPAN: change(r, r.t + begun)), {})
         only = replace(drives, settings=(setting,), errors=(error,))
-        runs.append(replace(base_case.recording("one", only, [fault]).runs[0], name=f"run_{i + 1}"))
+        runs.append(replace(recordings.recording("one", only, [fault]).runs[0], name=f"run_{i + 1}"))
     names = tuple(run.name for run in runs)
     return pipeline.criticise(Recording("through", tuple(runs), train=names), MODEL, lambda _: None).verdict
 
@@ -85,7 +85,7 @@ def test_what_is_otherwise_from_a_moment_on_is_no_matter_of_place():
 def test_a_clock_that_runs_on_from_run_to_run_is_named():
     """By the last run the reference is a tenth of a second early: before what was asked of the chair."""
     rng = np.random.default_rng(4)
-    recording = base_case.recording("clocks", base_case.draw_drives("rich", USUAL, rng, seconds=SPAN, rate=10.0), [])
+    recording = recordings.recording("clocks", recordings.draw_drives("rich", USUAL, rng, seconds=SPAN, rate=10.0), [])
     scale, runs = -4e-4, []
     for i, run in enumerate(recording.runs):
         begun = 100.0 * i

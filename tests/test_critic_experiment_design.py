@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 
-from kurumaisu.bench import next_experiment as bench
+from kurumaisu.bench.critic import next_experiment as bench
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.experiment import design, plan, rehearse
 from kurumaisu.critic.experiment.design import Prediction, divergence, left_over

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import Ask, base_catalogue, make
-from kurumaisu.bench.hidden.motion import STEP, Form
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.bench.hidden.base import catalogue
+from kurumaisu.bench.hidden.generator.motion import STEP, Form
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.engine import form_error_fit
 from kurumaisu.critic.engine.form_error import Missed, Muted, change
@@ -77,8 +78,8 @@ def test_a_chair_that_turns_sooner_less_than_more_lags_and_does_nothing_else(tmp
             out[k], level = (level + after) / 2, after
         return replace(rates, w=out)
 
-    hidden = replace(base_catalogue.BASE["base.lag_w"], other=Form("rates", uneven))
-    monkeypatch.setitem(base_catalogue.BASE, "base.lag_w", hidden)
+    hidden = replace(catalogue.BASE["base.lag_w"], other=Form("rates", uneven))
+    monkeypatch.setitem(catalogue.BASE, "base.lag_w", hidden)
     case = make(Ask("single", ("base.lag_w",), 30.0, "other", regime="usual", family="base"), 31703, tmp_path)
     verdict = pipeline.criticise(case.recording, MD100, lambda _: None).verdict
     assert ([cause.id for cause in verdict.causes], verdict.confounded, verdict.unknown) == (["base.lag_w"], (), ())

@@ -11,11 +11,11 @@ import pytest
 from laser_scene import recording as scanned
 
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.bench.hidden.base_case import draw_drives, recording
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.case import Known
-from kurumaisu.bench.hidden.motion import drive as driven_by
-from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.base.recordings import draw_drives, recording
+from kurumaisu.bench.hidden.generator.case import Known
+from kurumaisu.bench.hidden.generator.motion import drive as driven_by
+from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import gain_share, noise_of
 from kurumaisu.critic.app.job import Outcome
 from kurumaisu.critic.app.results import summary

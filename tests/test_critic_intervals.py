@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import base_case
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Problem
@@ -25,8 +25,8 @@ NOISE = Noise(position_sd=0.005, heading_sd=0.005, sd_v=0.01, sd_lateral=0.003, 
 
 def fitted(names, hidden, form="plain", seed=1):
     """Return the problem of drives with hidden sizes, by id, and the fit of some names."""
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(seed), seconds=40.0, rate=10.0)
-    data = base_case.recording("sizes", drives, [BASE[name].fault(size, form) for name, size in hidden.items()])
+    drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(seed), seconds=40.0, rate=10.0)
+    data = recordings.recording("sizes", drives, [BASE[name].fault(size, form) for name, size in hidden.items()])
     problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset(names))
     return problem, problem.fit(names, {})
 

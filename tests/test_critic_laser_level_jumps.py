@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden.laser_forms import ar1
+from kurumaisu.bench.hidden.laser.forms import ar1
 from kurumaisu.critic.ranges.noise.level_jumps import jumps, parted
 
 STAND = np.repeat([-1, 0, 1, 2], 20)

@@ -11,11 +11,11 @@ from hidden_effect import recording_of
 from scipy.special import logit
 
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.bench.hidden.base_case import run_of
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.motion import STEP, Setting
-from kurumaisu.bench.hidden.motion import drive as hidden_drive
-from kurumaisu.bench.hidden.noise import USUAL, draw_rates, draw_reference
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.base.recordings import run_of
+from kurumaisu.bench.hidden.generator.motion import STEP, Setting
+from kurumaisu.bench.hidden.generator.motion import drive as hidden_drive
+from kurumaisu.bench.hidden.generator.noise import USUAL, draw_rates, draw_reference
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive, prepare
 from kurumaisu.critic.engine import neighbouring_sets, refit, search

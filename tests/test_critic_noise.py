@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden.base_case import draw_drives, recording
-from kurumaisu.bench.hidden.motion import drive
-from kurumaisu.bench.hidden.noise import REGIMES
+from kurumaisu.bench.hidden.base.recordings import draw_drives, recording
+from kurumaisu.bench.hidden.generator.motion import drive
+from kurumaisu.bench.hidden.generator.noise import REGIMES
 from kurumaisu.bench.hidden.oracle import errors
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.noise.base_noise import Scatter

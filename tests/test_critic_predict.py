@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from kurumaisu import geometry
-from kurumaisu.bench.hidden.base_case import draw_drives, recording
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.noise import REGIMES
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.base.recordings import draw_drives, recording
+from kurumaisu.bench.hidden.generator.noise import REGIMES
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.app.arrays import recording_of

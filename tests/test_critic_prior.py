@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from kurumaisu.bench.hidden import Ask, base_case, make
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Problem
@@ -58,8 +59,8 @@ def problem_of(runs, noise, ids):
 
 def cost_of(name, sizes):
     """Return what a hidden effect costs when it is fitted, and the norm of its signal."""
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
-    runs = base_case.recording("one", drives, [BASE[name].fault(sizes, "plain")]).runs
+    drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
+    runs = recordings.recording("one", drives, [BASE[name].fault(sizes, "plain")]).runs
     problem = problem_of(runs, NOISE, frozenset([name]))
     fit = problem.fit([name], {})
     signal = np.linalg.norm(problem.residual((), np.empty(0)) - problem.residual(fit.terms, fit.values))

@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import Ask, base_case, base_rates, make, motion
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.bench.hidden.base import rates, recordings
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.generator import motion
+from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import prepare
@@ -25,8 +27,8 @@ STEP = "base.dac_quantisation"
 
 
 def problem_of(seed, faults, ids, design="rich"):
-    drives = base_case.draw_drives(design, USUAL, np.random.default_rng(seed), seconds=40.0, rate=10.0)
-    data = base_case.recording("hidden", drives, faults)
+    drives = recordings.draw_drives(design, USUAL, np.random.default_rng(seed), seconds=40.0, rate=10.0)
+    data = recordings.recording("hidden", drives, faults)
     return Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset(ids))
 
 
@@ -114,10 +116,10 @@ def test_a_ramp_shorter_than_a_step_begins_when_its_command_does(start):
 
 def test_a_top_speed_that_only_the_fastest_drives_meet_is_found():
     """Half of the sizes of a comb with even steps would have no such drive, the others half of all drives."""
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(4), seconds=40.0, rate=10.0)
+    drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(4), seconds=40.0, rate=10.0)
     top = 0.97 * max(float(np.abs(setting.command[:, 1]).max()) for setting in drives.settings)
     fault = BASE["base.saturation"].fault({"size": 1 - top, "axis": 0.0, "top_v": 1.0, "top_w": 1.0}, "plain")
-    data = base_case.recording("top", drives, [fault])
+    data = recordings.recording("top", drives, [fault])
     problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, NOISE, ids=frozenset({"base.saturation"}))
     ahead = next(c for c in problem.candidates if [term.key[1] for term in c.terms] == ["inverse_v", "knee"])
     fit = problem.fit_candidates([ahead], {})
@@ -138,7 +140,7 @@ def test_a_limit_with_a_round_corner_is_told_from_one_with_a_sharp_one(form, kne
 
 def jerk_limited(r, s):
     """Ramps whose slope itself comes and goes over `jerk` [s]: means over so long."""
-    ramped = base_rates.accel_limit(r, s)
+    ramped = rates.accel_limit(r, s)
     count = round(s["jerk"] / motion.STEP)
     v, w = (
         np.convolve(np.pad(rate, (count - 1, 0)), np.full(count, 1 / count), "valid") for rate in (ramped.v, ramped.w)
@@ -146,7 +148,7 @@ def jerk_limited(r, s):
     return replace(ramped, v=v, w=w)
 
 
-@pytest.mark.parametrize(("act", "rounded"), [(base_rates.accel_limit, 0.0), (jerk_limited, 0.04)])
+@pytest.mark.parametrize(("act", "rounded"), [(rates.accel_limit, 0.0), (jerk_limited, 0.04)])
 def test_a_ramp_with_round_corners_is_a_ramp_without_a_delay(act, rounded):
     fault = motion.Fault(motion.Form("rates", act), {"size": 0.4, "ratio": 0.8, "jerk": 0.03})
     found = search.search(problem_of(6, [fault], {"base.accel_limit", "base.delay"}), lambda _: None)

@@ -3,9 +3,9 @@
 
 import numpy as np
 
-from kurumaisu.bench.hidden import base_case
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine import search
@@ -52,9 +52,9 @@ def test_what_is_no_twin_or_hardly_likely_is_not_exchanged():
 def test_one_effect_that_does_what_two_others_do_does_not_hide_them():
     """A load makes both rates slower, as two gains do: from the set with it the true one is four changes away."""
     sizes = {"base.gain_v": 0.124, "base.gain_w": 0.10, "base.left_right_gain": 0.11}
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
+    drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
     faults = [BASE[name].fault({"size": size}, "plain") for name, size in sizes.items()]
-    runs = base_case.recording("gains", drives, faults).runs
+    runs = recordings.recording("gains", drives, faults).runs
     ids = frozenset((*sizes, "base.payload", "base.curvature_v", "base.curvature_w", "base.dead_zone_w"))
     problem = Problem([prepare(run, MODEL) for run in runs], MODEL, noise_of(USUAL), ids=ids)
     assert search.search(problem, lambda _: None).best.ids == set(sizes)
@@ -62,8 +62,8 @@ def test_one_effect_that_does_what_two_others_do_does_not_hide_them():
 
 def test_a_search_whose_lines_promise_nothing_goes_on_by_fits(monkeypatch):
     """Beside a large bend every set that lines know may lie outside its bounds."""
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=20.0, rate=10.0)
-    runs = base_case.recording("gain", drives, [BASE["base.gain_v"].fault({"size": 0.2}, "plain")]).runs
+    drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=20.0, rate=10.0)
+    runs = recordings.recording("gain", drives, [BASE["base.gain_v"].fault({"size": 0.2}, "plain")]).runs
     ids = frozenset({"base.gain_v", "base.curvature_v"})
     problem = Problem([prepare(run, MODEL) for run in runs], MODEL, noise_of(USUAL), ids=ids)
     monkeypatch.setattr(search.Screen, "guesses", lambda _: [])

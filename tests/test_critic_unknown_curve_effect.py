@@ -13,7 +13,7 @@ from kurumaisu import effects
 from kurumaisu.effects import Context, Motion
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
-from kurumaisu.sim.chair import ChairSimulator, Command
+from kurumaisu.sim.chair.simulator import ChairSimulator, Command
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.world import load_world
 

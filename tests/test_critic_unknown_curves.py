@@ -10,10 +10,11 @@ import unknown_effects as hidden
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from kurumaisu.bench.hidden import Ask, base_case
+from kurumaisu.bench.hidden import Ask
 from kurumaisu.bench.hidden import make as hidden_make
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.noise import REGIMES
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.generator.noise import REGIMES
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.covariates import informed
@@ -344,8 +345,8 @@ def test_columns_of_words_are_no_covariates_and_constant_ones_neither():
 def test_a_curve_that_draws_a_strong_cause_as_well_does_not_hide_it():
     """A lever moves the reference sideways in proportion to w, as a curve over w would, and far out of the noise."""
     rng = np.random.default_rng(11)
-    drives = base_case.draw_drives("rich", REGIMES["quiet"], rng, seconds=60.0, rate=20.0)
-    recording = base_case.recording("lever", drives, [BASE["base.marker_x"].fault({"size": 0.25}, "plain")])
+    drives = recordings.draw_drives("rich", REGIMES["quiet"], rng, seconds=60.0, rate=20.0)
+    recording = recordings.recording("lever", drives, [BASE["base.marker_x"].fault({"size": 0.25}, "plain")])
     verdict = pipeline.criticise(recording, MD100, lambda _: None).verdict
     assert [cause.id for cause in verdict.causes] == ["base.marker_x"]
     assert verdict.causes[0].p > 0.99

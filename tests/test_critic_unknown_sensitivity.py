@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from kurumaisu.bench.hidden import base_case
-from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import prepare, split
 from kurumaisu.critic.base.sensitivity import Sensitivity
@@ -19,8 +19,8 @@ MODEL = load_model(shipped("launch/md100.yaml"))
 
 @pytest.fixture(scope="module")
 def drive():
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(4), seconds=20.0, rate=50.0)
-    return prepare(base_case.recording("columns", drives, []).runs[0], MODEL)
+    drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(4), seconds=20.0, rate=50.0)
+    return prepare(recordings.recording("columns", drives, []).runs[0], MODEL)
 
 
 def seen_within_a_cell(drive):

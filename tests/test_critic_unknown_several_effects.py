@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import base_case
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.noise import USUAL
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.evidence import Problem
@@ -24,9 +24,9 @@ TWO = ("base.dac_zero_s", "base.dead_zone_w")
 @pytest.fixture(scope="module")
 def found():
     """Return drives with a large offset and a large dead zone, and what the catalogue says."""
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(7), rate=10.0)
+    drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(7), rate=10.0)
     faults = [BASE[name].fault({"size": size}, "plain") for name, size in zip(TWO, (-0.067, 0.27), strict=True)]
-    data = base_case.recording("two", drives, faults)
+    data = recordings.recording("two", drives, faults)
     problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, noise_of(USUAL), ids=frozenset(TWO))
     return problem, search(problem, lambda _: None)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.critic_table import Ask
+from kurumaisu.bench.critic.by_effect import Ask
 from kurumaisu.bench.hidden.make import make
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.base.replay import model_of

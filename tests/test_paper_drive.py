@@ -8,16 +8,16 @@ import pytest
 import yaml
 from scipy import odr, stats
 
-from kurumaisu.bench import paper as bench
+from kurumaisu.bench.paper import drive as bench
 from kurumaisu.critic.data.csv_reader import read_csv_run
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.experiments import load_script, nominal_path
-from kurumaisu.paper import drive, identify, law, law_file, lines
+from kurumaisu.paper.chair import drive, identify, law, law_file, lines
+from kurumaisu.paper.chair.samples import samples_of
 from kurumaisu.paper.options import load_options
-from kurumaisu.paper.samples import samples_of
 from kurumaisu.params import load_model, shipped
-from kurumaisu.ros.paper_command import main
+from kurumaisu.ros.paper.command import main
 
 OPTIONS = load_options()
 MODEL = shipped("launch/md100.yaml")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kurumaisu.bench import drives, sanity, wrong_data, wrong_scans
+from kurumaisu.bench.critic import drives, sanity, wrong_data, wrong_scans
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.sanity import input_match, map_placement, pose_stamps, rates

@@ -12,11 +12,12 @@ import pytest
 import yaml
 from recordings import full_run, write_bag
 
-from kurumaisu import _slam, map_command, maps, slam
+from kurumaisu import _slam, maps, slam
 from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose
 from kurumaisu.params import shipped
+from kurumaisu.ros.tools import map_command
 
 DATASETS = Path("/usr/share/mrpt/datasets")
 SENA = DATASETS / "2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog"

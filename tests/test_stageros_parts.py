@@ -9,12 +9,12 @@ from sim_worlds import ROOM, drive, robot, simulator
 
 from kurumaisu.effects import Reference
 from kurumaisu.errors import Error
-from kurumaisu.ros.stageros_names import Names
-from kurumaisu.ros.stageros_newcomers import renumbered
-from kurumaisu.ros.stageros_rates import Pace
-from kurumaisu.ros.stageros_saved import packed_names, unpacked_names
-from kurumaisu.ros.stageros_settings import read_settings
-from kurumaisu.ros.stageros_truth import Truth
+from kurumaisu.ros.stageros.added_models import renumbered
+from kurumaisu.ros.stageros.names import Names
+from kurumaisu.ros.stageros.rates import Pace
+from kurumaisu.ros.stageros.saved_names import packed_names, unpacked_names
+from kurumaisu.ros.stageros.settings import read_settings
+from kurumaisu.ros.stageros.truth import Truth
 from kurumaisu.world.layout import family
 
 

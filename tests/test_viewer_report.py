@@ -193,5 +193,5 @@ def test_a_report_is_served_with_our_script_and_no_other():
     assert policy["script-src"] == "'self'"  # so the inline one does not run
     for sheet in (b"a{}", b"b{}"):
         assert base64.b64encode(hashlib.sha256(sheet).digest()).decode() in policy["style-src-elem"]
-    assert body.count(b'<script type="module" src="../page/report.js"></script>') == 1
+    assert body.count(b'<script type="module" src="../page/report/report.js"></script>') == 1
     assert body.index(b"report.js") < body.index(b"</body>")

@@ -18,10 +18,10 @@ from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
-from kurumaisu.bench.viewer_page import Page
+from kurumaisu.bench.speed.viewer.page import Page
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
-from kurumaisu.ros.viewer_calls import call
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
+from kurumaisu.ros.viewer.calls import call
 
 STEP = 0.01  # [s]
 

@@ -42,6 +42,7 @@ from kurumaisu.effects.gain import GainV, GainW
 from kurumaisu.effects.lag import LagV, LagW
 from kurumaisu.effects.laser import LASER, BeamEffect, Beams, Echoes, LaserEffect, LaserStage, ReadingEffect
 from kurumaisu.effects.laser.chain import LaserChain, incidence, slanted
+from kurumaisu.effects.laser.smooth import RANGE_COVARIATES, smooth_range_id, smooth_range_of
 from kurumaisu.effects.lateral_slip import LateralSlip
 from kurumaisu.effects.left_right_gain import LeftRightGain
 from kurumaisu.effects.map_error import MapError
@@ -63,7 +64,6 @@ from kurumaisu.effects.smooth_covariates import (
     RECORDING_TIME,
     Follower,
 )
-from kurumaisu.effects.smooth_laser import RANGE_COVARIATES, smooth_range_id, smooth_range_of
 from kurumaisu.effects.steering_law import SteeringLaw
 from kurumaisu.effects.understeer import Understeer
 from kurumaisu.effects.veer import Veer

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.critic.data.reading import read_recording
-from kurumaisu.real.asking import ask, there
+from kurumaisu.real.criticise import ask, there
 
 
 def run(data: Path, output: Path) -> None:

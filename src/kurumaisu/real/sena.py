@@ -9,7 +9,7 @@ import numpy as np
 
 from kurumaisu import geometry
 from kurumaisu.critic.data.reading import read_recording
-from kurumaisu.real.asking import ask, there
+from kurumaisu.real.criticise import ask, there
 from kurumaisu.types import FloatArray
 
 FOLDER = Path("/usr/share/mrpt/datasets")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from kurumaisu.bench.hidden import laws
+from kurumaisu.bench.hidden.generator import laws
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.types import FloatArray
 

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.base_make import make_base
-from kurumaisu.bench.hidden.case import KINDS, Ask, Case, Truth
+from kurumaisu.bench.hidden.base.cases import make_base
+from kurumaisu.bench.hidden.base.catalogue import BASE
 from kurumaisu.bench.hidden.confounded import CONFOUNDED
-from kurumaisu.bench.hidden.laser_case import make_laser
-from kurumaisu.bench.hidden.laser_catalogue import LASER
-from kurumaisu.bench.hidden.rooms import draw_room, world_text
-from kurumaisu.bench.hidden.strange_case import strange_base, strange_laser
-from kurumaisu.bench.hidden.unknown import STRANGE_BASE, STRANGE_LASER
-from kurumaisu.bench.hidden.wrong import WRONG, spoilt
+from kurumaisu.bench.hidden.contradictions import WRONG, spoilt
+from kurumaisu.bench.hidden.generator.case import KINDS, Ask, Case, Truth
+from kurumaisu.bench.hidden.generator.rooms import draw_room, world_text
+from kurumaisu.bench.hidden.laser.cases import make_laser
+from kurumaisu.bench.hidden.laser.catalogue import LASER
+from kurumaisu.bench.hidden.unknown.cases import strange_base, strange_laser
+from kurumaisu.bench.hidden.unknown.forms import STRANGE_BASE, STRANGE_LASER
 from kurumaisu.errors import Error
 
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.bench.hidden.case import Case, Known
-from kurumaisu.bench.hidden.noise import Regime
+from kurumaisu.bench.hidden.generator.case import Case, Known
+from kurumaisu.bench.hidden.generator.noise import Regime
 from kurumaisu.critic.base.drive import Drive, prepare
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 from kurumaisu.critic.values.verdict import Gain

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.bench.hidden.case import APART, Truth
-from kurumaisu.bench.hidden.wrong import WRONG
+from kurumaisu.bench.hidden.contradictions import WRONG
+from kurumaisu.bench.hidden.generator.case import APART, Truth
 from kurumaisu.critic.values.verdict import Verdict
 
 SURE = 0.95  # probability from which an answer is taken for sure

@@ -12,7 +12,7 @@ from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.experiments import Limits, Place, Script, samples
 from kurumaisu.params import Model
-from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command, Observation
+from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator, Command, Observation
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""map_saver: writes the next map that comes as an image and its YAML file, for map_server."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import rospy
+
+from kurumaisu.errors import Error, failed
+from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, write_map
+from kurumaisu.ros.maps.messages import GridMessage, map_of
+
+
+def main() -> int:
+    """Save one map; return 1 when none comes, or it cannot be written."""
+    parser = argparse.ArgumentParser(prog="map_saver", description="Save the next map of the topic map.")
+    parser.add_argument("-f", dest="name", type=Path, default=Path("map"), metavar="NAME", help="files' name (map)")
+    parser.add_argument("--occ", type=float, default=OCCUPIED_ABOVE, metavar="PERCENT", help="walls are above (65)")
+    parser.add_argument("--free", type=float, default=FREE_BELOW, metavar="PERCENT", help="free is below (19.6)")
+    parser.add_argument("--png", action="store_true", help="a .png in place of a .pgm")
+    parser.add_argument("--wait", type=float, default=30.0, metavar="SECONDS", help="for a map (30)")
+    options = parser.parse_args(rospy.myargv()[1:])
+    if not 0 <= options.free < options.occ <= 100:
+        parser.error(f"--free must be from 0 and below --occ, which is at most 100: {options.free:g}, {options.occ:g}")
+    rospy.init_node("map_saver", anonymous=True, disable_signals=True)
+    try:
+        served = map_of(rospy.wait_for_message("map", GridMessage, options.wait))
+        suffix = ".png" if options.png else ".pgm"
+        image, text = write_map(served, options.name, suffix, options.occ, options.free)
+    except rospy.ROSException:
+        print(f"map_saver: {rospy.resolve_name('map')}: no map came within {options.wait:g} s", file=sys.stderr)
+        return 1
+    except Error as error:
+        return failed("map_saver", error)
+    print(f"written: {image}, {text}")
+    return 0

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""viewer_node: the page of a simulation or a robot, at an address that it prints."""
+
+from __future__ import annotations
+
+import sys
+
+import rospy
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+
+from kurumaisu.errors import Error, one_line
+from kurumaisu.ros.viewer.settings import read_settings
+from kurumaisu.ros.viewer.source import RosSource
+from kurumaisu.viewer.hub import Hub
+from kurumaisu.viewer.server import Server
+
+
+def main() -> None:
+    """Run the node; exit with 1 and one line for bad configuration or a port that is taken."""
+    # rostime stays off: it would hear every /clock of a simulator, though nobody looks
+    rospy.init_node("viewer_node", disable_rostime=True)
+    try:
+        settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
+        hub = Hub()
+        source = RosSource(hub, settings)
+        server = Server(settings.server, hub, source, settings.control)
+        server.start()
+    except Error as error:
+        rospy.logfatal(one_line(error))
+        sys.exit(1)
+
+    def new_token(_request: TriggerRequest) -> TriggerResponse:
+        # Who reaches this service can publish commands, too: nothing is given away.
+        return TriggerResponse(settings.control, server.new_address() if settings.control else server.address)
+
+    def clients(_request: TriggerRequest) -> TriggerResponse:
+        accounts, stalled = server.accounts()
+        lines = [
+            f"{one.address}: {one.seconds:.0f} s, {one.shown} frames, {one.missed} more were left out as it was slow"
+            for one in accounts
+        ]
+        return TriggerResponse(True, "\n".join([*lines, f"cut off so far, as they took nothing: {stalled}"]))
+
+    services = [rospy.Service("~new_token", Trigger, new_token), rospy.Service("~clients", Trigger, clients)]
+    # to the terminal only, for the log and /rosout are read by others
+    if settings.control:
+        print(f"viewer, with control, good once: {server.new_address()}")
+    print(f"viewer, to look: {server.address}", flush=True)
+    try:
+        source.run(settings.server.rate)
+    finally:
+        for service in services:
+            service.shutdown()
+        source.close()
+        server.close()
