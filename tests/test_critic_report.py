@@ -91,7 +91,7 @@ def test_the_pieces_of_a_path_are_told_apart_in_its_data():
         ["baseline", "1", "1", "0.5", "", ""],
         ["baseline", "2", "2", "1.5", "", ""],
     ]
-    assert picture.caption.replace(NBSP, " ") == "After 10 s off by 0.250 m with the model as it was (rms)."
+    assert picture.caption.replace(NBSP, " ") == "Error after 10 s: 0.250 m with the original model (rms)."
 
 
 def test_a_misfits_data_hold_the_means_before_and_after():
