@@ -271,12 +271,12 @@ class ViewerTest(unittest.TestCase):
         assert watching.newest["hello"]["mode"] == "robot"
         assert watching.newest["hello"]["abilities"] == []
         for name, arguments in (("drive", {"v": 0.1, "w": 0.0}), ("estop", {"on": True}), ("record", {"on": True})):
-            assert "only shows" in watching.ask(name, **arguments)["message"]
+            assert "is read-only" in watching.ask(name, **arguments)["message"]
         t = watching.state(lambda state: state["t"] > 0, "the time of the simulation")["t"]
         assert t < 1e6  # not this computer's
         watching.say(type="token", token="x")
         watching.wait(lambda: None in watching.replies, "an answer")
-        assert "only shows" in watching.replies[None]["message"]
+        assert "is read-only" in watching.replies[None]["message"]
         watching.close()
 
 
