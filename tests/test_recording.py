@@ -216,4 +216,4 @@ def test_meta_is_read_strictly(folder):
 
 def test_a_table_with_an_unknown_name_is_told(folder):
     shutil.copy(folder / "run_1" / "pose.csv", folder / "run_1" / "poses.csv")
-    assert read_recording(folder).problems[0].startswith("run_1/poses.csv: not read: it is none of command.csv")
+    assert read_recording(folder).problems[0].startswith("run_1/poses.csv: not read: its name is none of command.csv")

@@ -83,7 +83,7 @@ def test_the_page_says_what_verdict_and_story_hold(tmp_path):
         "2 more",
     ):
         assert words in said, words
-    order = ["The chair turns late.", "+0.370", "Spin both ways.", "Causes", "weighed"]
+    order = ["The chair turns late.", "+0.370", "Spin both ways.", "Causes", "Other explanations"]
     assert [said.index(words) for words in order] == sorted(said.index(words) for words in order)
 
 
