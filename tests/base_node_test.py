@@ -238,7 +238,7 @@ class BaseNode(unittest.TestCase):
         assert before.v == 0.5  # at once, without a ramp
         assert "still pressed" in reset().message
         stop.publish(False)
-        wait_for(lambda: "let go first" in reset().message, "the cause is gone, the command is not")
+        wait_for(lambda: "release the input first" in reset().message, "the cause is gone, the command is not")
         assert is_neutral(self.voltages.last)
         self.commander.say(0.0, 0.0)
         wait_for(lambda: reset().success, "a reset")

@@ -155,7 +155,7 @@ class Experiment(unittest.TestCase):
         other = Commander("experiment_vel")
         self.addCleanup(other.close)
         other.say(0.0, 0.0)
-        assert "commands the chair, too" in self.end(process, 1)
+        assert "also commands the chair" in self.end(process, 1)
         other.silence()
         assert "experiment_vel is published already" in self.end(self.start("slow", script=SLOW), 1)
 
@@ -166,7 +166,7 @@ class Experiment(unittest.TestCase):
         with subprocess.Popen([sys.executable, "-c", f"{program}; rospy.spin()"]) as pusher:
             try:
                 self.truth.wait(lambda m: m.twist.twist.linear.x > 0, "the chair to move")
-                assert "navigation commands the chair, too" in self.end(self.start("slow", script=SLOW), 1)
+                assert "navigation also commands the chair" in self.end(self.start("slow", script=SLOW), 1)
             finally:
                 pusher.terminate()  # a killed one would stay on the books of the master
 
@@ -176,7 +176,7 @@ class Experiment(unittest.TestCase):
         hand = Commander("joy_vel")
         self.addCleanup(hand.close)
         hand.say(0.0, 0.1)
-        assert "joystick commands the chair, too" in self.end(process, 1)
+        assert "joystick also commands the chair" in self.end(process, 1)
         hand.silence()
         self.stopped_properly()
 

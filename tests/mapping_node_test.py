@@ -269,9 +269,12 @@ class MappingNode(unittest.TestCase):
 
     def test_4_a_laser_that_nobody_has_placed_is_said(self):
         self.room.step_until(
-            lambda: self.says("nobody says"), "a laser without a place said", DEADLINE, frame="nowhere"
+            lambda: self.says("the mounting of the laser is unknown"),
+            "a laser without a place said",
+            DEADLINE,
+            frame="nowhere",
         )
-        self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but nobody says where the laser is")
+        self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but the mounting of the laser is unknown")
 
     def test_5_scans_without_transforms_do_not_stop_the_others(self):
         self.room.step(0.0, with_tf=False)

@@ -103,7 +103,7 @@ class SimWorldTest(unittest.TestCase):
     def test_a_pause_holds_the_clock_and_steps_are_single(self):
         answer = self.call["step"]()
         assert not answer.success
-        assert "nothing is paused" in answer.message
+        assert "only while paused" in answer.message
         at = [float(self.done("pause", True).split()[1])]
         for _ in range(3):
             at.append(float(self.done("step").split()[1]))

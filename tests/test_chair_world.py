@@ -305,7 +305,7 @@ def test_a_saved_state_goes_on_bit_for_bit(tmp_path, things):
     assert loaded.time == pytest.approx(1.23)
     assert bytes_of(drive(other, 0.5, -0.2, 1.0)) == bytes_of(went_on)
     assert other.state_hash() == simulator.state_hash()
-    with pytest.raises(Error, match="of another world"):
+    with pytest.raises(Error, match="belongs to another world"):
         among(tmp_path, things).load(saved)
     with pytest.raises(Error, match="state: "):
         simulator.load(saved[:-50])

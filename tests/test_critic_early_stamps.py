@@ -39,7 +39,7 @@ def test_a_stamp_at_the_other_end_of_a_period_is_noted() -> None:
     assert _verdict(made).problems == ()
     told = _verdict(_stamped(made, early_stamps.period(made.runs)))
     assert told.verdict == "none"
-    assert any("before what asks for it" in problem for problem in told.problems)
+    assert any("before its command" in problem for problem in told.problems)
 
 
 def test_clocks_that_differ_by_more_are_wrong_data() -> None:
@@ -52,7 +52,7 @@ def test_clocks_that_differ_by_more_are_wrong_data() -> None:
 def test_what_a_chair_does_is_no_clock(cause: str) -> None:
     rng = np.random.default_rng(8)
     told = _verdict(_made(7, BASE[cause].fault(BASE[cause].draw(rng), "other"), seconds=30.0))
-    assert not any("before what asks for it" in problem for problem in told.problems)
+    assert not any("before its command" in problem for problem in told.problems)
     assert cause in [named.id for named in told.causes] + [each for one in told.confounded for each in one]
 
 

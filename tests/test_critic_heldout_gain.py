@@ -173,7 +173,7 @@ def test_slam_goes_wrong_with_a_wrong_mounting_and_says_so(tmp_path: Path):
     assert seen.position.baseline < 0.02
     assert seen.heading.extended == pytest.approx(0.1, abs=0.05)
     assert seen.heading.hi90 < 0
-    assert "no better downstream" in out.story.details[-1]
+    assert "no improvement" in out.story.details[-1]
     assert out.story.overlays[0].run == f"SLAM on {seen.run}"
 
 

@@ -37,7 +37,7 @@ def test_what_is_missing_is_said(tmp_path):
     blind = replace(good, runs=(replace(good.runs[0], pose=None),))
     assert "reference pose" in criticise(blind, MODEL, say).refused
     mapped = replace(good, runs=(replace(good.runs[0], pose_source="particle filter over 6 scans"),))
-    assert "these very scans" in criticise(mapped, MODEL, say).refused
+    assert "computed from these scans" in criticise(mapped, MODEL, say).refused
     none = replace(good, runs=(replace(good.runs[0], scan=None),))
     scanless = criticise(none, MODEL, say)
     assert "scans" in scanless.refused

@@ -77,7 +77,7 @@ def test_how_far_readings_scatter_is_what_no_beam_keeps(stands, kept, told):
     by_incidence = [moved[name] - plain[name] for name in plain if name.startswith("spread, incidence")]
     assert (min(by_incidence) > 0.4) == told
     assert (max(by_incidence) > 0.1) == told
-    name = "spread of the beams' means"
+    name = "spread of the means per beam"
     assert (moved[name] - plain[name] > 0.8) == kept  # what scatters spreads them by no more than it does by chance
     assert abs(moved[name] - plain[name]) < 0.3 or kept
 
@@ -119,7 +119,7 @@ def test_what_is_cut_off_says_nothing_of_the_scatter(stands, louder, least, most
     error = louder * noise(stands, 6) + statistics.pose_errors(np.random.default_rng(8))
     cut = float(np.quantile(stands.marks.base[stands.geometry], 0.6))
     found = numbers(stands, error, np.minimum(stands.marks.base + error, cut))
-    assert found["greatest value at which readings pile up"] == pytest.approx(cut / 0.05, abs=0.02)
+    assert found["upper cut-off of the readings"] == pytest.approx(cut / 0.05, abs=0.02)
     spread = [found[f"spread, {name} {i} of 4"] for name in ("range", "incidence") for i in (1, 2)]
     assert least < min(spread) <= max(spread) < most
     gone = numbers(stands, error, np.minimum(stands.marks.base + error, 0.2))

@@ -61,7 +61,7 @@ def test_runs_beyond_a_dozen_are_counted_not_drawn(tmp_path):
     write_report(tmp_path / "report.html", full_verdict(), replace(story, overlays=story.overlays * 3))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.count('role="img"') == 12 + len(story.misfits)
-    assert "6 more runs are not drawn" in page
+    assert "6 more runs are not shown" in page
     text = re.sub(r'href="data:[^"]*"|<svg.*?</svg>', "", page, flags=re.DOTALL)
     assert not re.search(r"\bnan\b", text)  # an interval that nobody knows is left out
 
@@ -91,7 +91,7 @@ def test_the_pieces_of_a_path_are_told_apart_in_its_data():
         ["baseline", "1", "1", "0.5", "", ""],
         ["baseline", "2", "2", "1.5", "", ""],
     ]
-    assert picture.caption.replace(NBSP, " ") == "After 10 s off by 0.250 m with the model as it was (rms)."
+    assert picture.caption.replace(NBSP, " ") == "Error after 10 s: 0.250 m with the original model (rms)."
 
 
 def test_a_misfits_data_hold_the_means_before_and_after():

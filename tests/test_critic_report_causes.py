@@ -52,7 +52,7 @@ def test_a_sideways_effect_is_drawn_sideways_over_the_product_of_the_rates():
 
 def test_a_gain_is_drawn_forward_over_the_speed_asked_for():
     figure = picture_of("base.gain_v", {"gain": 0.1}, gain=0.1)
-    assert (figure.channel, figure.covariate_name) == ("forward speed", "forward speed asked for")
+    assert (figure.channel, figure.covariate_name) == ("forward speed", "commanded forward speed")
     np.testing.assert_allclose(figure.bins.mean, 0.1 * figure.bins.centre, atol=0.01)
     assert np.abs(figure.after.mean).max() < 0.015
 

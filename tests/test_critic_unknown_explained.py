@@ -67,4 +67,4 @@ def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, leas
     assert (found.verdict.verdict, found.verdict.causes) == (verdict, ())
     assert not any(setting.id.startswith("smooth") for setting in found.settings)
     assert all(one.p <= 0.5 for one in found.verdict.unknown)
-    assert bool(found.verdict.unknown) == ("not hold on data held out: it is not" in found.story.headline)
+    assert bool(found.verdict.unknown) == ("Held-out data do not confirm this: it is not" in found.story.headline)

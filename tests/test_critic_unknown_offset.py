@@ -26,7 +26,7 @@ def test_what_follows_nothing_is_no_curve_over_something(channel, name):
     extension = extend(problem, best.fit, best.curve, best.belief.prior)
     assert extension.coefficients[0] == pytest.approx(case.size, rel=0.25)
     assert sentences.shape(extension).startswith("constant, ")
-    assert "follows nothing that is known" in sentences.headline(extension)
+    assert "follows no known quantity" in sentences.headline(extension)
 
 
 def test_a_constant_is_written_for_the_simulator_and_shown(tmp_path):

@@ -149,7 +149,7 @@ def test_a_full_disk_is_told_before_and_while_it_is_recorded(tmp_path, monkeypat
         assert watched.bags == [tmp_path / "a.bag"]
         with pytest.raises(Error, match="GiB are free"):
             recorder.Recorder(tmp_path / "b.bag", ["voltages"])
-    with pytest.raises(Error, match=r"a\.bag: is there already"):
+    with pytest.raises(Error, match=r"a\.bag: exists already"):
         recorder.Recorder(tmp_path / "a.bag", ["voltages"])
 
 

@@ -77,7 +77,7 @@ def test_columns_may_come_in_any_order_quoted_and_with_covariates_among_them(fol
     assert run.command.columns == ("v", "w")
     assert run.command.values.tolist() == [[0.5, 0.1], [0.6, 0.2]]
     assert run.covariates["load"].values.tolist() == [[70]]
-    assert recording.problems == ("run_1/command.csv: column 'note' is not read: it holds no numbers",)
+    assert recording.problems == ("run_1/command.csv: column 'note' is not read: it has no numbers",)
 
 
 def test_repeated_rows_are_dropped_and_told(folder):
@@ -216,4 +216,4 @@ def test_meta_is_read_strictly(folder):
 
 def test_a_table_with_an_unknown_name_is_told(folder):
     shutil.copy(folder / "run_1" / "pose.csv", folder / "run_1" / "poses.csv")
-    assert read_recording(folder).problems[0].startswith("run_1/poses.csv: not read: it is none of command.csv")
+    assert read_recording(folder).problems[0].startswith("run_1/poses.csv: not read: its name is none of command.csv")

@@ -132,7 +132,7 @@ def test_a_scan_that_makes_no_sense_is_named(sena: slam.ScanLog) -> None:
     [
         (None, 0, "cannot be read"),
         ("RO-SLAM_demo.rawlog", None, "has no laser scan"),
-        ("README_directory.txt", None, "is no rawlog"),
+        ("README_directory.txt", None, "is not a rawlog"),
         (SENA.name, 100_000, "cut off"),
         (SENA.name, 0, "is empty"),
     ],
@@ -236,7 +236,7 @@ def test_command_goes_on_from_a_map(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert np.hypot(*(second - first)[:, 1:3].T).max() < 0.15
     capsys.readouterr()
     assert map_command.main([log, "-o", str(tmp_path / "c"), *start[:2], "--at", "500", "0", "0"]) == 2
-    assert "scan 0: the map to go on from explains 0 %" in capsys.readouterr().err
+    assert "scan 0: the map to continue explains 0 %" in capsys.readouterr().err
 
 
 def test_command_refuses_bad_input(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -251,7 +251,7 @@ def test_command_refuses_bad_input(tmp_path: Path, capfd: pytest.CaptureFixture[
         ([demo, "--settings", str(tmp_path / "none.yaml")], "none.yaml: No such file"),
         ([demo, "-o", str(blocked / "folder")], "folder: Not a directory"),
         ([demo, "--start", str(tmp_path / "none.simplemap")], "none.simplemap: cannot be read"),
-        ([demo, "--start", str(blocked)], "is no simplemap to go on from"),
+        ([demo, "--start", str(blocked)], "is not a simplemap to continue"),
     ):
         assert map_command.main(arguments) == 2
         out, err = capfd.readouterr()

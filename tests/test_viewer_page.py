@@ -219,5 +219,5 @@ def test_a_recording_is_scrubbed(browser):
         until(lambda: abs(rig.playback.t - 122.9) < 1e-9, "0.1 s back")
         page.keyboard.press("p")
         until(lambda: rig.playback.playing, "play")
-        expect(page.locator("#play")).to_have_text("Hold")
+        expect(page.locator("#play")).to_have_text("Pause")
         expect(page.locator("#estop")).to_be_hidden()

@@ -72,7 +72,7 @@ def test_a_point_of_the_report_leads_to_its_moment_and_place(browser, served):
         page.reload()
         link = page.locator("figure a", has_text="t = 5010.00 s")
         expect(page.locator(".unserved")).to_be_hidden()
-        page.get_by_text("furthest off, in the viewer").click()
+        page.get_by_text("largest misfits, in the viewer").click()
         expect(link).to_be_visible()
         assert NAMES[1] in link.text_content()
         svg = page.locator("svg[data-at]").first
@@ -99,7 +99,7 @@ def test_a_report_in_a_tab_of_its_own_leads_to_the_viewers_tab(browser, served):
         expect(visit.page.locator("#scrubber")).to_be_enabled()
         page = visit.context.new_page()
         page.goto(f"{served.server.address}report/report.html")
-        page.get_by_text("furthest off, in the viewer").click()
+        page.get_by_text("largest misfits, in the viewer").click()
         page.locator("figure a", has_text="t = 5010.00 s").click()
         expect(page.get_by_role("status")).to_contain_text("t = 5010.00 s")
         expect(page.get_by_role("status")).to_contain_text("shown in the viewer's tab")
@@ -111,7 +111,7 @@ def test_a_report_says_why_the_viewers_tab_does_not_go_there(browser, served):
     with Visit(browser, served.server.address) as visit:  # without a token
         page = visit.context.new_page()
         page.goto(f"{served.server.address}report/report.html")
-        page.get_by_text("furthest off, in the viewer").click()
+        page.get_by_text("largest misfits, in the viewer").click()
         page.locator("figure a", has_text="t = 5010.00 s").click()
         expect(page.get_by_role("status")).to_contain_text("the link that the viewer printed")
         assert playback(served).run == NAMES[0]

@@ -100,7 +100,7 @@ SURPRISES = {
     "pass below all walls": ("model ( pose [3 0 1 0] size [0.2 4 1] )\n" + ROBOT % ("", LASER % ""), "beam below"),
     "5 mm thin": ("model ( pose [3 0 0 0] size [0.005 4 1] )\n" + ROBOT % ("", LASER % ""), "thin wall"),
     "touches something solid": (WALL % ("1", "") + ROBOT % ("pose [2.8 0 0 0]", LASER % ""), "robot in a wall"),
-    "clamped to 1 m/s": (WALL % ("1", "") + f"position ( size [0.4 0.4 0.2] {LASER % ''} )", "clamped speed"),
+    "limited to 1 m/s": (WALL % ("1", "") + f"position ( size [0.4 0.4 0.2] {LASER % ''} )", "clamped speed"),
     "odom_error has no effect": (WALL % ("1", "") + ROBOT % ("odom_error [0.1 0 0 0]", LASER % ""), "gps"),
     "adds up only 20 %": (
         "interval_sim 20\n" + WALL % ("1", "") + ROBOT % ('localization "odom"', LASER % "update_interval 20"),

@@ -112,7 +112,7 @@ class ViewerTest(unittest.TestCase):
         after = self.page.state(lambda state: state["t"] > before, "a step")["t"]
         assert after - before == pytest.approx(STEP, abs=1e-6)
         self.do("pause", on=False)
-        assert "nothing is paused" in self.refused("step")
+        assert "only while paused" in self.refused("step")
 
     def test_speed(self):
         self.do("speed", value=0.3)
@@ -254,7 +254,7 @@ class ViewerTest(unittest.TestCase):
         assert len(lines) == 3
         for line in lines[:-1]:
             assert int(line.split(" frames")[0].split()[-1]) > 0
-        assert lines[-1] == "cut off so far, as they took nothing: 0"
+        assert lines[-1] == "disconnected so far because they did not read: 0"
         other.close()
         wait_for(lambda: len(call("viewer_node/clients", Trigger).message.splitlines()) == 2, "it to be gone")
 
@@ -271,12 +271,12 @@ class ViewerTest(unittest.TestCase):
         assert watching.newest["hello"]["mode"] == "robot"
         assert watching.newest["hello"]["abilities"] == []
         for name, arguments in (("drive", {"v": 0.1, "w": 0.0}), ("estop", {"on": True}), ("record", {"on": True})):
-            assert "only shows" in watching.ask(name, **arguments)["message"]
+            assert "is read-only" in watching.ask(name, **arguments)["message"]
         t = watching.state(lambda state: state["t"] > 0, "the time of the simulation")["t"]
         assert t < 1e6  # not this computer's
         watching.say(type="token", token="x")
         watching.wait(lambda: None in watching.replies, "an answer")
-        assert "only shows" in watching.replies[None]["message"]
+        assert "is read-only" in watching.replies[None]["message"]
         watching.close()
 
 

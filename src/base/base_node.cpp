@@ -130,7 +130,7 @@ void BaseNode::run() {
   finish();
   if (isForgotten()) {
     throw std::runtime_error(
-        "BASE_MASTER_FORGOT: another ROS master has taken the place of the one that knew this node");
+        "BASE_MASTER_FORGOT: a new ROS master is running, which does not know this node");
   }
 }
 
@@ -177,7 +177,7 @@ void BaseNode::onTick() {
   drive_.cutOff(master_.lost() || master_.forgotten());
   const k::Drive::Tick tick = drive_.tick(t);
   if (tick == k::Drive::Tick::kReset) {
-    warn("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");
+    warn("BASE_TIME_RESET: time ran backwards: neutral, odometry restarts");
   }
   odom_input_.check();
   if (tick != k::Drive::Tick::kRepeated) publish();

@@ -23,8 +23,8 @@ constexpr const char* kUsage =
     "set_voltages DEVICE.yaml V_F V_S V_REF\n\n"
     "Puts out three voltages [V], V_F and V_S as they are counted from the reference, tells what the device "
     "holds, waits\n"
-    "for a line, the end of its input or Ctrl-C, and puts out neutral. For a bench: nothing watches over it. "
-    "No chair!\n";
+    "for a line, the end of its input or Ctrl-C, and puts out neutral. For a bench, as it has no guard: "
+    "not for a chair!\n";
 
 double numberOf(const std::string& text) {
   double value = 0;

@@ -25,7 +25,7 @@ using kurumaisu::dac::VirtualChip;
 
 constexpr const char* kUsage =
     "virtual_dac DEVICE.yaml PLACE [--log FILE] [--realtime] [FAULT]...\n\n"
-    "A D/A converter that is none, as the file describes it, until Ctrl-C or the end of its standard input, "
+    "A simulated D/A converter, as the file describes it, until Ctrl-C or the end of its standard input, "
     "unless "
     "that is\n"
     "/dev/null. kind serial: a board at a terminal to which PLACE leads (the file's `port` is not read); "
@@ -36,7 +36,7 @@ constexpr const char* kUsage =
     "from its\n"
     "input, one per line, and `volts`.\n\n"
     "  --log FILE   every change of voltage: TIME volts V_f V_s V_ref, TIME in ns of CLOCK_MONOTONIC\n"
-    "  --realtime   before all others, where the system allows it\n"
+    "  --realtime   with real-time priority, where the system allows it\n"
     "  FAULT        NAME[/SIGNAL][@COMMAND][xCOUNT][=SECONDS]; without COMMAND it begins at once\n\n";
 
 struct Options {

@@ -87,7 +87,7 @@ std::unique_ptr<k::Port> open(const std::string& name, const k::Link::Interrupte
   int port = 0;
   const char* const end = name.data() + name.size();
   const auto [stop, error] = std::from_chars(name.data() + colon + 1, end, port);
-  if (error != std::errc() || stop != end) throw std::invalid_argument("its port is no number");
+  if (error != std::errc() || stop != end) throw std::invalid_argument("its port is not a number");
   return std::make_unique<k::Tcp>(name.substr(0, colon), port, kPatience, interrupted);
 }
 
@@ -100,7 +100,7 @@ std::string serialNumber(const std::string& name) {
                    [](k::Report::Level, const std::string& text) { std::cerr << text << "\n"; });
   const auto version = kurumaisu::scip::keyed(sensor.version);
   const auto found = version.find("SERI");
-  if (found == version.end() || found->second.empty()) throw std::runtime_error("VV holds no SERI");
+  if (found == version.end() || found->second.empty()) throw std::runtime_error("VV has no SERI");
   return found->second;
 }
 

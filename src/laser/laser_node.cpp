@@ -155,7 +155,7 @@ void LaserNode::publish(const k::Scan& scan) {
     rhythm_.add(now());
   }
   if (stamp < 0) {  // at the start of simulated time; ROS has no such time
-    ROS_WARN_THROTTLE(kWarningPeriod, "LASER_STAMP: a scan of %g s, before time began, is dropped", stamp);
+    ROS_WARN_THROTTLE(kWarningPeriod, "LASER_STAMP: a scan with a stamp before 0, %g s, is dropped", stamp);
     return;
   }
   message.header.stamp = ros::Time(stamp);
@@ -228,7 +228,7 @@ void LaserNode::updateStatus(Answer& answer) {
 void LaserNode::restart(Answer& answer) {
   driver_.restart();
   answer.success = true;
-  answer.message = "the port is opened anew";
+  answer.message = "the port is opened again";
 }
 
 /// Holds up other callbacks meanwhile.

@@ -39,7 +39,7 @@ constexpr double kAhead = 10.0;  // [s] an initial pose stamped farther in the f
 
 // Apart, because the macro counts as a handful of branches.
 void warnFrame(const std::string& frame, const std::string& taken_for) {
-  ROS_WARN("LOCALIZATION_MAP_FRAME: the map is in %s, and taken for one in %s", frame.c_str(),
+  ROS_WARN("LOCALIZATION_MAP_FRAME: the map is in %s, and used as if it were in %s", frame.c_str(),
            taken_for.c_str());
 }
 

@@ -131,7 +131,7 @@ void MappingNode::advertise(ros::NodeHandle& nh) {
       }));
   offer("reset", [this](auto& response) {
     begin();
-    response.message = "the map starts afresh";
+    response.message = "the map starts again";
   });
   offer("pause", [this](auto& response) {
     feed_.pause(true);
@@ -176,7 +176,7 @@ void MappingNode::askForMap() try {
   nav_msgs::GetMap call;
   if (!client.exists() || !client.call(call)) return;
   const k::Pose2D corner = k::planarOf(call.response.map.info.origin);
-  if (std::abs(corner.theta) > 1e-6) throw std::invalid_argument("its origin is turned");
+  if (std::abs(corner.theta) > 1e-6) throw std::invalid_argument("its origin is rotated");
   k::OccupancyGrid grid = k::gridOf(call.response.map);
   grid.x = corner.x;
   grid.y = corner.y;

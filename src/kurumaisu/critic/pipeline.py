@@ -80,7 +80,7 @@ def criticise(
     found = _with_worth(found, whole, replace(extension, scans=settings), progress, slam=slam)
     if not predictions.asked(recording):
         return found
-    progress("predicting what was asked for")
+    progress("predicting what the queries ask for")
     every = (*found.settings, *(each for each in settings if each not in found.settings))
     return replace(found, predictions=tuple(predictions.predictions(whole, model, extension.forecast, every)))
 
@@ -88,7 +88,7 @@ def criticise(
 def _with_worth(
     found: Criticism, recording: Recording, extension: extension_gain.Extension, progress: Progress, *, slam: bool
 ) -> Criticism:
-    progress("measuring the gain on scans held out")
+    progress("measuring the gain on held-out scans")
     found = extension_gain.with_laser_gain(found, recording, extension)
     if slam:
         progress("running SLAM with both models")
@@ -132,7 +132,7 @@ def _criticise_base(
     test = [drives[name] for name in recording.test if name in drives]
     made = decide(first, recording.truth, progress)
 
-    progress("measuring the gain on drives held out")
+    progress("measuring the gain on held-out drives")
     baseline = scatter(rough, rough.fit((), {}), recording.truth, project=False).estimate(made.problem.noise).noise
     withheld = [drives[run.name] for run in recording.runs if run.name in drives and _withheld(recording, run)]
     names = {drive.name for drive in withheld}

@@ -35,7 +35,7 @@ class Recorder:
         self._path = path
         self._first = path.with_name(f"{path.stem}_0{path.suffix}") if split else path
         if self._first.exists():
-            raise Error(f"{self._first}: is there already")
+            raise Error(f"{self._first}: exists already")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:

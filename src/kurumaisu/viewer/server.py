@@ -71,7 +71,7 @@ class Server:
     def new_address(self) -> str:
         """Return where the page is, with a token to command, which is good once. Raise Error if nobody may."""
         if not self._control:
-            raise Error("this viewer only shows: it was not started with control")
+            raise Error("this viewer is read-only: it was started without control")
         return f"{self.address}#token={self._keys.new_token()}"
 
     def accounts(self) -> tuple[list[Account], int]:
@@ -102,8 +102,8 @@ class Server:
         except OSError as error:
             await self._runner.cleanup()
             raise Error(
-                f"viewer: {self._settings.host}:{self._settings.port} cannot be had: {error.strerror}; "
-                "another port may be free, port 0 takes any"
+                f"viewer: {self._settings.host}:{self._settings.port} cannot be used: {error.strerror}; "
+                "choose another port; port 0 takes any free one"
             ) from error
         self._port = self._runner.addresses[0][1]
 
@@ -152,7 +152,7 @@ class Server:
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         access.check_origin(request.headers.get("Origin"), request.headers.get("Host"))
         if len(self._open) >= self._settings.most_clients:
-            raise web.HTTPServiceUnavailable(reason=f"{self._settings.most_clients} look already")
+            raise web.HTTPServiceUnavailable(reason=f"{self._settings.most_clients} pages are open already")
         client = Client(self._settings, self._hub, self._source, self._keys if self._control else None, self._workers)
         self._open.add(client)
         try:

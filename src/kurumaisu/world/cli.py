@@ -20,7 +20,7 @@ from kurumaisu.world.world import World, load_world
 def check_world(arguments: list[str] | None = None) -> int:
     """Say what a world contains and what in it will surprise. Return 0, 1 with findings, 2 for a bad file."""
     parser = argparse.ArgumentParser(
-        prog="check-world", description="Say what a world file contains and what in it will surprise."
+        prog="check-world", description="Show what a world file contains, and what in it may surprise."
     )
     _add_world(parser)
     options = parser.parse_args(arguments)
@@ -42,13 +42,15 @@ def export_world(arguments: list[str] | None = None) -> int:
         prog="export-world", description="Write a world as a map_server pair (NAME.pgm, NAME.yaml) and as NAME.svg."
     )
     _add_world(parser)
-    parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", default=Path(), help="where to (.)")
-    parser.add_argument("--resolution", type=float, default=0.05, metavar="M", help="of the map's cells [m] (0.05)")
+    parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", default=Path(), help="folder to write into (.)")
     parser.add_argument(
-        "--height", type=float, default=0.4, metavar="M", help="of the plane that the map cuts [m] (0.4, a laser's)"
+        "--resolution", type=float, default=0.05, metavar="M", help="size of the map's cells [m] (0.05)"
     )
     parser.add_argument(
-        "--png", action="store_true", help="the map as NAME.png, much smaller, which map_server reads too"
+        "--height", type=float, default=0.4, metavar="M", help="height of the map's plane [m] (0.4, a laser's)"
+    )
+    parser.add_argument(
+        "--png", action="store_true", help="write the map as NAME.png: much smaller; map_server reads it too"
     )
     options = parser.parse_args(arguments)
     try:
@@ -74,7 +76,7 @@ def _add_world(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--image-extents",
         action="store_true",
-        help="bitmaps fill their size with their margins, not trimmed as in Stage",
+        help="do not trim the margins of bitmaps, as Stage does",
     )
     parser.add_argument("values", nargs="*", metavar="NAME=VALUE", help="values for the world's parameters")
 

@@ -122,15 +122,15 @@ def _rebuilt(s: Sight, rng: np.random.Generator) -> Sight:
 
 
 SPOILT: dict[str, tuple[_Spoil, str]] = {
-    "another building": (_elsewhere, "do not belong together"),
+    "another building": (_elsewhere, "do not match the map"),
     "map before the house was rebuilt": (_rebuilt, "map"),
     "map shifted": (_walls(lambda p, r: p + r.uniform(1.0, 4.0, 2) * r.choice([-1, 1], 2)), "shifted"),
     "map turned": (_walls(_turned), "turned"),
     "map mirrored": (_walls(lambda p, _: p * [1, -1]), "mirrored"),
     "map scaled": (_walls(lambda p, r: p * r.choice([0.1, 0.5, 2.0, 10.0])), "scaled"),
     "beams reversed": (_ranges(lambda r, _: r[:, ::-1]), "other way round"),
-    "laser at 180 deg": (_laser(lambda m: replace(m, yaw=np.pi)), "aside"),
-    "angle_min off by half the fan": (_laser(lambda m: replace(m, angle_min=0.0)), "aside"),
+    "laser at 180 deg": (_laser(lambda m: replace(m, yaw=np.pi)), "the laser is turned by"),
+    "angle_min off by half the fan": (_laser(lambda m: replace(m, angle_min=0.0)), "the laser is turned by"),
     "fan in degrees": (
         _laser(lambda m: replace(m, angle_min=np.degrees(m.angle_min), angle_increment=np.degrees(m.angle_increment))),
         "degrees",

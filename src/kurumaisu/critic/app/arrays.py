@@ -87,7 +87,7 @@ def _rows(where: str, given: ArrayLike) -> FloatArray:
     try:
         rows = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise Error(f"{where}: is no array of numbers: {error}") from error
+        raise Error(f"{where}: is not an array of numbers: {error}") from error
     if rows.ndim != 2 or rows.shape[1] < 2:
         raise Error(f"{where}: must have rows of t and at least one number; its shape is {rows.shape}")
     return rows

@@ -25,8 +25,8 @@ examples:
                                                   a recording of such a name is ./watch
 
 exit codes:
-  0  none: nothing that is both detectable and large enough to matter
-  1  error: said on the standard error; also when any of several recordings could not be criticised
+  0  none: no effect is both detectable and large enough to matter
+  1  error: printed on standard error; also when any of several recordings could not be criticised
   2  the command line itself is wrong
   3  named          4  confounded          5  unknown          6  invalid_data
      of several recordings without an error, the largest
@@ -48,15 +48,15 @@ def _parser() -> argparse.ArgumentParser:
     add("recordings", type=Path, nargs="+", metavar="RECORDING", help=what)
     add("-o", "--output", type=Path, default=Path("criticism"), metavar="FOLDER", help="write here (criticism)")
     add("--model", type=Path, metavar="FILE", help="model to criticise (the recording's, else md100.yaml)")
-    add("--runs", type=name_list, default=(), metavar="A,B", help="use only these runs; patterns like drive_* count")
+    add("--runs", type=name_list, default=(), metavar="A,B", help="only these runs; patterns like drive_* are allowed")
     add_effects(parser)
     add("--seed", type=int, default=1, help="of the particle filter that makes a missing reference (1)")
-    add("--no-slam", action="store_true", help="do not run SLAM with both models, which takes some seconds")
+    add("--no-slam", action="store_true", help="do not compare SLAM with both models (saves some seconds)")
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--jobs", type=whole_number, default=1, metavar="N", help="recordings at a time on this machine (1)"
     )
-    where.add_argument("--dask", metavar="ADDRESS", help="run on the Dask cluster whose scheduler is there")
+    where.add_argument("--dask", metavar="ADDRESS", help="run on the Dask cluster with this scheduler")
     add("--json", action="store_true", help="print the verdict as JSON; of several, one line for each recording")
     add("--table", type=Path, metavar="FILE.csv", help="write the results as a table, one row for each recording")
     add("-q", "--quiet", action="store_true", help="show no progress")

@@ -44,7 +44,7 @@ def read_bag_run(path: Path, topics: dict[str, str], faults: Faults, put_aside: 
     wanted = resolve(topics)
     shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
     if shared:
-        raise Error(f"topics: {shared[0]} is given to two parts of a run")
+        raise Error(f"topics: {shared[0]} is assigned to two parts of a run")
 
     def kept(row: tuple[Fan, FloatArray, FloatArray | None]) -> tuple[Fan, FloatArray]:
         fan, ranges, intensities = row
@@ -107,9 +107,7 @@ def _last_of_each_time(where: str, topic: Topic, faults: Faults) -> Topic:
     if not dropped:
         return topic
     are = "message was" if dropped == 1 else "messages were"
-    faults.add(
-        f"{where}: {dropped} {are} received in one tick of the clock with a later one: the last of each tick holds"
-    )
+    faults.add(f"{where}: {dropped} {are} dropped: a later one has the same time of receipt")
     rows, stamps = [topic.rows[i] for i in keep], [topic.stamps[i] for i in keep]
     return replace(topic, received=received[keep].tolist(), stamps=stamps, rows=rows)
 
@@ -118,7 +116,7 @@ def _scan(where: str, topic: Topic, faults: Faults, *, aside: bool) -> tuple[Ser
     fan = topic.rows[0][0]
     keep = [i for i, (other, _) in enumerate(topic.rows) if other == fan]
     if len(keep) < len(topic.rows):
-        faults.add(f"{where}: {len(topic.rows) - len(keep)} scans dropped: their fan is not that of the first")
+        faults.add(f"{where}: {len(topic.rows) - len(keep)} scans dropped: their angles differ from those of the first")
     ranges = np.stack([topic.rows[i][1] for i in keep])
     columns = ("row",) if aside else tuple(f"r{i}" for i in range(fan.beams))
     return clean(Table(where, topic.times()[keep], ranges, columns, "scan", 1), faults, ranges=not aside), fan
@@ -129,7 +127,7 @@ def _covariates(name: str, where: str, topic: Topic, faults: Faults) -> dict[str
     t = topic.times()
     covariates = {}
     if not fields:
-        raise Error(f"{where}: {topic.type} has no numeric field, so it is no covariate")
+        raise Error(f"{where}: {topic.type} has no numeric field, so it cannot be a covariate")
     for key in fields:
         values = np.array([row[key] for row in topic.rows], dtype=np.float64)
         # A driver that does not measure a field leaves it at 0 or nan.

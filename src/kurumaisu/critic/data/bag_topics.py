@@ -83,7 +83,7 @@ def _read_into(
         raise Error(f"{path}: {error.strerror or error}") from error
     except Exception as error:  # whatever a parser trips over in a damaged file
         told = str(error) or type(error).__name__
-        raise Error(f"{path}: is not a whole ROS 1 bag (rosbag reindex may help): {told}") from error
+        raise Error(f"{path}: is not a complete ROS 1 bag (rosbag reindex may help): {told}") from error
 
 
 class _Reader(Reader):
@@ -126,7 +126,7 @@ def _converter(path: Path, part: str, connection: Any) -> Callable[[bytes], tupl
         try:
             return message, to_row(message)
         except AttributeError as error:
-            raise Error(f"{path}: {connection.topic}: {_ros(kind)} is defined otherwise there: {error}") from error
+            raise Error(f"{path}: {connection.topic}: {_ros(kind)} has another definition here: {error}") from error
 
     return convert
 

@@ -65,7 +65,7 @@ def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | Non
     ranges: values are laser ranges, for which nan and inf have a meaning; any other value must be finite.
     """
     keep = np.isfinite(table.t) & (ranges | np.isfinite(table.values).all(axis=1))
-    _report(table, ~keep, faults, "not a number: dropped", "holds no number in most rows", 0.5)
+    _report(table, ~keep, faults, "not a number: dropped", "has no number in most rows", 0.5)
     kept = np.flatnonzero(keep)
     kept = kept[~_repeated(table, kept, faults)]
     _out_of_order(table, kept, faults)
@@ -98,7 +98,7 @@ def _repeated(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
     same[order] = ~starts & equal
     conflict[order] = ~starts & ~equal
     _report(table, same, faults, "repeated: the first is kept", "repeats its rows: drop the copies")
-    _report(table, conflict, faults, "at a time already given: the first is kept", "contradicts itself")
+    _report(table, conflict, faults, "at a time already given: the first is kept", "has different rows for one time")
     repeated: BoolArray = (same | conflict)[kept]
     return repeated
 
@@ -123,7 +123,7 @@ def _ranges(where: str, series: Series, faults: Faults) -> Series:
     values = np.where(series.values == -np.inf, np.nan, series.values)
     senseless = values <= 0
     if senseless.any():
-        faults.add(f"{where}: {int(senseless.sum())} ranges that are 0 or less are taken as no valid reading")
+        faults.add(f"{where}: {int(senseless.sum())} ranges of 0 or less are taken as invalid")
     values = np.where(senseless, np.nan, values)
     if not np.isfinite(values).any():
         faults.add(f"{where}: no reading is valid")
@@ -145,7 +145,7 @@ def _unwrapped(where: str, series: Series, faults: Faults) -> Series:
         if len(doubtful):
             faults.add(
                 f"{where}: theta turns by more than {LARGEST_TURN:g} rad between samples "
-                f"{_times(len(doubtful))} (first: t = {series.t[doubtful[0]]:.6g} s): which way is a guess"
+                f"{_times(len(doubtful))} (first: t = {series.t[doubtful[0]]:.6g} s): the direction is a guess"
             )
         # The same heading reads the same whatever multiple of a turn the file started from.
         theta = theta - 2 * np.pi * np.floor((theta[0] + np.pi) / (2 * np.pi))

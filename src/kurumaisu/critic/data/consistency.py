@@ -62,6 +62,6 @@ def _check_scan(run: Run, scan: Series, laser: LaserMount | None, faults: Faults
     last = first + (run.fan.angle_increment - laser.angle_increment) * (beams - 1)
     if max(abs(first), abs(last)) > abs(laser.angle_increment) / 4:
         faults.add(
-            f"{run.name}: the scans' own fan is off that of meta.yaml by {first:.2g} rad at the first beam "
+            f"{run.name}: angles of the scans differ from those of meta.yaml by {first:.2g} rad at the first beam "
             f"and {last:.2g} rad at the last"
         )

@@ -42,7 +42,7 @@ def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
     for path in sorted(folder.glob("*.csv")):
         if path.stem not in (*REQUIRED, QUERY):
             known = ", ".join(f"{table}.csv" for table in (*REQUIRED, QUERY))
-            faults.add(f"{name}/{path.name}: not read: it is none of {known}")
+            faults.add(f"{name}/{path.name}: not read: its name is none of {known}")
     parts: dict[str, Series | None] = {}
     covariates: dict[str, Series] = {}
     for part in REQUIRED:
@@ -75,7 +75,7 @@ def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | N
     """Return the part itself and the covariates among its columns."""
     columns, rows, dropped = _read(path, ("t", *REQUIRED[part]))
     for column in dropped:
-        faults.add(f"{where}: column {column!r} is not read: it holds no numbers")
+        faults.add(f"{where}: column {column!r} is not read: it has no numbers")
     optional = tuple(name for name in OPTIONAL.get(part, ()) if name in columns)
     own = (*REQUIRED[part], *optional)
     if part == "scan":
@@ -141,7 +141,7 @@ def _check_header(path: Path, columns: list[str], required: tuple[str, ...]) -> 
             raise Error(f"{path}:1: column {name!r} is missing; there are: {', '.join(columns) or 'none'}")
     for name in columns:
         if not name or columns.count(name) > 1:
-            raise Error(f"{path}:1: column {name!r} {'is there twice' if name else 'has no name'}")
+            raise Error(f"{path}:1: column {name!r} {'occurs twice' if name else 'has no name'}")
 
 
 def _read_cells(path: Path, columns: list[str], required: tuple[str, ...]) -> tuple[list[str], FloatArray, list[str]]:

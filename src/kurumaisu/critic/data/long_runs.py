@@ -25,7 +25,7 @@ def bounded(recording: Recording) -> Recording:
         if len(pieces) > 1:
             notes.append(
                 f"{run.name}: lasts {_length(run) / 3600:.1f} h: {_PIECES} pieces of {_PIECE / 60:.0f} min are "
-                f"criticised, spread over all of it; give shorter runs to have all of them criticised"
+                f"criticised, spread over it; split the run to have all of it criticised"
             )
     if not notes:
         return recording

@@ -32,7 +32,7 @@ def read_rawlog_run(path: Path, faults: Faults) -> tuple[Run, LaserMount]:
     try:
         t, odom, ranges, fan = import_module("kurumaisu._slam").read_rawlog(str(path))
     except ImportError as error:
-        raise Error(f"{path}: this build has no reader of rawlogs: {error}") from error
+        raise Error(f"{path}: this build cannot read rawlogs: {error}") from error
     except (OSError, RuntimeError, ValueError) as error:
         raise Error(one_line(error)) from error  # it names the file
     run = to_run(rawlog_name(path), t, odom, np.asarray(ranges, dtype=np.float64), faults)

@@ -49,25 +49,25 @@ def sources(path: Path) -> list[Path]:
     """Return what each run is read from: a bag, a rawlog, or a folder of tables."""
     if not path.is_dir():
         if path.suffix != ".bag" and not is_rawlog(path):
-            raise Error(f"{path}: is no recording: a folder, a .bag or a .rawlog")
+            raise Error(f"{path}: is not a recording: give a folder, a .bag or a .rawlog")
         return [path]
     inside = sorted(path.iterdir())
     bags = [item for item in inside if item.suffix == ".bag" or is_rawlog(item)]
     folders = [item for item in inside if item.is_dir() and is_csv_run(item)]
     if is_csv_run(path):
         if bags or folders:
-            raise Error(f"{path}: holds both tables and runs ({(bags + folders)[0].name}): which is the run?")
+            raise Error(f"{path}: holds both tables and runs ({(bags + folders)[0].name}): one or the other")
         return [path]
     # The queries of a bag's run lie in a folder of its name, alone.
     names = [bag.stem for bag in bags]
     for folder in [folder for folder in folders if folder.name in names]:
         others = [item.name for item in folder.glob("*.csv") if item.stem != QUERY]
         if others:
-            raise Error(f"{folder / others[0]}: the run {folder.name} is there as a bag too")
+            raise Error(f"{folder / others[0]}: the run {folder.name} also exists as a bag")
         folders.remove(folder)
     twice = [name for name in names if names.count(name) > 1]
     if twice:
-        raise Error(f"{path}: the run {twice[0]} is there twice")
+        raise Error(f"{path}: the run {twice[0]} exists twice")
     if not bags and not folders:
         raise Error(f"{path}: holds no run: neither a .bag, nor a .rawlog, nor a folder with tables like pose.csv")
     return sorted(bags + folders, key=lambda item: item.stem)
@@ -120,7 +120,7 @@ def split(
 def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
     """Raise Error unless a run says something about base or laser; note the runs that do not."""
     useless = [run for run in runs if not usable(run)]
-    told = {f"{run.name}: says nothing: it has {_has(run)}" for run in useless}
+    told = {f"{run.name}: is of no use: it has {_has(run)}" for run in useless}
     for words in sorted(told):
         faults.add(words)
     if len(useless) == len(runs):

@@ -59,7 +59,7 @@ def scan_log(recording: Recording, run: Run) -> ScanLog:
     Raise Error when the run has no scans, no odometry, or nobody knows how the laser is mounted.
     """
     if run.scan is None or run.odom is None:
-        raise Error(f"{run.name}: has no reference pose, and not both scans and odometry to find one from")
+        raise Error(f"{run.name}: has no reference pose, and lacks scans or odometry to compute one")
     slam = import_module("kurumaisu.slam")
     ours = recording.model is not None or run.voltage is not None
     laser = load_model(recording.model or shipped("launch/md100.yaml")).laser if ours else None
@@ -67,7 +67,7 @@ def scan_log(recording: Recording, run: Run) -> ScanLog:
     place = mount or (laser.mount if laser is not None else None)
     fan = run.fan or mount or laser
     if place is None or fan is None:
-        raise Error(f"{run.name}: nobody says how the laser is mounted: give laser in meta.yaml")
+        raise Error(f"{run.name}: the mounting of the laser is unknown: give laser in meta.yaml")
     ranges = run.scan.values if laser is None else laser.error.range(run.scan.values)
     beams = slam.Fan(
         angle_min=fan.angle_min,
@@ -87,7 +87,7 @@ def scan_log(recording: Recording, run: Run) -> ScanLog:
 def _with_pose(recording: Recording, run: Run, seed: int, progress: Progress) -> Run:
     if run.scan is None and run.odom is not None and (run.voltage is not None or run.command is not None):
         poses = Series(run.odom.t, run.odom.values[:, :3], ("x", "y", "theta"))
-        source = "the odometry (no pose was measured): what wheels do on the floor does not show in it"
+        source = "the odometry (no pose was measured): slip of the wheels does not show in it"
         return replace(run, pose=poses, pose_source=source)
     path = map_run(scan_log(recording, run), seed, progress).trajectory
     source = f"particle filter over {len(path)} scans (no pose was measured), seed {seed}"

@@ -164,5 +164,5 @@ def _parser() -> argparse.ArgumentParser:
     question = parser.add_mutually_exclusive_group(required=True)
     question.add_argument("--between", nargs=2, metavar=("ID[=SIZE]", "ID[=SIZE]"), help="which of two effects acts")
     question.add_argument("--detect", metavar="ID[=SIZE]", help="whether an effect of that size acts at all")
-    parser.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="what the chair is")
+    parser.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="model file of the chair")
     return parser

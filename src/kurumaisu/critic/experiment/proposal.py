@@ -63,12 +63,12 @@ def propose(problem: Problem, found: Naming, scripts: Sequence[Script]) -> Propo
     options.sort(key=lambda option: -option.worth / option.script.seconds)
     listed = _listed(open_ids)
     if not options or max(option.nats for option in options) < design.NOTHING:
-        return Proposal(None, f"No scripted drive can decide about {listed}: measure it in another way.", ())
+        return Proposal(None, f"No scripted drive can decide whether {listed} acts: measure it in another way.", ())
     best = options[0]
     experiment = NextExperiment(best.script.name, best.script.seconds, best.nats, tuple(open_ids))
     sentence = (
-        f"critic experiment {best.script.name} ({best.script.seconds:.0f} s). It is expected to make the right one of "
-        f"{listed} {odds(best.nats)} times as probable as a wrong one."
+        f"critic experiment {best.script.name} ({best.script.seconds:.0f} s). It should make the true explanation "
+        f"{odds(best.nats)} times as probable as a false one; in question: {listed}."
     )
     return Proposal(experiment, sentence, tuple(options))
 

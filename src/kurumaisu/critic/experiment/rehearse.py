@@ -79,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="critic rehearse", description="Run experiments on the simulator alone.")
     parser.add_argument("names", nargs="+", metavar="NAME", help=f"of {', '.join(names())}; or a .yaml file")
     parser.add_argument("-o", "--output", type=Path, default=Path("rehearsed"), help="folder to write into")
-    parser.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="what the chair is")
+    parser.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="model file of the chair")
     parser.add_argument("--effects", type=Path, help="file of effects besides the model's own")
     parser.add_argument("--seed", type=int, default=1)
     return parser

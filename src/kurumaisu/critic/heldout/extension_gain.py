@@ -47,14 +47,12 @@ def with_laser_gain(criticism: Criticism, recording: Recording, extension: Exten
 def _told(worth: ChannelGain) -> str:
     density = worth.log_density_per_sample
     text = (
-        f"On scans held out, what was found in the laser gains {density.gain:+.3g} nats per reading "
+        f"On held-out scans, the laser effects found gain {density.gain:+.3g} nats per reading "
         f"(90 % {density.lo90:+.3g} to {density.hi90:+.3g})"
     )
     if worth.rmse is not None:
-        text += (
-            f"; readings are off by {1e3 * worth.rmse.baseline:.2g} mm before, {1e3 * worth.rmse.extended:.2g} mm after"
-        )
-    return text + ("." if density.lo90 > 0 else ": not confirmed there.")
+        text += f"; rms error {1e3 * worth.rmse.baseline:.2g} mm before, {1e3 * worth.rmse.extended:.2g} mm after"
+    return text + ("." if density.lo90 > 0 else ": not confirmed.")
 
 
 def with_slam(criticism: Criticism, recording: Recording, extension: Extension) -> Criticism:

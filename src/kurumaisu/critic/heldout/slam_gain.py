@@ -92,14 +92,14 @@ def words(gain: SlamGain) -> str:
     """Return in a sentence what SLAM gains."""
     p, h = gain.position, gain.heading
     text = (
-        f"SLAM on {gain.run} ({gain.scans} scans): path off by {1e3 * p.baseline:.0f} mm and "
-        f"{np.degrees(h.baseline):.2f} deg (rms) with the model as it was, {1e3 * p.extended:.0f} mm and "
-        f"{np.degrees(h.extended):.2f} deg with the extended one"
+        f"SLAM on {gain.run} ({gain.scans} scans): path error {1e3 * p.baseline:.0f} mm and "
+        f"{np.degrees(h.baseline):.2f} deg (rms) with the original model, {1e3 * p.extended:.0f} mm and "
+        f"{np.degrees(h.extended):.2f} deg with the extended model"
     )
     if max(p.lo90, h.lo90) > 0:
         return f"{text}."
     worse = min(p.hi90, h.hi90) < 0
-    return f"{text}: {'no better downstream' if worse else 'no difference that this run could show'}."
+    return f"{text}: {'no improvement' if worse else 'no significant difference in this run'}."
 
 
 def _chosen(recording: Recording) -> Run | None:
@@ -119,8 +119,8 @@ def _missing(recording: Recording) -> str:
     if all(run.pose_source != "measured" for run in runs):
         return "the reference pose is SLAM's own"
     if not any(driven(run) for run in runs):
-        return "nobody knows what drove the chair"
-    return f"no run has {FEWEST} scans between reference poses while it was driven"
+        return "what drove the chair was not recorded"
+    return f"no run has {FEWEST} scans between reference poses while the chair was driven"
 
 
 def _rows(run: Run) -> list[int]:

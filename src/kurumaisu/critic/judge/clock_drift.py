@@ -45,7 +45,7 @@ def one_clock(finding: LaserFinding, stamps: FloatArray) -> LaserFinding:
     agreed = -(delay.at + drift.at) / drift.growth
     if abs(agreed - first) > _NEAR + _SURE * delay.half / abs(drift.growth):
         return finding
-    told = f"{drifting}: the clocks agreed {agreed:.3g} s after time 0; the delay in the model says so."
+    told = f"{drifting}: the clocks agreed {agreed:.3g} s after time 0; the model has this as a delay."
     return replace(finding, causes=tuple(c for c in finding.causes if c.id != late), details=(*finding.details, told))
 
 

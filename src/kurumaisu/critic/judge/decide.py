@@ -113,7 +113,7 @@ def _density(problem: Problem, fit: Fit) -> float:
 def _judged(
     first: Problem, found: search.Naming, beside: Extension | None, truth: Truth, progress: Progress
 ) -> Decision:
-    progress("estimating the noise again, beside what was found")
+    progress("estimating the noise again, with the effects found")
     left = scatter(first, found.best, truth, project=True, beside=beside)
     final = left.estimate(first.noise)
     growth = left.growth(final, odds(len(found.p)))

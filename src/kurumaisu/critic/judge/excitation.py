@@ -40,13 +40,13 @@ def told(criticism: Criticism, made: Decision, drives: Sequence[Drive], scripts:
     best = _supplier(problem.model, scripts, wanted)
     why = lacking(drives, enough=made.found.enough)
     listed = ", ".join(wanted[:_LISTED]) + (f" and {len(wanted) - _LISTED} more" if len(wanted) > _LISTED else "")
-    sentence = f"Of {len(ids)} effects on the base, {len(wanted)} could not show: {listed}."
-    headline = f"Nothing can be named, because {why}: {len(wanted)} of {len(ids)} effects could not have shown."
+    some = f"None of the {len(ids)} effects can" if wanted == ids else f"{len(wanted)} of {len(ids)} effects cannot"
+    sentence, headline = f"{some} be detected in this recording: {listed}.", f"{some} be detected, because {why}."
     next_drive = criticism.story.next_drive
     if best is not None:
         next_drive = (
-            f"Run the experiment {best.id} ({best.seconds:.0f} s): at their usual sizes it shows {len(best.separates)} "
-            f"of them."
+            f"Run the experiment {best.id} ({best.seconds:.0f} s). It detects {len(best.separates)} of them at "
+            f"their usual sizes."
         )
     story = replace(
         criticism.story,
@@ -64,17 +64,17 @@ def lacking(drives: Sequence[Drive], *, enough: bool) -> str:
     turn = max(float(np.abs(drive.w).max()) for drive in drives)
     seconds = sum(float(drive.times[-1] - drive.times[0]) for drive in drives)
     if max(ahead, turn) < _REST:
-        return "nothing asked the chair to move"
+        return "the chair was never commanded to move"
     if seconds < _SHORT:
         return f"only {seconds:.1f} s were recorded"
     if not enough:
         count = sum(len(drive.times) - 1 for drive in drives)
         return f"{count} intervals between poses are too few to tell effects from noise"
     if turn < _REST:
-        return "the chair was never asked to turn"
+        return "the chair was never commanded to turn"
     if ahead < _REST:
-        return "the chair was never asked to drive, only to turn"
-    return "its inputs hardly change"
+        return "the chair was commanded only to turn, never to drive"
+    return "the inputs hardly change"
 
 
 def _supplier(model: Model, scripts: Sequence[Script], wanted: Sequence[str]) -> NextExperiment | None:

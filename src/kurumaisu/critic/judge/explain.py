@@ -58,8 +58,8 @@ def undriven(recording: Recording, model: Model) -> Criticism:
     story = Story(
         recording=recording.name,
         model=model.name,
-        headline="Nothing is missing in the model that these scans could show.",
-        details=("base not criticised: there are neither voltages nor commands nor odometry.",),
+        headline="These scans show no effect that the model lacks.",
+        details=("base not criticised: no voltages, commands or odometry were recorded.",),
         pose_source=_pose_source(recording),
         provenance=_provenance(recording),
     )
@@ -162,20 +162,20 @@ def _noise(problem: Problem) -> tuple[Noise, ...]:
         ("forward speed", n.sd_v, "m/s"),
         ("sideways speed", n.sd_lateral, "m/s"),
         ("yaw rate", n.sd_w, "rad/s"),
-        ("time constant of the rates' noise", n.tau, "s"),
+        ("time constant of the noise of the rates", n.tau, "s"),
     )
     if n.slow_v or n.slow_lateral or n.slow_w:
         rows += (
-            ("forward speed, slower part", n.slow_v, "m/s"),
-            ("sideways speed, slower part", n.slow_lateral, "m/s"),
-            ("yaw rate, slower part", n.slow_w, "rad/s"),
-            ("time constant of the slower part", n.slow_tau, "s"),
+            ("forward speed, slow part", n.slow_v, "m/s"),
+            ("sideways speed, slow part", n.slow_lateral, "m/s"),
+            ("yaw rate, slow part", n.slow_w, "rad/s"),
+            ("time constant of the slow part", n.slow_tau, "s"),
         )
     if n.lasting:
         rows += (
-            ("reference position, lasting part", n.lasting * n.position_sd, "m"),
-            ("reference heading, lasting part", n.lasting * n.heading_sd, "rad"),
-            ("time constant of the lasting part", n.lasting_tau, "s"),
+            ("reference position, slowly varying part", n.lasting * n.position_sd, "m"),
+            ("reference heading, slowly varying part", n.lasting * n.heading_sd, "rad"),
+            ("time constant of the slowly varying part", n.lasting_tau, "s"),
         )
     return tuple(Noise(name, value, float("nan"), float("nan"), unit) for name, value, unit in rows)
 
@@ -225,6 +225,6 @@ def _provenance(recording: Recording) -> dict[str, str]:
     return {
         "runs fitted": ", ".join(recording.train),
         "runs held out": ", ".join(recording.test) or "each in turn",
-        "named from": f"a probability of {search.NAMED:g}",
+        "an effect is named": f"from a probability of {search.NAMED:g} on",
         "kurumaisu, numpy, scipy": f"{version()}, {np.__version__}, {scipy.__version__}",
     }

@@ -60,7 +60,7 @@ def criticism(
     share, felt = _shares(made)
     words = _told(extension, beyond, share)
     if not _held(made, worth) or not _matters(share, felt):
-        small = f"{words} It is too small to matter, or was not confirmed on data held out."
+        small = f"{words} It is too small to matter, or was not confirmed on held-out data."
         story = replace(beside.story, unexplained=(small, *beside.story.unexplained))
         kept = replace(beside, story=story, model=problem.model)
         return _unheld(kept, problem, made, worth) if share >= MATERIAL else kept
@@ -87,7 +87,7 @@ def _unheld(kept: Criticism, problem: Problem, made: Decision, worth: Gain | Non
     if worth is None or not _no_noise(made):
         return kept
     curves = tuple(replace(one, p=min(one.p, _UNHELD)) for one in _unknowns(problem, made.beyond))
-    headline = f"{sentences.headline(extension)} That does not hold on data held out: it is not the whole of it."
+    headline = f"{sentences.headline(extension)} Held-out data do not confirm this: it is not the whole explanation."
     verdict = replace(kept.verdict, verdict="unknown", unknown=curves)
     return replace(kept, verdict=verdict, story=replace(kept.story, headline=headline))
 
@@ -186,10 +186,10 @@ def _samples(
 def _told(extension: Extension, beyond: Beyond, share: float) -> str:
     curve = extension.curve
     where = f"{sentences.channel(curve)} {sentences.followed(curve)}"
-    better = f"explains {beyond.rivalry.lead:.1f} nats more than the best set of the catalogue"
+    better = f"explains {beyond.rivalry.lead:.1f} nats more than the best effects of the catalogue"
     return (
         f"Outside the catalogue: {where} ({sentences.shape(extension)}) {better}; "
-        f"within {HORIZON:g} s it moves the chair by {100 * share:.1f} % of its way or turn."
+        f"after {HORIZON:g} s the chair is off by {100 * share:.1f} % of the distance driven or angle turned."
     )
 
 
@@ -216,4 +216,4 @@ def _rivals(found: Naming, beyond: Beyond) -> Iterator[Rival]:
             seen.add(rival.curve.id)
             beside = "".join(f" + {name}" for name in sorted(rival.fit.ids))
             name = f"{sentences.channel(rival.curve)} {sentences.followed(rival.curve)}{beside}"
-            yield Rival(name, rival.worth - best.worth, "a curve over something else explains less")
+            yield Rival(name, rival.worth - best.worth, "a curve over another quantity explains less")

@@ -26,7 +26,7 @@ def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
     if finding.refused is not None:
         told = replace(story, details=(*story.details, _refusal(finding.refused), *finding.details))
         if not story.noise and verdict.verdict == _NOTHING_SAID:  # nothing was said of the base either
-            told = replace(told, headline=f"Nothing can be named: {finding.refused}.")
+            told = replace(told, headline=f"No effect can be named: {finding.refused}.")
         return replace(criticism, story=told)
     kind: Kind = verdict.verdict
     if finding.unknown:
@@ -47,7 +47,7 @@ def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
         words = f"{story.headline} {words}"
     if finding.small and not words and kind == _NOTHING_SAID:
         slight = f"{', '.join(finding.small)} is detectable in the scans, but too small to matter."
-        words = f"{story.headline} {slight}" if story.noise else f"Nothing that matters: {slight}"
+        words = f"{story.headline} {slight}" if story.noise else f"No effect matters: {slight}"
     shown = finding.pictures
     told = replace(
         story,
@@ -69,7 +69,7 @@ def _with_drive(criticism: Criticism, finding: LaserFinding) -> Criticism:
         return criticism
     first, more = ", ".join(drive.separates[:_TOLD]), len(drive.separates) - _TOLD
     listed = f"{first} and {more} more" if more > 0 else first
-    sentence = f"critic experiment {drive.id} ({drive.seconds:.0f} s), whose scans tell {listed} from their rivals."
+    sentence = f"critic experiment {drive.id} ({drive.seconds:.0f} s). Its scans tell {listed} from similar effects."
     return replace(
         criticism,
         verdict=replace(criticism.verdict, next_experiment=drive),
@@ -82,11 +82,11 @@ def headline(finding: LaserFinding) -> str:
     if finding.unknown:
         first = finding.unknown[0]
         over = _PLACES.get(first.covariate, first.covariate)
-        return f"Ranges are off over the {over} in a way that is not in the catalogue: {first.shape}."
+        return f"No effect in the catalogue explains the error of the ranges. It follows the {over}: {first.shape}."
     if finding.causes:
         return named(finding.causes)
     if finding.confounded:
-        return f"The scans miss something, but cannot tell which: {' or '.join(finding.confounded[0])}."
+        return f"The model lacks an effect, but these scans cannot tell which: {' or '.join(finding.confounded[0])}."
     return ""
 
 

@@ -71,8 +71,8 @@ def remaining(problem: Problem, fit: Fit) -> tuple[str, ...]:
             x = np.concatenate([covariate(drive, follows) for drive in problem.drives])
             r = _correlation(white[:, channel], x)
             if abs(r) * np.sqrt(len(x)) > _NOTEWORTHY:
-                said.append(f"The {rate.value} still follows the {follows.value} a little (correlation {r:+.2f}).")
-    return tuple(said) or ("The residual follows neither the rates asked for nor their changes.",)
+                said.append(f"The residual {rate.value} still follows the {follows.value} (correlation {r:+.2f}).")
+    return tuple(said) or ("The residual follows neither the commanded rates nor their changes.",)
 
 
 def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[effects.BaseEffect]) -> Misfit:
@@ -89,7 +89,7 @@ def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[ef
     return Misfit(
         channel=name,
         unit=unit,
-        covariate_name=over.name if over is not None else f"what {effect.id} adds",
+        covariate_name=over.name if over is not None else f"change by {effect.id}",
         covariate_unit=over.unit if over is not None else unit,
         covariate=x,
         residual=residual[:, channel],
@@ -126,9 +126,9 @@ def _covariates(drives: Sequence[Drive]) -> list[Covariate]:
     parts = {f.value: [covariate(drive, f) for drive in drives] for f in Follows}
     out = [Covariate(f.value, _UNITS[f], np.concatenate(parts[f.value])) for f in Follows]
     v, w = out[0].values, out[1].values
-    out.append(Covariate("product of the rates asked for", "m/s²", v * w))
-    out.append(Covariate("size of the forward speed asked for", "m/s", np.abs(v)))
-    out.append(Covariate("size of the yaw rate asked for", "rad/s", np.abs(w)))
+    out.append(Covariate("product of the commanded rates", "m/s²", v * w))
+    out.append(Covariate("absolute commanded forward speed", "m/s", np.abs(v)))
+    out.append(Covariate("absolute commanded yaw rate", "rad/s", np.abs(w)))
     out.append(Covariate("heading", "rad", np.concatenate([wrap(drive.poses[:-1, 2]) for drive in drives])))
     since = [drive.times[:-1] - drive.times[0] for drive in drives]
     return [*out, Covariate("time since the start", "s", np.concatenate(since))]

@@ -45,7 +45,7 @@ def from_base_link(
     by = np.sum([shift.by for name, shift in seen if name in told], axis=0)
     again = look(replace(recording, runs=tuple(_moved(run, by) for run in recording.runs)))
     words = [
-        f"laser: from the reference it seems to sit elsewhere ({name}); that is {other}, no fault of the mounting."
+        f"laser: seen from the reference it seems displaced ({name}); the cause is {other}, not the mounting."
         for name, other in told.items()
     ]
     there = tuple(setting for setting in finding.settings if setting.id in told)

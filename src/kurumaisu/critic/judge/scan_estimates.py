@@ -59,8 +59,8 @@ def another_map(winner: Rival | None, normal: Normal, lacking: float) -> str | N
     if low < (_ANOTHER_LACKS if lacking > _LACKS else _ANOTHER) * p.upper:
         return None
     return (
-        f"scans and map do not belong together, whose walls would be off by {low:.2g} m and more (1 sd), each its own "
-        f"way; another place?"
+        f"scans do not match the map, whose walls would be off by {low:.2g} m or more (1 sd), each in its own "
+        f"direction; another place?"
     )
 
 

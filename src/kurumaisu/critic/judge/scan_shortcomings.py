@@ -17,7 +17,7 @@ def lacking(assembly: Assembly) -> list[str]:
     """Return sentences about what the scans did not see, with the scripted drive that shows it."""
     seen, trust = assembly.marks.seen, assembly.geometry
     if not trust.any():
-        return ["laser: no beam meets a wall of the map well inside; record room_poses in a room that is mapped."]
+        return ["laser: no beam hits a mapped wall away from its ends; record room_poses in a mapped room."]
     bearings = np.array([each.bearings for each in seen.beams])
     angle = seen.origins[..., 2] + bearings
     reach = np.where(trust, seen.level, 0.0)[..., np.newaxis]
@@ -25,14 +25,14 @@ def lacking(assembly: Assembly) -> list[str]:
     out = []
     if _across(ends[trust]) < _FLAT:
         out.append(
-            "laser: only one wall was seen, where an offset, the mounting along its normal and the place of the wall "
-            "are one and the same; room_poses shows others."
+            "laser: only one wall was seen, so that range offset, mounting and position of the wall cannot be told "
+            "apart; record room_poses, which sees more walls."
         )
     if np.ptp(seen.origins[..., :2].reshape(-1, 2), axis=0).max() < _MOVED:
-        out.append("laser: all scans are from one place; room_poses or wall_five_distances change it.")
+        out.append("laser: all scans are from one place; record room_poses or wall_five_distances.")
     ranges = seen.ranges[trust]
     if float(np.quantile(ranges, 0.98)) < _DISTANCES * float(np.quantile(ranges, 0.02)):
-        out.append("laser: all walls are about as far, so no effect of the range shows; drive wall_five_distances.")
+        out.append("laser: all walls are equally far, so the range has no visible effect; drive wall_five_distances.")
     return out
 
 

@@ -63,7 +63,7 @@ def criticise(
         return LaserFinding(refused=why, details=repeatability.words(recording, model), next_experiment=drive)
 
     def beside(setting: EffectSetting) -> LaserFinding:
-        progress(f"laser: looking at the rest beside {setting.id}")
+        progress(f"laser: looking for more effects, with {setting.id} in the model")
         return criticise(recording, extend(model, [setting]), progress, ids)
 
     progress("laser: predicting the scans")
@@ -76,7 +76,7 @@ def criticise(
         (placed,) = pinned(assembly, normal, [form], [far], None, {}, recording.truth).settings
         worth = (1.0, Search([form], normal.gram).run().best.log_likelihood)
         return _with_rest(assembly, normal, placed, worth, beside(placed[0]))
-    progress("laser: weighing effects")
+    progress("laser: comparing effects")
     found = Search(assembly.forms, normal.gram).run()
     if found.best.forms:
         assembly.refine(found.best.forms, normal.beam_noise, normal.wary)
@@ -88,7 +88,7 @@ def criticise(
     if (wrong := another_map(made.winner, normal, float(assembly.displaced.readings.mean()))) is not None:
         return LaserFinding(wrong=wrong)
     made = made.beside(assembly, normal)
-    progress("laser: fitting what acts")
+    progress("laser: fitting the effects found")
     fit = refitted(assembly, normal, made, recording.truth)
     lead = leading(assembly, normal, made.fit, fit)
     certain = lead is not None and made.found.p[lead.id] >= NAMED
@@ -97,7 +97,7 @@ def criticise(
         worth = (min(made.found.p[lead.id], 1.0), gain_of(made, lead.id))
         return _with_rest(assembly, normal, placed, worth, beside(placed[0]))
     made, fit = cleared(assembly, normal, made, fit, recording.truth)
-    progress("laser: weighing effects on the scatter")
+    progress("laser: comparing effects on the scatter")
     away = 0.0 if made.winner is None else block_evidence.elsewhere(made.winner, normal.gram)
     scatter, comparison = (
         ([], ()) if fit.assembly.strange else _scatter(assembly, fit, ids, strange=made.curve, away=away)
@@ -111,7 +111,7 @@ def criticise(
     finding = one_clock(_finding(assembly, normal, made, fit, heard), assembly.shots.stamps)
     slight = tuple(each.setting.id for each in scatter if each not in heard)
     words = tuple(
-        f"{name}: detectable, but it does not matter beside what single readings scatter by." for name in slight
+        f"{name}: detectable, but too small to matter, compared with the scatter of single readings." for name in slight
     )
     finding = replace(finding, small=(*finding.small, *slight), details=(*finding.details, *words))
     finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
@@ -220,17 +220,17 @@ def _confused(assembly: Assembly, normal: Normal, made: Acting, causes: Sequence
 def _noise_told(assembly: Assembly, normal: Normal) -> str:
     noise, beam = normal.scan_noise, normal.beam_noise
     return (
-        f"laser: {normal.readings} readings of {len(assembly.shots.stamps)} scans; noise of neighbours correlates by "
-        f"{beam.rho:.2f}, of whole scans {1e3 * noise.common_sd:.2g} mm over {noise.common_tau:.2g} s, of "
-        f"single beams {1e3 * beam.own_sd:.2g} mm, of the reference {1e3 * noise.position_sd:.2g} mm and "
+        f"laser: {normal.readings} readings of {len(assembly.shots.stamps)} scans. Noise: neighbours correlate by "
+        f"{beam.rho:.2f}, whole scans {1e3 * noise.common_sd:.2g} mm over {noise.common_tau:.2g} s, "
+        f"single beams {1e3 * beam.own_sd:.2g} mm, reference {1e3 * noise.position_sd:.2g} mm and "
         f"{1e3 * noise.heading_sd:.2g} mrad."
     )
 
 
 def _told(sizes: Mapping[str, float], small: Sequence[str]) -> list[str]:
     return [
-        f"{name}: changes the readings where it acts by {1e3 * size:.2g} mm"
-        f"{': detectable, but it does not matter' if name in small else ''}."
+        f"{name}: changes the readings it affects by {1e3 * size:.2g} mm"
+        f"{': detectable, but too small to matter' if name in small else ''}."
         for name, size in sorted(sizes.items())
     ]
 

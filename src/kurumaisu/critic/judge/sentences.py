@@ -22,7 +22,7 @@ _CAUSES_TOLD = 4  # in a headline
 _KINDS_TOLD = 2  # of problems in a headline
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
-UNMET = "The drives held out hardly show it, so they neither confirm nor refute it."
+UNMET = "The held-out drives hardly show this effect, so they neither confirm nor refute it."
 
 
 def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[str, float]) -> str:
@@ -34,21 +34,21 @@ def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[st
         return named(verdict.causes)
     if verdict.verdict == "confounded":
         group = " or ".join(verdict.confounded[0])
-        return f"Something is missing in the model, but these drives cannot tell which: {group}."
+        return f"The model lacks an effect, but these drives cannot tell which: {group}."
     if not found.enough:
-        return "Nothing can be named: too little was recorded to tell effects from noise."
+        return "No effect can be named: too little was recorded to tell effects from noise."
     listed = ", ".join(sorted(found.best.ids))
     if found.best.ids and verdict.gain is None:
-        return f"Nothing can be named: {listed} is suspected, but too little was recorded to test it on data held out."
+        return f"No effect can be named: {listed} is suspected, but too little was recorded to test it."
     if found.best.ids and not matters and max(shares.values()) >= MATERIAL:
-        return f"Nothing can be named: {listed} fits these drives, but does not hold on data held out."
+        return f"No effect can be named: {listed} fits these drives, but held-out data do not confirm it."
     if found.best.ids and not matters:
-        return f"Nothing that matters: {listed} is detectable, but too small to gain anything."
+        return f"No effect matters: {listed} is detectable, but too small to improve the simulation."
     # Nothing is near where nothing of the base was looked for.
     nearest = max(found.p, key=lambda name: found.p[name], default=None)
     if nearest is not None and found.p[nearest] >= search.RIVAL:
-        return f"Nothing can be named: noise explains these drives as well. The nearest suspect is {nearest}."
-    return "Nothing is missing in the model that these drives could show."
+        return f"No effect can be named: noise explains these drives as well. The nearest suspect is {nearest}."
+    return "These drives show no effect that the model lacks."
 
 
 def wrong(problems: Sequence[str]) -> str:
@@ -93,25 +93,25 @@ def details(
             elif e.estimate != form.null:  # of the usual form nothing need be said
                 fitted.setdefault(name, []).append(f"{parameter} {quantities([e.estimate], e.unit)[0]}")
     for name, told in fitted.items():
-        moved = f"within {HORIZON:g} s it moves the chair by {100 * shares[name]:.1f} % of its way or turn"
+        moved = (
+            f"after {HORIZON:g} s the chair is off by {100 * shares[name]:.1f} % of the distance driven or angle turned"
+        )
         said.append(f"{name}: {', '.join(told)}; {moved}{_weight(name, found, shares, matters)}.")
     n = problem.noise
     wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
-    said.append(
-        f"The yaw rate fluctuates at random: in a minute the heading strays by {wander:.0f}° or so, whatever the model."
-    )
+    said.append(f"Noise of the yaw rate turns the heading by about {wander:.0f}° in a minute; no model can predict it.")
     if found.p:  # else no effect was looked for
-        alarm = f"{100 * found.false_alarm:.1f} %" if found.false_alarm > 0 else f"less than {100 / search.NULLS:.2f} %"
-        said.append(f"Noise alone would look as much like some effect in {alarm} of drives like these.")
+        alarm = f"{100 * found.false_alarm:.1f} %" if found.false_alarm > 0 else f"below {100 / search.NULLS:.2f} %"
+        said.append(f"The chance that noise alone looks this much like an effect is {alarm}.")
     return tuple(said)
 
 
 def _weight(name: str, found: Naming, shares: dict[str, float], matters: set[str]) -> str:
     if name not in matters:
         small = shares[name] < MATERIAL
-        return ": detectable, but it does not matter" if small else ": not confirmed on data held out"
+        return ": detectable, but too small to matter" if small else ": not confirmed on held-out data"
     if any(name in group for group in found.confounded):
-        return ": others that look alike may act in its place"
+        return ": a similar effect may act instead"
     return "" if found.p[name] >= search.NAMED else ": not certain enough to be named"
 
 
@@ -120,8 +120,8 @@ def suspects(found: Naming) -> tuple[str, ...]:
     some = sorted((name for name in found.p if search.RIVAL <= found.p[name] < search.NAMED), key=lambda n: -found.p[n])
     if not some:
         return ()
-    listed = ", ".join(f"{name} ({found.p[name]:.2f})" for name in some)
-    return (f"Not certain enough to be named (probability): {listed}.",)
+    listed = ", ".join(f"{name} (p = {found.p[name]:.2f})" for name in some)
+    return (f"Suspected, but not certain enough to be named: {listed}.",)
 
 
 def rivals(found: Naming) -> tuple[Rival, ...]:
@@ -139,9 +139,9 @@ def rivals(found: Naming) -> tuple[Rival, ...]:
 def _rival(fit: Fit, best: Fit) -> Rival:
     likelihood = fit.log_likelihood - best.log_likelihood
     if fit.score > best.score:
-        why = f"fits better by {likelihood:.1f} nats, too little for one more effect, which is rare beforehand"
+        why = f"fits better by {likelihood:.1f} nats, too little for one more effect, which is improbable a priori"
     elif fit.ids > best.ids:
-        why = f"fits better by {likelihood:.1f} nats, less than another effect costs"
+        why = f"fits better by {likelihood:.1f} nats, too little to justify another effect"
     elif fit.ids < best.ids or likelihood < 0:
         why = f"fits worse by {-likelihood:.1f} nats"
     else:

@@ -71,9 +71,9 @@ def overlay_svg(overlay: Overlay, name: str) -> str:
         figure.set_layout_engine("constrained", rect=_BELOW_LEGEND)
         axes = figure.subplots()
         axes.plot(*overlay.measured.T, color=INK, linewidth=2.6, alpha=0.55, label="measured")
-        axes.plot(*overlay.baseline.T, color=BASELINE, linewidth=1.5, linestyle=(0, (4, 1.5)), label="model as it was")
+        axes.plot(*overlay.baseline.T, color=BASELINE, linewidth=1.5, linestyle=(0, (4, 1.5)), label="original model")
         if overlay.extended is not None:
-            axes.plot(*overlay.extended.T, color=EXTENDED, linewidth=1.3, label="extended")
+            axes.plot(*overlay.extended.T, color=EXTENDED, linewidth=1.3, label="extended model")
         if len(overlay.measured):
             axes.plot(*overlay.measured[0], marker="o", markersize=7, color=INK, linestyle="none", label="start")
         axes.set_aspect("equal", adjustable="datalim")
@@ -125,8 +125,8 @@ def comparison_svg(comparison: Comparison, name: str) -> str:
         axes.axvspan(-NORMAL90, NORMAL90, color=FAINT, linewidth=0)
         axes.axvline(0.0, color=INK, linewidth=0.8)
         for simulated, marker, colour, said in (
-            (comparison.baseline, "o", BASELINE, "model as it was"),
-            (comparison.extended, "D", EXTENDED, "extended"),
+            (comparison.baseline, "o", BASELINE, "original model"),
+            (comparison.extended, "D", EXTENDED, "extended model"),
         ):
             off = ((comparison.measured - simulated) / comparison.sd)[most]
             axes.plot(off, rows, marker, color=colour, markersize=5, label=said)

@@ -57,11 +57,11 @@ def overlay_picture(overlay: Overlay, name: str) -> Picture:
     """Return a run from above; name: of the file of its data, and prefix of ids."""
     offs = {
         said: off
-        for said, off in (("with the model as it was", overlay.off), ("extended", overlay.off_extended))
+        for said, off in (("with the original model", overlay.off), ("with the extended one", overlay.off_extended))
         if off is not None
     }
     told = ", ".join(f"{text} {said}" for said, text in zip(offs, quantities(list(offs.values()), "m"), strict=True))
-    told = f"After {overlay.restart:g} s off by {told} (rms)." if told else ""
+    told = f"Error after {overlay.restart:g} s: {told} (rms)." if told else ""
     paths = {"measured": overlay.measured, "baseline": overlay.baseline, "extended": overlay.extended}
     return Picture(
         title=f"{overlay.run}{', held out' if overlay.held_out else ''}",
@@ -76,16 +76,16 @@ def overlay_picture(overlay: Overlay, name: str) -> Picture:
 def misfit_picture(misfit: Misfit, name: str) -> Picture:
     """Return measured minus simulated; name as in overlay_picture."""
     shown = figures.shown_points(misfit)
-    caption = ["Misfit: measured minus simulated. Before: without this effect, but with all others that were found."]
+    caption = ["Misfit: measured minus simulated. Before: without this effect, but with the others found."]
     if misfit.after is not None:
-        caption.append("After: with it; the means should lie on zero. Bars: 90 % intervals.")
+        caption.append("After: with it; the means should be zero. Bars: 90 % intervals.")
     count = len(misfit.residual)
     if shown.index.sum() < count:
         caption.append(f"{shown.index.sum()} of {count} samples are drawn.")
     return Picture(
         title=f"{misfit.explained_by}: {misfit.channel} over {misfit.covariate_name}",
         svg=Markup(figures.misfit_svg(misfit, shown, name)),
-        alt=f"What the model gets wrong in {misfit.channel}, over {misfit.covariate_name}, with binned means.",
+        alt=f"Error of the model in {misfit.channel}, over {misfit.covariate_name}, with binned means.",
         caption=" ".join(caption),
         file=f"{name}.csv",
         data=_csv(
@@ -103,14 +103,14 @@ def comparison_picture(comparison: Comparison, name: str) -> Picture:
     return Picture(
         title=f"{comparison.explained_by}: how the readings scatter",
         svg=Markup(figures.comparison_svg(comparison, name)),
-        alt="By how much simulated scatter differs from the measured one, with the model as it was and extended.",
+        alt="Difference of simulated and measured scatter, with the original model and the extended one.",
         caption=(
-            "Each number says how the readings scatter, taken from measured and from simulated scans alike; sd: its "
-            "standard deviation from one simulation to the next. In the grey band, chance explains the difference. "
-            f"The {shown} that were furthest off."
+            "Each number describes the scatter of the readings, measured and simulated; sd: its "
+            "standard deviation between simulations. In the grey band, chance explains the difference. "
+            f"The {shown} with the largest differences are shown."
         ),
         file=f"{name}.csv",
-        data=_csv(("number", "measured", "model as it was", "extended", "standard deviation"), rows),
+        data=_csv(("number", "measured", "original model", "extended model", "standard deviation"), rows),
     )
 
 

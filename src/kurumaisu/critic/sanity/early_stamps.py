@@ -33,7 +33,7 @@ def lead(problem: Problem, progress: Progress) -> float:
     cost, tried = min((_cost(problem, by), by) for by in _TRIED)
     if alone - cost < _HOPE:
         return 0.0
-    progress("asking whether the clocks agree")
+    progress("checking whether the clocks agree")
     best = minimize_scalar(lambda by: _cost(problem, by), bounds=(0.0, min(2 * tried, _LONGEST)), method="bounded")
     by = float(best.x)
     if by < _LEAST:
@@ -62,12 +62,12 @@ def period(runs: Sequence[Run]) -> float:
 
 def words(by: float) -> str:
     """Return what is wrong with the clocks, in words."""
-    return f"all runs: the motion comes {by:.3f} s before what asks for it; try t of the reference pose {by:+.3f} s"
+    return f"all runs: the motion comes {by:.3f} s before its command; try t of the reference pose {by:+.3f} s"
 
 
 def note(by: float) -> str:
     """Return what was mended, in words."""
-    return f"all runs: the motion comes {by:.3f} s before what asks for it: judged with the pose's stamps {by:+.3f} s"
+    return f"all runs: the motion comes {by:.3f} s before its command: judged with the pose's stamps {by:+.3f} s"
 
 
 def _later(problem: Problem, by: float) -> Problem:

@@ -79,8 +79,8 @@ def folded(pose: Series) -> str | None:
     ):
         return None
     return (
-        f"heading of the reference pose looks folded, as if its sign were lost: it agrees with the course to "
-        f"{either:.2f} when its sign may change from place to place, else to {max(each):.2f}; record atan2, not acos"
+        f"heading of the reference pose looks folded, its sign lost: it agrees with the course to "
+        f"{either:.2f} if its sign may change from place to place, else to {max(each):.2f}; record atan2, not acos"
     )
 
 
@@ -126,7 +126,7 @@ def heading_words(found: Course, turns_agree: bool | None, goes_ahead: bool | No
     """
     if found.agreement < _AGREES or found.right:
         return None
-    share = f"course and heading then agree to {found.agreement:.2f}, as given to {found.plain:.2f} (1: perfectly)"
+    share = f"agreement of course and heading: {found.agreement:.2f} then, {found.plain:.2f} as given (1: perfect)"
     if found.factor in (1.0, -1.0):
         mirrored = found.factor < 0
         return f"{_reflected(found, turns_agree, goes_ahead) if mirrored else _turned(found)}: {share}"
@@ -155,4 +155,4 @@ def _reflected(found: Course, turns_agree: bool | None, goes_ahead: bool | None)
             if forward
             else "x of the reference pose has the wrong sign: try -x"
         )
-    return name if turns_agree else f"{name} (or else heading counts clockwise)"
+    return name if turns_agree else f"{name} (or heading counts clockwise)"

@@ -33,17 +33,17 @@ _ROUGHLY = 0.7  # and where it has none: an effect may come on top
 _UNITS_V = {
     1000.0: "positions look like millimetres: try 0.001 * x, y",
     100.0: "positions look like centimetres: try 0.01 * x, y",
-    1e-3: "the speed asked for looks like mm/s: try 0.001 * v",
-    1e-2: "the speed asked for looks like cm/s: try 0.01 * v",
-    1 / 3.6: "the speed asked for looks like km/h (or a wheel's rad/s): try v / 3.6",
+    1e-3: "the commanded speed looks like mm/s: try 0.001 * v",
+    1e-2: "the commanded speed looks like cm/s: try 0.01 * v",
+    1 / 3.6: "the commanded speed looks like km/h (or a wheel's rad/s): try v / 3.6",
     3.6: "the speed driven looks like km/h: try x, y / 3.6",
 }
 _UNITS_W = {
     180 / np.pi: "heading looks like degrees: try theta * pi / 180",
-    np.pi / 180: "the yaw rate asked for looks like deg/s: try w * pi / 180",
+    np.pi / 180: "the commanded yaw rate looks like deg/s: try w * pi / 180",
     30 / np.pi: "heading or yaw rate look like revolutions per minute: try w * pi / 30",
-    np.pi / 30: "the yaw rate asked for looks like revolutions per minute: try w * pi / 30",
-    1e-3: "the yaw rate asked for looks like mrad/s: try 0.001 * w",
+    np.pi / 30: "the commanded yaw rate looks like revolutions per minute: try w * pi / 30",
+    1e-3: "the commanded yaw rate looks like mrad/s: try 0.001 * w",
 }
 
 
@@ -119,8 +119,8 @@ def _is_swap(pairs: list[list[Likeness]], crossed: FloatArray, possible: BoolArr
 def _shift_words(name: str, lag: float, alike: float, plain: float) -> str:
     way = "after" if lag > 0 else "before"
     return (
-        f"clocks differ: the motion comes {abs(lag):.1f} s {way} the {name} that asks for it; try t of the {name} "
-        f"{lag:+.1f} s (correlation of the rates then {alike:.2f}, as given {plain:.2f})"
+        f"clocks differ: the motion comes {abs(lag):.1f} s {way} its {name}; try t of the {name} "
+        f"{lag:+.1f} s (correlation of the rates: {alike:.2f} then, {plain:.2f} as given)"
     )
 
 
@@ -158,7 +158,7 @@ def _scale_words(asked: Rates, driven: Rates, name: str, base: float) -> list[st
     if best[0] < base + 2 * _WIN:
         return []
     return [
-        f"clocks run at different speeds: {name} and motion agree when the clock of the motion is taken to run "
+        f"clocks run at different speeds: {name} and motion agree if the clock of the motion runs "
         f"{best[1]:.3g} times as fast (correlation {best[2]:.2f}); try t / {best[1]:.3g}"
     ]
 
@@ -213,7 +213,7 @@ def _sure(correlation: float, number: float) -> bool:
 
 def _time_words(factor: float, name: str) -> str:
     return (
-        f"the motion is {factor:.3g} times as fast as the {name} asks for, in both channels: the times of the poses "
+        f"the motion is {factor:.3g} times as fast as the {name} demands, in both channels: the times of the poses "
         f"look like another unit than seconds; try t * {factor:.3g}"
     )
 
@@ -223,9 +223,9 @@ def _unit_words(size: float, alike: float, units: dict[float, str], channel: int
     near = abs(np.log(size / unit)) < _NEAR
     outside = not _PLAIN[0] <= size <= _PLAIN[1]
     quantity = ("forward", "turning")[channel]
-    measured = f"{quantity} {size:.4g} times as fast as asked for"
+    measured = f"{quantity} {size:.4g} times as fast as commanded"
     if (near and alike > 0.9) or (outside and abs(np.log(size / unit)) < _ROUGHLY):
         return [f"{units[unit]}; {measured}"]
     if size > 2 * _PLAIN[1] or size < _PLAIN[0] / 2:
-        return [f"{measured}: no unit that is known here; are both in SI units?"]
+        return [f"{measured}: no known unit explains this; are both in SI units?"]
     return []

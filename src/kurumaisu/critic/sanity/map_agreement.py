@@ -58,7 +58,7 @@ def words(scan: Series, pose: Series, laser: LaserMount, segments: FloatArray, m
     found = max(_readings(check, view), key=lambda pair: pair[0], default=(0.0, ""))
     if found[0] < max(_AGREES, plain + _WIN):
         found = max(found, _moved(check, view, segments), key=lambda pair: pair[0])
-    share = f"as given {plain:.0%} of the readings are where the map has a wall"
+    share = f"as given {plain:.0%} of the readings match a wall of the map"
     if _mounted(check, view) > max(_GOOD, found[0] - _ALIKE):
         return None
     if plain > _HALF and found[0] < plain + _WIN:
@@ -66,13 +66,13 @@ def words(scan: Series, pose: Series, laser: LaserMount, segments: FloatArray, m
         if other < FEW:
             return None
         return (
-            f"scans and map do not belong together: {share}, and {other:.0%} are, wherever they are taken from, of "
-            f"something that the map does not have: another place, or a map of another day?"
+            f"scans do not match the map: {share}, and {other:.0%} come, from whichever place they are taken, from "
+            f"objects that are not in it: another place, or a map of another day?"
         )
     if found[0] > max(_AGREES, plain + _WIN):
         return f"{found[1]}; {share}, then {found[0]:.0%}"
     return (
-        f"scans and map do not belong together: {share}, and no turn, shift, mirror or scale mends it: another place?"
+        f"scans do not match the map: {share}, and no rotation, shift, mirroring or scale corrects it: another place?"
     )
 
 
@@ -219,7 +219,7 @@ def _turned(check: _Check, view: _View) -> Iterator[tuple[float, str]]:
         for fine in np.radians(np.arange(-2, 2.5, 1)):
             best = max(best, (check.agreement(replace(view, bearings=bearings + by + fine)), float(by + fine)))
         degrees = np.degrees(best[1])
-        turn = f"the laser looks {degrees:.0f} deg aside: try angle_min or yaw {best[1]:+.3g}"
+        turn = f"the laser is turned by {degrees:.0f} deg: try angle_min or yaw {best[1]:+.3g}"
         if not mirrored and abs(by) > _ASIDE:
             yield best[0], turn
         elif not mirrored:
@@ -235,7 +235,7 @@ def _fans(check: _Check, view: _View) -> Iterator[tuple[float, str]]:
         bearings = np.radians(np.linspace(-span / 2, span / 2, len(view.bearings)))
         yield (
             check.agreement(replace(view, bearings=bearings)),
-            f"the fan looks like one of {span} deg: another sensor's?",
+            f"the beams look like a scan of {span} deg: another sensor?",
         )
 
 

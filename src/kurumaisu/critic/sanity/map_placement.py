@@ -114,4 +114,4 @@ def _words(turn: float, scale: float, mirrored: bool, shift: FloatArray) -> str:
     parts += [f"scaled by {scale:g}"] if scale != 1.0 else []
     parts += [f"turned by {degrees:.0f} deg"] if abs(degrees) > 1 else []
     parts += [f"shifted by ({shift[0]:.1f}, {shift[1]:.1f}) m"] if np.abs(shift).max() > 0.2 else []
-    return f"the map lies elsewhere than the poses say: it fits when {', '.join(parts) or 'moved a little'}"
+    return f"the map does not fit the poses as given: it fits when {', '.join(parts) or 'moved a little'}"

@@ -58,7 +58,7 @@ def _heading(pose: Series) -> str | None:
     if bool((np.abs(np.abs(step[odd]) - np.pi) < _HALF).all()):
         return (
             f"heading of the reference pose jumps {_times(list(odd))} by half a turn ({first}): "
-            f"wrapped wrongly, or atan where atan2 is meant"
+            f"wrapped wrongly, or atan instead of atan2"
         )
     return f"heading of the reference pose jumps {_times(list(odd))} ({first}): relocalised, or wrapped wrongly"
 

@@ -43,9 +43,9 @@ def words(pose: Series) -> str | None:
     if jitter < _JITTER or follows + _SURE * error > _TRUE:
         return None
     return (
-        f"stamps of the reference pose look like times of arrival: between poses {np.diff(new.t).min():.2g} to "
-        f"{np.diff(new.t).max():.2g} s apart the way made follows their times by {max(follows, 0.0):.2f} only (true "
-        f"stamps: 1), as if they were off by {jitter:.2g} s rms; record the time of measuring, or leave out what waited"
+        f"stamps of the reference pose look like times of arrival: for poses {np.diff(new.t).min():.2g} to "
+        f"{np.diff(new.t).max():.2g} s apart, the distance follows their times only by {max(follows, 0.0):.2f} (true "
+        f"stamps: 1), as if they were off by {jitter:.2g} s rms; record the time of measurement, or drop delayed poses"
     )
 
 

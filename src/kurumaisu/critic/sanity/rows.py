@@ -35,7 +35,7 @@ def frozen(pose: Series, asked: Rates, driven: Rates) -> str | None:
     if worst < _FROZEN:
         return None
     return (
-        f"the reference pose stands still, to the last bit, for {total:.3g} s while the input asks to drive (longest "
+        f"the reference pose stands still, to the last bit, for {total:.3g} s while the input commands motion (longest "
         f"{worst:.3g} s, from t = {at:.6g} s): frozen; cut these rows out"
     )
 
@@ -69,7 +69,7 @@ def repeats(pose: Series, driven: Rates) -> float:
 
 def held(times: float) -> str:
     """Return the words for poses that repeat so many times."""
-    how = f"each {times:.2g} times on the mean" if times >= 2 else f"{1 - 1 / times:.0%} of them"
+    how = f"each {times:.2g} times on average" if times >= 2 else f"{1 - 1 / times:.0%} of them"
     return f"duplicate rows: poses repeat under new times, {how}, while the robot moves: keep the first"
 
 
@@ -96,8 +96,8 @@ def blocks(part: Series, name: str) -> str | None:
     k = int(np.argmax(lengths))
     row, source = int(starts[k]) - 1, int(earlier[starts[k]]) - 1
     return (
-        f"rows of {name} repeat earlier ones exactly: {int(lengths[k]) + 1} rows from t = {part.t[row]:.6g} s on are "
-        f"those from t = {part.t[source]:.6g} s on; {int(follows.sum())} in all; cut them out"
+        f"rows of {name} repeat earlier ones exactly: {int(lengths[k]) + 1} rows from t = {part.t[row]:.6g} s on equal "
+        f"those from t = {part.t[source]:.6g} s on; {int(follows.sum())} in total; cut them out"
     )
 
 
@@ -121,6 +121,6 @@ def coarse(pose: Series, driven: Rates) -> str | None:
     if step < _GRID or step < 0.5 * usual:
         return None
     return (
-        f"positions lie on a grid of {step:.3g} m, while the robot drives {usual:.2g} m in a second: too coarse to "
-        f"judge a motion by; record more digits"
+        f"positions lie on a grid of {step:.3g} m, while the robot drives {usual:.2g} m per second: too coarse to "
+        f"judge motion; record more digits"
     )

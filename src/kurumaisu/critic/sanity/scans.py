@@ -25,7 +25,7 @@ def words(scan: Series, pose: Series | None, laser: LaserMount | None, farthest:
     ranges = scan.values[few]
     valid = np.isfinite(ranges)
     if valid.mean() < _FEW and not np.isinf(ranges).any():
-        return [f"scans hold hardly any reading: {valid.mean():.2%} of {ranges.size} are numbers above 0"]
+        return [f"scans have almost no readings: {valid.mean():.2%} of {ranges.size} are numbers above 0"]
     if valid.any() and np.ptp(ranges[valid]) == 0 and valid.sum() > 100:
         return [f"all ranges are {ranges[valid][0]:g}: the laser measured nothing"]
     told = [_stuck(scan, pose), _piled(ranges, farthest), _degrees(laser)]
@@ -61,7 +61,7 @@ def _piled(ranges: FloatArray, farthest: float) -> str | None:
     if share < _PILED or (below > largest * (1 - _GAP) and largest < farthest - 1e-3):
         return None
     return (
-        f"{share:.1%} of the ranges are exactly {largest:g}, and none is inf: no return is written as a number; "
+        f"{share:.1%} of the ranges are exactly {largest:g}, and none is inf: missing returns are written as a number; "
         f"try inf for {largest:g}"
     )
 
@@ -73,7 +73,7 @@ def _degrees(laser: LaserMount | None) -> str | None:
     if span < 2 * np.pi * 1.01 and abs(laser.angle_min) < 2 * np.pi:
         return None
     return (
-        f"the fan spans {span:.4g} rad from {laser.angle_min:.4g} rad on, more than a turn: degrees? "
+        f"the beams span {span:.4g} rad from {laser.angle_min:.4g} rad on, more than a turn: degrees? "
         f"try angle_min and angle_increment * pi / 180"
     )
 
@@ -97,8 +97,8 @@ def _mirrored(scan: Series, pose: Series, laser: LaserMount) -> str | None:
         return None
     apart = [change[sign] / len(pairs) for sign in (1.0, -1.0)]
     return (
-        f"beams are counted the other way round (clockwise): over {len(pairs)} turns, what was seen before and after "
-        f"differs by {apart[0]:.3g} m, with the beams reversed by {apart[1]:.3g} m; try r reversed"
+        f"beams are counted the other way round (clockwise): over {len(pairs)} turns, scans before and after "
+        f"differ by {apart[0]:.3g} m as given, by {apart[1]:.3g} m with the beams reversed; try r reversed"
     )
 
 

@@ -81,7 +81,7 @@ def _wrong(name: str, raw: FloatArray, line: _Line, reference: float, follows: b
             return f"{name} looks like mV, not V: {measured}; try {name} / 1000"
         return f"{name} looks like mV, reference voltage included: {measured}; try ({name} - {line.offset:.0f}) / 1000"
     if line.correlation < -_ALIKE and not follows:
-        alike = f"correlation {line.correlation:.2f} with the voltage expected"
+        alike = f"correlation {line.correlation:.2f} with the expected voltage"
         return (
             f"{name} has the wrong sign ({'forward speed' if name == _NAMES[0] else 'yaw rate'}): {alike}; try -{name}"
         )

@@ -54,7 +54,7 @@ def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> B
     """Return whether a curve beats the catalogue, and the best one with the effects that act beside it."""
     if not _asked(problem) or not found.enough:
         return Beyond(no_rivals(found), None, 1.0)
-    progress("trying what is not in the catalogue")
+    progress("trying errors outside the catalogue")
     rivalry = compare(problem, found)
     if rivalry.winner is None and not undecided(found, rivalry):
         return Beyond(rivalry, None, 1.0)

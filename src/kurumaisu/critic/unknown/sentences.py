@@ -17,15 +17,15 @@ CHANNELS = {
     "w": "yaw rate",
     "v_gain": "forward speed",
     "w_gain": "yaw rate",
-    "curvature": "curvature of the way",
-    "speed": "size of the forward speed",
+    "curvature": "curvature of the path",
+    "speed": "absolute forward speed",
 }
 _SHARES = {"v_gain": "of the forward speed", "w_gain": "of the yaw rate"}  # in place of a unit
 COVARIATES = {
     "v": ("v", "forward speed", "m/s"),
     "abs_v": ("|v|", "speed", "m/s"),
     "w": ("w", "yaw rate", "rad/s"),
-    "abs_w": ("|w|", "size of the yaw rate", "rad/s"),
+    "abs_w": ("|w|", "absolute yaw rate", "rad/s"),
     "v_times_w": ("vw", "product of speed and yaw rate", "m/s^2"),
     "wheel_left": ("wheel_left", "speed of the left wheel", "m/s"),
     "wheel_right": ("wheel_right", "speed of the right wheel", "m/s"),
@@ -38,8 +38,8 @@ COVARIATES = {
     "x": ("x", "x in the map", "m"),
     "y": ("y", "y in the map", "m"),
     effects.MOVING: ("constant", "time since the start", "s"),
-    "v_f": ("v_f mod step", "translation voltage within a step of the converter", "V"),
-    "v_s": ("v_s mod step", "steering voltage within a step of the converter", "V"),
+    "v_f": ("v_f mod step", "translation voltage within one D/A step", "V"),
+    "v_s": ("v_s mod step", "steering voltage within one D/A step", "V"),
 }
 
 
@@ -94,11 +94,11 @@ def headline(extension: Extension) -> str:
     name = covariate(extension.curve)[1]
     if extension.curve.basis.covariate == effects.MOVING:
         return (
-            f"The {CHANNELS[extension.curve.channel]} is off in a way that is not in the catalogue. "
-            f"The error follows nothing that is known: {shape(extension, intervals=False)}."
+            f"No effect in the catalogue explains the error of the {CHANNELS[extension.curve.channel]}. "
+            f"It follows no known quantity: {shape(extension, intervals=False)}."
         )
     return (
-        f"The {CHANNELS[extension.curve.channel]} is off in a way that is not in the catalogue. The error follows the "
+        f"No effect in the catalogue explains the error of the {CHANNELS[extension.curve.channel]}. It follows the "
         f"{name}: {shape(extension, intervals=False)}."
     )
 

@@ -141,7 +141,7 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("recording", type=Path, metavar="RECORDING", help="a bag, a folder of runs or CSV tables, or an MRPT rawlog")
     add("--report", type=Path, metavar="FOLDER", help="what the critic wrote (criticism or report in the recording)")
-    add("--runs", type=name_list, default=(), metavar="A,B", help="only these runs; patterns like drive_* count")
+    add("--runs", type=name_list, default=(), metavar="A,B", help="only these runs; patterns like drive_* are allowed")
     add("--model", type=Path, metavar="FILE", help="model to compare with (the recording's, else md100.yaml)")
     add("--port", type=_port, metavar="N", help="port to listen at; 0 takes a free one (launch/viewer.yaml's)")
     return parser

@@ -27,7 +27,7 @@ from kurumaisu.viewer.tape import Held, Tape, Track
 from kurumaisu.world import World as Map
 
 # Bodies of simulated drives, by id: name and colour, those of the report's pictures.
-SIMULATED = {"model": ("model as it was", "#c04a00"), "extended": ("extended model", "#0072b2")}
+SIMULATED = {"model": ("original model", "#c04a00"), "extended": ("extended model", "#0072b2")}
 _IMPOSSIBLE = 20.0  # [m/s] beyond which odometry was not driven but set
 _MOST_NOTES = 50
 _MARGIN = 1.0  # [m] around what there is to see

@@ -90,7 +90,7 @@ def smooth_range_of(name: str) -> type[SmoothRange] | None:
     match = _ID.fullmatch(name)
     if match is None or match[1] not in RANGE_COVARIATES:
         return None
-    text = f"something unknown changes the ranges with {match[1].replace('_', ' ')}"
+    text = f"an unknown effect changes the ranges with {match[1].replace('_', ' ')}"
     own = {"id": name, "covariate": match[1], "sentence": text, "oblique": match[1] == "incidence"}
     return type("SmoothRange", (SmoothRange,), own)
 

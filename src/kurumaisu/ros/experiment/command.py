@@ -91,9 +91,9 @@ def _parser() -> argparse.ArgumentParser:
         prog="critic experiment", description="Run a scripted experiment; it begins when the chair stands."
     )
     parser.add_argument("name", help=f"one of {', '.join(names())}; or any name for a --file")
-    parser.add_argument("--file", type=Path, help="a script of your own")
+    parser.add_argument("--file", type=Path, help="your own script")
     parser.add_argument("--bag", type=Path, help="record into this bag (a folder of bags, where there are places)")
     parser.add_argument("--world", help="world file to check for space, or none (default: the simulator's)")
-    parser.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="what the chair is")
+    parser.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="model file of the chair")
     parser.add_argument("--settings", type=Path, default=shipped("launch/experiment_node.yaml"))
     return parser

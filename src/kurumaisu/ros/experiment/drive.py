@@ -42,7 +42,7 @@ def run_drive(
     if others:
         raise Error(f"{topic} is published already, by {', '.join(others)}")
     if not hearers(topic, care.patience):
-        raise Error(f"nobody hears {topic}")
+        raise Error(f"no node subscribes to {topic}")
     recorder = Recorder(bag, tuple(dict.fromkeys((topic, *RECORDED)))) if bag is not None else None
     try:
         return _Driver(script, care, model, ground, topic).run(stop)
@@ -106,11 +106,11 @@ class _Driver:
     def _overhear(self, message: Twist | Voltages) -> None:
         caller = message._connection_header["callerid"]  # rospy says nowhere else who it was
         if caller != rospy.get_name():
-            self._stop(f"{caller} commands the chair, too")
+            self._stop(f"{caller} also commands the chair")
 
     def _yield(self, message: String) -> None:
         if message.data not in ("", INPUT):
-            self._stop(f"{message.data} commands the chair, too")
+            self._stop(f"{message.data} also commands the chair")
 
     def _stop(self, why: str) -> None:
         with self._lock:

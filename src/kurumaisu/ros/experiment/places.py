@@ -29,7 +29,7 @@ _GLANCE = 0.01  # [s] of wall time
 def run_places(script: Script, care: Care, ground: Ground, stop: Callable[[], bool], folder: Path | None) -> str:
     """Return why it was stopped, '' when it is done; one bag per place. Raise Error when it is refused."""
     if ground.sources()[0] != TRUTH:
-        raise Error(f"nobody publishes {TRUTH}: the places are measured from where the chair starts")
+        raise Error(f"no node publishes {TRUTH}: the places are measured from the start of the chair")
     walker = _Walker(care, stop)
     origin = walker.standing()
     if origin is None:
@@ -78,7 +78,7 @@ class _Walker:
     def _stood(visit: Visit, begin: float) -> bool:
         now = rospy.get_time()
         if not visit.stands(now, begin):
-            raise Error("the chair was moved while it was to stand")
+            raise Error("the chair moved while it should stand")
         return bool(now - begin >= visit.seconds)
 
     def _until(self, condition: Callable[[], bool]) -> bool:

@@ -38,7 +38,7 @@ class Ground:
         """Return the topics that bring poses, the reference first. Raise Error when there is none."""
         found = [topic for topic in (TRUTH, ODOM) if publishers(topic)]
         if not found:
-            raise Error(f"nobody publishes {TRUTH} or {ODOM}: where the chair is must be known")
+            raise Error(f"no node publishes {TRUTH} or {ODOM}: the pose of the chair must be known")
         if self._walls is not None and found[0] != TRUTH:
             raise Error(f"space cannot be checked in a world without {TRUTH}; with --world none it is up to you")
         return found

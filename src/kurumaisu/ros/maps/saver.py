@@ -17,11 +17,17 @@ from kurumaisu.ros.maps.messages import GridMessage, map_of
 def main() -> int:
     """Save one map; return 1 when none comes, or it cannot be written."""
     parser = argparse.ArgumentParser(prog="map_saver", description="Save the next map of the topic map.")
-    parser.add_argument("-f", dest="name", type=Path, default=Path("map"), metavar="NAME", help="files' name (map)")
-    parser.add_argument("--occ", type=float, default=OCCUPIED_ABOVE, metavar="PERCENT", help="walls are above (65)")
-    parser.add_argument("--free", type=float, default=FREE_BELOW, metavar="PERCENT", help="free is below (19.6)")
-    parser.add_argument("--png", action="store_true", help="a .png in place of a .pgm")
-    parser.add_argument("--wait", type=float, default=30.0, metavar="SECONDS", help="for a map (30)")
+    parser.add_argument(
+        "-f", dest="name", type=Path, default=Path("map"), metavar="NAME", help="name of the files (map)"
+    )
+    parser.add_argument(
+        "--occ", type=float, default=OCCUPIED_ABOVE, metavar="PERCENT", help="cells above this are walls (65)"
+    )
+    parser.add_argument(
+        "--free", type=float, default=FREE_BELOW, metavar="PERCENT", help="cells below this are free (19.6)"
+    )
+    parser.add_argument("--png", action="store_true", help="write a .png instead of a .pgm")
+    parser.add_argument("--wait", type=float, default=30.0, metavar="SECONDS", help="wait for a map at most (30)")
     options = parser.parse_args(rospy.myargv()[1:])
     if not 0 <= options.free < options.occ <= 100:
         parser.error(f"--free must be from 0 and below --occ, which is at most 100: {options.free:g}, {options.occ:g}")

@@ -108,19 +108,23 @@ def _parser() -> argparse.ArgumentParser:
         parts, "conjecture", _conjecture, "does noise rise with range, or with incidence? The critic's answer"
     )
     conjecture.add_argument(
-        "recordings", nargs="*", type=Path, help="of a wall, with its world; none: data made either way"
+        "recordings", nargs="*", type=Path, help="of a wall, with its world; none: simulated data of both kinds"
     )
     conjecture.add_argument(
-        "--distances", nargs="+", type=float, default=[], help="[m] of the runs, by name: finds the law ahead first"
+        "--distances",
+        nargs="+",
+        type=float,
+        default=[],
+        help="[m] of the runs, by name: fits the law straight ahead first",
     )
     dac = _part(parts, "dac", _dac, "figure 10: voltages at the D/A converter")
-    dac.add_argument("--speeds", type=Path, help="script of speeds in place of launch/paper/figure_10.yaml")
+    dac.add_argument("--speeds", type=Path, help="script of speeds, instead of launch/paper/figure_10.yaml")
     simulated = _part(
         parts, "simulated-wall", _simulated_wall, "figures 11 and 12: a simulated wall, through the driver"
     )
     simulated.add_argument("--speed", type=float, default=2.0, help="simulated seconds per second")
     _part(parts, "all", _all, "all figures, one after the other")
-    odometry = parts.add_parser("odometry", help="odometry again, from a bag's voltages: is it what was recorded?")
+    odometry = parts.add_parser("odometry", help="recompute odometry from a bag's voltages; compare with the recorded")
     odometry.set_defaults(command=_odometry)
     odometry.add_argument("bags", nargs="+", type=Path)
     return parser
@@ -135,7 +139,7 @@ def _part(
     part: argparse.ArgumentParser = parts.add_parser(name, help=words, description=words)
     part.set_defaults(command=command)
     part.add_argument("--out", type=Path, required=True, help="folder for figures, data and model files")
-    part.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="what the chair is")
-    part.add_argument("--seed", type=int, default=1, help="of the simulated noise")
-    part.add_argument("--settings", type=Path, help="in place of launch/paper.yaml")
+    part.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="model file of the chair")
+    part.add_argument("--seed", type=int, default=1, help="seed of the simulated noise")
+    part.add_argument("--settings", type=Path, help="settings, instead of launch/paper.yaml")
     return part

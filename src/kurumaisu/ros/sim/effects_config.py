@@ -77,7 +77,7 @@ def sift(request: Mapping[str, Any]) -> Asked:
         elif name in _ENABLERS:
             asked.changes[name] = bool(value)
         elif name not in _NUMBERS:
-            asked.complaints.append(f"{name}: is no parameter of an effect")
+            asked.complaints.append(f"{name}: is not a parameter of an effect")
         else:
             _bound(asked, name, float(value))
     return asked
@@ -101,7 +101,7 @@ def _bound(asked: Asked, name: str, value: float) -> None:
         return
     held = min(max(value, parameter.lower), parameter.upper)
     if held != value:
-        asked.complaints.append(f"{effect}: {parameter.name} must be {limits}: {value:g}; {held:g} is taken")
+        asked.complaints.append(f"{effect}: {parameter.name} must be {limits}: {value:g}; {held:g} is used")
     asked.changes[name] = held
 
 

@@ -111,7 +111,7 @@ class DrivenLaser:
         rospy.logwarn_throttle(
             10.0,
             f"SIM_LASER_LATE no scan came back within {self._patience:g} s of {owed:.3f} s of the clock: "
-            f"time runs on; {self._late} times so far, {self._device.counters['dropped']} scans dropped",
+            f"time continues; {self._late} times so far, {self._device.counters['dropped']} scans dropped",
         )
 
     def _hear(self, message: rospy.AnyMsg) -> None:

@@ -35,7 +35,7 @@ class SensorTopics:
         """Advertise; robot: the chair's number among the robots. Raise Error for two sensors of one name."""
         names = [sensor.name for sensor in sensors]
         if len(set(names)) < len(names):
-            raise Error(f"sensors: two have one name: {', '.join(names)}")
+            raise Error(f"sensors: two have the same name: {', '.join(names)}")
         self._robot = robot
         self._base = base_frame
         self._sensors = tuple(sensors)

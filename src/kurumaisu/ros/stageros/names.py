@@ -67,7 +67,7 @@ def _prefix(number: int, robot: Model, use_model_names: bool) -> str | None:
     if not use_model_names or not robot.name or ":" in robot.name:  # Stage's own names, of the unnamed, have a colon
         return f"robot_{number}"
     if not re.fullmatch(r"[A-Za-z0-9_/]+", robot.name):
-        raise Error(f"{robot.place}: with -u the name must do for a ROS topic: {robot.name!r}")
+        raise Error(f"{robot.place}: with -u the name must be valid in a ROS topic: {robot.name!r}")
     return robot.name
 
 
@@ -77,6 +77,8 @@ def _only_sensor_carrier_plain(
     """Take the prefix from the only robot with sensors; the others are what it has to avoid."""
     carriers = [i for i, robot in enumerate(robots) if any(devices_of(models, robot, k) for k in (Ranger, Camera))]
     if len(robots) > 1 and len(carriers) != 1:
-        raise Error(f"robot_prefix: never needs one robot with sensors; there are {len(carriers)} of {len(robots)}")
+        raise Error(
+            f"robot_prefix: never: needs exactly one robot with sensors; there are {len(carriers)} of {len(robots)}"
+        )
     plain = carriers[0] if carriers else 0
     return [None if i == plain else prefix for i, prefix in enumerate(prefixes)]

@@ -80,8 +80,10 @@ def _speed(world: World, settings: StagerosSettings, headless: bool) -> float:
     if headless:
         return settings.headless_rate
     if settings.headless_rate > 0:
-        raise Error(f"headless_rate: {settings.headless_rate:g}: goes with -g; else the world's speedup counts")
-    rospy.logwarn("STAGEROS_NO_WINDOW without -g the world runs at its speedup, but there is no window yet")
+        raise Error(
+            f"headless_rate: {settings.headless_rate:g}: works only with -g; otherwise the world's speedup is used"
+        )
+    rospy.logwarn("STAGEROS_NO_WINDOW without -g the world runs at its speedup, but this program has no window")
     return max(world.speedup, 0.0)
 
 
@@ -98,7 +100,7 @@ def _run(session: Session, requests: Requests, pacer: Pacer, world: World, stopp
         session.step()
         session.show(pacer.speed)  # before the pause: a step that is due when its scans are noted is due when shown
         if 0 < world.quit_time <= session.time:
-            rospy.loginfo(f"{world.path}: quit_time {world.quit_time:g} s has come")
+            rospy.loginfo(f"{world.path}: quit_time {world.quit_time:g} s is reached")
             break
         pacer.wait(world.interval)
     requests.close()

@@ -115,7 +115,7 @@ def _over(below: Section, above: Section, where: str) -> tuple[dict[str, Any], t
         value = above.take(key)
         if key not in tree:
             close = difflib.get_close_matches(key, tree, 1)
-            unknown.append(f"{where}/{key} is not a parameter" + (f"; is {close[0]} meant?" if close else ""))
+            unknown.append(f"{where}/{key} is not a parameter" + (f"; did you mean {close[0]}?" if close else ""))
         elif isinstance(tree[key], dict) and isinstance(value, dict):
             tree[key] = {**tree[key], **value}
         else:

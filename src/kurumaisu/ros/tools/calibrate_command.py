@@ -56,38 +56,34 @@ def _laser(options: argparse.Namespace) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="calibrate", description=__doc__)
-    parser.add_argument("--settings", type=Path, help="in place of launch/paper.yaml")
+    parser.add_argument("--settings", type=Path, help="settings, instead of launch/paper.yaml")
     parts = parser.add_subparsers(required=True, metavar="STEP")
-    plan = parts.add_parser("plan", help="say which drive to do")
+    plan = parts.add_parser("plan", help="print which drive to do")
     plan.set_defaults(command=_plan)
-    record = parts.add_parser(
-        "record", help="record a drive, and say meanwhile what it lacks; ends when it lacks nothing"
-    )
+    record = parts.add_parser("record", help="record a drive and print what is still missing; ends when nothing is")
     record.set_defaults(command=_record)
-    record.add_argument("bag", type=Path, help="to write")
-    record.add_argument("--every", type=float, default=5.0, help="seconds between two looks")
+    record.add_argument("bag", type=Path, help="bag to write")
+    record.add_argument("--every", type=float, default=5.0, help="seconds between two checks")
     record.add_argument("--split", type=int, default=0, help="seconds after which a new bag begins; 0: one bag")
-    drive = parts.add_parser("drive", help="from drives to a model file with the law of the chair")
+    drive = parts.add_parser("drive", help="write a model file with the law of the chair, from drives")
     drive.set_defaults(command=_drive)
     drive.add_argument("train", nargs="+", type=Path, help="recordings to fit")
-    drive.add_argument("--test", nargs="+", type=Path, required=True, help="recordings to judge by")
+    drive.add_argument("--test", nargs="+", type=Path, required=True, help="recordings to validate with")
     drive.add_argument(
         "--keep", action="append", default=[], metavar="BRANCH", help="take a refused branch from the model"
     )
-    laser = parts.add_parser("laser", help="from scans of a wall to a model file with equation (4) of the laser")
+    laser = parts.add_parser("laser", help="write a model file with equation (4) of the laser, from scans of a wall")
     laser.set_defaults(command=_laser)
     laser.add_argument("recordings", nargs="+", type=Path, help="scans of the wall")
-    laser.add_argument("--distances", nargs="+", type=float, required=True, help="[m] of the runs, in the order given")
+    laser.add_argument("--distances", nargs="+", type=float, required=True, help="of the runs, in their order [m]")
     laser.add_argument(
         "--test",
         nargs="+",
         type=Path,
         default=[],
-        help="scans to judge by, at the same distances; none: every other one",
+        help="scans to validate with, at the same distances (default: every other one)",
     )
     for part in (drive, laser):
         part.add_argument("--out", type=Path, required=True, help="folder for the model file, figures and data")
-        part.add_argument(
-            "--model", type=Path, default=shipped("launch/md100.yaml"), help="what the chair is said to be"
-        )
+        part.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="model file of the chair")
     return parser

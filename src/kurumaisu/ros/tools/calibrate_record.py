@@ -117,7 +117,7 @@ def _look(heard: Heard, options: Options) -> list[str]:
 
 
 def _tell(missing: list[str], heard: Heard) -> None:
-    reference = "" if heard.measured else " (by odom: no ground_truth; the particle filter decides afterwards)"
+    reference = "" if heard.measured else " (judged by odom, without ground_truth; the particle filter decides later)"
     print(f"\nstill missing{reference}:" if missing else "\nnothing is missing", flush=True)
     for words in missing:
         print(f"  {words}", flush=True)

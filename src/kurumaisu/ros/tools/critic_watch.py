@@ -53,7 +53,7 @@ _LEVELS = {
 }
 _DESCRIPTION = """\
 Listen to a running robot (cmd_vel, voltages, ground_truth, odom, scan, battery, temperature), criticise the last
-minutes again and again in a process of its own, and publish the verdict on /diagnostics. Ends with ROS or Ctrl-C."""
+minutes repeatedly in a separate process, and publish the verdict on /diagnostics. Ends with ROS or Ctrl-C."""
 _EPILOG = """\
 examples:
   critic watch

@@ -27,11 +27,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="map", description="Make a map from a recording of scans and odometry.")
     parser.add_argument("log", type=Path, metavar="LOG", help="an MRPT rawlog, a bag, or a folder as critic reads it")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/map"), metavar="FOLDER")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the particle filter (1)")
-    parser.add_argument("--settings", type=Path, metavar="FILE", help="as launch/mapping_node.yaml, the default")
-    parser.add_argument("--start", type=Path, metavar="SIMPLEMAP", help="go on from this map")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the particle filter (1)")
+    parser.add_argument("--settings", type=Path, metavar="FILE", help="settings (launch/mapping_node.yaml)")
+    parser.add_argument("--start", type=Path, metavar="SIMPLEMAP", help="continue from this map")
     parser.add_argument(
-        "--at", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "THETA"), help="where in it (0 0 0)"
+        "--at",
+        type=float,
+        nargs=3,
+        default=(0.0, 0.0, 0.0),
+        metavar=("X", "Y", "THETA"),
+        help="start pose in that map (0 0 0)",
     )
     parser.add_argument(
         "--within",
@@ -39,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
         nargs=2,
         default=(0.3, 0.2),
         metavar=("DISTANCE", "ANGLE"),
-        help="how well that is known: deviations, 1 m and 0.5 rad at most (0.3 0.2)",
+        help="its standard deviations, at most 1 m and 0.5 rad (0.3 0.2)",
     )
     parser.add_argument(
         "--rawlog", type=Path, metavar="FILE", help="write the scans and odometry as MRPT's rawlog, too"
@@ -72,7 +77,7 @@ def read_log(path: Path) -> tuple[slam.ScanLog, FloatArray | None]:
         return slam.read_rawlog(path), None
     recording = read_recording(path)
     if len(recording.runs) != 1:
-        raise Error(f"{path}: has {len(recording.runs)} runs; a map is made of one")
+        raise Error(f"{path}: has {len(recording.runs)} runs; a map is made from one")
     run = recording.runs[0]
     truth = None if run.pose is None else np.column_stack([run.pose.t, run.pose.values[:, :3]])
     return scan_log(recording, run), truth

@@ -115,7 +115,7 @@ def check(path: Path) -> int:
             raise Error(f"{part}: {error}") from error
     found = dead_reckoning.compare(put, odom)
     if found is None:
-        raise Error(f"{path}: has no voltages and odom of the same stamps")
+        raise Error(f"{path}: has no voltages and odom with equal stamps")
     print(
         f"{path.name}: {found.equal} of {found.stamps} poses are the same to the last bit; the others differ by "
         f"{found.worst:.2e} m, {found.worst_turn:.2e} rad at most; {found.gaps} gaps"

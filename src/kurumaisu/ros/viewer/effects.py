@@ -62,7 +62,7 @@ class EffectSwitches:
         """Switch one on, change it, or switch it off. Raise Error where sim_node does not."""
         chosen = next((one for one in effects.ALL if one.id == effect), None)
         if chosen is None:
-            raise Error(f"effect: there is none {effect!r}")
+            raise Error(f"effect: there is no effect {effect!r}")
         for name in values:
             if name not in {p.name for p in chosen.parameters}:
                 raise Error(f"effect: {effect} has no {name!r}")
@@ -76,7 +76,7 @@ class EffectSwitches:
         if any(said[key] != value for key, value in changes.items()):
             raise Error(f"effect: {self._node} refuses {effect}: its log says why")
         self._values[effect] = {**self._of(chosen), **values}
-        return Outcome(f"{effect} {'acts' if enabled else 'is off'}")
+        return Outcome(f"{effect} {'is on' if enabled else 'is off'}")
 
     def model(self) -> Outcome:
         """Return the model file with the effects that act, as the simulator reads it."""

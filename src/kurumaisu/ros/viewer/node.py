@@ -36,16 +36,16 @@ def main() -> None:
     def clients(_request: TriggerRequest) -> TriggerResponse:
         accounts, stalled = server.accounts()
         lines = [
-            f"{one.address}: {one.seconds:.0f} s, {one.shown} frames, {one.missed} more were left out as it was slow"
+            f"{one.address}: {one.seconds:.0f} s, {one.shown} frames, {one.missed} more dropped because it was slow"
             for one in accounts
         ]
-        return TriggerResponse(True, "\n".join([*lines, f"cut off so far, as they took nothing: {stalled}"]))
+        return TriggerResponse(True, "\n".join([*lines, f"disconnected so far because they did not read: {stalled}"]))
 
     services = [rospy.Service("~new_token", Trigger, new_token), rospy.Service("~clients", Trigger, clients)]
     # to the terminal only, for the log and /rosout are read by others
     if settings.control:
-        print(f"viewer, with control, good once: {server.new_address()}")
-    print(f"viewer, to look: {server.address}", flush=True)
+        print(f"viewer, with control (the link works once): {server.new_address()}")
+    print(f"viewer, view only: {server.address}", flush=True)
     try:
         source.run(settings.server.rate)
     finally:

@@ -95,14 +95,14 @@ class Simulation:
                 return Outcome("back at the start")
             case "set_pose":
                 return Outcome(self._put(**arguments))
-        raise Error(f"{name}: is nothing that a simulation does")
+        raise Error(f"{name}: is not possible in a simulation")
 
     def _put(self, body: str, x: float, y: float, yaw: float) -> str:
         known = {one["id"]: one for one in self._world.get("bodies", [])}
         if body not in known:
             raise Error(f"set_pose: there is no body {body!r}")
         if not known[body]["movable"]:
-            raise Error(f"set_pose: {known[body]['name']} is a wall, which nobody moves")
+            raise Error(f"set_pose: {known[body]['name']} is a wall, which cannot be moved")
         pose = Pose(Point(x, y, known[body]["z"]), quaternion_of(yaw))
         try:
             return done(f"{self._services}set_pose", SetPose, body, pose)

@@ -180,7 +180,7 @@ class RosSource:
     def _guess(self, x: float, y: float, yaw: float) -> Outcome:
         """Tell whoever localises where the robot is."""
         if self._shown is None:
-            raise Error("initial_pose: nothing has been heard of a robot yet")
+            raise Error("initial_pose: no robot has been heard yet")
         message = PoseWithCovarianceStamped()
         message.header.stamp, message.header.frame_id = rospy.Time.from_sec(self._shown["t"]), self._map_frame
         message.pose.pose.position.x, message.pose.pose.position.y = x, y

@@ -41,7 +41,7 @@ class Sticks:
     def _topic(self, body: str) -> str:
         topics = self._topics()
         if body not in topics:
-            raise Error(f"drive: {body!r} is nothing that can be driven")
+            raise Error(f"drive: {body!r} cannot be driven")
         return topics[body] or self._driving.topic
 
 

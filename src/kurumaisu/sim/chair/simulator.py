@@ -50,8 +50,8 @@ class ChairSimulator:
         self._world = self._walls.as_drawn()
         if self._world.overlaps():
             raise Error(
-                f"{world.path}: the chair, as large as in the model, overlaps a wall at its start pose, "
-                "or something else that is solid"
+                f"{world.path}: the chair, with its size in the model, overlaps a wall at its start pose, "
+                "or another solid object"
             )
         self._seed = 0
         name = self._scene.models[self._scene.chair].name
@@ -138,7 +138,7 @@ class ChairSimulator:
         """
         known = state.unpack(saved)
         if known.get("world") != self._fingerprint:
-            raise Error("state: is of another world, chassis, list of effects or of sensors")
+            raise Error("state: belongs to another world, chassis, list of effects or of sensors")
         self.reset(known["seed"])
         self._steps = known["steps"]
         self._world.restore(known["motion"])

@@ -48,5 +48,5 @@ class Walls:
         world = self.built(settings, seed)
         world.restore(before.state())
         if world.overlaps():
-            raise Error("effects: a wall would stand in the chair: drive away from it, or restart with the effect")
+            raise Error("effects: a wall would be inside the chair: drive away from it, or restart with the effect")
         return world

@@ -33,7 +33,7 @@ def build_cells(
             outline, _ = _body(models, members, _solid)
             numbers.append(cells.add_body(*outline, members[0].root))
     except ValueError as error:
-        raise Error(f"collision: cells of {resolution:g} m: {error}; collision: exact does without them") from error
+        raise Error(f"collision: cells of {resolution:g} m: {error}; collision: exact needs none") from error
     found = np.array(numbers, dtype=np.int64)
     cells.set_poses(found, np.ascontiguousarray(poses[bodies.heads]))
     return cells, found
@@ -58,7 +58,7 @@ def build_cell_rays(
         found = np.array(numbers, dtype=np.int64)
         rays.set_poses(found, np.ascontiguousarray(poses[bodies.heads]))
     except ValueError as error:
-        raise Error(f"ray_casting: cells of {resolution:g} m: {error}; ray_casting: exact does without them") from error
+        raise Error(f"ray_casting: cells of {resolution:g} m: {error}; ray_casting: exact needs none") from error
     return rays, found
 
 

@@ -88,7 +88,7 @@ def same_fans(new: Machinery, old: Machinery) -> list[tuple[int, int]]:
 def stuck(machinery: Machinery) -> list[str]:
     """Say which robots cannot move from where they are."""
     return [
-        f"{robot.place}: {robot.name or robot.type} touches something where it begins; it stalls until it is free"
+        f"{robot.place}: {robot.name or robot.type} touches something at its start; it stalls until it is free"
         for robot, touches in zip(machinery.robots, machinery.touching(), strict=True)
         if touches
     ]

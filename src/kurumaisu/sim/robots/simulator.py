@@ -158,7 +158,7 @@ class Simulator:
         """Continue from a state that a simulator of the same world and options saved. Raise Error for another one."""
         known = state.unpack(saved)
         if known["world"] != self._fingerprint:
-            raise Error(f"state: is of another world than {self._world.path}, or of other options")
+            raise Error(f"state: belongs to another world than {self._world.path}, or to other options")
         machinery = self._home
         if known["population"] is not None:
             machinery = self._home.of(known["population"])

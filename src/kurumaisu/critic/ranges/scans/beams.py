@@ -77,14 +77,14 @@ def missing(recording: Recording) -> str | None:
     if not scanned:
         return "no scans were recorded; room_poses records them"
     if recording.world is None:
-        return "there is no map: give world in meta.yaml, a Stage world of measured walls"
+        return "there is no map: give world in meta.yaml, a Stage world with measured walls"
     posed = [run for run in scanned if _referred(run)]
     if not posed and any(run.pose is not None for run in scanned):
-        return "the reference pose comes from these very scans, in a frame of its own; measure one, as room_poses does"
+        return "the reference pose was computed from these scans; measure one, as room_poses does"
     if not posed:
         return "there is no reference pose at the scans; give pose.csv, as room_poses does"
     if sum(len(_within(run)) for run in posed) < _FEWEST_SCANS:
-        return f"fewer than {_FEWEST_SCANS} scans lie within the time of the reference poses; record room_poses"
+        return f"fewer than {_FEWEST_SCANS} scans lie within the times of the reference poses; record room_poses"
     return None
 
 

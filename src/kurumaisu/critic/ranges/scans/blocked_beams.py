@@ -45,5 +45,5 @@ def told(beams: BoolArray, measured: FloatArray, bearings: FloatArray) -> Iterat
         for first, stop in groups[:_TOLD]
     ]
     if words:
-        shape = f"{'; '.join(words)}, wherever the chair stands: something rides in their way"
+        shape = f"{'; '.join(words)}, wherever the chair stands: something on the chair blocks them"
         yield Unknown(CHANNEL, "bearing", shape, 1.0)

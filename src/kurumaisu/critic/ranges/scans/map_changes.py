@@ -37,7 +37,7 @@ class Displaced:
         if not self.readings.any():
             return
         ends = [f"{low:.3g} to {high:.3g} m" for low, high in zip(self.low, self.high, strict=True)]
-        longer = "longer" if self.off > 0 else "shorter"
+        longer = "too long" if self.off > 0 else "too short"
         shape = f"where the map has x {ends[0]}, y {ends[1]}, readings are {abs(self.off):.3g} m {longer} (median)"
         # The narrower the better it says where.
         for axis in np.argsort(self.high - self.low).tolist():

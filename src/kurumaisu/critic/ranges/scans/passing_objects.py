@@ -40,7 +40,7 @@ class Strangers:
         """Yield what is outside the catalogue: when it is there, and where."""
         if self.many:
             shape = (
-                f"in {self.scans} of {len(self.readings)} scans something that the map does not have stands before its "
+                f"in {self.scans} of {len(self.readings)} scans an object that is not in the map stands before its "
                 f"walls, {self.nearer:.2g} m nearer (median)"
             )
             yield from (Unknown(CHANNEL, covariate, shape, 1.0) for covariate in _COVARIATES)

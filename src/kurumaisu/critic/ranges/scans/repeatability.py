@@ -86,8 +86,8 @@ def words(recording: Recording, model: Model) -> tuple[str, ...]:
                 )
         lags = ", ".join(f"{value:.2f}" for value in found.correlation.values())
         told.append(
-            f"{run.name}: neighbours correlate by {lags} at lags {', '.join(map(str, found.correlation))} (the model's "
-            f"are independent unless an effect says otherwise); whole scans scatter by {1e3 * found.common_sd:.2g} mm; "
+            f"{run.name}: neighbours correlate by {lags} at lags {', '.join(map(str, found.correlation))} (in the "
+            f"model by 0, unless an effect couples them); whole scans scatter by {1e3 * found.common_sd:.2g} mm; "
             f"{found.missing:.1%} of the readings are missing"
         )
     return tuple(told)

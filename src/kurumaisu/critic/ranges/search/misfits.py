@@ -79,7 +79,7 @@ def rivals(found: Found) -> tuple[Rival, ...]:
             continue
         seen.add(fit.ids)
         better = fit.log_likelihood - best.log_likelihood
-        why = f"fits better by {better:.1f} nats, less than another effect costs"
+        why = f"fits better by {better:.1f} nats, too little to justify another effect"
         if better <= 0:
             why = f"fits worse by {-better:.1f} nats"
         out.append(Rival(" + ".join(sorted(fit.ids)) or "no effect on the mean reading", fit.score - best.score, why))
@@ -92,8 +92,8 @@ def noise_rows(normal: Normal) -> tuple[Noise, ...]:
     rows = (
         ("laser: single reading (median)", float(np.median(beam.sd[beam.valid])), "m"),
         ("laser: correlation of neighbouring readings", beam.rho, "1"),
-        ("laser: whole scans together", scan.common_sd, "m"),
-        ("laser: time constant of that", scan.common_tau, "s"),
+        ("laser: error common to a whole scan", scan.common_sd, "m"),
+        ("laser: time constant of the common error", scan.common_tau, "s"),
         ("reference position at the scans, each axis", scan.position_sd, "m"),
         ("reference heading at the scans", scan.heading_sd, "rad"),
     )
@@ -108,7 +108,7 @@ def _misfit(name: str, over: Mapping[str, tuple[str, FloatArray]], left: FloatAr
     return Misfit(
         channel="range",
         unit="m",
-        covariate_name=best if share[best] >= FOLLOWED else f"what {name} adds",
+        covariate_name=best if share[best] >= FOLLOWED else f"change by {name}",
         covariate_unit=unit,
         covariate=x,
         residual=left + added,
@@ -131,7 +131,7 @@ def _covariates(assembly: Assembly) -> dict[str, tuple[str, FloatArray]]:
         ("bearing of the beam", "rad", np.broadcast_to(bearings, shape)),
         ("time", "s", np.broadcast_to(shots.stamps[:, np.newaxis], shape)),
         ("reflectance of the wall", "1", seen.returns),
-        ("slope of the range over the heading", "m/rad", assembly.poses[:, :, 2]),
+        ("change of the range with the heading", "m/rad", assembly.poses[:, :, 2]),
         ("x of the laser in the map", "m", poses[..., 0]),
         ("y of the laser in the map", "m", poses[..., 1]),
     )

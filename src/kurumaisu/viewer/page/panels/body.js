@@ -43,7 +43,7 @@ export class BodyPanel {
     let why = this.permit.why;
     if (!body) why = "Choose a body here, or click on one in the picture.";
     else if (!why && !body.movable) why = "This body cannot be moved.";
-    else if (!why && !usable) why = "The source moves no bodies.";
+    else if (!why && !usable) why = "This source cannot move bodies.";
     setText(byId("place-why"), why);
     this.#show();
   }
@@ -65,6 +65,6 @@ export class BodyPanel {
     const [x, y, yaw] = ["x", "y", "yaw"].map((name) => byId(`place-${name}`).valueAsNumber);
     const body = this.#chosen;
     const reply = await this.ask("set_pose", {body: body.id, x, y, yaw: radians(yaw)});
-    if (reply.ok) this.say(`${body.name} was put there.`);
+    if (reply.ok) this.say(`${body.name} was moved there.`);
   }
 }

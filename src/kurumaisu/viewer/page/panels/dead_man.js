@@ -62,7 +62,7 @@ export class Drive {
 
   #send() {
     if (this.#unanswered >= UNANSWERED || this.connection.backlog > BACKLOG) {
-      this.disarm("the connection is too slow to drive by");
+      this.disarm("the connection is too slow for driving");
     } else this.#command(...this.#held);
   }
 

@@ -65,6 +65,6 @@ export class Effects {
     const reply = await this.ask("save_model");
     if (!reply.ok) return;
     download(new Blob([reply.result], {type: "application/yaml"}), "model.yaml");
-    this.say("Saved as model.yaml: what acts now.");
+    this.say("Saved as model.yaml, with the active effects.");
   }
 }

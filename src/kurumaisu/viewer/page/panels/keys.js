@@ -24,7 +24,7 @@ export function keyTable({picture, options, transport, bag, stick, edit, pointer
   return [
     {keys: [" "], shown: "Space", meaning: "emergency stop", act: () => transport.stop(), onMap: true},
     {
-      keys: ["p"], shown: "p", meaning: "pause or run; play or hold a recording",
+      keys: ["p"], shown: "p", meaning: "pause or run; play or pause a recording",
       act: () => (bag.playback ? bag.togglePlay() : transport.togglePause()),
     },
     {
@@ -33,8 +33,8 @@ export function keyTable({picture, options, transport, bag, stick, edit, pointer
     },
     {keys: [","], shown: ",", meaning: "0.1 s back in a recording", act: () => bag.nudge(-1)},
     // none of the keys that drive: who holds those while the stick is taken away must not take it again
-    {keys: ["t"], shown: "t", meaning: "take the stick, or lay it down", act: () => stick.toggle()},
-    {shown: "Arrows, W A S D", meaning: "with the stick taken: hold to drive; let go to stop. Any other key stops"},
+    {keys: ["t"], shown: "t", meaning: "start or end driving", act: () => stick.toggle()},
+    {shown: "Arrows, W A S D", meaning: "after t: hold to drive; let go to stop. Any other key stops"},
     {keys: ["ArrowUp"], act: pan(0, PAN), onMap: true},
     {keys: ["ArrowDown"], act: pan(0, -PAN), onMap: true},
     {keys: ["ArrowLeft"], act: pan(PAN, 0), onMap: true},
@@ -50,9 +50,9 @@ export function keyTable({picture, options, transport, bag, stick, edit, pointer
       act: () => options.set({tool: options.tool === "measure" ? null : "measure"}),
     },
     {keys: ["e"], shown: "e", meaning: "effects", act: () => tabs.show("effects")},
-    {keys: ["v"], shown: "v", meaning: "what is shown", act: () => tabs.show("view")},
+    {keys: ["v"], shown: "v", meaning: "what the picture shows", act: () => tabs.show("view")},
     {
-      keys: ["Escape"], shown: "Esc", meaning: "lay the stick down; give back what is being dragged",
+      keys: ["Escape"], shown: "Esc", meaning: "end driving; cancel a drag",
       act: () => {
         stick.drive.disarm();
         pointer.cancel();

@@ -53,7 +53,7 @@ export class Bag {
     const scrubber = byId("scrubber");
     const {from, to, t, playing, rate} = playback;
     Object.assign(scrubber, {min: from, max: to, step: 0.01});
-    setText(byId("play"), playing ? "Hold" : "Play");
+    setText(byId("play"), playing ? "Pause" : "Play");
     if (t !== this.#before) this.#wanted = null;
     if (!this.#held) {
       scrubber.value = this.#wanted ?? t;

@@ -45,7 +45,7 @@ export class Residuals {
     if (!chosen) return;
     const {samples, unit} = chosen;
     this.#marks = largest(samples, MARKED);
-    setText(byId("residual-count"), `The ${Math.min(LISTED, this.#marks.length)} furthest off of ${samples.length} in the picture:`);
+    setText(byId("residual-count"), `The ${Math.min(LISTED, this.#marks.length)} largest of ${samples.length} misfits in the picture:`);
     byId("residual-list").replaceChildren(...this.#marks.slice(0, LISTED).map((sample) => make("li", {},
       make("a", {href: fragment(sample), textContent: `${quantity(sample.value, unit)} ${told(sample)}`}))));
     this.picture.dirty("front");

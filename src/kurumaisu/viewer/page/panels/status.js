@@ -58,9 +58,9 @@ export class Status {
     const {state, seconds} = this.#line;
     const silent = performance.now() - this.#heard;
     let [text, mark] = ["Connected", "on"];
-    if (state === "wrong") [text, mark] = ["Page and server differ: load the page again", "off"];
-    else if (state !== "on") [text, mark] = [seconds ? "No connection: trying again" : "Connecting", "off"];
-    else if (silent > STALE && this.#expected()) [text, mark] = [`Nothing new for more than ${STALE / 1000} s`, "stale"];
+    if (state === "wrong") [text, mark] = ["Page and server have different versions: reload the page", "off"];
+    else if (state !== "on") [text, mark] = [seconds ? "No connection: retrying" : "Connecting", "off"];
+    else if (silent > STALE && this.#expected()) [text, mark] = [`No new data for more than ${STALE / 1000} s`, "stale"];
     const place = byId("connection");
     setText(place, text);
     place.dataset.state = mark;

@@ -143,7 +143,7 @@ export class Stick {
   /** Shares of the limits, forward and to the left. */
   #hold(v, w) {
     const limits = this.scene.hello?.limits;
-    if (!limits) return this.drive.disarm("no limits of speed are known");
+    if (!limits) return this.drive.disarm("the speed limits are unknown");
     this.drive.hold(v * limits.v * this.#share, w * limits.w * this.#share);
     const [now, turn] = this.drive.held ?? [0, 0];
     setText(byId("drive-read"), `${fixed(now, 2)} m/s  ${fixed(turn, 2)} rad/s`);
@@ -168,6 +168,6 @@ export class Stick {
     byId("stick-box").hidden = !armed;
     this.pad.classList.toggle("held", Boolean(held));
     setPressed(byId("drive"), armed);
-    if (reason) say(`The stick was taken away: ${reason}.`);
+    if (reason) say(`Driving was ended: ${reason}.`);
   }
 }

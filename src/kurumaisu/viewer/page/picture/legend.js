@@ -53,7 +53,7 @@ function bar(context, x, y, width, colors) {
 function scaleOfColors(context, x, y, {colors, options, scene}) {
   const error = options.scanColor === "error";
   const high = error ? options.errorScale : strongest(scene.scans.values());
-  if (!high) return label(context, "no intensities are known", x, y + 24, colors);
+  if (!high) return label(context, "no intensities available", x, y + 24, colors);
   const steps = colors[options.scanColor];
   const step = COLORS / BUCKETS;
   steps.forEach((color, i) => {

@@ -59,7 +59,7 @@ function lead(picture) {
   const ring = ringIn(svg);
   const said = document.createElement("p");
   said.className = "hint";
-  const hint = "A point that is clicked is shown in the viewer.";
+  const hint = "Click a point to see it in the viewer.";
   said.textContent = hint;
   svg.parentElement.after(said);
   const point = (event) => {
@@ -87,7 +87,7 @@ function lead(picture) {
 function list(samples, unit) {
   const details = document.createElement("details");
   const summary = document.createElement("summary");
-  summary.textContent = `The ${samples.length} furthest off, in the viewer`;
+  summary.textContent = `The ${samples.length} largest misfits, in the viewer`;
   const items = samples.map((sample) => {
     const link = document.createElement("a");
     Object.assign(link, {href: address(sample), target: VIEWER, textContent: `${quantity(sample.value, unit)} ${told(sample)}`});

@@ -5,8 +5,8 @@ import {News} from "../common/dom.js";
 
 const OFF = "Not connected";
 const ASKING = "Asking for control";
-const CLOSED = "View only: the viewer was started without control (viewer_control:=true gives it).";
-const NO_TOKEN = "View only: to take control open the link that the viewer printed when it started, or ask it for a new one.";
+const CLOSED = "View only: the viewer was started without control; start it with viewer_control:=true.";
+const NO_TOKEN = "View only: to take control, open the link that the viewer printed at its start, or ask it for a new one.";
 
 /** News: "change". */
 export class Permit extends News {
@@ -57,7 +57,7 @@ export class Permit extends News {
       if (element.tagName === "FORM") element.firstElementChild.disabled = !this.can(name);
       else element.disabled = !this.can(name);
       element.dataset.title ??= element.title;
-      element.title = this.can(name) ? element.dataset.title : this.why || "The source does not take this command";
+      element.title = this.can(name) ? element.dataset.title : this.why || "This source does not have this command";
     }
     this.tell("change");
   }
