@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu import settings
+from kurumaisu import program, settings
 from kurumaisu.critic.options import name_list
 from kurumaisu.critic.recording import Recording
 from kurumaisu.critic.replay import model_of
@@ -131,7 +131,7 @@ def _port(text: str) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = program.Parser(
         prog="view",
         description="Look at a recording in the browser, moment by moment.",
         epilog=_EPILOG,

@@ -17,6 +17,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, LaserScan, Temperature
 
+from kurumaisu import program
 from kurumaisu.critic import messages
 from kurumaisu.critic.checks import check_run, usable
 from kurumaisu.critic.clean import Faults
@@ -218,7 +219,7 @@ def main(arguments: Sequence[str]) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     form = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(
+    parser = program.Parser(
         prog="critic watch", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=form, allow_abbrev=False
     )
     add = parser.add_argument

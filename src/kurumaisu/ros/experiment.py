@@ -12,7 +12,7 @@ from pathlib import Path
 
 import rospy
 
-from kurumaisu import settings
+from kurumaisu import program, settings
 from kurumaisu.errors import Error, one_line
 from kurumaisu.experiments import Script, load_script, names, shipped_script
 from kurumaisu.experiments.supervisor import read_care
@@ -87,7 +87,7 @@ def _hint(bag: Path | None) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = program.Parser(
         prog="critic experiment", description="Run a scripted experiment; it begins when the chair stands."
     )
     parser.add_argument("name", help=f"one of {', '.join(names())}; or any name for a --file")
