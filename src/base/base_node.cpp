@@ -32,8 +32,8 @@ namespace {
 
 constexpr const char* kHelp = R"(usage: base_node
 
-The base controller: follows the commands of one input at a time within its limits,
-puts out voltages, and computes odometry from them.
+The base controller: follows the commands of one input at a time, within limits;
+puts out voltages and computes odometry from them.
 base.launch starts it: roslaunch kurumaisu base.launch
 
 subscribes to:

@@ -23,8 +23,8 @@ namespace dac = kurumaisu::dac;
 
 constexpr const char* kHelp = R"(usage: set_voltages DEVICE.yaml V_F V_S V_REF
 
-Puts out three voltages until Enter or Ctrl-C, then neutral; to try a D/A converter
-with a voltmeter. Nothing watches over it: never with the chair connected!
+Puts out three voltages until Enter or Ctrl-C, then neutral: to try a D/A
+converter with a voltmeter. Nothing watches over it: never connect a chair!
 
   DEVICE.yaml    the D/A converter: launch/dac holds examples
   V_F V_S V_REF  [V]; V_F and V_S count from the reference V_REF

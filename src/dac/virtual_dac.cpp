@@ -27,18 +27,20 @@ using kurumaisu::dac::VirtualChip;
 
 constexpr const char* kHelp = R"(usage: virtual_dac DEVICE.yaml PLACE [--log FILE] [--realtime] [FAULT]...
 
-Simulates a D/A converter until Ctrl-C or the end of its standard input; /dev/null
-has no end.
+Simulates a D/A converter until Ctrl-C or the end of its standard input, unless
+that is /dev/null.
 
   DEVICE.yaml  the D/A converter: launch/dac holds examples
   PLACE        kind serial: link to make to a terminal, in the place of `port`
-               kind iio: folder to make, which is the file's `root`; it can only be
-               unplugged
-  --log FILE   every change: TIME volts V_f V_s V_ref, TIME in ns of CLOCK_MONOTONIC
+               kind iio: folder to make, the file's `root`; its one fault is
+               to be unplugged
+  --log FILE   every change: TIME volts V_f V_s V_ref; TIME [ns] is
+               CLOCK_MONOTONIC
   --realtime   before all others, where the system allows it
-  FAULT        NAME[/SIGNAL][@COMMAND][xCOUNT][=SECONDS]; without COMMAND: at once
+  FAULT        NAME[/SIGNAL][@COMMAND][xCOUNT][=SECONDS]; without COMMAND: at
+               once
 
-On its standard input it takes a FAULT on each line, and `volts`, which prints them.
+On its standard input it takes a FAULT on each line, and `volts`: print them.
 Exit code: 1 a failure, 2 wrong usage. More: docs/dac.md
 
 )";

@@ -20,7 +20,8 @@ namespace k = kurumaisu;
 
 constexpr const char* kHelp = R"(usage: guard [--neutral] DEVICE.yaml GUARD.yaml
 
-Keeps the D/A converter neutral unless its client, base_node, may drive. Needs no ROS.
+Keeps the D/A converter neutral unless its client, base_node, may drive. It
+needs no ROS.
 
   DEVICE.yaml  the D/A converter: launch/dac holds examples
   GUARD.yaml   socket, time-outs: launch/guard.yaml

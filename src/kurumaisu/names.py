@@ -8,7 +8,7 @@ from difflib import get_close_matches
 
 _NEAR = 0.6  # share of letters in common from which a name is suggested
 _MOST = 3  # suggestions
-_FEW = 8  # names that are all told where none is near
+_FEW = 8  # names that are all told where none is near; of more, the first ones, unless a page lists them
 
 
 def nearest(name: str, names: Iterable[str]) -> list[str]:
@@ -26,6 +26,6 @@ def hint(name: str, names: Iterable[str], listed: str = "") -> str:
         return f"did you mean {' or '.join(near)}?"
     if not known:
         return "there is none"
-    if len(known) <= _FEW or not listed:
+    if len(known) <= _FEW:
         return f"there are: {', '.join(known)}"
-    return f"there are {len(known)}: {listed}"
+    return f"there are {len(known)}: {listed or ', '.join([*known[:_MOST], '...'])}"

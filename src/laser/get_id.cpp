@@ -31,13 +31,14 @@ constexpr int kBaud = 115200;           // [baud] on RS-232, where urg_node, too
 constexpr const char* kHokuyo = "15d1";
 constexpr const char* kHelp = R"(usage: getID [--quiet] [PORT]...
 
-Prints the serial number of each laser scanner; without a PORT, of all Hokuyo sensors
-on USB. Needs no ROS, for udev.
+Prints the serial number of the laser scanner at each PORT; without a PORT, of
+all Hokuyo sensors on USB. Needs no ROS, for udev.
 
   PORT         a tty, or ADDRESS:PORT with the address in numbers
   -q, --quiet  the number only; so does -- after the PORT, as with urg_node
 
-Exit code: 0 all answered, 1 one did not, 2 wrong usage. More: docs/laser_node.md
+Exit code: 0 all answered, 1 one did not, 2 wrong usage.
+More: docs/laser_node.md
 )";
 
 struct Arguments {

@@ -31,7 +31,8 @@ using std_srvs::Trigger;
 constexpr const char* kHelp = R"(usage: laser_node
 
 The driver of a Hokuyo URG or UTM laser scanner, in the place of urg_node.
-laser.launch starts it: roslaunch kurumaisu laser.launch serial_port:=/dev/ttyACM0
+laser.launch starts it:
+roslaunch kurumaisu laser.launch serial_port:=/dev/ttyACM0
 
 publishes:
   scan                    sensor_msgs/LaserScan

@@ -33,8 +33,9 @@ using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
 constexpr const char* kHelp = R"(usage: localization_node
 
-Say where the chair is in a known map, from scans and odometry; in the place of amcl.
-localization.launch starts it: roslaunch kurumaisu localization.launch map:=FILE.yaml
+Say where the chair is in a known map, from scans and odometry; in the place of
+amcl. localization.launch starts it:
+roslaunch kurumaisu localization.launch map:=FILE.yaml
 
 subscribes to:
   scan

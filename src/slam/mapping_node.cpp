@@ -31,8 +31,8 @@ using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
 constexpr const char* kHelp = R"(usage: mapping_node
 
-Make a map from scans and odometry, and say where the chair is in it; in the place of
-slam_gmapping. slam.launch starts it: roslaunch kurumaisu slam.launch
+Make a map from scans and odometry, and say where the chair is in it; in the
+place of slam_gmapping. slam.launch starts it: roslaunch kurumaisu slam.launch
 
 subscribes to:
   scan
@@ -51,8 +51,8 @@ services:
   ~pause, ~resume              use no scans for a while
   ~reset                       begin anew
 parameters:
-  launch/mapping_node.yaml, which the node reads itself; also slam_gmapping's names
-  start_map: a .simplemap to go on from, or static_map, the service that has the map
+  launch/mapping_node.yaml, which the node reads itself; also slam_gmapping's
+  start_map: a .simplemap to go on from, or static_map for the service's map
 
 More: docs/mapping.md
 )";

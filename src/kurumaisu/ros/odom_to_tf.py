@@ -11,8 +11,8 @@ from nav_msgs.msg import Odometry
 from kurumaisu import program
 
 _HELP = """
-Publish the transform that each odometry message holds: for recordings whose tf also
-has transforms that are not wanted.
+Publish the transform that each odometry message holds: for recordings whose tf
+also has transforms that are not wanted.
 
 subscribes to:
   odom  nav_msgs/Odometry

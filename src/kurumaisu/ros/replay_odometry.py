@@ -20,12 +20,12 @@ from kurumaisu.paper import reckon
 from kurumaisu.paper.reckon import Odom, Put, Reckoner
 
 _HELP = """
-Compute base_node's odometry again, from the voltages of a bag that is played. For a
-check without ROS: paper odometry FILE.bag
+Compute base_node's odometry again, from the voltages of a bag that is played.
+For a check without ROS: paper odometry FILE.bag
 
 subscribes to:
   voltages       what the D/A converter put out
-  recorded/odom  the odometry of the bag: stamps, frames, covariances and the start
+  recorded/odom  the odometry of the bag: start, stamps, frames, covariances
 publishes:
   odom           the same messages, with the pose that the voltages make
 """

@@ -32,16 +32,16 @@ from kurumaisu.sim.holder import VoltageHolder
 from kurumaisu.types import FloatArray
 
 _HELP = """
-The simulator of the chair in a world; it also sets the time (/clock). sim.launch
-starts it with the base controller: roslaunch kurumaisu sim.launch
+Simulate the chair in a world, and set the time of all other nodes (/clock).
+sim.launch starts it with the base controller: roslaunch kurumaisu sim.launch
 
 subscribes to:
   voltages            what the D/A converter puts out
   NAME/cmd_vel        drives another robot of the world
 publishes:
-  scan                of the laser; not with laser:=driver, where laser_node does
+  scan                of the laser; with laser:=driver laser_node publishes it
   ground_truth        where the chair is
-  collision           whether something limited its motion since the last message
+  collision           whether it touched something since the last message
   /clock, /tf_static
   ~effects            what is wrong with chair, laser and world at the moment
   ~world, ~view       what a page draws

@@ -23,7 +23,7 @@ from kurumaisu.world import World, load_world
 
 _USAGE = "usage: stageros [-g] [-u] FILE.world"
 _HELP = """
-Simulate a world of Stage, with the topics, frames and services of stage_ros 1.8.0.
+Simulate a Stage world with the topics, frames and services of stage_ros 1.8.0.
 
 With several robots the names below begin with /robot_0/, /robot_1/, ...
 
@@ -40,7 +40,7 @@ publishes:
 services:
   reset_positions             all back to the start, as in stage_ros
   ~reset, ~seed               likewise, with the same or another seed
-  ~pause, ~step, ~speed       hold the time, go on by one step, go faster or slower
+  ~pause, ~step, ~speed       hold the time, go on by one step, change the speed
   ~set_pose, ~spawn, ~delete  put a model elsewhere, add one, remove one
   ~save, ~load                the whole state, to a file and back
 parameters:

@@ -13,7 +13,8 @@ from kurumaisu.ros.teleop import Ending, Hand, overlaid, run
 from kurumaisu.teleop.stick import Stick, read_stick
 
 _HELP = """
-Drive by a joystick, with a dead-man button. teleop.launch starts it with the joystick.
+Drive by a joystick, with a dead-man button. teleop.launch starts it, and the
+node joystick: roslaunch kurumaisu teleop.launch
 
 subscribes to:
   joy       sensor_msgs/Joy

@@ -16,13 +16,14 @@ from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.server import Server
 
 _HELP = """
-Serve a page that shows a simulation or a robot in the browser, at the address that
-is printed. viewer.launch starts it: roslaunch kurumaisu viewer.launch
+Serve a page that shows a simulation or a robot in the browser, and print its
+address. viewer.launch starts it: roslaunch kurumaisu viewer.launch
 
 It listens only while somebody looks.
 
 subscribes to:
-  sim_node/world, sim_node/view, sim_node/effects, or stageros/world, stageros/view
+  sim_node/world, sim_node/view, sim_node/effects
+  stageros/world, stageros/view
   scan, tf, /clock                   of a robot
   odom, voltages, cmd_vel_out, active_input, diagnostics
   map, particlecloud, amcl_pose      of who maps or localises

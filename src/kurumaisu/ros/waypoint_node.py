@@ -16,8 +16,8 @@ from kurumaisu.errors import Error, one_line
 from kurumaisu.ros.rotation import planar
 
 _HELP = """
-Drive a route of waypoints, then end. It steers by the ground truth of a simulator:
-for demonstrations and tests.
+Drive a route of waypoints, then end. It steers by the ground truth of a
+simulator: for demonstrations and tests.
 
 subscribes to:
   ground_truth  where the chair is

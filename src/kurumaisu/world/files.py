@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.world.notes import Notes
 from kurumaisu.world.tokens import Kind, Source, Token, skip_line, tokenize
 
@@ -66,7 +67,8 @@ class Reader:
         self.tokens.append(Token(Kind.END, "", source, len(source.text)))
         unused = sorted(set(self.values) - self.used)
         if unused:
-            raise Error(f"{self.top}: has no parameter ${{{unused[0]}}}, for which a value was given")
+            near = hint(unused[0], sorted(self.used))
+            raise Error(f"{self.top}: has no parameter ${{{unused[0]}}}, for which a value was given; {near}")
         return self.tokens
 
     def _splice(self, source: Source, depth: int) -> None:
