@@ -4,8 +4,11 @@
 import pytest
 
 from kurumaisu import effects
+from kurumaisu.errors import Error
 from kurumaisu.names import hint, nearest
+from kurumaisu.params import shipped
 from kurumaisu.program import Parser
+from kurumaisu.world import load_world
 
 EFFECTS = [effect.id for effect in effects.ALL]
 PAGE = "docs/effects.md"
@@ -54,3 +57,8 @@ def test_a_part_of_a_program_hints(capsys):
     with pytest.raises(SystemExit, match="2"):
         parser.parse_args(["drvie"])
     assert capsys.readouterr().err.endswith("there is no 'drvie'; did you mean drive?\n")
+
+
+def test_a_world_that_is_not_there_has_near_names():
+    with pytest.raises(Error, match=r"bulding\.world: No such file or directory; did you mean building\.world"):
+        load_world(shipped("worlds/building.world").with_name("bulding.world"))
