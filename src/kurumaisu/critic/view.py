@@ -24,11 +24,13 @@ from kurumaisu.world import load_world
 
 _EPILOG = """\
 examples:
-  view drive.bag                              one drive
-  view drives/ --report criticism             with what the critic found: the report leads to moments and places
-  view drives/ --runs 'monday_*' --port 0     some drives, at any free port
+  view drive.bag                           one drive
+  view drives/ --report criticism          with what the critic found: the report
+                                           leads to moments and places
+  view drives/ --runs 'monday_*' --port 0  some drives, at any free port
 
-Open the address that is printed: it holds the right to move the recording, once. Ctrl-C ends it."""
+Open the address that is printed: it holds the right to move the recording,
+once. Ctrl-C ends it. More: docs/viewer_bag.md"""
 # Where a report is looked for inside a recording that is a folder.
 _USUAL = ("criticism", "report")
 

@@ -53,14 +53,21 @@ _LEVELS = {
     "invalid_data": DiagnosticStatus.ERROR,
 }
 _DESCRIPTION = """\
-Listen to a running robot (cmd_vel, voltages, ground_truth, odom, scan, battery, temperature), criticise the last
-minutes again and again in a process of its own, and publish the verdict on /diagnostics. Ends with ROS or Ctrl-C."""
+Listen to a running robot, criticise the last minutes again and again in a
+process of its own, and publish the verdict. Ends with ROS or Ctrl-C."""
 _EPILOG = """\
+subscribes to:
+  cmd_vel, voltages, ground_truth, odom, scan, battery, temperature
+publishes:
+  /diagnostics
+
 examples:
   critic watch
   critic watch --window 300 --every 60 ground_truth:=/mocap/pose
   critic watch --meta recordings/office/meta.yaml
-  rostopic echo /diagnostics"""
+  rostopic echo /diagnostics
+
+More: docs/critic.md"""
 
 
 class CriticWatch:

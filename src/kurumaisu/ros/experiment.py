@@ -21,6 +21,22 @@ from kurumaisu.ros.experiment_drive import run_drive
 from kurumaisu.ros.experiment_ground import Ground, wait_until_gone
 from kurumaisu.ros.experiment_places import run_places
 
+_HELP = """
+Run a scripted experiment on the chair, or on the simulator behind the same
+topics. It begins when the chair stands; Ctrl-C stops it.
+
+subscribes to:
+  ground_truth, odom  where the chair is
+  active_input        who drives: it stops when somebody else does
+  collision
+publishes:
+  experiment_vel      commands for base_node; of a sweep voltages
+parameters:
+  launch/experiment_node.yaml, by --settings
+
+Exit code: 0 done, 1 refused or stopped, 2 wrong usage.
+More: docs/experiments.md
+"""
 _LONGEST = 10.0  # [s] of wall time for stopping when killed
 
 
@@ -87,9 +103,7 @@ def _hint(bag: Path | None) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = program.Parser(
-        prog="critic experiment", description="Run a scripted experiment; it begins when the chair stands."
-    )
+    parser = program.node_parser("critic experiment", _HELP)
     parser.add_argument("name", help=f"one of {', '.join(names())}; or any name for a --file")
     parser.add_argument("--file", type=Path, help="a script of your own")
     parser.add_argument("--bag", type=Path, help="record into this bag (a folder of bags, where there are places)")

@@ -115,7 +115,8 @@ class Reader:
             with path.open("rb") as file:
                 data = file.read(_MOST_BYTES + 1)
         except (OSError, ValueError) as error:
-            reason = f"{path}: {getattr(error, 'strerror', None) or error}{_near(path)}"
+            near = _near(path) if isinstance(error, FileNotFoundError) else ""
+            reason = f"{path}: {getattr(error, 'strerror', None) or error}{near}"
             raise asked.error(reason) if asked else Error(reason) from error
         if len(data) > _MOST_BYTES:
             raise Error(f"{path}: is larger than {_MOST_BYTES} bytes")
@@ -152,7 +153,7 @@ class Reader:
 def _near(path: Path) -> str:
     """Return which worlds beside a missing file have a like name."""
     there = sorted(file.name for file in path.parent.glob(f"*{path.suffix}")) if path.suffix else []
-    near = [] if path.name in there else nearest(path.name, there)
+    near = nearest(path.name, there)
     return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
