@@ -60,7 +60,7 @@ class BadStarts(unittest.TestCase):
 
     def test_rate_of_no_sensor(self):
         self.refused(
-            "there is no sensor of this name; there are: base_scan", ONE, "_rates:={sensors: {base_scam: 5.0}}"
+            "there is no sensor of this name; did you mean base_scan?", ONE, "_rates:={sensors: {base_scam: 5.0}}"
         )
 
     def test_no_world(self):

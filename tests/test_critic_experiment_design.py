@@ -92,7 +92,7 @@ def test_the_plan_knows_what_the_textbook_knows():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("base.lag", "'base.lag' is no effect on the base: base.cross_v_to_w"),
+        ("base.lag", "'base.lag' is no effect on the base; did you mean base.lag_"),
         ("laser.offset", "is no effect on the base"),
         ("base.lag_v=fast", "'base.lag_v=fast': the size must be a number"),
         ("base.lag_v=-1", "tau must be 0 to 3 s"),

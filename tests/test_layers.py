@@ -23,7 +23,7 @@ ROS_CPP = r"<(ros\w*|tf2?|tf2_\w+|xmlrpcpp|actionlib|nodelet|diagnostic_updater|
 ABSTRACT = {"base", "mechanism", "laser"}
 MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - ABSTRACT | {r"laser\.\w+"}
 CONCRETE = rf"kurumaisu\.effects\.({'|'.join([*MODULES, *(effect.__name__ for effect in effects.ALL)])})(\.|$)"
-SHARED = r"file_descriptor\.h|steady\.h"  # C++ that rests on nothing
+SHARED = r"command_line\.h|file_descriptor\.h|steady\.h"  # C++ that rests on nothing
 IDS = {effect.id for effect in effects.ALL}
 
 
@@ -80,7 +80,11 @@ CPP_RULES = [
     Rule(
         r"virtual_urg/", rf'"(?!scip/|virtual_urg/|bindings\.h|{SHARED})', "the virtual sensor shares the protocol only"
     ),
-    Rule(r"laser/", r'"(?!scip/|serial/|laser/|params\.h)', "the driver rests on the protocol and the port only"),
+    Rule(
+        r"laser/",
+        r'"(?!scip/|serial/|laser/|params\.h|command_line\.h)',
+        "the driver rests on the protocol and the port only",
+    ),
     Rule(r"serial/", rf'"(?!serial/|{SHARED})', "a port rests on nothing"),
     # a virtual board is plugged in and out as a virtual sensor is
     Rule(r"dac/(?!virtual_)", rf'"(?!dac/|serial/|yaml\.h|{SHARED})', "what moves the chair rests on the port only"),

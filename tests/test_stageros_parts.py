@@ -45,7 +45,7 @@ def test_bad_rates_are_named(rates, message):
 def test_a_rate_of_no_sensor_is_named():
     one = pace(sensors={"base_scan_1": 5.0})
     one.check(["/robot_0/base_scan_0", "/robot_0/base_scan_1"])
-    with pytest.raises(Error, match="base_scan_1: there is no sensor of this name; there are: base_scan"):
+    with pytest.raises(Error, match="base_scan_1: there is no sensor of this name; did you mean base_scan"):
         one.check(["base_scan"])
 
 

@@ -68,6 +68,7 @@ from kurumaisu.effects.steering_law import SteeringLaw
 from kurumaisu.effects.understeer import Understeer
 from kurumaisu.effects.veer import Veer
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.params import EffectSetting
 
 # What the critic looks for.
@@ -143,7 +144,7 @@ def by_id(name: str) -> type[Mechanism]:
     ranged = smooth_range_of(name)
     if ranged is not None:
         return ranged
-    raise Error(f"effects: {name!r} is not in the catalogue: {', '.join(effect.id for effect in ALL)}")
+    raise Error(f"effects: {name!r} is not in the catalogue; {hint(name, _BY_ID, 'docs/effects.md')}")
 
 
 def fluctuation(sd_v: float, sd_w: float, tau: float) -> EffectSetting:

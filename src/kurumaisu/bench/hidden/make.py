@@ -19,6 +19,7 @@ from kurumaisu.bench.hidden.laser.catalogue import LASER
 from kurumaisu.bench.hidden.unknown.cases import strange_base, strange_laser
 from kurumaisu.bench.hidden.unknown.forms import STRANGE_BASE, STRANGE_LASER
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 
 
 def make(ask: Ask, seed: int, folder: Path | None = None) -> Case:
@@ -57,9 +58,7 @@ def _check(ask: Ask) -> None:
     there = [*names_of(ask.kind, "base"), *names_of(ask.kind, "laser")]
     for name in ask.ids:
         if name not in there:
-            raise Error(
-                f"hidden: {name!r} cannot be hidden in a case of kind {ask.kind!r}; there are: {', '.join(there)}"
-            )
+            raise Error(f"hidden: {name!r} cannot be hidden in a case of kind {ask.kind!r}; {hint(name, there)}")
     if len({name in BASE for name in ask.ids}) > 1 and ask.kind in ("pair", "triple"):
         raise Error(f"hidden: {', '.join(ask.ids)}: are not all of the base or all of the laser")
 

@@ -7,30 +7,40 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from kurumaisu import program
 from kurumaisu.critic.values.version import version
 
 _DESCRIPTION = """\
-Say what a model gets wrong about a measured robot: replay the recording through the model, name what is missing, or
-abstain. Writes verdict.json, extended.yaml (the model with what was found) and report.html."""
+Say what a model gets wrong about a measured robot: replay the recording through
+the model, name what is missing, or abstain. Writes verdict.json, extended.yaml
+(the model with what was found) and report.html."""
 _EPILOG = """\
 examples:
-  critic drive.bag                                one drive; the answer is in criticism/report.html
-  critic drives/ --runs 'monday_*' --seed 7       some drives of a recording
-  critic drives/ --only 'base.lag_*,base.delay'   look for these effects only
-  critic drives/ --json --quiet | jq .causes      for programs
-  critic day_1/ day_2/ --output out               several: out/day_1/report.html, ...
-  critic recordings/ --jobs 8 --table all.csv     a folder of recordings, eight at a time
-  critic recordings/ --dask tcp://head:8786       on a Dask cluster that is there
-  critic experiment, critic plan, critic rehearse, critic watch: other commands, each with its own --help;
-                                                  a recording of such a name is ./watch
+  critic drive.bag                       one drive: criticism/report.html
+  critic drives/ --runs 'monday_*'       some drives of a recording
+  critic drives/ --only 'base.lag_*,base.delay'
+                                         look for these effects only
+  critic drives/ --json --quiet | jq .causes
+                                         for programs
+  critic day_1/ day_2/ --output out      several: out/day_1/report.html, ...
+  critic recordings/ --jobs 8 --table all.csv
+                                         a folder of them, eight at a time
+  critic recordings/ --dask tcp://head:8786
+                                         on a Dask cluster that is there
+
+other commands, each with its own --help: critic experiment, critic plan,
+critic rehearse, critic watch. A recording of such a name is ./watch
 
 exit codes:
-  0  none: no effect is both detectable and large enough to matter
-  1  error: printed on standard error; also when any of several recordings could not be criticised
-  2  the command line itself is wrong
-  3  named          4  confounded          5  unknown          6  invalid_data
-     of several recordings without an error, the largest
-  130  interrupted (Ctrl-C): what was done until then is kept, and is in the table"""
+  0    none: no effect is both detectable and large enough to matter
+  1    error, printed on standard error; also when any of several recordings
+       could not be criticised
+  2    the command line itself is wrong
+  3    named          4  confounded          5  unknown          6  invalid_data
+       of several recordings without an error, the largest
+  130  interrupted (Ctrl-C): what was done until then is kept, and in the table
+
+More: docs/critic.md"""
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -40,7 +50,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def _parser() -> argparse.ArgumentParser:
     form = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(
+    parser = program.Parser(
         prog="critic", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=form, allow_abbrev=False
     )
     add = parser.add_argument

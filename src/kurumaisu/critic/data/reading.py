@@ -17,6 +17,7 @@ from kurumaisu.critic.data.rawlog_reader import is_rawlog, rawlog_name, read_raw
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
 from kurumaisu.critic.values.selection import matching
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 
 
 def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
@@ -109,7 +110,7 @@ def split(
     for key, chosen in (("train", meta.train), ("test", meta.test)):
         for name in chosen if not partly else ():
             if name not in names:
-                raise Error(f"{meta_file}: {key}: there is no run {name!r}; there are: {', '.join(names)}")
+                raise Error(f"{meta_file}: {key}: there is no run {name!r}; {hint(name, names)}")
     train = tuple(name for name in meta.train or names if name in names and name not in meta.test)
     if not train:
         where = "--runs" if partly else f"{meta_file}: train"

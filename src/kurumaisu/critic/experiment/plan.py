@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import ndtr
 
-from kurumaisu import settings
+from kurumaisu import program, settings
 from kurumaisu.critic.engine.catalogue import Candidate, Term, candidates, catalogue
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.engine.search import NAMED
@@ -22,6 +22,7 @@ from kurumaisu.critic.experiment.proposal import drives
 from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.errors import Error, failed
 from kurumaisu.experiments import Script
+from kurumaisu.names import hint
 from kurumaisu.params import Model, load_model, shipped
 from kurumaisu.types import FloatArray
 
@@ -76,7 +77,7 @@ def cause(model: Model, text: str) -> Explanation:
     ways = candidates(catalogue(model), model)
     chosen = max((way for way in ways if way.id == name), key=lambda way: len(way.terms), default=None)
     if chosen is None:
-        raise Error(f"{name!r} is no effect on the base: {', '.join(dict.fromkeys(way.id for way in ways))}")
+        raise Error(f"{name!r} is no effect on the base; {hint(name, (way.id for way in ways), 'docs/effects.md')}")
     values = np.array([_typical(term) for term in chosen.terms])
     if size:
         values[0] = _size(text, size, chosen)
@@ -160,7 +161,7 @@ def _typical(term: Term) -> float:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="critic plan", description="Which experiments would decide, and how fast.")
+    parser = program.Parser(prog="critic plan", description="Which experiments would decide, and how fast.")
     question = parser.add_mutually_exclusive_group(required=True)
     question.add_argument("--between", nargs=2, metavar=("ID[=SIZE]", "ID[=SIZE]"), help="which of two effects acts")
     question.add_argument("--detect", metavar="ID[=SIZE]", help="whether an effect of that size acts at all")

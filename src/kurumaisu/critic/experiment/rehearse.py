@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from kurumaisu import settings
+from kurumaisu import program, settings
 from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.critic.experiment.rehearsal import Manner, Rehearsal
 from kurumaisu.critic.values.recording import Recording
@@ -76,7 +76,7 @@ def write(folder: Path, recording: Recording) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="critic rehearse", description="Run experiments on the simulator alone.")
+    parser = program.Parser(prog="critic rehearse", description="Run experiments on the simulator alone.")
     parser.add_argument("names", nargs="+", metavar="NAME", help=f"of {', '.join(names())}; or a .yaml file")
     parser.add_argument("-o", "--output", type=Path, default=Path("rehearsed"), help="folder to write into")
     parser.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="model file of the chair")

@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from difflib import get_close_matches
 from fnmatch import fnmatchcase
 
 from kurumaisu import effects
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 
-_NEAR = 0.6  # share of letters in common from which a name is suggested
+_PAGE = "docs/effects.md"
 
 
 def effect_ids(only: Sequence[str], without: Sequence[str]) -> frozenset[str] | None:
@@ -25,9 +25,9 @@ def effect_ids(only: Sequence[str], without: Sequence[str]) -> frozenset[str] | 
     catalogue = (*(effect.id for effect in effects.ALL), effects.SMOOTH)
     wanted: set[str] = set() if only else set(catalogue)
     for pattern in only:
-        wanted |= set(matching("--only", pattern, catalogue, "effect"))
+        wanted |= set(matching("--only", pattern, catalogue, "effect", _PAGE))
     for pattern in without:
-        wanted -= set(matching("--without", pattern, catalogue, "effect"))
+        wanted -= set(matching("--without", pattern, catalogue, "effect", _PAGE))
     if not wanted:
         raise Error("--without: leaves no effect to look for")
     return frozenset(wanted)
@@ -39,11 +39,9 @@ def beside_odometry(ids: frozenset[str] | None) -> frozenset[str]:
     return (ids if ids is not None else frozenset((*(effect.id for effect in effects.ALL), effects.SMOOTH))) - known
 
 
-def matching(option: str, pattern: str, names: Sequence[str], what: str) -> list[str]:
-    """Return the names that a pattern matches. Raise Error, with near names, when there is none."""
+def matching(option: str, pattern: str, names: Sequence[str], what: str, listed: str = "") -> list[str]:
+    """Return the names that a pattern matches. Raise Error, with a hint as names.hint has it, when there is none."""
     found = [name for name in names if fnmatchcase(name, pattern)]
     if found:
         return found
-    near = get_close_matches(pattern, names, n=3, cutoff=_NEAR) or [n for n in names if pattern and pattern in n][:3]
-    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(names)}"
-    raise Error(f"{option}: there is no {what} {pattern!r}; {hint}")
+    raise Error(f"{option}: there is no {what} {pattern!r}; {hint(pattern, names, listed)}")

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu import settings
+from kurumaisu import program, settings
 from kurumaisu.critic.app.options import name_list
 from kurumaisu.critic.base.replay import model_of
 from kurumaisu.critic.values.recording import Recording
@@ -24,11 +24,13 @@ from kurumaisu.world import load_world
 
 _EPILOG = """\
 examples:
-  view drive.bag                              one drive
-  view drives/ --report criticism             with what the critic found: the report leads to moments and places
-  view drives/ --runs 'monday_*' --port 0     some drives, at any free port
+  view drive.bag                           one drive
+  view drives/ --report criticism          with what the critic found: the report
+                                           leads to moments and places
+  view drives/ --runs 'monday_*' --port 0  some drives, at any free port
 
-Open the address that is printed: it holds the right to move the recording, once. Ctrl-C ends it."""
+Open the address that is printed: it holds the right to move the recording,
+once. Ctrl-C ends it. More: docs/viewer_bag.md"""
 # Where a report is looked for inside a recording that is a folder.
 _USUAL = ("criticism", "report")
 
@@ -131,7 +133,7 @@ def _port(text: str) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = program.Parser(
         prog="view",
         description="Look at a recording in the browser, moment by moment.",
         epilog=_EPILOG,

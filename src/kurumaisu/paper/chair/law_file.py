@@ -8,6 +8,7 @@ from pathlib import Path
 
 from kurumaisu._core import AxisLaw, Branch
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.paper.chair.law import AxisFit, BranchFit, Coefficient
 from kurumaisu.paper.model_file import ModelFile
 from kurumaisu.params import load_model
@@ -22,7 +23,7 @@ def settled(model: Path, fits: Sequence[AxisFit], keep: Sequence[str]) -> dict[s
     known = [f"{fit.name}.{side}" for fit in fits for side in fit.branches()]
     for name in keep:
         if name not in known:
-            raise Error(f"--keep {name}: there are: {', '.join(known)}")
+            raise Error(f"--keep {name}: {hint(name, known)}")
     there = load_model(model)
     laws = {}
     for fit in fits:

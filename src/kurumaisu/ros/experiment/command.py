@@ -12,7 +12,7 @@ from pathlib import Path
 
 import rospy
 
-from kurumaisu import settings
+from kurumaisu import program, settings
 from kurumaisu.errors import Error, one_line
 from kurumaisu.experiments import Script, load_script, names, shipped_script
 from kurumaisu.experiments.supervisor import read_care
@@ -21,6 +21,22 @@ from kurumaisu.ros.experiment.drive import run_drive
 from kurumaisu.ros.experiment.places import run_places
 from kurumaisu.ros.experiment.surroundings import Ground, wait_until_gone
 
+_HELP = """
+Run a scripted experiment on the chair, or on the simulator behind the same
+topics. It begins when the chair stands; Ctrl-C stops it.
+
+subscribes to:
+  ground_truth, odom  where the chair is
+  active_input        who drives: it stops when somebody else does
+  collision
+publishes:
+  experiment_vel      commands for base_node; of a sweep voltages
+parameters:
+  launch/experiment_node.yaml, by --settings
+
+Exit code: 0 done, 1 refused or stopped, 2 wrong usage.
+More: docs/experiments.md
+"""
 _LONGEST = 10.0  # [s] of wall time for stopping when killed
 
 
@@ -87,9 +103,7 @@ def _hint(bag: Path | None) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="critic experiment", description="Run a scripted experiment; it begins when the chair stands."
-    )
+    parser = program.node_parser("critic experiment", _HELP)
     parser.add_argument("name", help=f"one of {', '.join(names())}; or any name for a --file")
     parser.add_argument("--file", type=Path, help="your own script")
     parser.add_argument("--bag", type=Path, help="record into this bag (a folder of bags, where there are places)")

@@ -3,20 +3,27 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
 import rospy
 
+from kurumaisu import program
 from kurumaisu.errors import Error, failed
 from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, write_map
 from kurumaisu.ros.maps.messages import GridMessage, map_of
 
+_HELP = """
+Save the next map that comes, as an image and its YAML file, and end.
+
+subscribes to:
+  map  nav_msgs/OccupancyGrid
+"""
+
 
 def main() -> int:
     """Save one map; return 1 when none comes, or it cannot be written."""
-    parser = argparse.ArgumentParser(prog="map_saver", description="Save the next map of the topic map.")
+    parser = program.node_parser("map_saver", _HELP)
     parser.add_argument(
         "-f", dest="name", type=Path, default=Path("map"), metavar="NAME", help="name of the files (map)"
     )
@@ -28,7 +35,7 @@ def main() -> int:
     )
     parser.add_argument("--png", action="store_true", help="write a .png instead of a .pgm")
     parser.add_argument("--wait", type=float, default=30.0, metavar="SECONDS", help="wait for a map at most (30)")
-    options = parser.parse_args(rospy.myargv()[1:])
+    options = parser.parse_args(program.words())
     if not 0 <= options.free < options.occ <= 100:
         parser.error(f"--free must be from 0 and below --occ, which is at most 100: {options.free:g}, {options.occ:g}")
     rospy.init_node("map_saver", anonymous=True, disable_signals=True)

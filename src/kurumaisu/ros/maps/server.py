@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -13,11 +12,23 @@ import rospy
 from nav_msgs.msg import MapMetaData, OccupancyGrid
 from nav_msgs.srv import GetMap, GetMapResponse, LoadMap, LoadMapRequest, LoadMapResponse
 
-from kurumaisu import settings
+from kurumaisu import program, settings
 from kurumaisu.errors import Error, one_line
 from kurumaisu.map_file import read_map
 from kurumaisu.params import shipped
 from kurumaisu.ros.maps.messages import message_of
+
+_HELP = """
+Serve a map from its YAML file, with map_server's topics and services.
+
+publishes:
+  map, map_metadata  latched
+services:
+  static_map         the map
+  change_map         serve another one: a file, file:// or package://
+parameters:
+  frame_id           of the map; else that of launch/map_server.yaml
+"""
 
 
 class MapServer:
@@ -86,9 +97,9 @@ def read_settings(given: dict[str, object], where: str) -> str:
 
 def main() -> int:
     """Serve the map that the first argument names; return 1 when it cannot be read."""
-    parser = argparse.ArgumentParser(prog="map_server", description="Serve a map.")
-    parser.add_argument("map", type=Path, help="its YAML file")
-    options = parser.parse_args(rospy.myargv()[1:])
+    parser = program.node_parser("map_server", _HELP)
+    parser.add_argument("map", type=Path, metavar="FILE.yaml", help="the map")
+    options = parser.parse_args(program.words())
     rospy.init_node("map_server")
     try:
         frame = read_settings(rospy.get_param("~", {}), rospy.get_name())

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from kurumaisu import program
 from kurumaisu.errors import Error, failed
 from kurumaisu.paper.commands import drive, wall
 from kurumaisu.params import shipped
@@ -86,7 +87,7 @@ def _odometry(options: argparse.Namespace) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="paper", description=__doc__)
+    parser = program.Parser(prog="paper", description=__doc__)
     parts = parser.add_subparsers(required=True, metavar="FIGURES")
     drive = _part(parts, "drive", _drive, "figures 3 to 6, equations (1) and (2): a drive")
     drive.add_argument(

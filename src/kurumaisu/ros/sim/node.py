@@ -13,6 +13,7 @@ from functools import partial
 import rospy
 from geometry_msgs.msg import Twist
 
+from kurumaisu import program
 from kurumaisu.errors import Error, one_line
 from kurumaisu.msg import Voltages
 from kurumaisu.params import EffectSetting
@@ -30,6 +31,32 @@ from kurumaisu.sim.chair.holder import VoltageHolder
 from kurumaisu.sim.chair.simulator import ChairSimulator, Observation
 from kurumaisu.types import FloatArray
 
+_HELP = """
+Simulate the chair in a world, and set the time of all other nodes (/clock).
+sim.launch starts it with the base controller: roslaunch kurumaisu sim.launch
+
+subscribes to:
+  voltages            what the D/A converter puts out
+  NAME/cmd_vel        drives another robot of the world
+publishes:
+  scan                of the laser; with laser:=driver laser_node publishes it
+  ground_truth        where the chair is
+  collision           whether it touched something since the last message
+  /clock, /tf_static
+  ~effects            what is wrong with chair, laser and world at the moment
+  ~world, ~view       what a page draws
+  and each further sensor's readings, under the sensor's name
+services:
+  reset, seed         back to the start, with the same or another seed
+  pause, step, speed  hold the time, go on by one step, go faster or slower
+  set_pose            put a model elsewhere
+  save, load          the whole state, to a file and back
+parameters:
+  launch/sim_node.yaml, and the arguments of launch/sim.launch
+  effects, while it runs: dynamic_reconfigure at ~live
+
+More: docs/sim_node.md
+"""
 _NS = 1_000_000_000
 _GLANCE = 0.02  # [s] of wall time in which a service is noticed by who waits for voltages
 
@@ -203,6 +230,7 @@ class SimNode:
 
 def main() -> None:
     """Run the node; exit with 1 and one line for bad configuration."""
+    program.no_arguments("sim_node", _HELP)
     rospy.init_node("sim_node")
     try:
         values = {key: value for key, value in rospy.get_param("~", {}).items() if key != NAMESPACE}

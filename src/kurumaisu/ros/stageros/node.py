@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import argparse
 import signal
 import threading
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import rospy
 
+from kurumaisu import program
 from kurumaisu.errors import Error
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
@@ -20,6 +22,32 @@ from kurumaisu.ros.stageros.settings import StagerosSettings, read_settings
 from kurumaisu.world import World, load_world
 
 _USAGE = "usage: stageros [-g] [-u] FILE.world"
+_HELP = """
+Simulate a Stage world with the topics, frames and services of stage_ros 1.8.0.
+
+With several robots the names below begin with /robot_0/, /robot_1/, ...
+
+subscribes to:
+  cmd_vel                     drives a robot
+  cmd_pose, cmd_pose_stamped  put it elsewhere
+publishes:
+  odom, base_pose_ground_truth
+  base_scan                   of a robot with several lasers: /base_scan_0, ...
+  image, depth, camera_info   while somebody listens
+  /clock, /tf
+  ~world, ~view               what a page draws
+  base_sonar, collision, bumper, fiducials: see launch/stageros.yaml
+services:
+  reset_positions             all back to the start, as in stage_ros
+  ~reset, ~seed               likewise, with the same or another seed
+  ~pause, ~step, ~speed       hold the time, go on by one step, change the speed
+  ~set_pose, ~spawn, ~delete  put a model elsewhere, add one, remove one
+  ~save, ~load                the whole state, to a file and back
+parameters:
+  launch/stageros.yaml, which the node reads itself
+
+More: docs/stageros.md
+"""
 
 
 @dataclass(frozen=True)
@@ -32,15 +60,28 @@ class Arguments:
 
 
 def parse(arguments: Sequence[str]) -> Arguments | None:
-    """Return what the arguments say; None without a file, which is the last of them, as in 1.8.0."""
+    """Return what the arguments say; None without a file, which is the last of them, as in 1.8.0.
+
+    End the program for --help, and with 2 for an unknown option.
+    """
     if not arguments or arguments[-1] in ("-g", "-u"):
         return None
-    return Arguments(Path(arguments[-1]), "-g" in arguments[:-1], "-u" in arguments[:-1])
+    options = _parser().parse_args(arguments)
+    return Arguments(Path(options.world[-1]), options.g, options.u)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = program.node_parser("stageros", _HELP)
+    parser.usage = _USAGE.removeprefix("usage: ")
+    parser.add_argument("-g", action="store_true", help="as fast as possible, instead of at the world's speedup")
+    parser.add_argument("-u", action="store_true", help="topics and frames begin with the models' names")
+    parser.add_argument("world", nargs="+", metavar="FILE.world", help="a Stage world, or a map_server YAML")
+    return parser
 
 
 def main() -> int:
     """Run the node; return what the process exits with."""
-    arguments = parse(rospy.myargv()[1:])
+    arguments = parse(program.words())
     if arguments is None:
         print(_USAGE)
         return 255

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.settings import Section
 
 KINDS = (
@@ -59,7 +60,7 @@ class Pace:
         known = {*names, *(name.split("/")[-1] for name in names)}
         for name in self._sensors:
             if name not in known:
-                raise Error(f"rates: sensors: {name}: there is no sensor of this name; there are: {', '.join(names)}")
+                raise Error(f"rates: sensors: {name}: there is no sensor of this name; {hint(name, names)}")
 
 
 def _steps(name: str, rate: float, interval: float) -> int:

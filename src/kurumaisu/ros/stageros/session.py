@@ -14,6 +14,7 @@ import rospy
 from geometry_msgs.msg import Pose, Twist
 
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.ros.rotation import pose_of
 from kurumaisu.ros.stageros.added_models import is_text, renumbered
 from kurumaisu.ros.stageros.names import Names, names_of, names_of_another
@@ -227,6 +228,7 @@ class Session:
         if isinstance(name, str) and name.startswith("#") and not found:
             return self._simulator.models[self._simulator.machinery.population.index(name)]
         if len(found) != 1:
-            known = ", ".join(sorted({model.name for model in self._simulator.models if model.name}))
-            raise Error(f"name {name!r}: {'several models have' if found else 'no model has'} it; there are: {known}")
+            known = sorted({model.name for model in self._simulator.models if model.name})
+            why = "several models have it" if found else f"no model has it; {hint(str(name), known)}"
+            raise Error(f"name {name!r}: {why}")
         return found[0]

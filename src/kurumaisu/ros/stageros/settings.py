@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass, replace
 from typing import Any
 
 from kurumaisu import settings
 from kurumaisu.errors import Error
+from kurumaisu.names import nearest
 from kurumaisu.params import shipped
 from kurumaisu.ros.stageros.rates import Rates, read_rates
 from kurumaisu.settings import Section
@@ -114,7 +114,7 @@ def _over(below: Section, above: Section, where: str) -> tuple[dict[str, Any], t
     for key in above.names():
         value = above.take(key)
         if key not in tree:
-            close = difflib.get_close_matches(key, tree, 1)
+            close = nearest(key, tree)
             unknown.append(f"{where}/{key} is not a parameter" + (f"; did you mean {close[0]}?" if close else ""))
         elif isinstance(tree[key], dict) and isinstance(value, dict):
             tree[key] = {**tree[key], **value}

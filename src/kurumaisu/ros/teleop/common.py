@@ -13,7 +13,7 @@ import rospy
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool
 
-from kurumaisu import settings
+from kurumaisu import program, settings
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.settings import Section
@@ -92,8 +92,9 @@ class Ending:
         self._done.wait(_LAST_PATIENCE)
 
 
-def run(name: str, node: Callable[[Ending], None]) -> int:
-    """Run a node until it returns. Return 1 after an Error, which is logged."""
+def run(name: str, help_text: str, node: Callable[[Ending], None]) -> int:
+    """Run a node until it returns. Return 1 after an Error, which is logged. help_text: as of program.node_parser."""
+    program.no_arguments(name, help_text)
     rospy.init_node(name, disable_signals=True)
     ending = Ending()
     try:

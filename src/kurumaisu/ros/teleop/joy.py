@@ -12,12 +12,26 @@ from sensor_msgs.msg import Joy
 from kurumaisu.ros.teleop.common import Ending, Hand, overlaid, run
 from kurumaisu.teleop.stick import Stick, read_stick
 
+_HELP = """
+Drive by a joystick, with a dead-man button. teleop.launch starts it, and the
+node joystick: roslaunch kurumaisu teleop.launch
+
+subscribes to:
+  joy       sensor_msgs/Joy
+publishes:
+  joy_vel   commands for base_node
+  dead_man  whether the button is held
+parameters:
+  launch/teleop_joy.yaml, which the node reads itself: axes, buttons, speeds
+
+More: docs/robot.md
+"""
 _WARNING_PERIOD = 5.0  # [s]
 
 
 def main() -> int:
     """Drive by a joystick until shut down; rest is the last command. Return 1 for settings that make no sense."""
-    return run("teleop_joy", _drive)
+    return run("teleop_joy", _HELP, _drive)
 
 
 def _drive(ending: Ending) -> None:

@@ -14,6 +14,18 @@ from kurumaisu.ros.teleop.common import Ending, overlaid, run
 from kurumaisu.settings import Section
 from kurumaisu.teleop.reader import Reader, open_device
 
+_HELP = """
+Publish what a joystick at /dev/input does. Debian has no joy_node.
+
+publishes:
+  joy     sensor_msgs/Joy
+parameters:
+  device  as evdev has it: /dev/input/by-id/...-event-joystick
+  others  launch/joystick.yaml, which the node reads itself
+
+More: docs/robot.md
+"""
+
 
 @dataclass(frozen=True)
 class _Settings:
@@ -24,7 +36,7 @@ class _Settings:
 
 def main() -> int:
     """Publish joy until shut down; nothing while the device is away. Return 1 for settings that make no sense."""
-    return run("joystick", _serve)
+    return run("joystick", _HELP, _serve)
 
 
 def _read(section: Section) -> _Settings:

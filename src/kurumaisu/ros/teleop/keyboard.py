@@ -11,10 +11,22 @@ from kurumaisu.ros.teleop.common import Ending, Hand, overlaid, run
 from kurumaisu.teleop.keys import HELP, Keys, KeySettings, read_keys
 from kurumaisu.teleop.terminal import Terminal
 
+_HELP = """
+Drive by the keys of this terminal. The keys are shown when it starts.
+
+publishes:
+  key_vel   commands for base_node
+  dead_man  whether a key is held
+parameters:
+  launch/teleop_keyboard.yaml, which the node reads itself: speeds, time-out
+
+More: docs/robot.md
+"""
+
 
 def main() -> int:
     """Drive by keys until Ctrl-C or the terminal's end; rest is the last command. Return 1 without a terminal."""
-    return run("teleop_keyboard", _drive)
+    return run("teleop_keyboard", _HELP, _drive)
 
 
 def _drive(ending: Ending) -> None:

@@ -4,11 +4,15 @@
 from __future__ import annotations
 
 import math
+import re
+import subprocess
 import threading
 import time
 from collections.abc import Callable
 from typing import Any
 
+import rosgraph
+import roslib.packages
 import rospy
 from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Clock
@@ -21,6 +25,15 @@ PATIENCE = (
     60.0  # [s] of wall time for things that take a moment: a busy machine may take a while, a fault takes for ever
 )
 
+_EVERY_NODES = (
+    "rosout",
+    "get_loggers",
+    "set_logger_level",
+    "set_parameters",
+    "parameter_descriptions",
+    "parameter_updates",
+)
+
 
 def wait_for(condition: Callable[[], Any], what: str, patience: float = PATIENCE) -> Any:
     """Return the condition's value as soon as it is true. Raise AssertionError after so many seconds."""
@@ -30,6 +43,17 @@ def wait_for(condition: Callable[[], Any], what: str, patience: float = PATIENCE
             return result
         time.sleep(0.005)
     raise AssertionError(f"not within {patience} s: {what}")
+
+
+def unexplained(node: str, program: str) -> set[str]:
+    """Return the topics and services that a running node has and its program's --help does not name."""
+    (path,) = roslib.packages.find_node("kurumaisu", program)
+    said = subprocess.run([path, "--help"], capture_output=True, text=True, timeout=PATIENCE, check=True).stdout
+    words = {*re.findall(r"\w+", said), *_EVERY_NODES}
+    state = rosgraph.Master("/testing").getSystemState()
+    names = {name for kind in state for name, nodes in kind if node in nodes}
+    assert names, f"{node} has neither topics nor services"
+    return {name for name in names if name.rpartition("/")[2] not in words}
 
 
 def pose_of(message: Any) -> FloatArray:

@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from kurumaisu import program
 from kurumaisu.errors import Error, failed
 from kurumaisu.paper.chair import advice
 from kurumaisu.paper.commands import calibrate
@@ -55,7 +56,7 @@ def _laser(options: argparse.Namespace) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="calibrate", description=__doc__)
+    parser = program.Parser(prog="calibrate", description=__doc__)
     parser.add_argument("--settings", type=Path, help="settings, instead of launch/paper.yaml")
     parts = parser.add_subparsers(required=True, metavar="STEP")
     plan = parts.add_parser("plan", help="print which drive to do")

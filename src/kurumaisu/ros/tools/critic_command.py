@@ -27,6 +27,9 @@ def main() -> int:
     if name in _PARTS:
         command: Callable[[Sequence[str]], int] = import_module(_PARTS[name]).main
         return _told(command, arguments)
+    from kurumaisu.critic.app import options
+
+    options.parse(None)  # --help and a wrong option need not wait for what the critic imports
     from kurumaisu.critic.app import cli
 
     return cli.main()

@@ -17,6 +17,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, LaserScan, Temperature
 
+from kurumaisu import program
 from kurumaisu.critic.app.options import add_effects, whole_number
 from kurumaisu.critic.app.results import causes
 from kurumaisu.critic.app.watch import Rolled, Rolling
@@ -52,14 +53,21 @@ _LEVELS = {
     "invalid_data": DiagnosticStatus.ERROR,
 }
 _DESCRIPTION = """\
-Listen to a running robot (cmd_vel, voltages, ground_truth, odom, scan, battery, temperature), criticise the last
-minutes repeatedly in a separate process, and publish the verdict on /diagnostics. Ends with ROS or Ctrl-C."""
+Listen to a running robot, criticise the last minutes repeatedly in a separate
+process, and publish the verdict. Ends with ROS or Ctrl-C."""
 _EPILOG = """\
+subscribes to:
+  cmd_vel, voltages, ground_truth, odom, scan, battery, temperature
+publishes:
+  /diagnostics
+
 examples:
   critic watch
   critic watch --window 300 --every 60 ground_truth:=/mocap/pose
   critic watch --meta recordings/office/meta.yaml
-  rostopic echo /diagnostics"""
+  rostopic echo /diagnostics
+
+More: docs/critic.md"""
 
 
 class CriticWatch:
@@ -218,7 +226,7 @@ def main(arguments: Sequence[str]) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     form = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(
+    parser = program.Parser(
         prog="critic watch", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=form, allow_abbrev=False
     )
     add = parser.add_argument

@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
-from kurumaisu import slam, slam_score
+from kurumaisu import program, slam, slam_score
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.data.reference import scan_log
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error, failed
 from kurumaisu.geometry import interpolate
 from kurumaisu.maps import draw_map, save_map
 from kurumaisu.params import shipped
@@ -23,8 +22,8 @@ _LEAST_POSES = 3  # to fit two paths to each other
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; return 0, or 2 for bad input, which is told on stderr."""
-    parser = argparse.ArgumentParser(prog="map", description="Make a map from a recording of scans and odometry.")
+    """Run the command; return 0, or 1 for bad input, which is told on stderr."""
+    parser = program.Parser(prog="map", description="Make a map from a recording of scans and odometry.")
     parser.add_argument("log", type=Path, metavar="LOG", help="an MRPT rawlog, a bag, or a folder as critic reads it")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/map"), metavar="FOLDER")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the particle filter (1)")
@@ -50,9 +49,9 @@ def main(arguments: list[str] | None = None) -> int:
         "--rawlog", type=Path, metavar="FILE", help="write the scans and odometry as MRPT's rawlog, too"
     )
     options = parser.parse_args(arguments)
+    if not 0 <= options.seed < 2**32:
+        parser.error(f"--seed: must be 0 to 4294967295: {options.seed}")
     try:
-        if not 0 <= options.seed < 2**32:
-            raise Error(f"--seed: must be 0 to 4294967295: {options.seed}")
         settings = slam.load_mapping_settings(options.settings or shipped("launch/mapping_node.yaml"))
         log, truth = read_log(options.log)
         if options.rawlog is not None:
@@ -63,8 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
             start = slam.Start(options.start, np.array(options.at), np.array([distance, distance, angle]))
         report(log, truth, settings, options.seed, start, options.output)
     except Error as error:
-        print(f"map: {one_line(error)}", file=sys.stderr)
-        return 2
+        return failed("map", error)
     return 0
 
 

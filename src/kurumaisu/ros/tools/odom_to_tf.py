@@ -8,9 +8,22 @@ import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 
+from kurumaisu import program
+
+_HELP = """
+Publish the transform that each odometry message holds: for recordings whose tf
+also has transforms that are not wanted.
+
+subscribes to:
+  odom  nav_msgs/Odometry
+publishes:
+  /tf   from the message's frame_id to its child_frame_id
+"""
+
 
 def main() -> int:
     """Publish a transform for every message on odom, until shut down."""
+    program.no_arguments("odom_to_tf", _HELP)
     rospy.init_node("odom_to_tf")
     broadcaster = tf2_ros.TransformBroadcaster()
     rospy.Subscriber("odom", Odometry, lambda odom: broadcaster.sendTransform(_transform(odom)), queue_size=100)

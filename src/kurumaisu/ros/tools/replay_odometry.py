@@ -12,12 +12,23 @@ import rosbag
 import rospy
 from nav_msgs.msg import Odometry
 
+from kurumaisu import program
 from kurumaisu.critic.data.bag_parts import parts_of
 from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper.chair import dead_reckoning
 from kurumaisu.paper.chair.dead_reckoning import Odom, Put, Reckoner
 
+_HELP = """
+Compute base_node's odometry again, from the voltages of a bag that is played.
+For a check without ROS: paper odometry FILE.bag
+
+subscribes to:
+  voltages       what the D/A converter put out
+  recorded/odom  the odometry of the bag: start, stamps, frames, covariances
+publishes:
+  odom           the same messages, with the pose that the voltages make
+"""
 _QUEUE = 10000  # messages: none may be lost
 
 
@@ -78,6 +89,7 @@ class _Again:
 
 def main() -> int:
     """Publish odom, until shut down."""
+    program.no_arguments("replay_odometry", _HELP)
     rospy.init_node("replay_odometry")
     again = _Again()
     rospy.spin()

@@ -10,10 +10,22 @@ import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
-from kurumaisu import settings
+from kurumaisu import program, settings
 from kurumaisu.driving import Driver, Route, read_route
 from kurumaisu.errors import Error, one_line
 from kurumaisu.ros.rotation import planar
+
+_HELP = """
+Drive a route of waypoints, then end. It steers by the ground truth of a
+simulator: for demonstrations and tests.
+
+subscribes to:
+  ground_truth  where the chair is
+publishes:
+  cmd_vel       commands
+parameters:
+  the route: launch/round.yaml is one, which round.launch loads
+"""
 
 
 class WaypointNode:
@@ -49,6 +61,7 @@ class WaypointNode:
 
 def main() -> int:
     """Drive the route in the private parameters; return 1 when it is not done by its deadline."""
+    program.no_arguments("waypoint_node", _HELP)
     rospy.init_node("waypoint_node")
     try:
         node = WaypointNode(read_route(settings.Section(_own_parameters(), rospy.get_name())))

@@ -15,6 +15,7 @@ from std_msgs.msg import String
 from kurumaisu import effects
 from kurumaisu.effects import Mechanism
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.params import EffectSetting, effects_of, load_model
 from kurumaisu.ros.sim.effects import NAMESPACE
 from kurumaisu.ros.sim.effects_config import key_of, listed
@@ -62,7 +63,8 @@ class EffectSwitches:
         """Switch one on, change it, or switch it off. Raise Error where sim_node does not."""
         chosen = next((one for one in effects.ALL if one.id == effect), None)
         if chosen is None:
-            raise Error(f"effect: there is no effect {effect!r}")
+            near = hint(effect, (one.id for one in effects.ALL), "docs/effects.md")
+            raise Error(f"effect: there is no effect {effect!r}; {near}")
         for name in values:
             if name not in {p.name for p in chosen.parameters}:
                 raise Error(f"effect: {effect} has no {name!r}")

@@ -8,15 +8,42 @@ import sys
 import rospy
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
+from kurumaisu import program
 from kurumaisu.errors import Error, one_line
 from kurumaisu.ros.viewer.settings import read_settings
 from kurumaisu.ros.viewer.source import RosSource
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.server import Server
 
+_HELP = """
+Serve a page that shows a simulation or a robot in the browser, and print its
+address. viewer.launch starts it: roslaunch kurumaisu viewer.launch
+
+It listens only while somebody looks.
+
+subscribes to:
+  sim_node/world, sim_node/view, sim_node/effects
+  stageros/world, stageros/view
+  scan, tf, /clock                   of a robot
+  odom, voltages, cmd_vel_out, active_input, diagnostics
+  map, particlecloud, amcl_pose      of who maps or localises
+  /rosout                            warnings
+publishes, if the page may command:
+  viewer_vel                         commands for base_node; stageros: cmd_vel
+  initialpose
+services:
+  ~new_token                         a new address for who may command
+  ~clients                           who looks
+parameters:
+  launch/viewer.yaml, and the arguments of launch/viewer.launch
+
+More: docs/viewer.md
+"""
+
 
 def main() -> None:
     """Run the node; exit with 1 and one line for bad configuration or a port that is taken."""
+    program.no_arguments("viewer", _HELP)
     # rostime stays off: it would hear every /clock of a simulator, though nobody looks
     rospy.init_node("viewer_node", disable_rostime=True)
     try:

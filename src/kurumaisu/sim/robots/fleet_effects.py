@@ -13,6 +13,7 @@ from kurumaisu import effects
 from kurumaisu._core import Arena, AxisLaw
 from kurumaisu.effects import Reference
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.params import EffectSetting, identity_law
 from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.options import ALL_ROBOTS, Options, RobotEffects
@@ -121,10 +122,11 @@ class FleetEffects:
 
 def check_names(entries: Sequence[RobotEffects], robots: Sequence[Model]) -> None:
     """Raise Error for an entry whose robot the world has not, and for an effect that a robot would have twice."""
-    names = {robot.name for robot in robots}
+    names = [robot.name for robot in robots if robot.name]
     for entry in entries:
         if entry.robot != ALL_ROBOTS and entry.robot not in names:
-            raise Error(f"effects: robot: the world has no position of this name: {entry.robot}")
+            near = hint(entry.robot, names)
+            raise Error(f"effects: robot: the world has no position of this name: {entry.robot}; {near}")
     for robot in robots:
         effects.check(_of(robot, entries))
 

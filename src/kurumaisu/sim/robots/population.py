@@ -10,6 +10,7 @@ import numpy as np
 
 from kurumaisu.errors import Error
 from kurumaisu.geometry import attached, relative
+from kurumaisu.names import hint
 from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world.layout import family
 from kurumaisu.world.model import Model
@@ -47,7 +48,8 @@ class Population:
             found = [number] if 0 <= number < len(self.models) else []
             model = f"number {number}"
         if len(found) != 1:
-            raise Error(f"model {model}: there {'are several' if found else 'is none'} of this name")
+            near = "" if found else f"; {hint(str(model), [m.name for m in self.models if m.name])}"
+            raise Error(f"model {model}: there {'are several' if found else 'is none'} of this name{near}")
         return found[0]
 
     def with_descendants(self, index: int) -> IntArray:
