@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What docs/real_data.md says of real recordings, as far as it is measured by hand; and the readers' faults."""
+"""What docs/critic/real_data.md says of real recordings, as far as it is measured by hand; and the readers' faults."""
 
 import re
 import struct

@@ -42,5 +42,5 @@ def ask(path: Path, output: Path, title: str) -> Verdict | None:
 def there(path: Path) -> Path:
     """Return the path. Raise Error where nothing is there."""
     if not path.exists():
-        raise Error(f"{path}: is not there; docs/real_data.md says where it is from")
+        raise Error(f"{path}: is not there; docs/critic/real_data.md says where it is from")
     return path

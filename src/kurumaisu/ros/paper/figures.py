@@ -17,7 +17,7 @@ from kurumaisu.params import load_model, shipped
 from kurumaisu.ros.paper import launches
 
 LAWS = {"custom": "intercept 0.1 V", "published": "equation (1)"}
-_RIDDLE_SEED = 1000  # of docs/riddles.md
+_RIDDLE_SEED = 1000  # of docs/paper/open_questions.md
 _CODES = 1.5  # half a step of V_f, half a step of the reference, and rounding
 
 
