@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     jobs = [Job(ask, options.seed + i, baselines) for i, ask in enumerate(np.repeat(np.array(asks), options.draws))]
     answers = all_answers(jobs, options.jobs, options.log)
     headings = ("right           ", "misnamed        ", "confounded      ", "unknown         ", "nothing         ")
-    title = f"{options.kind}, seeds from {options.seed}; right: {RIGHT[kind]}; shares with 90 % intervals"
+    title = f"{options.kind}; right: {RIGHT[kind]}; shares with 90 % intervals"
     table = Table(title, "hidden", "number", *headings, "interval covers ", "median z", "CPU [s]")
     scores: dict[str, list[Score]] = {}
     for answer in answers:

@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for row in _of_draw(names[i % len(names)], options.seed + i)
         if row is not None
     ]
-    title = f"{options.draws} recordings, seeds from {options.seed}: withheld motion of one run of three"
+    title = f"{options.draws} recordings: withheld motion of one run of three"
     headings = ("dx covered      ", "dy covered      ", "dtheta covered  ", "nats           ", "oracle's nats")
     table = Table(title, "horizon [s]", "number", *headings)
     for horizon in _HORIZONS:
