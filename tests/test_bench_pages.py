@@ -14,7 +14,7 @@ from kurumaisu.errors import Error
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SECTIONS = [
     pytest.param(path, section, id=f"{path.name} {section.name}")
-    for path in sorted(DOCS.glob("*.md"))
+    for path in sorted(DOCS.rglob("*.md"))
     for section in page.sections(path.read_text(encoding="utf-8"))
 ]
 BEFORE = "# Page\n\n<!-- bench arena -->\nold\n<!-- end -->\n\nwords\n\n<!-- bench sim -->\nkept\n<!-- end -->\n"
@@ -80,7 +80,7 @@ def written(tmp_path, monkeypatch, arguments, text=BEFORE):
         Table("", "robots", "scan [ms]").row("one", 2.5)
         return 1
 
-    monkeypatch.setattr(importlib.import_module("kurumaisu.bench.arena"), "main", run)
+    monkeypatch.setattr(importlib.import_module(__main__.MODULES["arena"]), "main", run)
     monkeypatch.setattr("os.cpu_count", lambda: 3)
     path = tmp_path / "page.md"
     path.write_text(text)
@@ -107,7 +107,7 @@ def test_a_page_without_its_section_is_left_alone(tmp_path, monkeypatch, capsys,
 
 def test_a_page_that_is_not_there_is_said_before_hours_of_work(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(
-        importlib.import_module("kurumaisu.bench.arena"), "main", lambda _: pytest.fail("it ran nonetheless")
+        importlib.import_module(__main__.MODULES["arena"]), "main", lambda _: pytest.fail("it ran nonetheless")
     )
     assert __main__.main(["arena", f"--write={tmp_path}/none.md"]) != 0
     assert "none.md: No such file" in capsys.readouterr().err
