@@ -37,7 +37,7 @@ def test_a_bound_is_judged_by_the_worst(times, bound, verdict):
 
 def test_of_busy_cores_the_99th_percentile_counts(monkeypatch):
     bounds = []
-    monkeypatch.setattr(main, "_table", lambda _device, _options, worst, loops: bounds.append((worst, loops)) or 0)
+    monkeypatch.setattr(main, "_table", lambda _device, _options, worst, loops: bounds.append((worst, loops)) or [])
     assert main.main(["--device", "iio"]) == 0
     (idle, none), (busy, loops) = bounds
     times = [0.001] * 199 + [1.0]

@@ -123,7 +123,7 @@ def test_thick_and_double_walls_are_told_from_thin_ones():
 
 def test_bounds_say_which_is_broken():
     bound = Bound("x", 2.0, 1.0)
-    assert [bound.told(value).split(":")[0] for value in (1.0, 1.5, 2.5)] == ["reached", "kept", "BROKEN"]
+    assert [bound.judged(value).state for value in (1.0, 1.5, 2.5)] == ["reached", "kept", "BROKEN"]
 
 
 def test_the_covariance_of_a_pose_has_the_maps_own(drive):

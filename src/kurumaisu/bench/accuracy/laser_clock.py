@@ -10,10 +10,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 
-_PARTS = ("the first second", "1 to 5 s", "5 to 20 s", "20 to 60 s", "from 60 s on")
+_PARTS = ("the first second", "1 to 5 s", "5 to 20 s", "20 to 60 s")  # and what comes after them
 _WAYS = {
     "tcp": "Ethernet",
     "usb": "USB, 1 ms frames",
@@ -23,8 +25,8 @@ _WAYS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print a table for each part of a run. Return 1 if another method is better than ours at its end."""
-    parser = argparse.ArgumentParser(prog="bench laser_clock")
+    """Print the table. Return 1 if another method is better than ours at the end of a run."""
+    parser = argparse.ArgumentParser(prog="scripts/bench laser_clock", description=__doc__)
     parser.add_argument("--seeds", type=int, default=50, help="sensors, each with a drift of its own up to 0.2 %%")
     parser.add_argument("--seconds", type=float, default=600.0, help="of each run")
     parser.add_argument(
@@ -34,10 +36,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command = [_simulator(), *map(str, (options.seeds, options.seconds, options.start))]
     output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     rows = [line.split() for line in output.splitlines()]
-    for k, part in enumerate(_PARTS):
-        table = Table(f"Error of stamps, {part}", "way, method", "bias [ms]", "sd [ms]", "worst [ms]")
-        for way, method, *numbers in rows:
-            table.row(f"{_WAYS[way]}: {method}", *map(float, numbers[3 * k : 3 * k + 3]))
+    title = f"Error of stamps from 60 s on, {options.seeds} sensors for each way; and the worst before [ms]"
+    table = Table(title, "way, method", "bias", "sd", "worst", *(f"worst, {part}" for part in _PARTS))
+    for way, method, *numbers in rows:
+        errors = np.array(numbers, dtype=float).reshape(len(_PARTS) + 1, 3)  # bias, sd, worst in each part of a run
+        table.row(f"{_WAYS[way]}: {method}", *errors[-1], *errors[:-1, 2])
     worst = {(way, method): float(numbers[-1]) for way, method, *numbers in rows}
     return int(any(worst[way, "envelope"] > min(worst[way, "arrival"], worst[way, "mrpt"]) for way in _WAYS))
 

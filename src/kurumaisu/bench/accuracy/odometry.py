@@ -45,7 +45,7 @@ Estimate = tuple[FloatArray, FloatArray]
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the mean squared error by each covariance. Return 1 if that of the measured noise is out of bounds."""
-    parser = argparse.ArgumentParser(prog="bench odometry", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench odometry", description=__doc__)
     parser.add_argument("--drives", type=int, default=1000, help="of each noise")
     options = parser.parse_args(arguments)
     low, high = bounds(options.drives)

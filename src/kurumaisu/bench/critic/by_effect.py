@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     jobs = [Job(ask, options.seed + i, baselines) for i, ask in enumerate(np.repeat(np.array(asks), options.draws))]
     answers = all_answers(jobs, options.jobs, options.log)
     headings = ("right           ", "misnamed        ", "confounded      ", "unknown         ", "nothing         ")
-    title = f"{options.kind}, seeds from {options.seed}; right: {RIGHT[kind]}; shares with 90 % intervals"
+    title = f"{options.kind}; right: {RIGHT[kind]}; shares with 90 % intervals"
     table = Table(title, "hidden", "number", *headings, "interval covers ", "median z", "CPU [s]")
     scores: dict[str, list[Score]] = {}
     for answer in answers:
@@ -109,7 +109,7 @@ def run(options: argparse.Namespace) -> int:
         if kind in ("single", "pair", "triple"):
             hard = [one for one in all_of if one.truth.strong]
             _row(table, f"  each z >= 10, rival's z >= 6: {who}", hard)
-    _summary(scores["critic"])
+    _summary(table, scores["critic"])
     return 0
 
 
@@ -160,16 +160,20 @@ def _row(table: Table, label: str, scores: Sequence[Score]) -> None:
     )
 
 
-def _summary(scores: Sequence[Score]) -> None:
+def _summary(table: Table, scores: Sequence[Score]) -> None:
     stated = [pair for one in scores for pair in one.stated]
     sure = [right for p, right in stated if p >= SURE]
-    print(f"\nof {len(stated)} causes named: calibration error {calibration_error(stated):.3f}; ", end="")
-    print(f"right when p >= {SURE}: {share(sum(sure), len(sure))}, {len(sure)} of them")
+    table.note(
+        f"Of {len(stated)} causes named: calibration error {calibration_error(stated):.3f}; "
+        f"right when p >= {SURE}: {share(sum(sure), len(sure))}, {len(sure)} of them."
+    )
     gained = [one.gain_share for one in scores if one.gain_share is not None and one.truth.z >= 10]
     if gained:
         low, middle = np.quantile(gained, [0.1, 0.5])
-        print(f"gain on data held out, as a share of the oracle's, z >= 10: median {middle:.3f}, ", end="")
-        print(f"10 % quantile {low:.3f}, of {len(gained)}")
+        table.note(
+            f"Gain on data held out, as a share of the oracle's, z >= 10: median {middle:.3f}, "
+            f"10 % quantile {low:.3f}, of {len(gained)}."
+        )
 
 
 def _log(path: Path | None, jobs: Sequence[Job], answers: Sequence[Answers]) -> None:

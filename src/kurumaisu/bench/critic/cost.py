@@ -33,7 +33,7 @@ _LIMITS = ("30", "-", "2048")  # wall time [s] on two cores, CPU time, memory [M
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print time and memory of a verdict over ten minutes of driving with scans."""
-    parser = argparse.ArgumentParser(prog="bench critic_time")
+    parser = argparse.ArgumentParser(prog="scripts/bench critic_time", description=__doc__)
     parser.add_argument("--seed", type=int, default=1000)
     parser.add_argument("--runs", type=int, default=1, help="times it is done; the median is shown")
     options = parser.parse_args(arguments)

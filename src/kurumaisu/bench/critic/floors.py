@@ -142,7 +142,7 @@ def run(options: argparse.Namespace) -> int:
         compared = any(figure.compared and part in figure.parts for figure in FIGURES)
         jobs = list(part.jobs(options.draws, options.seed, baselines=compared))
         answers[part] = all_answers(jobs, options.jobs, options.log)
-    title = f"{options.draws} draws, seeds from {options.seed}; shares with 90 % intervals, and of how many"
+    title = f"{options.draws} draws; shares with 90 % intervals, and of how many"
     table = Table(title, "figure", "floor    ", *(f"{who:<24}" for who in ("critic", *BASELINES)))
     for figure in FIGURES:
         table.row(figure.label, figure.floor, *(f"{cell:<24}" for cell in _cells(figure, answers)))

@@ -11,7 +11,7 @@ from kurumaisu.bench.critic import by_effect, floors
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table of all that the critic must reach, or with --kind that of one kind, effect by effect."""
-    parser = argparse.ArgumentParser(prog="bench critic")
+    parser = argparse.ArgumentParser(prog="scripts/bench critic", description=__doc__)
     parser.add_argument("--draws", type=int, default=4, help="recordings per effect")
     parser.add_argument("--seed", type=int, default=1000)
     by_effect.options_of(parser)

@@ -62,7 +62,7 @@ PAIRS = (
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table."""
-    parser = argparse.ArgumentParser(prog="bench next_experiment")
+    parser = argparse.ArgumentParser(prog="scripts/bench next_experiment", description=__doc__)
     parser.add_argument("--draws", type=int, default=10, help="recordings per cause")
     parser.add_argument("--seed", type=int, default=1000)
     options = parser.parse_args(arguments)

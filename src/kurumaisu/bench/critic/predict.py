@@ -27,7 +27,7 @@ _HELD = -1  # index of the run of which poses are withheld
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print a row per horizon: coverage of 90 % intervals per channel, and log densities against an oracle's."""
-    parser = argparse.ArgumentParser(prog="bench predict")
+    parser = argparse.ArgumentParser(prog="scripts/bench predict", description=__doc__)
     parser.add_argument("--draws", type=int, default=20, help="recordings, each with one hidden effect")
     parser.add_argument("--seed", type=int, default=1000)
     parser.add_argument("--effects", nargs="+", default=(), help="ids that are hidden in turn; all of the base")
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for row in _of_draw(names[i % len(names)], options.seed + i)
         if row is not None
     ]
-    title = f"{options.draws} recordings, seeds from {options.seed}: withheld motion of one run of three"
+    title = f"{options.draws} recordings: withheld motion of one run of three"
     headings = ("dx covered      ", "dy covered      ", "dtheta covered  ", "nats           ", "oracle's nats")
     table = Table(title, "horizon [s]", "number", *headings)
     for horizon in _HORIZONS:

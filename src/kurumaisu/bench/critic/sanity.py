@@ -24,23 +24,25 @@ from kurumaisu.params import load_model, shipped
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; every draw has its own drive, effect, noise and fault."""
-    parser = argparse.ArgumentParser(prog="bench sanity")
+    parser = argparse.ArgumentParser(prog="scripts/bench sanity", description=__doc__)
     parser.add_argument("--draws", type=int, default=20, help="recordings per fault")
     parser.add_argument("--good", type=int, default=300, help="recordings without a fault")
     parser.add_argument("--seed", type=int, default=1000)
     parser.add_argument("--only", default="", help="faults whose name holds this")
     parser.add_argument("--show", action="store_true", help="print what was missed")
     options = parser.parse_args(arguments)
-    table = Table(
-        "one drive of 40-120 s; 90 % intervals", "fault", "number", "called invalid   ", "with the right words"
-    )
+    columns = ("fault", "number", "called invalid   ", "with the right words")
+    table = Table("one drive of 40-120 s; 90 % intervals", *columns, page=False)
     faults = {**wrong_data.SPOILT, **wrong_scans.SPOILT}
+    totals: dict[str, list[tuple[bool, bool]]] = {}  # called invalid, with the right words
     for k, (name, (_, word)) in enumerate(faults.items()):
         if options.only not in name:
             continue
         said = [said_of(name, [options.seed, k, i]) for i in range(options.draws)]
         right = [any(word in line for line in lines) for lines in said]
         table.row(name, str(len(said)), share(sum(map(bool, said)), len(said), 3), share(sum(right), len(said), 3))
+        kind = "wrong drives" if name in wrong_data.SPOILT else "wrong scans, map or laser"
+        totals.setdefault(kind, []).extend(zip(map(bool, said), right, strict=True))
         for i, lines in enumerate(said):
             if options.show and not right[i]:
                 print("   ", i, drives.draw(np.random.default_rng([options.seed, k, i]), easy=True), lines)
@@ -50,7 +52,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if options.show and lines:
                 print("   ", i, drives.draw(np.random.default_rng([options.seed, 999 + bool(name), i])), lines)
         table.row(f"none (good data) {name}", str(options.good), share(sum(map(bool, said)), options.good, 3), "-")
+        totals[f"good drives {name}".strip()] = [(bool(lines), False) for lines in said]
+    _sums(totals, columns, len(faults))
     return 0
+
+
+def _sums(totals: dict[str, list[tuple[bool, bool]]], columns: Sequence[str], faults: int) -> None:
+    table = Table(f"drives of 40-120 s, {faults} kinds of wrong data; 90 % intervals", *columns)
+    for name, told in totals.items():
+        shares = [share(sum(column), len(told), 3) for column in zip(*told, strict=True)]
+        table.row(name, str(len(told)), shares[0], "-" if name.startswith("good") else shares[1])
 
 
 def said_of(fault: str, seed: Sequence[int]) -> list[str]:

@@ -38,7 +38,7 @@ class Outcome:
 
 def main(arguments: Sequence[str]) -> int:
     """Run the benchmark. Return 1 if a target failed."""
-    parser = argparse.ArgumentParser(prog="bench fuzz", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench fuzz", description=__doc__)
     parser.add_argument("--runs", type=int, default=1_000_000, help="inputs per target")
     parser.add_argument("--target", action="append", choices=TARGETS, help="only this one; may be repeated")
     parser.add_argument("--log", type=Path, help="a sensor's bytes as Player logged them (.logr), as seeds")

@@ -73,7 +73,7 @@ COEFFICIENTS = ("slope", "intercept")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; return 1 where the usual case's rate lies clearly off its level."""
-    parser = argparse.ArgumentParser(prog="bench paper", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench paper", description=__doc__)
     parser.add_argument("--drives", type=int, default=100, help="of each case")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--case", default="", help="only those whose name has this in it")

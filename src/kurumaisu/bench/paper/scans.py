@@ -41,7 +41,7 @@ class Found:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; return 1 where the intervals by scans hold the truth clearly less often than they say."""
-    parser = argparse.ArgumentParser(prog="bench paper_scans", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench paper_scans", description=__doc__)
     parser.add_argument("--drives", type=int, default=10, help="of each chair")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)

@@ -45,7 +45,7 @@ CASES = (
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; return 1 where the paper's case lies clearly off its level."""
-    parser = argparse.ArgumentParser(prog="bench paper_wall", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench paper_wall", description=__doc__)
     parser.add_argument("--walls", type=int, default=200, help="of each case")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)

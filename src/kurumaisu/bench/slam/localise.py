@@ -49,7 +49,7 @@ class Drive:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the tables; those of the office need its recordings."""
-    parser = argparse.ArgumentParser(prog="bench slam_localise", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench slam_localise", description=__doc__)
     parser.add_argument("office", type=Path, nargs="?", help="folder of bags with ground_truth, and truth_map.yaml")
     parser.add_argument("--mount", type=float, nargs=3, default=[0.25, 0.0, 0.0], help="base_from_laser in the office")
     parser.add_argument("--seeds", type=int, default=10)
@@ -61,21 +61,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--only {options.only} needs the folder of the office")
     settings = load_localizer_settings(shipped("launch/localization_node.yaml"))
     columns = ("position [m]     ", "largest [m]     ", "heading [deg]    ", "sure and wrong", "CPU [ms/scan]   ")
+    tables = []
     if options.only in (None, "building"):
-        _building(settings, options.seeds, columns)
+        tables.append(_building(settings, options.seeds, columns))
     if options.office is not None and options.only != "building":
         error = load_model(shipped("launch/md100.yaml")).laser.error
         grid = read_map(options.office / "truth_map.yaml")
         drives = {n: Drive(log, truth, grid, error) for n, log, truth in office_logs(options.office, options.mount)}
         if options.only != "lost":
-            _office(drives, settings, options.seeds, columns)
+            tables.append(_office(drives, settings, options.seeds, columns))
         if options.only != "office":
-            _lost(drives, settings, options.starts, options.kidnaps)
-    print(f"\npeak memory of this process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
+            tables.append(_lost(drives, settings, options.starts, options.kidnaps))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    tables[-1].note(f"Peak memory of the process, Python and logs included: {peak:.0f} MiB.")
     return 0
 
 
-def _building(settings: LocalizerSettings, seeds: int, columns: Sequence[str]) -> None:
+def _building(settings: LocalizerSettings, seeds: int, columns: Sequence[str]) -> Table:
     world = load_world(shipped("worlds/building.world"))
     model = with_effects(load_model(shipped("launch/md100.yaml")), shipped("launch/uneven_floor.yaml"))
     grid = read_map(shipped("worlds/maps/building.yaml"))
@@ -92,12 +94,14 @@ def _building(settings: LocalizerSettings, seeds: int, columns: Sequence[str]) -
     for name, variant in variants.items():
         drives = [variant(Drive(log, truth, grid, error)) for log, truth in rounds]
         table.row(name, *_spread([_follow(each, settings, seed) for seed, each in enumerate(drives, start=1)]))
+    return table
 
 
-def _office(drives: dict[str, Drive], settings: LocalizerSettings, seeds: int, columns: Sequence[str]) -> None:
+def _office(drives: dict[str, Drive], settings: LocalizerSettings, seeds: int, columns: Sequence[str]) -> Table:
     table = Table(f"office, {seeds} seeds: median (worst)", "odometry", *columns)
     for name, each in drives.items():
         table.row(name, *_spread([_follow(each, settings, seed) for seed in range(1, seeds + 1)]))
+    return table
 
 
 def _without_mean_error(each: Drive) -> Drive:
@@ -119,7 +123,7 @@ def _follow(each: Drive, settings: LocalizerSettings, seed: int) -> tuple[float,
     return (float(np.sqrt(np.mean(off**2))), float(off.max()), float(np.sqrt(np.mean(turn**2))), float(wrong), cpu)
 
 
-def _lost(drives: dict[str, Drive], settings: LocalizerSettings, starts: int, kidnaps: int) -> None:
+def _lost(drives: dict[str, Drive], settings: LocalizerSettings, starts: int, kidnaps: int) -> Table:
     logs = [(each.log, each.truth) for each in drives.values()]
     any_drive = next(iter(drives.values()))
 
@@ -142,6 +146,7 @@ def _lost(drives: dict[str, Drive], settings: LocalizerSettings, starts: int, ki
             f"{np.median(noticed):.1f} ({noticed.max():.1f})",
             f"{max(r.slowest for r in results):.0f}",
         )
+    return table
 
 
 def _spread(results: Sequence[tuple[float, ...]]) -> tuple[str, ...]:

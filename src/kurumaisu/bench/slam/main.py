@@ -7,7 +7,7 @@ import argparse
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from kurumaisu.bench.slam import office
 from kurumaisu.bench.slam.drive import SimulatedDrive
 from kurumaisu.bench.slam.models import models
 from kurumaisu.bench.slam.new_drives import drives, fresh
+from kurumaisu.bench.slam.office import Judged
 from kurumaisu.bench.slam.office_bags import office_logs
 from kurumaisu.bench.slam.peers import Peer
 from kurumaisu.bench.slam.real import real, real_logs
@@ -40,28 +41,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     if options.office is None and options.only in ("mapping", "localisation"):
         _parser().error(f"--only {options.only} needs the folder of recordings with the truth")
-    told: list[str] = []
+    judged: list[Judged] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         gmapping = options.gmapping and Peer.compiled("gmapping", options.gmapping, ["gridfastslam"], folder)
         if options.only in (None, "building"):
             _building(options.seeds, options.seconds)
         if options.office is not None and options.only in (None, "mapping", "localisation"):
-            told += _office(options, gmapping, folder)
+            judged += _office(options, gmapping, folder)
         if options.only in (None, "fresh", "models"):
-            told += _fresh(options)
+            judged += _fresh(options)
         if options.only in (None, "real"):
             real(options.recordings, gmapping, folder, options.pictures)
         if options.only in (None, "real", "models"):
             _recorded_models(options)
-    print()
-    for line in told:
-        print(line)
-    return 1 if any(line.startswith("BROKEN") for line in told) else 0
+    if judged:
+        table = Table("What must be kept", "figure", "ours", "floor", "aim", "peers", "state")
+        for row in judged:
+            table.row(*astuple(row))
+    return int(any(row.state == "BROKEN" for row in judged))
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="bench slam", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench slam", description=__doc__)
     parser.add_argument("office", type=Path, nargs="?", help="folder of bags with ground_truth, and truth_map.yaml")
     parser.add_argument("--mount", type=float, nargs=3, default=[0.25, 0.0, 0.0], help="base_from_laser in those bags")
     parser.add_argument("--gmapping", type=Path, metavar="PREFIX", help="where openslam_gmapping is installed")
@@ -78,21 +80,21 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _office(options: argparse.Namespace, gmapping: Peer | None, folder: Path) -> list[str]:
-    told: list[str] = []
+def _office(options: argparse.Namespace, gmapping: Peer | None, folder: Path) -> list[Judged]:
+    judged: list[Judged] = []
     grid = read_map(options.office / "truth_map.yaml")
     logs = list(office_logs(options.office, options.mount))
     if options.only != "localisation":
-        told += office.mapping(logs, grid, options.seeds, gmapping, options.peer_seeds, folder)
+        judged += office.mapping(logs, grid, options.seeds, gmapping, options.peer_seeds, folder)
     if options.only != "mapping":
         amcl = options.amcl and Peer.compiled("amcl", options.amcl, ["amcl_sensors"], folder)
         settings = load_localizer_settings(shipped("launch/localization_node.yaml"))
-        told += office.localisation(logs, grid, settings, options.seeds, amcl)
-    return told
+        judged += office.localisation(logs, grid, settings, options.seeds, amcl)
+    return judged
 
 
-def _fresh(options: argparse.Namespace) -> list[str]:
-    told: list[str] = []
+def _fresh(options: argparse.Namespace) -> list[Judged]:
+    judged: list[Judged] = []
     settings = load_localizer_settings(shipped("launch/localization_node.yaml"))
     model = with_effects(load_model(shipped("launch/md100.yaml")), shipped("launch/uneven_floor.yaml"))
     noise, error = model.effects[-1].parameters, model.laser.error
@@ -104,10 +106,10 @@ def _fresh(options: argparse.Namespace) -> list[str]:
         grid = read_map(path)
         logs = drives(grid, options.fresh_seed, _DRIVES, _LONG)
         if options.only != "models":
-            told += fresh(name, logs, grid, settings, error, options.fresh_seed, (options.starts, options.kidnaps))
+            judged += fresh(name, logs, grid, settings, error, options.fresh_seed, (options.starts, options.kidnaps))
         if options.only != "fresh":
             models(f"{name}, {_DRIVES} fresh drives: median (worst)", logs, grid, settings, error, process)
-    return told
+    return judged
 
 
 def _recorded_models(options: argparse.Namespace) -> None:
@@ -122,7 +124,9 @@ def _building(seeds: int, seconds: float) -> None:
     laser = load_model(shipped("launch/md100.yaml")).laser
     rounds = [drive(world, seed, seconds) for seed in range(1, seeds + 1)]
     title = f"round in {world.name}, uneven floor, {seeds} seeds: median (worst)"
-    table = Table(title, "path by", "position [m]     ", "heading [deg]    ", "map to wall [m]  ", "CPU [ms/scan]")
+    table = Table(
+        title, "path by", "position [m]     ", "heading [deg]    ", "map to wall [m]  ", "CPU [ms/scan]", page=False
+    )
     table.row("odometry", *_spread([slam_score.trajectory_error(log.odom, truth) for log, truth in rounds]), "-", "-")
     for name, error in (("filter, readings as they are", None), ("filter, mean error taken out", laser.error)):
         results = [_mapped(log, truth, error, seed, world) for seed, (log, truth) in enumerate(rounds, start=1)]

@@ -44,7 +44,13 @@ def models(
 ) -> None:
     """Print a row per model: errors against the truth, and the error normalised by the covariance that is told."""
     table = Table(
-        title, "models", "position [m]     ", "heading [deg]    ", "normalised error^2 (right: 3)", "sure [%]"
+        title,
+        "models",
+        "position [m]     ",
+        "heading [deg]    ",
+        "normalised error^2 (right: 3)",
+        "sure [%]",
+        page=False,
     )
     raw = list(drives)
     corrected = [(without_mean_error(log, error), truth) for log, truth in raw]

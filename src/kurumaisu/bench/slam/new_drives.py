@@ -11,12 +11,14 @@ import numpy as np
 from kurumaisu._core import LaserError
 from kurumaisu.bench.slam.lost import Found, Logs, carried_away, from_nowhere
 from kurumaisu.bench.slam.models import without_mean_error
+from kurumaisu.bench.slam.office import Judged
 from kurumaisu.bench.slam.random_drives import roam
 from kurumaisu.bench.table import Table
 from kurumaisu.localization import Localizer, LocalizerSettings, make_localizer
 from kurumaisu.map_file import MapFile
 
 _NOTICED = 3.0  # [s]
+_RIGHT = 0.8  # share at least
 
 
 def drives(grid: MapFile, seed: int, count: int, seconds: float) -> Logs:
@@ -33,7 +35,7 @@ def fresh(
     error: LaserError,
     seed: int,
     counts: tuple[int, int],
-) -> list[str]:
+) -> list[Judged]:
     """Print how many of so many unknown starts and carried chairs come out right; return what became of the bounds."""
     corrected = [(without_mean_error(log, error), truth) for log, truth in logs]
 
@@ -42,7 +44,10 @@ def fresh(
 
     columns = ("right at the end", "ever sure and wrong", "after [s]      ", "noticed in 3 s", "noticed after [s]")
     table = Table(
-        f"{name}, {len(logs)} fresh drives, two minutes from anywhere: how many; median (worst)", "what", *columns
+        f"{name}, {len(logs)} fresh drives, two minutes from anywhere: how many; median (worst)",
+        "what",
+        *columns,
+        page=False,
     )
     starts = [from_nowhere(make, corrected, case, seed) for case in range(counts[0])]
     carried = [carried_away(make, corrected, case, seed) for case in range(counts[1])]
@@ -52,10 +57,15 @@ def fresh(
     right, moved = sum(r.right for r in starts), sum(r.right for r in carried)
     wrong = sum(r.wrong for r in [*starts, *carried])
     return [
-        f"{'kept' if right >= 0.8 * len(starts) else 'BROKEN'}: {name}, unknown starts right {right} of {len(starts)}",
-        f"{'kept' if moved >= 0.8 * len(carried) else 'BROKEN'}: {name}, carried away right {moved} of {len(carried)}",
-        f"{'kept' if wrong == 0 else 'BROKEN'}: {name}, sure and wrong {wrong} times",
+        _judged(f"{name}: unknown starts, right at the end", right, len(starts)),
+        _judged(f"{name}: carried away, right at the end", moved, len(carried)),
+        Judged(f"{name}: sure and wrong", str(wrong), "0", "0", "-", "reached" if wrong == 0 else "BROKEN"),
     ]
+
+
+def _judged(name: str, right: int, of: int) -> Judged:
+    state = "kept" if right >= _RIGHT * of else "BROKEN"
+    return Judged(name, f"{right} of {of}", f"{100 * _RIGHT:g} %", "-", "-", state)
 
 
 def _row(table: Table, name: str, results: list[Found]) -> None:

@@ -31,6 +31,18 @@ Mapping = Callable[[ScanLog, int], tuple[Run, FloatArray, Grid]]
 
 
 @dataclass(frozen=True)
+class Judged:
+    """A row of the table of bounds: a figure, floor, aim, what peers have, and 'kept', 'reached' or 'BROKEN'."""
+
+    name: str
+    value: str
+    floor: str
+    aim: str
+    peers: str
+    state: str
+
+
+@dataclass(frozen=True)
 class Bound:
     """What a figure may be at most, and what is aimed at."""
 
@@ -38,14 +50,15 @@ class Bound:
     floor: float
     aim: float
 
-    def told(self, value: float) -> str:
-        """Return words; those of a broken bound begin with BROKEN."""
+    def judged(self, value: float, peers: str = "-") -> Judged:
+        """Return the row of a figure."""
         state = "reached" if value <= self.aim else ("kept" if value <= self.floor else "BROKEN")
-        return f"{state}: {self.name} {value:.3g} (floor {self.floor:g}, aim {self.aim:g})"
+        return Judged(self.name, f"{value:.3g}", f"{self.floor:g}", f"{self.aim:g}", peers, state)
 
 
 _MEDIAN, _WORST = Bound("mapping, median [m]", 0.12, 0.08), Bound("mapping, worst [m]", 0.25, 0.12)
 _CPU, _MEMORY = Bound("mapping, CPU [ms/scan]", 3.0, 1.0), Bound("mapping, peak memory [MiB]", 300, 150)
+_MAPPED = ((_MEDIAN, 0, np.median), (_WORST, 0, np.max), (_CPU, 3, np.median), (_MEMORY, 4, np.max))  # columns
 _FOLLOWED = (  # in the order of the logs: commands, encoders, bad odometry
     Bound("localisation by commands, median [m]", 0.06, 0.04),
     Bound("localisation by encoders, median [m]", 0.046, 0.03),
@@ -56,7 +69,7 @@ _FOLLOWED_CPU = Bound("localisation, CPU [ms/scan]", 0.5, 0.2)
 
 def mapping(
     logs: Logs, truth_grid: MapFile, seeds: int, peer: peers.Peer | None, peer_seeds: int, folder: Path
-) -> list[str]:
+) -> list[Judged]:
     """Print errors and costs of all logs; return what became of the bounds, which are of the first log.
 
     gmapping, which takes a minute for a log, has the first one only.
@@ -69,20 +82,25 @@ def mapping(
         "map to wall [m]",
         "CPU [ms/scan]  ",
         "memory [MiB]",
+        page=False,
     )
-    told: list[str] = []
+    all_figures = []
     for name, log, truth in logs:
         figures = _mapped(lambda log, seed: ours(log, seed, folder), log, truth, truth_grid, seeds)
         table.row(f"{name}, ours", *_cells(figures))
-        if not told:
-            position, cpu, memory = figures[:, 0], figures[:, 3], figures[:, 4]
-            told = [_MEDIAN.told(float(np.median(position))), _WORST.told(float(position.max()))]
-            told += [_CPU.told(float(np.median(cpu))), _MEMORY.told(float(memory.max()))]
+        all_figures.append(figures)
+    others = None
     if peer is not None:
         theirs, (name, log, truth) = peer, logs[0]
         others = _mapped(lambda log, seed: peers.gmapping(theirs, log, seed), log, truth, truth_grid, peer_seeds)
         table.row(f"{name}, gmapping", *_cells(others))
-    return told
+    return [
+        bound.judged(
+            float(of(all_figures[0][:, column])),
+            "-" if others is None else f"gmapping {of(others[:, column]):.3g}",
+        )
+        for bound, column, of in _MAPPED
+    ]
 
 
 def _mapped(mapper: Mapping, log: ScanLog, truth: FloatArray, truth_grid: MapFile, seeds: int) -> FloatArray:
@@ -110,7 +128,7 @@ def _to_walls(grid: Grid, truth_from_map: FloatArray, truth: MapFile) -> float:
 
 def localisation(
     logs: Logs, grid: MapFile, settings: LocalizerSettings, seeds: int, peer: peers.Peer | None
-) -> list[str]:
+) -> list[Judged]:
     """Print errors and costs of all logs; return what became of the bounds."""
     table = Table(
         f"localisation in the true map, {seeds} seeds: median (worst)",
@@ -119,23 +137,26 @@ def localisation(
         "largest [m]    ",
         "CPU [ms/scan]  ",
         "memory [MiB]",
+        page=False,
     )
-    told: list[str] = []
+    judged: list[Judged] = []
     slowest = 0.0
     for (name, log, truth), bound in zip(logs, _FOLLOWED, strict=False):
         figures = np.array([_followed(log, truth, grid, settings, seed) for seed in range(1, seeds + 1)])
         table.row(f"{name}, ours", *_cells(figures), "-")
-        told.append(bound.told(float(np.median(figures[:, 0]))))
         slowest = max(slowest, float(np.median(figures[:, 2])))
-        if peer is None:
-            continue
-        for manner, theirs in (("AMCL, defaults", peers.AMCL), ("AMCL, tuned", peers.AMCL_TUNED)):
+        peers = []
+        manners = (("AMCL, defaults", peers.AMCL), ("AMCL, tuned", peers.AMCL_TUNED))
+        for manner, theirs in manners if peer is not None else ():
+            assert peer is not None
             rows = []
             for seed in range(1, seeds + 1):
                 run, poses = peers.amcl(peer, log, grid, theirs, _start(truth, seed), _OFF, seed)
                 rows.append((*_off(poses, truth), 1000 * run.cpu / len(log.times), run.memory))
             table.row(f"{name}, {manner}", *_cells(np.array(rows)))
-    return [*told, _FOLLOWED_CPU.told(slowest)]
+            peers.append(f"{manner} {np.median(np.array(rows)[:, 0]):.3g}")
+        judged.append(bound.judged(float(np.median(figures[:, 0])), "; ".join(peers) or "-"))
+    return [*judged, _FOLLOWED_CPU.judged(slowest)]
 
 
 def _start(truth: FloatArray, seed: int) -> FloatArray:

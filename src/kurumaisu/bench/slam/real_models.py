@@ -24,7 +24,7 @@ def mapping_models(recordings: Sequence[tuple[str, ScanLog, FloatArray | None]],
     """Print, for name, log and true poses (n, 3) if there are any, how sharp the map is and how far the path is off."""
     columns = ("walls [m]    ", "double walls [%]", "position [m] ", "heading [deg]  ")
     for name, log, truth in recordings:
-        table = Table(f"mapping {name}, {seeds} seeds: median (worst)", "models" + " " * 30, *columns)
+        table = Table(f"mapping {name}, {seeds} seeds: median (worst)", "models" + " " * 30, *columns, page=False)
         for models, changed, changes in _variants(log):
             settings = {**slam.load_mapping_settings(shipped("launch/mapping_node.yaml")), **changes}
             figures = np.array([_judged(changed, truth, settings, seed) for seed in range(1, seeds + 1)])

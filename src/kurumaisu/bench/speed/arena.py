@@ -40,7 +40,7 @@ class _Scene:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table. Return 1 if ranges among the walls differ from those by every wall in numpy."""
-    parser = argparse.ArgumentParser(prog="bench arena")
+    parser = argparse.ArgumentParser(prog="scripts/bench arena", description=__doc__)
     parser.add_argument("--repeats", type=int, default=15, help="of everything that is timed; the median counts")
     parser.add_argument("--threads", type=int, default=1)
     options = parser.parse_args(arguments)
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         stalled = int(_step(scene))
         table.row(f"{robots} x {beams}", 1e3 * scan, 1e3 * wall, 1e9 * scan / robots / beams, 1e3 * step, stalled)
         worst = max(worst, _difference(scene))
-    print(f"\nlargest difference of ranges {worst:.1e} m, at most {_EXACT:.0e} m")
+    table.note(f"Largest difference of ranges: {worst:.1e} m; the limit is {_EXACT:.0e} m.")
     return 0 if worst <= _EXACT else 1
 
 

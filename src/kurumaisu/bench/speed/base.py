@@ -27,21 +27,22 @@ _ROUNDING = 1e-12  # [m/s, rad/s]
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print both tables. Return 1 if a round trip is inexact or a minute costs more than it may."""
-    parser = argparse.ArgumentParser(prog="bench base")
+    parser = argparse.ArgumentParser(prog="scripts/bench base", description=__doc__)
     parser.add_argument("--repeats", type=int, default=100, help="of everything that is timed; the median counts")
     options = parser.parse_args(arguments)
     worst = _round_trips(options.repeats)
     dearest = _minutes(options.repeats)
     good = worst < _ROUNDING and dearest <= _LIMIT
-    print(f"\nworst round trip {worst:.1e}, at most {_ROUNDING:.0e}")
-    print(f"dearest minute {dearest:.2f} ms, at most {_LIMIT:g} ms")
+    table = Table("What must be kept", "what", "seen", "limit")
+    table.row("rate -> volts -> rate, sign known: largest error [m/s, rad/s]", f"{worst:.1e}", f"{_ROUNDING:.0e}")
+    table.row("a simulated minute with one effect, the dearest: CPU [ms]", f"{dearest:.2f}", f"{_LIMIT:g}")
     return 0 if good else 1
 
 
 def _round_trips(repeats: int) -> float:
     """Print the errors of rate -> volts -> rate, and return the largest of those with the sign known."""
     title = f"Rate -> volts -> rate, {_SAMPLES} rates from -{_TOP:g} to {_TOP:g} m/s or rad/s: largest error"
-    table = Table(title, "law", "sign known", "sign unknown", "ambiguous [%]", "CPU [ns/rate]")
+    table = Table(title, "law", "sign known", "sign unknown", "ambiguous [%]", "CPU [ns/rate]", page=False)
     rates = np.linspace(-_TOP, _TOP, _SAMPLES)
     signs, unknown = np.sign(rates), np.full_like(rates, np.nan)
     errors = []
@@ -71,7 +72,7 @@ def _error(law: AxisLaw, rates: FloatArray, signs: FloatArray) -> float:
 def _minutes(repeats: int) -> float:
     """Print the cost of a minute without effects, with each and with all; return the largest with one at most."""
     title = f"Plant, {_MINUTE:g} s at {_RATE:g} Hz from voltages in one chunk"
-    table = Table(title, "effects", "CPU [ms]", "of limit [%]")
+    table = Table(title, "effects", "CPU [ms]", "of limit [%]", page=False)
     model = load_model(shipped("launch/md100.yaml"))
     settings = {effect.id: _setting(effect) for effect in effects.BASE}
     variants = {"none": (), **{name: (setting,) for name, setting in settings.items()}, "all": tuple(settings.values())}

@@ -41,7 +41,7 @@ class Cost:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print a row per rate of loop and commands. Return 1 if at 50 Hz it is slow or dear."""
-    parser = argparse.ArgumentParser(prog="bench drive", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench drive", description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0, help="of each row")
     parser.add_argument(
         "--peer", type=Path, metavar="PROGRAM", help="drivers/diff_drive.cpp, built elsewhere: more rows"
@@ -58,9 +58,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             late = _row(table, f"{name}, {loop:g} Hz, {commands:g} Hz", cost)
             if commands == _RATES[0][1] and name == "topic":
                 good = late < _LATENCY and cost.cpu < _SHARE
-    print("roscpp alone: a node with the same topics and rates that computes nothing")
-    print("guard: with a virtual board at a pty; its answer is in the time, the guard's own CPU is not in the share")
-    print(f"limits at 50 Hz, topic: p99 {1e3 * _LATENCY:g} ms, CPU {100 * _SHARE:g} %")
+    table.note("roscpp alone: a node with the same topics and rates that computes nothing.")
+    table.note("guard: with a virtual board at a pty; the time has its answer, the share not the guard's own CPU.")
+    table.note(f"Limits at 50 Hz, topic: p99 {1e3 * _LATENCY:g} ms, CPU {100 * _SHARE:g} %.")
     return int(not good)
 
 

@@ -46,16 +46,19 @@ class Cost:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print both tables. Return 1 if our driver is late, dear or loses a scan."""
-    parser = argparse.ArgumentParser(prog="bench laser", description=__doc__)
+    """Print the table. Return 1 if our driver is late, dear or loses a scan."""
+    parser = argparse.ArgumentParser(prog="scripts/bench laser", description=__doc__)
     parser.add_argument("--urg-node", type=Path, metavar="PREFIX", help="where urg_node is installed; else without it")
     parser.add_argument("--no-stock", action="store_true", help="without MRPT's own driver")
     parser.add_argument("--seconds", type=float, default=12.0, help="of each driver at each wire")
     parser.add_argument("--sensors", type=int, default=10, help="at once")
     parser.add_argument("--minute", type=float, default=60.0, help="of all sensors at once [s]")
     options = parser.parse_args(arguments)
-    good = _alone(_clients(options), options.seconds)
-    return int(not (_together(options.sensors, options.minute) and good))
+    table = Table("682 beams at 10 Hz: from the sensor's writing to the subscriber", "driver", *_COLUMNS)
+    good = _alone(table, _clients(options), options.seconds)
+    good &= _together(table, options.sensors, options.minute)
+    table.note(f"Limits of laser_node: median {1e3 * _LATENCY:g} ms, CPU {100 * _SHARE:g} %, nothing lost.")
+    return int(not good)
 
 
 def _clients(options: argparse.Namespace) -> dict[str, Client]:
@@ -67,11 +70,8 @@ def _clients(options: argparse.Namespace) -> dict[str, Client]:
     return clients
 
 
-def _alone(clients: dict[str, Client], seconds: float) -> bool:
+def _alone(table: Table, clients: dict[str, Client], seconds: float) -> bool:
     """Print what each driver costs by itself; return whether ours keeps its limits."""
-    table = Table(
-        f"One sensor, 682 beams at 10 Hz, {seconds:g} s: from its writing to the subscriber", "driver", *_COLUMNS
-    )
     good = True
     for tcp in (False, True):
         for name, client in clients.items():
@@ -79,13 +79,11 @@ def _alone(clients: dict[str, Client], seconds: float) -> bool:
             table.row(f"{name}, {'TCP' if tcp else 'pty'}", *cost.cells())
             if client is ours:
                 good &= float(np.median(cost.latencies)) < _LATENCY and cost.cpu < _SHARE and not cost.lost
-    print(f"limits of laser_node: median {1e3 * _LATENCY:g} ms, CPU {100 * _SHARE:g} %, nothing lost")
     return good
 
 
-def _together(count: int, seconds: float) -> bool:
+def _together(table: Table, count: int, seconds: float) -> bool:
     """Print what many of our drivers cost side by side; return whether no scan was lost."""
-    table = Table(f"{count} sensors at once, {seconds:g} s", "laser_node", *_COLUMNS)
     costs = measure(ours, count, seconds, tcp=False)
     together = Cost(
         [value for cost in costs for value in cost.latencies],
@@ -94,8 +92,8 @@ def _together(count: int, seconds: float) -> bool:
         sum(cost.cpu for cost in costs),
         sum(cost.memory for cost in costs),
     )
-    table.row("all together", *together.cells())
-    table.row("the worst", *np.max([cost.cells() for cost in costs], axis=0).tolist())
+    table.row(f"{count} laser_node, {seconds:g} s", *together.cells())
+    table.row("the worst of them", *np.max([cost.cells() for cost in costs], axis=0).tolist())
     return together.lost == 0
 
 

@@ -23,11 +23,15 @@ _SCENES = ((1, 682), (10, 121), (100, 682))  # robots, beams
 
 def main(arguments: Sequence[str]) -> int:
     """Run the benchmark; return 0."""
-    parser = argparse.ArgumentParser(prog="bench pool", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench pool", description=__doc__)
     parser.add_argument("--repeats", type=int, default=7)
     options = parser.parse_args(arguments)
     table = Table(
-        f"{_SIMULATIONS} simulations side by side", "robots, beams", "1 thread [us]", "2 threads [us]", "faster"
+        f"{_SIMULATIONS} simulations side by side: wall time of a step",
+        "robots, beams",
+        "1 thread [us]",
+        "2 threads [us]",
+        "faster",
     )
     with tempfile.TemporaryDirectory() as folder:
         for robots, beams in _SCENES:

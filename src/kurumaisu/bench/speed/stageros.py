@@ -46,7 +46,7 @@ class _Cost:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table. Return 1 if the peer is there and cheaper."""
-    parser = argparse.ArgumentParser(prog="bench stageros")
+    parser = argparse.ArgumentParser(prog="scripts/bench stageros", description=__doc__)
     parser.add_argument("--peer", help="stage_ros' executable; LD_LIBRARY_PATH must lead to its libstage")
     parser.add_argument("--map", type=Path, help=f"bitmap of {_SIDE:g} m a side, as Stage's cave.png; else boxes")
     parser.add_argument("--robots", type=int, nargs="+", default=[1, 10])

@@ -31,7 +31,7 @@ _BEYOND, _FEW = 2.0, 100  # [m] around a world of so few segments, which is not 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print a row for each world. Return 1 if one of them is beyond a limit."""
-    parser = argparse.ArgumentParser(prog="bench agreement")
+    parser = argparse.ArgumentParser(prog="scripts/bench agreement", description=__doc__)
     parser.add_argument("--stage", type=Path, metavar="PREFIX", required=True, help="where a Stage 4.3 is installed")
     parser.add_argument("--stage-tree", type=Path, metavar="DIR", required=True, help="Stage's sources")
     parser.add_argument("--stage-ros-tree", type=Path, metavar="DIR", help="stage_ros' sources")
@@ -45,10 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         f"{options.poses} free poses of the first robot in each world, next to Stage",
         *("world", "ray_casting", "beams", "left out [%]", "median, p95 [cells]", "other model [%]", "same [%]", ""),
     )
-    print(
-        "differences of ranges; same: range and model, of all beams; the verdict is that of cells, all beams counted;"
-    )
-    print("exact, without beams within a cell of an edge: what Stage's rounding to cells makes of true ranges")
+    table.note("Differences of ranges; same: of all beams, those with the same range and model.")
+    table.note("`exact` leaves out beams within a cell of an edge: what Stage's rounding makes of true ranges.")
+    median, high, other = _LIMITS
+    table.note(f"Limits, of `cells` alone: median {median:g} and p95 {high:g} cells, other model {other:g} %.")
     with tempfile.TemporaryDirectory() as folder:
         stage = Stage(options.stage, Path(folder))
         good = [_row(table, path, stage, options.poses) for path in [*paths, *options.world]]
@@ -72,7 +72,7 @@ def _row(table: Table, path: Path, stage: Stage, count: int) -> bool:
     _figures(table, (path.stem, "exact"), np.abs(ranges - exact.ranges) / world.resolution, walls, met)
     ours, those = observer.cells(poses)
     every = np.ones_like(walls)
-    return _figures(table, ("", "cells"), np.abs(ranges - ours) / world.resolution, every, models == those)
+    return _figures(table, (path.stem, "cells"), np.abs(ranges - ours) / world.resolution, every, models == those)
 
 
 def _figures(table: Table, names: tuple[str, str], apart: FloatArray, counted: BoolArray, met: BoolArray) -> bool:

@@ -45,7 +45,7 @@ def table(stage_tree: Path, prefix: Path, folder: Path, others: Sequence[Path]) 
         "nothing, walls only, robots",
         *("world", "cells_stale", "cells", "exact", "largest distance at any time [m]", ""),
     )
-    print("columns: option collision, and the distance with cells_stale; bodies move in Stage's order, by addresses")
+    out.note("Columns: the option `collision`; the distance is that with `cells_stale`. Bodies move in Stage's order.")
     stage = Stage(prefix, folder, "stage_drive")
     worlds = [stage_tree / "worlds" / f"{name}.world" for name in _WORLDS]
     worlds += [*_solid_worlds(stage_tree, folder), _rooms(folder / "rooms.world"), *others]

@@ -14,6 +14,7 @@ from pathlib import Path
 from kurumaisu.bench.faults.base import board, chip, clock, commands, ends, odometry, owners, parameters, stops
 from kurumaisu.bench.faults.base.cases import OK, Case, Seen
 from kurumaisu.bench.faults.base.stage import Setup, Stage, stage
+from kurumaisu.bench.table import MarkdownTable
 from kurumaisu.errors import Error
 
 _MODULES = (
@@ -38,8 +39,8 @@ def cases() -> list[Case]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table, in markdown. Return 1 if anything is not as expected."""
-    parser = argparse.ArgumentParser(prog="bench base_faults", description=__doc__)
+    """Print the table. Return 1 if anything is not as expected."""
+    parser = argparse.ArgumentParser(prog="scripts/bench base_faults", description=__doc__)
     parser.add_argument(
         "--only", default="", metavar="TEXT", help="only the faults with that text in their row's start"
     )
@@ -48,20 +49,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = [case for case in cases() if options.only in case.name]
     if not chosen:
         parser.error(f"no fault has {options.only!r} in its row's start")
-    print(f"load average before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
-    _row(_COLUMNS)
-    _row(["---"] * len(_COLUMNS))
-    verdicts = [seen.verdict() for seen in _play(chosen, options.times)]
+    load = os.getloadavg()[0]
+    table = MarkdownTable("", *_COLUMNS)
+    verdicts = [seen.verdict() for seen in _play(table, chosen, options.times)]
     good = verdicts.count(OK)
-    print(f"\n{good} of {len(chosen)} faults as expected")
+    table.note(f"{good} of {len(chosen)} faults as expected. The load average before was {load:.1f}.")
     return int(good < len(chosen))
 
 
-def _row(cells: Sequence[str]) -> None:
-    print("| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |", flush=True)
-
-
-def _play(chosen: Sequence[Case], times: int) -> Iterator[Seen]:
+def _play(table: MarkdownTable, chosen: Sequence[Case], times: int) -> Iterator[Seen]:
     """Play case after case, on the same stage as long as it is fit for the next one; print the rows."""
     with tempfile.TemporaryDirectory() as folder:
         players = _Players(Path(folder))
@@ -70,7 +66,7 @@ def _play(chosen: Sequence[Case], times: int) -> Iterator[Seen]:
                 seen = Seen()
                 for _ in range(times if case.repeated else 1):
                     seen = players.play(case, seen)
-                _row([case.number, case.fault, case.how, case.expected, seen.cell(), seen.verdict()])
+                table.row(case.number, case.fault, case.how, case.expected, seen.cell(), seen.verdict())
                 yield seen
         finally:
             players.end()

@@ -31,6 +31,9 @@ _DEVICES: dict[str, Callable[[Path], Rig]] = {
 }
 
 
+Rows = list[tuple[str, str, str, str]]  # name, figures in words, bound, verdict
+
+
 @dataclass(frozen=True)
 class End:
     """Seconds until the device was neutral, and of these, until guard or sentinel noticed; nan: never, not said."""
@@ -41,7 +44,7 @@ class End:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the tables. Return 1 if a bound is broken."""
-    parser = argparse.ArgumentParser(prog="bench guard", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench guard", description=__doc__)
     parser.add_argument("--times", type=int, default=50, help="repetitions of each")
     parser.add_argument("--only", default="", metavar="TEXT", help="only the cases with that text in their name")
     parser.add_argument(
@@ -52,25 +55,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     cores = os.cpu_count() or 1
     print(f"load average before: {os.getloadavg()[0]:.1f} on {cores} cores; arming shortened, to save time")
-    print("noticed: of that, until guard or sentinel saw it, by its own log; the rest is its writing, and the device's")
-    broken = 0
-    for device in _DEVICES if options.device == "all" else (options.device,):
+    devices = tuple(_DEVICES) if options.device == "all" else (options.device,)
+    idle: list[Rows] = []
+    loaded: list[Rows] = []
+    for device in devices:
         if options.load != "busy":
-            broken += _table(device, options, lambda times: max(times), 0)
+            idle.append(_table(device, options, lambda times: max(times), 0))
         if options.load != "idle":
-            broken += _table(device, options, _p99, 2 * cores)
-    print(f"\n{broken} bounds broken")
-    return 1 if broken else 0
+            loaded.append(_table(device, options, _p99, 2 * cores))
+    for rows, loops in ((idle, 0), (loaded, 2 * cores)):
+        if rows:
+            _summary(devices, rows, f"{_load(loops)}, {options.times} times each")
+    return int(any(row[-1] == "BROKEN" for rows in (*idle, *loaded) for row in rows))
 
 
-def _table(device: str, options: argparse.Namespace, worst: Callable[[list[float]], float], loops: int) -> int:
-    """Print a table; return how many bounds are broken, by the maximum or the quantile that counts."""
-    words = f"{loops} busy loops on {os.cpu_count()} cores" if loops else "as it is"
+def _load(loops: int) -> str:
+    return f"{loops} busy loops on {os.cpu_count()} cores" if loops else "as it is"
+
+
+def _summary(devices: Sequence[str], rows: Sequence[Rows], words: str) -> None:
+    """Print the table of all devices: of each end median / p99 / p99 of noticing."""
+    title = f"time to neutral at the device [ms], {words}: median / p99 / noticed p99"
+    table = Table(title, "end", *(f"{device:<22}" for device in devices), "bound", "verdict")
+    for ends in zip(*rows, strict=True):
+        bounds = " / ".join(dict.fromkeys(end[2] for end in ends))
+        verdict = "BROKEN" if any(end[3] == "BROKEN" for end in ends) else ends[0][3]
+        table.row(ends[0][0], *(f"{end[1]:<22}" for end in ends), bounds, verdict)
+    table.note("noticed: until guard or sentinel saw it, by its own log; the rest is its writing, and the device's.")
+
+
+def _table(device: str, options: argparse.Namespace, worst: Callable[[list[float]], float], loops: int) -> Rows:
+    """Print a table of one device; return its rows for that of all."""
     table = Table(
-        f"time to neutral at the device ({device}) [ms], {words}",
+        f"time to neutral at the device ({device}) [ms], {_load(loops)}",
         *("end", "times", "min", "median", "p99", "max", "never", "noticed p99", "bound", "verdict"),
+        page=False,
     )
-    broken = 0
+    rows: Rows = []
     dice = random.Random(options.seed)
     with tempfile.TemporaryDirectory(dir=in_memory()) as folder, busy(loops), _first(loops > 0):
         rig = _DEVICES[device](Path(folder))
@@ -78,29 +99,24 @@ def _table(device: str, options: argparse.Namespace, worst: Callable[[list[float
             for case in CASES:
                 if options.only in case.name:
                     ends = [_once(rig, case, dice) for _ in range(options.times)]
-                    broken += _row(table, case.name, ends, _bound(rig, case), worst)
-    return broken
+                    rows.append(_row(table, case.name, ends, _bound(rig, case), worst))
+    return rows
 
 
 def _row(
     table: Table, name: str, ends: Sequence[End], bound: float | None, worst: Callable[[list[float]], float]
-) -> bool:
-    """Print a case's row; return whether its bound is broken."""
+) -> tuple[str, str, str, str]:
+    """Print a case's row; return its name, median / p99 / p99 of noticing [ms], its bound and the verdict."""
     times = [end.neutral for end in ends]
     there = [t for t in times if not math.isnan(t)]
     figures = [1e3 * float(f(there)) if there else math.nan for f in (min, np.median, _p99, max)]
     noticed = [end.noticed for end in ends if not math.isnan(end.noticed)]
     verdict = judge(times, bound, worst)
-    table.row(
-        name,
-        str(len(times)),
-        *figures,
-        str(len(times) - len(there)),
-        1e3 * _p99(noticed) if noticed else "-",
-        "-" if bound is None else f"{1e3 * bound:.0f}",
-        verdict,
-    )
-    return verdict == "BROKEN"
+    seen = 1e3 * _p99(noticed) if noticed else math.nan
+    limit = "-" if bound is None else f"{1e3 * bound:.0f}"
+    table.row(name, str(len(times)), *figures, str(len(times) - len(there)), seen if noticed else "-", limit, verdict)
+    words = " / ".join(f"{value:.3g}" for value in (figures[1], figures[2], seen)).replace("nan", "-")
+    return name, words, limit, verdict
 
 
 def judge(times: list[float], bound: float | None, worst: Callable[[list[float]], float]) -> str:

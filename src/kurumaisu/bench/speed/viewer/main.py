@@ -46,7 +46,7 @@ class _Cost:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the tables. Return 1 if one page costs a simulator 5 % or more."""
-    parser = argparse.ArgumentParser(prog="bench viewer")
+    parser = argparse.ArgumentParser(prog="scripts/bench viewer", description=__doc__)
     parser.add_argument("--simulators", nargs="+", choices=_PHASES, default=list(_PHASES))
     parser.add_argument("--robots", type=int, default=10, help="in stageros, with 682 beams each")
     parser.add_argument("--seconds", type=float, default=0.7, help="of each measurement")
@@ -72,6 +72,7 @@ def _costs(rig: Rig, simulator: str, options: argparse.Namespace) -> bool:
     progress = Table(
         f"{simulator}, {what} of 682 beams, flat out, {os.cpu_count()} cores: CPU time, times nobody",
         *("turn of", *phases, "load average"),
+        page=False,
     )
     runs: dict[str, list[_Cost]] = {name: [] for name in (_NOBODY, *phases)}
     ratios: dict[str, list[tuple[float, float]]] = {name: [] for name in phases}  # of CPU time, of speed
@@ -101,20 +102,19 @@ def _clock(simulator: str, robots: int, seconds: float) -> None:
             rig.look(1)
             time.sleep(seconds)
         frames, in_frames, calls, in_calls, passed = json.loads(file.read_text())
-    print(
-        f"\n{simulator}, by the clock of the thread that simulates: {1e6 * in_frames / frames:.0f} us for a view, "
-        f"{100 * _RATE * in_frames / frames:.2f} % of a core at {_RATE:g} a second; "
-        f"{1e6 * in_calls / calls:.1f} us to see that none is due (with the clock).\n"
-        f"Here {frames / passed:.0f} views in a second of its CPU time: {100 * in_frames / passed:.2f} % and "
-        f"{100 * in_calls / passed:.2f} % of that",
-        flush=True,
+    table = Table(
+        f"{simulator}, by the clock of the thread that simulates",
+        *("what", "each [us]", f"of a core at {_RATE:g} views/s [%]", "of its CPU time here [%]"),
     )
+    table.row("a view", 1e6 * in_frames / frames, 100 * _RATE * in_frames / frames, 100 * in_frames / passed)
+    table.row("to see that none is due", 1e6 * in_calls / calls, "-", 100 * in_calls / passed)
+    table.note(f"Here {frames / passed:.0f} views in a second of its CPU time.")
 
 
 def _print(simulator: str, runs: dict[str, list[_Cost]], ratios: dict[str, list[tuple[float, float]]]) -> None:
     table = Table(
-        f"{simulator}: medians; in brackets where the true one is, to {_CERTAIN:.0%}",
-        *("", "CPU [ms] per simulated s", "times nobody", "speed [s/s]", "times nobody's", "viewer, CPU [%]"),
+        f"{simulator}: medians; in brackets where the true one is, to {_CERTAIN:.0%}; limit of one page {_LIMIT:g}",
+        *("who looks", "CPU [ms] per simulated s", "times nobody", "speed [s/s]", "times nobody's", "viewer, CPU [%]"),
         "frames/s of a page",
     )
     for name, costs in runs.items():
@@ -154,9 +154,9 @@ def _measure(rig: Rig, phase: str, seconds: float) -> _Cost:
 
 def _soak(rig: Rig, seconds: float) -> None:
     """Print memory over time with ten pages, one of which hangs, is cut off and comes again; and who missed what."""
-    table = Table(
-        "ten pages, one hangs", "[s]", "viewer [MB]", "simulator [MB]", "frames/s of a page", "cut off", "after [s]"
-    )
+    columns = ("viewer [MB]", "simulator [MB]", "frames/s of a page", "cut off", "after [s]")
+    table = Table("ten pages, one hangs", "[s]", *columns, page=False)
+    rows: list[tuple[str | float, ...]] = []
     rig.look(_PAGES[_TEN])
     begin = hung = time.monotonic()
     cuts: list[float] = []
@@ -172,9 +172,11 @@ def _soak(rig: Rig, seconds: float) -> None:
                 hung = time.monotonic()
         rate = (rig.pages[0].counts["state"] - seen) / (time.monotonic() - start)
         after = f"{cuts[-1]:.1f}" if cuts else "-"
-        table.row(
-            f"{time.monotonic() - begin:.0f}", memory(rig.viewer), memory(rig.simulator), rate, str(len(cuts)), after
-        )
+        rows.append((memory(rig.viewer), memory(rig.simulator), rate, str(len(cuts)), after))
+        table.row(f"{time.monotonic() - begin:.0f}", *rows[-1])
+    ends = Table(f"ten pages of stageros for {seconds:g} s, one hangs, is cut off and comes again", "when", *columns)
+    ends.row("at first", *rows[0])
+    ends.row("at last", *rows[-1])
     print("\nwho looks, as the viewer says:", *rig.service("clients").split("; "), sep="\n  ", flush=True)
 
 
