@@ -6,7 +6,7 @@ import pytest
 
 from kurumaisu import geometry
 from kurumaisu.critic.base.drive import GRID, Drive
-from kurumaisu.critic.base.pose_paths import ways
+from kurumaisu.critic.base.pose_paths import pose_paths
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 
 STEP = 0.0005  # [s]
@@ -78,5 +78,5 @@ def test_turns_are_counted_the_short_way():
     path = np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.1]])
     poses = path.copy()
     poses[1, 2] += 2 * np.pi
-    np.testing.assert_allclose(ways(times, poses, edges, path), ways(times, path, edges, path), atol=1e-9)
+    np.testing.assert_allclose(pose_paths(times, poses, edges, path), pose_paths(times, path, edges, path), atol=1e-9)
     np.testing.assert_allclose(geometry.wrap(poses[1, 2]), 0.1)

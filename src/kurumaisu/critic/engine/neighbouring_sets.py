@@ -10,7 +10,7 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.engine.catalogue import Candidate, Key, Term
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.linear_screening import Guess, Screen
+from kurumaisu.critic.engine.linear_screening import Screen, ScreenedSet
 from kurumaisu.critic.engine.start_values import HOPE
 from kurumaisu.types import FloatArray
 
@@ -18,12 +18,12 @@ CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
 _HOPES = 3.0  # times what lines promise at most, about nothing, that something with a comb of likely values explains
 _HOPELESS = 100.0  # [nat] behind the best set that nothing makes good
 
-Chosen = frozenset[Candidate]
+EffectSet = frozenset[Candidate]
 
 
-def neighbours(
+def neighbouring_sets(
     problem: Problem, screen: Screen, nothing: Screen, fit: Fit
-) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
+) -> Iterator[tuple[EffectSet, Mapping[Key, float]]]:
     """Yield the set without each of its effects, with what can only act or not, and with each rival instead."""
     kept = fit.start
     for one in sorted(fit.candidates, key=lambda candidate: candidate.id):
@@ -38,7 +38,7 @@ def neighbours(
                 yield fit.candidates - {one} | {other}, begin
                 if other.id == one.id:  # what stood in for the right form may go with the wrong one
                     rest = fit.candidates - {one}
-                    sets = [rest - gone | {other} for gone in _that_stood_in(rest)]
+                    sets = [rest - gone | {other} for gone in _stand_ins(rest)]
                     # Steps are as large in another form, but beside what stood in others may look better.
                     yield from ((chosen, start) for chosen in sets for start in (begin, kept))
     for other in screen.fixed:
@@ -53,10 +53,10 @@ def neighbours(
     yield from (
         (fit.candidates, problem.teeth.anew(fit.terms, fit.values, one.id)) for one in fit.candidates if one.rough
     )
-    yield from _combs(problem, screen, fit)
+    yield from _step_sets(problem, screen, fit)
 
 
-def _that_stood_in(rest: Chosen) -> Iterator[Chosen]:
+def _stand_ins(rest: EffectSet) -> Iterator[EffectSet]:
     """Yield each effect of some, and each pair of which one shows in the forward speed and the other in the yaw rate.
 
     Steps of a converter are in both, so for their wrong form two may stand in.
@@ -81,7 +81,7 @@ def hopeless_alone(problem: Problem, rough: Candidate, empty: Fit, fit: Fit) -> 
     return empty.log_likelihood + _HOPES * hope < fit.log_likelihood - _HOPELESS
 
 
-def _combs(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
+def _step_sets(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[EffectSet, Mapping[Key, float]]]:
     """Yield what has a comb of likely values beside the part of the set that leaves it most to explain.
 
     Smooth effects that draw the mean of its steps together leave no tooth that stands out beside all of them.
@@ -100,7 +100,7 @@ def _combs(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen,
             yield frozenset(each for each in part.chosen if each.id != other.id) | {other}, begin
 
 
-def _left(problem: Problem, part: Guess) -> tuple[tuple[Term, ...], FloatArray, float]:
+def _left(problem: Problem, part: ScreenedSet) -> tuple[tuple[Term, ...], FloatArray, float]:
     """Return the terms and values of a guess, and its log likelihood when simulated."""
     ordered = sorted(part.chosen, key=lambda candidate: candidate.id)
     terms = tuple(term for candidate in ordered for term in candidate.terms)

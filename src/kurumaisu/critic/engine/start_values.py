@@ -11,7 +11,7 @@ import numpy as np
 
 from kurumaisu.critic.engine import least_squares
 from kurumaisu.critic.engine.catalogue import Key, Term
-from kurumaisu.critic.engine.step_likelihood import Comb
+from kurumaisu.critic.engine.step_likelihood import StepLikelihood
 from kurumaisu.types import FloatArray
 
 _STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a fit may start
@@ -20,22 +20,22 @@ _ROUNDS, _BETTER = 8, 0.1  # how often a tooth is left for a likelier one close 
 HOPE = 4.0  # [nat] less is not worth a closer look: a tooth costs more
 
 
-class Linear(least_squares.Linear, Protocol):
+class LinearByDrive(least_squares.Linearised, Protocol):
     """What can be fitted, drive by drive."""
 
     def residuals(self, terms: Sequence[Term], values: FloatArray) -> list[FloatArray]:
         """Return the whitened residual of each drive."""
 
 
-class Teeth:
+class StartValues:
     """First values; of what is rough, by a comb of what every size would explain."""
 
-    def __init__(self, problem: Linear, comb: Callable[[], Comb]) -> None:
+    def __init__(self, problem: LinearByDrive, comb: Callable[[], StepLikelihood]) -> None:
         """Take what is fitted; comb: makes that of its drives, where something is rough."""
         self._problem, self._make = problem, comb
 
     @cached_property
-    def _comb(self) -> Comb:
+    def _comb(self) -> StepLikelihood:
         return self._make()
 
     @property

@@ -48,7 +48,7 @@ Walked = dict[Way, tuple[FloatArray, FloatArray]]  # sizes (k,), and what each c
 
 
 @dataclass(frozen=True)
-class Start:
+class StepSize:
     """A value; how far the next one that was weighed is from it; what it explains, in nats, as far as lines go."""
 
     value: float
@@ -56,7 +56,7 @@ class Start:
     nats: float
 
 
-class Comb:
+class StepLikelihood:
     """What changes of the rates explain in some drives, about the model without effects."""
 
     def __init__(self, drives: Sequence[Drive], model: Model, noise: Noise, walked: Walked) -> None:
@@ -77,7 +77,7 @@ class Comb:
         self._smooth = _smooth(self._plain)
         self._squares: dict[Way, FloatArray] = {}
 
-    def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[Start]:
+    def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[StepSize]:
         """Return the most promising values of a term beside fixed ones; residual: of each drive, whitened."""
         key = _way(term, fixed)
         values, changes = self._sizes(term, fixed)
@@ -91,7 +91,7 @@ class Comb:
         peaks = np.flatnonzero((gained >= np.append(gained[1:], -np.inf)) & (gained >= np.append(-np.inf, gained[:-1])))
         best = peaks[np.argsort(-gained[peaks])][:_BEST]
         apart = np.abs(np.diff(values, append=1.1 * values[-1]))
-        return [Start(float(values[k]), float(apart[k]), float(gained[k])) for k in best]
+        return [StepSize(float(values[k]), float(apart[k]), float(gained[k])) for k in best]
 
     def apart(self, term: Term, fixed: Sequence[Term], value: float) -> float:
         """Return how far apart the sizes about a value are that were weighed."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 from kurumaisu.critic.heldout import scan_gain, slam_gain
 from kurumaisu.critic.predict.motion import Forecast, Settings
-from kurumaisu.critic.predict.scan_poses import Places, joined
-from kurumaisu.critic.ranges.scans.beams import missing
+from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
+from kurumaisu.critic.ranges.scans.beams import why_not_usable
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.story import Overlay
@@ -40,11 +40,11 @@ def with_laser_gain(criticism: Criticism, recording: Recording, extension: Exten
         return criticism
     gain = criticism.verdict.gain or Gain(worth.log_density_per_sample)
     whole = replace(gain, channels={**gain.channels, scan_gain.CHANNEL: worth})
-    story = replace(criticism.story, details=(*criticism.story.details, _told(worth)))
+    story = replace(criticism.story, details=(*criticism.story.details, _sentence(worth)))
     return replace(criticism, verdict=replace(criticism.verdict, gain=whole), story=story)
 
 
-def _told(worth: ChannelGain) -> str:
+def _sentence(worth: ChannelGain) -> str:
     density = worth.log_density_per_sample
     text = (
         f"On scans held out, what was found in the laser gains {density.gain:+.3g} nats per reading "
@@ -77,7 +77,7 @@ def _without(name: str, criticism: Criticism, recording: Recording, extension: E
     """Return what extends the model as fitted without a run."""
     base, scans = extension.refit(name), extension.scans
     others = replace(recording, train=tuple(other for other in recording.train if other != name))
-    if scans and name not in recording.test and others.train and missing(others) is None:
-        places = Places(others, criticism.model, extension.forecast)
+    if scans and name not in recording.test and others.train and why_not_usable(others) is None:
+        places = ScanPoses(others, criticism.model, extension.forecast)
         scans = scan_gain.refit(joined(places.trained()), scans)
     return (*base, *scans)

@@ -43,7 +43,7 @@ def confirmed(worth: Gain | None, nats: float, *, free: bool = False) -> bool:
     return gain.lo90 > 0 or (nats >= (STRONG_CURVE if free else _STRONG) and gain.gain > least)
 
 
-def nearer(worth: Gain | None, channels: Sequence[str]) -> bool:
+def simulates_nearer(worth: Gain | None, channels: Sequence[str]) -> bool:
     """Return whether drives held out are simulated nearer to what was measured in one of some channels, in none less.
 
     What a curve or an equation leaves of something strong is no normal noise: a few surprises may cost all that the
@@ -59,7 +59,7 @@ def nearer(worth: Gain | None, channels: Sequence[str]) -> bool:
     return any(error.lo90 > 0 for error in known) and all(error.hi90 > 0 for error in known)
 
 
-def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
+def share_of_way(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
     """Return how far the chair is moved within HORIZON by what `settings` have and `without` lack.
 
     As a share of the way or of the turn made meanwhile (rms over all starts), whichever is larger.
@@ -74,7 +74,7 @@ def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Se
     return float(np.sqrt((moved / np.maximum(made, 1e-12)).max()))
 
 
-def felt_share(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
+def share_of_noise(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
     """Return what `settings` have and `without` lack, in standard deviations of an increment's noise (rms)."""
     count = sum(len(drive.measured) for drive in problem.drives)
     return float(np.sqrt(2 * expected_nats(problem, problem.drives, settings, without) / count))

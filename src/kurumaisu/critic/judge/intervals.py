@@ -12,7 +12,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout.materiality import HORIZON, spans
-from kurumaisu.critic.unknown.effect_likeness import FORM, signal_of
+from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR, signal_of
 from kurumaisu.critic.values.verdict import NORMAL90, Estimate
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
@@ -38,7 +38,7 @@ def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
     for at, term in enumerate(fit.terms):
         value = float(fit.values[at])
         if term.id == name and term.fixed:
-            out[term.parameter.name] = _told(problem.model, term, value, value, value)
+            out[term.parameter.name] = _estimate(problem.model, term, value, value, value)
         elif term.id == name:
             k = known.index(at)
             sd = float(np.sqrt(spread[k, k])) * abs(float(unit[k]))
@@ -52,7 +52,7 @@ def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
             beyond = 0.0 if term.shape else order * abs(value - term.null)
             more = NORMAL90 * float(np.hypot(doubt[k] * sd, beyond))
             ends = value - np.hypot(value - low, more), value + np.hypot(high - value, more)
-            out[term.parameter.name] = _told(problem.model, term, value, *map(float, ends))
+            out[term.parameter.name] = _estimate(problem.model, term, value, *map(float, ends))
     return out
 
 
@@ -67,7 +67,7 @@ def _doubt(problem: Problem, fit: Fit, columns: FloatArray) -> FloatArray:
         if effects.by_id(name).empirical:
             signal = signal_of(problem, fit, name)
             norms = np.linalg.norm(columns, axis=0) * np.linalg.norm(signal)
-            out += FORM**2 * float(signal @ signal) / _WAYS * (columns.T @ signal / np.maximum(norms, 1e-12)) ** 2
+            out += FORM_ERROR**2 * float(signal @ signal) / _WAYS * (columns.T @ signal / np.maximum(norms, 1e-12)) ** 2
     return np.asarray(np.sqrt(out))
 
 
@@ -121,7 +121,7 @@ def ends_of(problem: Problem, fit: Fit, at: int, ridge: FloatArray, sd: float) -
     cost = fallen(0.0)
     ends = []
     for sign, room in ((-1.0, value - parameter.lower), (1.0, parameter.upper - value)):
-        far = _comb_end(fallen, sign, abs(value)) if fit.terms[at].rough else 0.0
+        far = _step_end(fallen, sign, abs(value)) if fit.terms[at].rough else 0.0
         ends.append(value + sign * max(_end(fallen, sign, sd, room), min(far, room)))
     return ends[0], ends[1]
 
@@ -144,13 +144,13 @@ def _end(fallen: Callable[[float], float], sign: float, sd: float, room: float) 
     return offset
 
 
-def _comb_end(fallen: Callable[[float], float], sign: float, size: float) -> float:
+def _step_end(fallen: Callable[[float], float], sign: float, size: float) -> float:
     """Return the farthest place to one side where the likelihood stands as high as at the ends of 90 %."""
     likely = [share * size for share in _TEETH if fallen(sign * share * size) < _REFUSED]
     return max(likely, default=0.0)
 
 
-def _told(model: Model, term: Term, value: float, low: float, high: float) -> Estimate:
+def _estimate(model: Model, term: Term, value: float, low: float, high: float) -> Estimate:
     """Return a fitted parameter with its 90 % interval, which its bounds cut."""
     unit = term.parameter.unit
     if unit == "V" and model.law_name == "identity":
