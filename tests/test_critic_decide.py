@@ -65,7 +65,7 @@ def judged(monkeypatch):
         return answers[asked[-1]]
 
     monkeypatch.setattr(search, "search", lambda *_: found_of("wrong"))
-    monkeypatch.setattr(decide.smooth_judge, "hinted", lambda *_: None)
+    monkeypatch.setattr(decide.beyond_catalogue, "hinted_curve", lambda *_: None)
     monkeypatch.setattr(decide, "_judged", judge)
     return asked, answers
 
@@ -124,7 +124,7 @@ def test_a_curve_has_to_beat_the_noise_that_would_take_it_up(judged, monkeypatch
     curve = SimpleNamespace()
     won = decision(found_of("a"))
     won = replace(won, beyond=Beyond(CurveComparison((curve,), 5.0, {}, {}, 0.0, least), curve, 0.0))
-    monkeypatch.setattr(decide.smooth_judge, "hinted", lambda *_: curve)
+    monkeypatch.setattr(decide.beyond_catalogue, "hinted_curve", lambda *_: curve)
     monkeypatch.setattr(decide, "_by_noise", lambda *_: by_noise)
     plain = decision(found_of("a"))
     monkeypatch.setattr(decide, "_judged", lambda _first, _found, hint, *_: plain if hint is None else won)

@@ -49,7 +49,7 @@ def test_a_lag_that_is_not_of_the_first_order_is_a_lag_and_nothing_else(form, ex
         told.append(missed(problem, found))
         return told[-1]
 
-    monkeypatch.setattr(form_error_fit, "missed", heard)
+    monkeypatch.setattr(form_error_fit, "likeliest_form_error", heard)
     case = make(Ask("single", ("base.lag_v",), 150.0, form, regime="usual", family="base"), 31240, tmp_path)
     verdict = pipeline.criticise(case.recording, MD100, lambda _: None).verdict
     assert [cause.id for cause in verdict.causes] == ["base.lag_v"]

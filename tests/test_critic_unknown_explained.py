@@ -61,7 +61,7 @@ def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, leas
     """Nothing is extended by what did not hold, and no curve is certain."""
     recording = hidden.make(hidden.KINDS["carpet edge"], 30.0, 1003, seconds=30.0, runs=2).recording
     monkeypatch.setattr(explain_unknown, "confirmed", lambda worth, nats, free: False)
-    monkeypatch.setattr(explain_unknown, "nearer", lambda worth, channels: False)
+    monkeypatch.setattr(explain_unknown, "simulates_nearer", lambda worth, channels: False)
     monkeypatch.setattr(explain_unknown, "NO_NOISE", least)
     found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None)
     assert (found.verdict.verdict, found.verdict.causes) == (verdict, ())
