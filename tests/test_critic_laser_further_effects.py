@@ -53,7 +53,9 @@ def test_what_beams_keep_is_no_error_of_whole_scans(tmp_path):
     bearings = FIRST + INCREMENT * np.arange(682)
     data = recording(tmp_path, None, 0.0, 7, scans=SCANS)
     seen = Assembly(gather(with_readings(data, lambda r: r + 0.002 * np.cos(2 * bearings)), MODEL), frozenset())
-    alone, beside = (one.settle((0.003, 0.003)).scan_noise for one in (seen, seen.beside([beam_family(seen.shots)])))
+    alone, beside = (
+        one.settle((0.003, 0.003)).scan_noise for one in (seen, seen.with_families([beam_family(seen.shots)]))
+    )
     assert alone.common_sd > 3e-4
     assert beside.common_sd < 2e-4  # what is usual beforehand
 

@@ -39,7 +39,7 @@ def test_a_part_of_a_wall_is_displaced_if_nearly_all_its_readings_are_far_off(of
     if expected:
         assert found.readings[part].all()
         assert found.off == pytest.approx(off, abs=0.01)
-        first, second = found.told()
+        first, second = found.unknowns()
         assert (first.covariate, second.covariate) == ("hit y", "hit x")
         assert "x 1 to 2 m" in first.shape
 
@@ -74,7 +74,7 @@ def test_what_stands_before_a_wall_is_as_wide_as_a_thing(width, depth, told):
     measured, ranges, _ = wall()
     found = passing_objects(person(measured, ranges, 30, width, depth), ranges, BEARINGS)
     assert found.many == told
-    assert bool(list(found.told())) == told
+    assert bool(list(found.unknowns())) == told
     if told:
         assert found.scans == 30
         assert found.readings[0, 100 : 100 + width].all()

@@ -26,7 +26,7 @@ from kurumaisu.critic.engine.linear_screening import Screen
 from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.decide import Decision
-from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, uninformative
+from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
 from kurumaisu.critic.noise.base_noise import Noise, NoiseGrowth, NoiseResiduals, whitener
 from kurumaisu.critic.sanity import examination
 from kurumaisu.critic.unknown.beyond_catalogue import Beyond, undecided
@@ -275,8 +275,8 @@ def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatc
     """Whatever they gain, if it is no loss beyond chance."""
     monkeypatch.setattr("kurumaisu.critic.judge.held_out_pruning.expected_nats", lambda *_: seen)
     made = decision({"a": 1.0}, fit_of("a", nats))
-    assert uninformative(made, gain(held), ()) is silent
-    assert not uninformative(made, None, ())
+    assert untested(made, gain(held), ()) is silent
+    assert not untested(made, None, ())
 
 
 @pytest.mark.parametrize(("told", "without", "best"), [(True, 0.2, ""), (False, 0.2, "a"), (False, -0.1, "")])

@@ -42,7 +42,7 @@ def test_errors_act_along_the_way(late, size, rates):
     error = size * (0.5 + late * (np.arange(len(t)) % 200 / 200 + STEP - 0.5))  # the same in each increment
     drive = drive_of(3.0, error * 0.1 * (rates != "w"), error * (rates != "v"))
     change = drive.measured - simulated(drive)
-    c, s, x, y, late_c, late_s, late_x, late_y = drive.ways.T
+    c, s, x, y, late_c, late_s, late_x, late_y = drive.pose_paths.T
     mean, lateness = 0.1 * size * 0.5, 0.1 * size * late / 12
     told = 0.1 * (rates != "w") * np.stack([c * mean + late_c * lateness, s * mean + late_s * lateness])
     told += (rates != "v") * np.stack([-y * mean - late_y * lateness, x * mean + late_x * lateness])

@@ -173,7 +173,7 @@ def test_effects_beside_a_curve_over_the_same_are_not_named(slipping):
     )
     only = compare(problem, SearchResult((bent,), dict.fromkeys(bent.ids, 1.0), (), 0.0))
     assert (only.winner.curve.id, only.winner.fit.ids) == ("smooth.w_gain.abs_w", bent.ids)
-    assert only.winner.worth < rivalry.winner.worth
+    assert only.winner.log_posterior < rivalry.winner.log_posterior
     assert max(only.p_effects.values()) < 0.01
 
 
@@ -229,7 +229,7 @@ def test_a_curve_beside_nothing_is_one_over_rates_that_nothing_has_bent(slipping
     rivalry = compare(problem, SearchResult((bent, empty), dict.fromkeys(names, 1.0), (), 0.0))
     alone = compare(problem, SearchResult((empty,), dict.fromkeys(names, 0.0), (), 0.0))
     assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.w_gain.abs_w", frozenset())
-    assert rivalry.winner.belief.nats == pytest.approx(alone.winner.belief.nats, abs=1e-6)
+    assert rivalry.winner.evidence.nats == pytest.approx(alone.winner.evidence.nats, abs=1e-6)
     assert max(rivalry.p_effects.values()) < 0.01
 
 
@@ -238,7 +238,7 @@ def test_a_curve_and_an_effect_of_the_catalogue_are_fitted_together():
     problem = Problem(drives_of(case.recording), hidden.MODEL, hidden.USUAL)
     right = problem.fit(["base.gain_w"], {})
     best = compare(problem, SearchResult((right,), {"base.gain_w": 1.0}, (), 0.0)).rivals[0]
-    extension = fit_with_curve(problem, best.fit, best.curve, best.belief.prior)
+    extension = fit_with_curve(problem, best.fit, best.curve, best.evidence.prior)
     assert extension.fit.values[0] == pytest.approx(0.06, abs=4 * extension.fit.sds[0])
     assert sentences.shape(extension).startswith("periodic, period 2 pi/3, amplitude")
     size = shapes.shape_of(extension).size

@@ -68,10 +68,10 @@ def test_a_narrow_gust_is_drawn_by_a_curve_that_bends_often():
     gust = hidden.Kind(2, "y", lambda s, a, b: hidden.bump((s.y - 0.3) / 0.12))
     problem = problem_of(hidden.make(gust, 40.0, 1021, seconds=60.0).recording)
     rivalry = compare(problem, SearchResult((problem.fit_candidates((), {}),), {}, (), 1.0))
-    usual = max(r.worth for r in rivalry.rivals if len(r.curve.basis.knots) == 8)
+    usual = max(r.log_posterior for r in rivalry.rivals if len(r.curve.basis.knots) == 8)
     assert (sentences.channel(rivalry.winner.curve), rivalry.winner.curve.basis.covariate) == ("base.w", "y")
     assert len(rivalry.winner.curve.basis.knots) == 22
-    assert rivalry.winner.worth > usual + 10
+    assert rivalry.winner.log_posterior > usual + 10
 
 
 def test_a_top_speed_without_a_corner_is_one_though_a_bent_law_mends_it():
@@ -82,7 +82,7 @@ def test_a_top_speed_without_a_corner_is_one_though_a_bent_law_mends_it():
     mended = problem.fit_candidates([sharp["base.saturation"], sharp["base.curvature_v"]], {})
     designs = Designs(problem, mended)
     rivals = compare(problem, SearchResult((mended, empty), {}, (), 0.0)).rivals
-    drawn = [EffectLikeness(problem, mended, designs).drawn_alone(r.fit, r.curve, r.belief) for r in rivals[:3]]
+    drawn = [EffectLikeness(problem, mended, designs).drawn_alone(r.fit, r.curve, r.evidence) for r in rivals[:3]]
     assert any("base.saturation" in names for names in drawn)
 
 

@@ -25,7 +25,7 @@ def test_what_follows_nothing_is_no_curve_over_something(channel, name):
     )
     best = compare(problem, SearchResult((problem.fit_candidates((), {}),), {}, (), 1.0)).rivals[0]
     assert best.curve.id == f"smooth.{name}.moving"
-    extension = fit_with_curve(problem, best.fit, best.curve, best.belief.prior)
+    extension = fit_with_curve(problem, best.fit, best.curve, best.evidence.prior)
     assert extension.coefficients[0] == pytest.approx(case.size, rel=0.25)
     assert sentences.shape(extension).startswith("constant, ")
     assert "follows nothing that is known" in sentences.headline(extension)

@@ -38,9 +38,9 @@ def test_a_curve_of_the_yaw_rate_draws_both_together(found):
     alone = [rival for rival in compare(problem, naming).rivals if not rival.fit.ids]
     other = next(rival for rival in alone if rival.curve.channel == "v")
     likeness = EffectLikeness(problem, naming.best, designs)
-    assert set(likeness.drawn_together(alone[0].fit, alone[0].curve, alone[0].belief)) == set(TWO)
-    assert likeness.drawn_together(other.fit, other.curve, other.belief) == {}
-    assert likeness.drawn_together(naming.best, alone[0].curve, alone[0].belief) == {}  # nothing is missing there
+    assert set(likeness.drawn_together(alone[0].fit, alone[0].curve, alone[0].evidence)) == set(TWO)
+    assert likeness.drawn_together(other.fit, other.curve, other.evidence) == {}
+    assert likeness.drawn_together(naming.best, alone[0].curve, alone[0].evidence) == {}  # nothing is missing there
 
 
 def test_two_effects_are_believed_more_where_a_curve_that_explains_less_is_them(found, monkeypatch):

@@ -41,14 +41,14 @@ def test_a_jump_beats_an_effect_that_has_a_corner_near_by(slipping):
     assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.w_gain.abs_w", frozenset())
     assert isinstance(rivalry.winner.curve.basis, StepCurve)
     assert rivalry.p_effects["base.saturation"] < 0.01
-    smooth = max(r.worth for r in rivalry.rivals if not isinstance(r.curve.basis, StepCurve))
-    assert rivalry.winner.worth > smooth + 10  # eight knots draw it far worse
+    smooth = max(r.log_posterior for r in rivalry.rivals if not isinstance(r.curve.basis, StepCurve))
+    assert rivalry.winner.log_posterior > smooth + 10  # eight knots draw it far worse
 
 
 def test_a_jump_is_told_and_written_where_it_is(slipping):
     problem, _, empty = slipping
     best = compare(problem, SearchResult((empty,), {}, (), 1.0)).winner
-    extension = fit_with_curve(problem, best.fit, best.curve, best.belief.prior)
+    extension = fit_with_curve(problem, best.fit, best.curve, best.evidence.prior)
     found = shapes.shape_of(extension)
     assert found.place[1] - 0.01 < 0.4 < found.place[2] + 0.01  # these drives have no rate just there
     assert found.place[1] <= found.place[0] <= found.place[2]
@@ -80,7 +80,7 @@ def test_what_jumps_is_no_other_form_of_what_does_not(slipping):
     """A curve that draws an effect speaks for it, but a jump that explains far more than its equation does not."""
     problem, limit, empty = slipping
     best = compare(problem, SearchResult((empty,), {}, (), 1.0)).winner
-    assert EffectLikeness(problem, limit, Designs(problem, limit)).drawn(empty, best.curve, best.belief) == {}
+    assert EffectLikeness(problem, limit, Designs(problem, limit)).drawn(empty, best.curve, best.evidence) == {}
 
 
 def test_a_jump_that_does_what_an_effect_does_speaks_for_it():
@@ -100,7 +100,7 @@ def test_a_tyre_that_goes_flat_bends_the_way_from_then_on_and_is_no_veer():
     rivalry = compare(problem, SearchResult((veer, empty), {"base.veer": 1.0}, (), 0.0))
     assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.curvature.time", frozenset())
     assert rivalry.p_effects["base.veer"] < 0.1
-    extension = fit_with_curve(problem, empty, rivalry.winner.curve, rivalry.winner.belief.prior)
+    extension = fit_with_curve(problem, empty, rivalry.winner.curve, rivalry.winner.evidence.prior)
     found = shapes.shape_of(extension)
     assert found.place[1] - 0.1 < 25 < found.place[2] + 0.1
     assert sentences.channel(extension.curve) == "base.w"

@@ -19,7 +19,7 @@ from kurumaisu.critic.judge import excitation, explain, explain_unknown
 from kurumaisu.critic.judge.decide import Decision, decide, noise_residuals
 from kurumaisu.critic.judge.extended_model import write_extended
 from kurumaisu.critic.judge.forecast import forecast_of
-from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, uninformative
+from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
 from kurumaisu.critic.judge.merge import with_scans
 from kurumaisu.critic.judge.reference_point import from_base_link
 from kurumaisu.critic.judge.scan_verdict import criticise_scans as look
@@ -150,7 +150,7 @@ def _criticise_base(
         held = leave_one_out(
             made, held, lambda: drive_gain.measure(model, more, made.refit, baseline, made.problem.noise)
         )
-    made = replace(made, unmet=bool(whole) and uninformative(made, held, whole))
+    made = replace(made, untested=bool(whole) and untested(made, held, whole))
     progress("planning the next drive")
     scripts = next_experiment.drives()
     proposal = next_experiment.propose(made.problem, made.found, scripts)

@@ -96,8 +96,8 @@ class Drive:
         return np.asarray(np.where(moved > 0, moved, usual))
 
     @cached_property
-    def ways(self) -> FloatArray:
-        """How the chair went from each pose to the next, (m, 8): see ways.ways."""
+    def pose_paths(self) -> FloatArray:
+        """How the chair went from each pose to the next, (m, 8): see pose_paths."""
         edges = self.start + GRID * np.arange(len(self.v) + 1)
         asked = _core.integrate(self.v, self.w, np.full(len(self.v), GRID), [0.0, 0.0, 0.0])
         return pose_paths(self.times, self.poses, edges, asked)

@@ -34,7 +34,7 @@ from kurumaisu.types import FloatArray
 
 _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
 _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
-_ROUGH_DERIVATIVE = 1e-4  # the same of what has a comb of likely values: right between its teeth
+_ROUGH_DERIVATIVE = 1e-4  # the same of what has many likely values: right between its peaks
 _AT_WILL = float(np.log(2.0))  # [nat] of a size beyond some, which every other one is
 _LARGER = 0.5  # by this share such sizes are made larger, to see it
 _ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
@@ -204,7 +204,8 @@ class Problem:
             y = self.residual((), np.empty(0))
             likelihood = -0.5 * float(y @ y)
             return Fit(frozenset(), (), np.empty(0), np.empty(0), (), likelihood, likelihood)
-        solution = self.teeth.likeliest(terms, least_squares.least_squares(self, terms, self.teeth.first(terms, start)))
+        begun = least_squares.least_squares(self, terms, self.start_values.first(terms, start))
+        solution = self.start_values.likeliest(terms, begun)
         costs = self._occam(ordered, terms, solution)
         return Fit(
             frozenset(ordered),
@@ -217,8 +218,8 @@ class Problem:
         )
 
     @cached_property
-    def teeth(self) -> StartValues:
-        """Return what finds first values, and those of what has a comb of likely ones."""
+    def start_values(self) -> StartValues:
+        """Return what finds first values, and those of what has many likely values."""
         return StartValues(self, lambda: StepLikelihood(self.drives, self.model, self.noise, self._walked))
 
     def _occam(self, chosen: Sequence[Candidate], terms: Sequence[Term], solution: least_squares.Solution) -> float:

@@ -48,15 +48,15 @@ def likeliest_form_error(problem: Problem, found: SearchResult) -> tuple[FormErr
     """
     known = {fit.candidates: fit for fit in reversed(found.fits)}
 
-    def worth(fit: Fit) -> tuple[float, Fit, FormError | None]:
+    def weighed(fit: Fit) -> tuple[float, Fit, FormError | None]:
         gain, what = _form_error_of(problem, fit)
         return log_posterior(fit, len(found.p)) + gain, fit, what
 
-    first = best = max((worth(fit) for fit in found.fits[:_WEIGHED]), key=lambda one: one[0])
+    first = best = max((weighed(fit) for fit in found.fits[:_WEIGHED]), key=lambda one: one[0])
     while len(best[1].candidates) > 1:
         parts = [best[1].candidates - {one} for one in sorted(best[1].candidates, key=lambda one: one.id)]
         fits = [known.get(part) or problem.fit_candidates(part, best[1].start) for part in parts]
-        fewer = max((worth(fit) for fit in fits), key=lambda one: one[0])
+        fewer = max((weighed(fit) for fit in fits), key=lambda one: one[0])
         if fewer[0] <= best[0]:
             break
         best = fewer

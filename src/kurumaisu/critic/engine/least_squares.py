@@ -48,7 +48,7 @@ def least_squares(problem: Linearised, terms: Sequence[Term], start: FloatArray)
     null = np.array([term.null for term in terms])
     tight = np.array([term.step if term.shape else 0.0 for term in terms])  # 1 / sd of a shape's prior, per step
     values, damping = np.clip(start, lower, upper), _DAMPING[0]
-    # Slopes of what has a comb of likely values lead astray: where they lead nowhere, the others go on alone.
+    # Slopes of what has many likely values lead astray: where they lead nowhere, the others go on alone.
     rough, held = np.array([term.rough for term in terms]), np.zeros(len(terms), dtype=np.bool_)
 
     def cost_at(at: FloatArray, residual: FloatArray) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from kurumaisu.critic.engine.catalogue import Candidate, Key
 from kurumaisu.critic.engine.evidence import Fit, Problem
 
-_OTHER_SIZE = 0.05  # share by which sizes of something rough differ that are on teeth far apart
+_OTHER_SIZE = 0.05  # share by which sizes of something rough differ that are on peaks far apart
 _BETTER = 0.5  # [nat] by which a fit must be beaten by mere first values to be made again
 
 
@@ -32,7 +32,7 @@ def start_is_better(problem: Problem, fit: Fit, start: Mapping[Key, float]) -> b
 def other_step_size(fit: Fit, start: Mapping[Key, float], begun: set[tuple[frozenset[Candidate], float]]) -> bool:
     """Tell whether first values have another size of something rough than its fit; once for each that has begun.
 
-    No fit goes from there to here, and by mere first values the better tooth may look the worse.
+    No fit goes from there to here, and by mere first values the better peak may look the worse.
     """
     for term, value in zip(fit.terms, fit.values, strict=True):
         size = start.get(term.key, value)

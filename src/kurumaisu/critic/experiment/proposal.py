@@ -30,7 +30,7 @@ class Option:
 
     script: Script
     nats: float
-    worth: float
+    expected_nats: float
     pairs: FloatArray
 
 
@@ -60,7 +60,7 @@ def propose(problem: Problem, found: SearchResult, scripts: Sequence[Script]) ->
     rivals = [Explanation(f.terms, f.values, design.doubt(problem, f.terms, f.values)) for f in fits]
     possible = [script for script in scripts if design.possible(script, problem.model)]
     options = [_option(problem, script, fits[0], rivals, weights) for script in possible]
-    options.sort(key=lambda option: -option.worth / option.script.seconds)
+    options.sort(key=lambda option: -option.expected_nats / option.script.seconds)
     listed = _listed(open_ids)
     if not options or max(option.nats for option in options) < design.NOTHING:
         return Proposal(None, f"No scripted drive can decide about {listed}: measure it in another way.", ())

@@ -35,25 +35,24 @@ class Extension:
 
 def with_laser_gain(criticism: Criticism, recording: Recording, extension: Extension) -> Criticism:
     """Return a criticism with the gain of what its settings for the laser do."""
-    worth = scan_gain.measure(recording, criticism.model, extension.forecast, extension.scans)
-    if worth is None:
+    measured = scan_gain.measure(recording, criticism.model, extension.forecast, extension.scans)
+    if measured is None:
         return criticism
-    gain = criticism.verdict.gain or Gain(worth.log_density_per_sample)
-    whole = replace(gain, channels={**gain.channels, scan_gain.CHANNEL: worth})
-    story = replace(criticism.story, details=(*criticism.story.details, _sentence(worth)))
+    gain = criticism.verdict.gain or Gain(measured.log_density_per_sample)
+    whole = replace(gain, channels={**gain.channels, scan_gain.CHANNEL: measured})
+    story = replace(criticism.story, details=(*criticism.story.details, _sentence(measured)))
     return replace(criticism, verdict=replace(criticism.verdict, gain=whole), story=story)
 
 
-def _sentence(worth: ChannelGain) -> str:
-    density = worth.log_density_per_sample
+def _sentence(measured: ChannelGain) -> str:
+    density = measured.log_density_per_sample
     text = (
         f"On scans held out, what was found in the laser gains {density.gain:+.3g} nats per reading "
         f"(90 % {density.lo90:+.3g} to {density.hi90:+.3g})"
     )
-    if worth.rmse is not None:
-        text += (
-            f"; readings are off by {1e3 * worth.rmse.baseline:.2g} mm before, {1e3 * worth.rmse.extended:.2g} mm after"
-        )
+    if measured.rmse is not None:
+        before, after = 1e3 * measured.rmse.baseline, 1e3 * measured.rmse.extended
+        text += f"; readings are off by {before:.2g} mm before, {after:.2g} mm after"
     return text + ("." if density.lo90 > 0 else ": not confirmed there.")
 
 
@@ -63,7 +62,7 @@ def with_slam(criticism: Criticism, recording: Recording, extension: Extension) 
     if extension.empty or verdict.gain is None:
         return criticism
     seen = slam_gain.measure(recording, criticism.model, lambda name: _without(name, criticism, recording, extension))
-    told = replace(story, details=(*story.details, seen.told))
+    told = replace(story, details=(*story.details, seen.sentence))
     if seen.gain is None or seen.measured is None or seen.baseline is None:
         return replace(criticism, story=told)
     held_out = seen.gain.run in recording.test

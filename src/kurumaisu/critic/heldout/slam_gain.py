@@ -40,7 +40,7 @@ Refit = Callable[[str], Settings]  # what extends the model, fitted without the 
 class Downstream:
     """gain: None where SLAM was not run, for the reason told; paths (n, 2) [m] in the reference's frame."""
 
-    told: str
+    sentence: str
     gain: SlamGain | None = None
     measured: FloatArray | None = None
     baseline: FloatArray | None = None

@@ -30,15 +30,15 @@ Truth = tuple[float, float] | None
 class Decision:
     """What acts, in a problem whose noise is that about it.
 
-    growth: whether the noise grows with the rates; beyond: what was found outside the catalogue; unmet: drives held out
-    can neither confirm nor refute it.
+    growth: whether the noise grows with the rates; beyond: what was found outside the catalogue; untested: drives held
+    out can neither confirm nor refute it.
     """
 
     problem: Problem
     found: search.SearchResult
     growth: base_noise.NoiseGrowth
     beyond: beyond_catalogue.Beyond
-    unmet: bool = False
+    untested: bool = False
 
     @property
     def something(self) -> bool:

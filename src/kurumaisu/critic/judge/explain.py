@@ -77,18 +77,18 @@ def undriven(recording: Recording, model: Model) -> Criticism:
 def criticism(
     recording: Recording,
     made: Decision,
-    worth: Gain | None,
+    gain: Gain | None,
     drives: Sequence[Drive],
     proposal: Proposal,
 ) -> Criticism:
-    """Return the criticism after a search; worth: the gain on held-out drives, None when nothing was found."""
+    """Return the criticism after a search; gain: the gain on held-out drives, None when nothing was found."""
     problem, found, growth = made.problem, made.found, made.growth
     best = found.best
     shares = {name: share_of_way(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
     nats = found.nats(best)
     # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
-    held = confirmed(worth, nats) or (nats >= NO_NOISE and simulates_nearer(worth, tuple(CHANNELS)))
-    gains = found.enough and (held or made.unmet)
+    held = confirmed(gain, nats) or (nats >= NO_NOISE and simulates_nearer(gain, tuple(CHANNELS)))
+    gains = found.enough and (held or made.untested)
     felt = {name: share_of_noise(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     told = tuple(group for group in found.confounded if not best.ids & set(group) or matters & set(group))
@@ -114,7 +114,7 @@ def criticism(
         confounded=found.confounded if kind != "none" else (),
         problems=recording.problems,
         next_experiment=proposal.experiment,
-        gain=worth,
+        gain=gain,
     )
     story = Story(
         recording=recording.name,
@@ -122,7 +122,7 @@ def criticism(
         headline=sentences.headline(verdict, found, matters, shares),
         details=(
             *sentences.details(problem, found, drives, fitted, shares, matters),
-            *((sentences.UNMET,) if matters and not held else ()),
+            *((sentences.UNTESTED,) if matters and not held else ()),
         ),
         pose_source=_pose_source(recording),
         provenance=_provenance(recording),

@@ -46,7 +46,7 @@ _PLAUSIBLE = 0.02  # posterior from which another curve is listed
 
 
 def criticism(
-    recording: Recording, made: Decision, worth: Gain | None, drives: Sequence[Drive], proposal: Proposal
+    recording: Recording, made: Decision, gain: Gain | None, drives: Sequence[Drive], proposal: Proposal
 ) -> Criticism:
     """Return the criticism of drives in which a curve explains more than the catalogue."""
     problem, found, beyond = made.problem, made.found, made.beyond
@@ -56,14 +56,14 @@ def criticism(
     curved = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
     fit = curved.fit_candidates(extension.fit.candidates, extension.fit.start)
     inner = replace(found, fits=(fit, *found.fits), confounded=(), false_alarm=beyond.false_alarm)
-    beside = explain.criticism(recording, replace(made, problem=curved, found=inner), worth, drives, proposal)
+    beside = explain.criticism(recording, replace(made, problem=curved, found=inner), gain, drives, proposal)
     share, felt = _shares(made)
     words = _sentences(extension, beyond, share)
-    if not _confirmed(made, worth) or not _matters(share, felt):
+    if not _confirmed(made, gain) or not _matters(share, felt):
         small = f"{words} It is too small to matter, or was not confirmed on data held out."
         story = replace(beside.story, unexplained=(small, *beside.story.unexplained))
         kept = replace(beside, story=story, model=problem.model)
-        return _unconfirmed(kept, problem, made, worth) if share >= MATERIAL else kept
+        return _unconfirmed(kept, problem, made, gain) if share >= MATERIAL else kept
     verdict = replace(beside.verdict, verdict="unknown", unknown=tuple(_unknowns(problem, beyond)))
     settings = (*extension.settings, process_noise(problem))
     story = replace(
@@ -77,14 +77,14 @@ def criticism(
     return Criticism(verdict, story, problem.model, settings)
 
 
-def _unconfirmed(kept: Criticism, problem: Problem, made: Decision, worth: Gain | None) -> Criticism:
+def _unconfirmed(kept: Criticism, problem: Problem, made: Decision, gain: Gain | None) -> Criticism:
     """Return a criticism of what did not hold on data held out, as unknown where it cannot be noise.
 
     It follows more than one thing, or none that is known: the curves only say where to look, and extend nothing.
     """
     extension = made.beyond.extension
     assert extension is not None
-    if worth is None or not _no_noise(made):
+    if gain is None or not _no_noise(made):
         return kept
     curves = tuple(replace(one, p=min(one.p, _UNHELD)) for one in _unknowns(problem, made.beyond))
     headline = f"{sentences.headline(extension)} That does not hold on data held out: it is not the whole of it."
@@ -92,10 +92,10 @@ def _unconfirmed(kept: Criticism, problem: Problem, made: Decision, worth: Gain 
     return replace(kept, verdict=verdict, story=replace(kept.story, headline=headline))
 
 
-def is_reported(made: Decision, worth: Gain | None) -> bool:
+def is_reported(made: Decision, gain: Gain | None) -> bool:
     """Tell whether a curve is told of: it matters, and held on data held out, or what it draws cannot be noise."""
     share, felt = _shares(made)
-    return (_confirmed(made, worth) and _matters(share, felt)) or (_no_noise(made) and share >= MATERIAL)
+    return (_confirmed(made, gain) and _matters(share, felt)) or (_no_noise(made) and share >= MATERIAL)
 
 
 def _shares(made: Decision) -> tuple[float, float]:
@@ -110,22 +110,22 @@ def _matters(share: float, felt: float) -> bool:
     return share >= MATERIAL or felt >= FELT
 
 
-def _confirmed(made: Decision, worth: Gain | None) -> bool:
+def _confirmed(made: Decision, gain: Gain | None) -> bool:
     assert made.beyond.extension is not None
     nats = _nats(made.found, made.beyond)
     rate = effects.CHANNELS[made.beyond.extension.curve.channel].rate
-    return confirmed(worth, nats, free=True) or (nats >= STRONG_CURVE and simulates_nearer(worth, (_SEEN_IN[rate],)))
+    return confirmed(gain, nats, free=True) or (nats >= STRONG_CURVE and simulates_nearer(gain, (_SEEN_IN[rate],)))
 
 
 def _no_noise(made: Decision) -> bool:
     best = made.beyond.rivalry.rivals[0]
-    return made.found.nats(best.fit) + best.belief.nats >= NO_NOISE
+    return made.found.nats(best.fit) + best.evidence.nats >= NO_NOISE
 
 
 def _nats(found: SearchResult, beyond: Beyond) -> float:
     """Return the evidence [nat] for what was found: over the catalogue, or, where an effect may be it, over nothing."""
     best = beyond.rivalry.rivals[0]
-    return beyond.rivalry.lead if beyond.rivalry.winner else found.nats(best.fit) + best.belief.nats
+    return beyond.rivalry.lead if beyond.rivalry.winner else found.nats(best.fit) + best.evidence.nats
 
 
 def figure(problem: Problem, extension: FitWithCurve) -> Misfit:
@@ -201,7 +201,7 @@ def _unknowns(problem: Problem, beyond: Beyond) -> Iterator[Unknown]:
         if rival.curve.id in seen or len(seen) == _LISTED or (seen and p[rival.curve.id] < _PLAUSIBLE):
             continue
         seen.add(rival.curve.id)
-        own = fit_with_curve(problem, rival.fit, rival.curve, rival.belief.prior)
+        own = fit_with_curve(problem, rival.fit, rival.curve, rival.evidence.prior)
         name = sentences.covariate(rival.curve)[0]
         yield Unknown(sentences.channel(rival.curve), name, sentences.shape(own), min(p[rival.curve.id], 1.0))
 
@@ -218,4 +218,5 @@ def _rivals(found: SearchResult, beyond: Beyond) -> Iterator[Alternative]:
             seen.add(rival.curve.id)
             beside = "".join(f" + {name}" for name in sorted(rival.fit.ids))
             name = f"{sentences.channel(rival.curve)} {sentences.followed(rival.curve)}{beside}"
-            yield Alternative(name, rival.worth - best.worth, "a curve over something else explains less")
+            behind = rival.log_posterior - best.log_posterior
+            yield Alternative(name, behind, "a curve over something else explains less")

@@ -21,8 +21,8 @@ _WAYS = 4  # in which a form may differ, of which one passes for another size
 _TRIES = 6  # residuals per end of an interval
 _NEAR = 0.05  # of NORMAL90, by which an end may be off
 _FARTHER = 3.0  # times as far as tried before, at most: a flat likelihood does not say how far it goes
-_TEETH = np.geomspace(1e-5, 1e-2, 24)  # shares of a size, at which what has a comb of likely values is tried
-_REFUSED = NORMAL90**2 / 2  # [nat] beyond which a tooth is none
+_PEAK_DISTANCES = np.geomspace(1e-5, 1e-2, 24)  # shares of a size, at which what has many likely values is tried
+_REFUSED = NORMAL90**2 / 2  # [nat] beyond which a peak is none
 
 
 def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
@@ -44,7 +44,7 @@ def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
             sd = float(np.sqrt(spread[k, k])) * abs(float(unit[k]))
             ridge = np.zeros(len(fit.terms))  # where the others go with this one
             ridge[known] = spread[:, k] * unit / (spread[k, k] * unit[k])
-            # Off its tooth, the step of a converter fits nothing: the way then goes on beside the step as it is.
+            # Off its peak, the step of a converter fits nothing: the way then goes on beside the step as it is.
             held = np.array([other.rough and i != at for i, other in enumerate(fit.terms)])
             ways = [ridge, np.where(held, 0.0, ridge)] if (ridge[held] != 0).any() else [ridge]
             lows, highs = zip(*(ends_of(problem, fit, at, way, sd) for way in ways), strict=True)
@@ -146,7 +146,7 @@ def _end(fallen: Callable[[float], float], sign: float, sd: float, room: float) 
 
 def _step_end(fallen: Callable[[float], float], sign: float, size: float) -> float:
     """Return the farthest place to one side where the likelihood stands as high as at the ends of 90 %."""
-    likely = [share * size for share in _TEETH if fallen(sign * share * size) < _REFUSED]
+    likely = [share * size for share in _PEAK_DISTANCES if fallen(sign * share * size) < _REFUSED]
     return max(likely, default=0.0)
 
 

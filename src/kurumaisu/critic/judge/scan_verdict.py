@@ -62,7 +62,7 @@ def criticise_scans(
         drive = supplying_experiment(model, every_id(), recording.truth) if recording.world is not None else None
         return LaserFinding(refused=why, details=repeatability.sentences(recording, model), next_experiment=drive)
 
-    def beside(setting: EffectSetting) -> LaserFinding:
+    def rest_with(setting: EffectSetting) -> LaserFinding:
         progress(f"laser: looking at the rest beside {setting.id}")
         return criticise_scans(recording, extend(model, [setting]), progress, ids)
 
@@ -74,8 +74,8 @@ def criticise_scans(
     if far is not None:
         form = next(form for form in assembly.forms if form.id == far.id)
         (placed,) = fit_parameters(assembly, normal, [form], [far], None, {}, recording.truth).settings
-        worth = (1.0, FormSearch([form], normal.gram).run().best.log_likelihood)
-        return _with_rest(assembly, normal, placed, worth, beside(placed[0]))
+        evidence = (1.0, FormSearch([form], normal.gram).run().best.log_likelihood)
+        return _with_rest(assembly, normal, placed, evidence, rest_with(placed[0]))
     progress("laser: weighing effects")
     found = FormSearch(assembly.forms, normal.gram).run()
     if found.best.forms:
@@ -87,15 +87,15 @@ def criticise_scans(
     made = mean_effects(assembly, normal, found)
     if (wrong := another_map(made.winner, normal, float(assembly.displaced.readings.mean()))) is not None:
         return LaserFinding(wrong=wrong)
-    made = made.beside(assembly, normal)
+    made = made.without_spurious(assembly, normal)
     progress("laser: fitting what acts")
     fit = refitted(assembly, normal, made, recording.truth)
     lead = dominant_effect(assembly, normal, made.fit, fit)
     certain = lead is not None and made.found.p[lead.id] >= NAMED
     if lead is not None and certain and all(own.id != lead.id for own in model.effects):
         placed = next(each for each in fit.settings if each[0] is lead)
-        worth = (min(made.found.p[lead.id], 1.0), gain_of(made, lead.id))
-        return _with_rest(assembly, normal, placed, worth, beside(placed[0]))
+        evidence = (min(made.found.p[lead.id], 1.0), gain_of(made, lead.id))
+        return _with_rest(assembly, normal, placed, evidence, rest_with(placed[0]))
     made, fit = settled(assembly, normal, made, fit, recording.truth)
     progress("laser: weighing effects on the scatter")
     away = 0.0 if made.winner is None else block_evidence.wall_error(made.winner, normal.gram)
@@ -123,15 +123,15 @@ def _with_rest(
     assembly: Assembly,
     normal: NormalEquations,
     lead: tuple[EffectSetting, dict[str, float]],
-    worth: tuple[float, float],
+    evidence: tuple[float, float],
     rest: LaserFinding,
 ) -> LaserFinding:
     """Return an effect, which must be in place before the rest can be seen, with the rest that was found then.
 
-    lead: its setting, and the sds of what was fitted; worth: its posterior, and the log evidence of it [nat].
+    lead: its setting, and the sds of what was fitted; evidence: its posterior, and the log evidence of it [nat].
     """
     setting, sds = lead
-    cause = Cause(setting.id, worth[0], estimates_of(setting, sds), worth[1])
+    cause = Cause(setting.id, evidence[0], estimates_of(setting, sds), evidence[1])
     size = size_of(assembly.marks.together([setting])[normal.beam_noise.valid])
     rest = replace(rest, details=(*rest.details, *_sentences({setting.id: size}, ())))
     return without_double_delay(with_dominant(rest, setting, cause, assembly, normal), assembly.shots.stamps)
@@ -185,12 +185,12 @@ def _finding(
     curve = made.winner is not None and made.curve and made.winner.free.id in matters
     gains = {name: gain_of(made, name) for name in settings if p.get(name, 0.0) >= NAMED}
     # A curve is what one covariate shows of a thing nobody knows: what it leaves may be as much, and looks like others.
-    least = made.winner.belief.nats if made.winner is not None and curve else -np.inf
+    least = made.winner.evidence.nats if made.winner is not None and curve else -np.inf
     causes = tuple(
         Cause(name, min(p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
     )
     # Of the scans as they are seen with what acts: a laser that is askew looks past the ends of walls.
-    unknown = tuple(fit.assembly.told())
+    unknown = tuple(fit.assembly.unknowns())
     unknown += tuple(unknowns(made.weighed, normal.gram)) if curve else ()
     groups = () if curve else _confused(assembly, normal, made, causes)
     confounded = tuple(group for group in groups if matters & set(group))

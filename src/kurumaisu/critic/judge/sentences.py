@@ -22,7 +22,7 @@ _CAUSES_TOLD = 4  # in a headline
 _KINDS_TOLD = 2  # of problems in a headline
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
-UNMET = "The drives held out hardly show it, so they neither confirm nor refute it."
+UNTESTED = "The drives held out hardly show it, so they neither confirm nor refute it."
 
 
 def headline(verdict: Verdict, found: SearchResult, matters: set[str], shares: dict[str, float]) -> str:

@@ -91,7 +91,7 @@ def whitener(drive: Drive, noise: Noise) -> Whitener:
         drive.times,
         np.maximum(drive.activity, noise.rest) * grown,
         drive.rolling * grown,
-        drive.ways,
+        drive.pose_paths,
         position_sd=noise.position_sd * noise.louder,
         heading_sd=noise.heading_sd * noise.louder,
         process_sd=[

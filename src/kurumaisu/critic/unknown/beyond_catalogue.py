@@ -104,13 +104,13 @@ def false_alarm(problem: Problem, rivalry: CurveComparison) -> float:
     than all that is left is no evidence, but columns of which rounding makes something.
     """
     best = rivalry.rivals[0]
-    if best.belief.nats > -best.fit.log_likelihood:
+    if best.evidence.nats > -best.fit.log_likelihood:
         return 1.0
-    if best.belief.nats > _NEVER:
+    if best.evidence.nats > _NEVER:
         return 0.0
     design = Design(problem, best.fit.settings)
     drawn = null_evidence(design, without_own_span(problem, best.fit, design.columns)[1], search.NULLS)
-    return float(np.mean(drawn >= best.belief.nats))
+    return float(np.mean(drawn >= best.evidence.nats))
 
 
 def _asked(problem: Problem) -> bool:
@@ -119,4 +119,4 @@ def _asked(problem: Problem) -> bool:
 
 def _extension(problem: Problem, rivalry: CurveComparison) -> FitWithCurve:
     best = rivalry.rivals[0]
-    return fit_with_curve(problem, best.fit, best.curve, best.belief.prior)
+    return fit_with_curve(problem, best.fit, best.curve, best.evidence.prior)

@@ -41,8 +41,8 @@ class SetWithCurve:
 
     fit: Fit
     curve: Curve
-    curve_evidence: CurveEvidence
-    worth: float
+    evidence: CurveEvidence
+    log_posterior: float
 
 
 @dataclass(frozen=True)
@@ -84,35 +84,35 @@ def compare(problem: Problem, found: SearchResult, also: frozenset[Candidate] = 
     """Try every curve beside the best sets of the catalogue, beside none, and beside one more."""
     designs = Designs(problem, found.best)
     bare = [(fit, coarsened_posterior.of_set(found, fit)) for fit in found.fits]
-    rivals = sorted(_with_curves(problem, designs, _tried(bare, also)), key=lambda rival: -rival.worth)
+    rivals = sorted(_with_curves(problem, designs, _tried(bare, also)), key=lambda rival: -rival.log_posterior)
     if not rivals:
         return no_curves(found)
-    plain = np.array([worth + np.log1p(-_ODDS) for _, worth in bare])
-    total = logsumexp(np.concatenate([plain, [rival.worth for rival in rivals]]))
+    plain = np.array([score + np.log1p(-_ODDS) for _, score in bare])
+    total = logsumexp(np.concatenate([plain, [rival.log_posterior for rival in rivals]]))
     acting = [(float(w), fit.ids) for (fit, _), w in zip(bare, plain, strict=True)]
     likeness, ceiling = EffectLikeness(problem, found.best, designs), float(plain.max())
     beyond: list[SetWithCurve] = []
     own = ceiling  # of the catalogue, its effects in other forms included
     doubt = coarsened_posterior.variance(found)
     for rival in rivals:
-        share = float(np.exp(rival.worth - total))
-        asked = (rival.worth - total) / doubt > np.log(_SHARE)
-        draws = likeness.drawn(rival.fit, rival.curve, rival.belief) if asked else {}
-        if asked and rival.worth - ceiling > _BEYOND:  # else it is no news, and nobody asks whose form it mends
+        share = float(np.exp(rival.log_posterior - total))
+        asked = (rival.log_posterior - total) / doubt > np.log(_SHARE)
+        draws = likeness.drawn(rival.fit, rival.curve, rival.evidence) if asked else {}
+        if asked and rival.log_posterior - ceiling > _BEYOND:  # else it is no news, and nobody asks whose form it mends
             draws = draws or likeness.mended(rival.fit, rival.curve)
-            draws = draws or likeness.drawn_alone(rival.fit, rival.curve, rival.belief)
-        if asked and rival.worth < ceiling - _BEHIND:
-            draws = draws or likeness.drawn_together(rival.fit, rival.curve, rival.belief)
-        drawn = {name for name, nats in draws.items() if rival.worth - ceiling < _BEYOND + nats}
-        wins = not drawn and rival.worth - ceiling > _BEYOND and share > _SHARE
+            draws = draws or likeness.drawn_alone(rival.fit, rival.curve, rival.evidence)
+        if asked and rival.log_posterior < ceiling - _BEHIND:
+            draws = draws or likeness.drawn_together(rival.fit, rival.curve, rival.evidence)
+        drawn = {name for name, nats in draws.items() if rival.log_posterior - ceiling < _BEYOND + nats}
+        wins = not drawn and rival.log_posterior - ceiling > _BEYOND and share > _SHARE
         part = likeness.part_of(rival.fit, rival.curve) if wins else set()
-        acting.append((rival.worth, (rival.fit.ids - part) | drawn))
+        acting.append((rival.log_posterior, (rival.fit.ids - part) | drawn))
         beyond += [] if drawn else [rival]
-        own = max(own, rival.worth) if drawn else own
+        own = max(own, rival.log_posterior) if drawn else own
     curves: dict[str, float] = {}
     for rival in beyond:
-        curves[rival.curve.id] = curves.get(rival.curve.id, 0.0) + float(np.exp(rival.worth - total))
-    lead = beyond[0].worth - own if beyond else -np.inf
+        curves[rival.curve.id] = curves.get(rival.curve.id, 0.0) + float(np.exp(rival.log_posterior - total))
+    lead = beyond[0].log_posterior - own if beyond else -np.inf
     nothing = float(sum(np.exp(w - total) for (fit, _), w in zip(bare, plain, strict=True) if not fit.ids))
     least = _BEYOND * doubt if found.best.ids else _OVER_NOTHING
     return CurveComparison(tuple(beyond), lead, curves, _odds(acting, found.p), nothing, least)
@@ -141,7 +141,7 @@ def _tried(bare: Sequence[tuple[Fit, float]], also: frozenset[Candidate]) -> lis
 def _with_curves(problem: Problem, designs: Designs, fits: Sequence[tuple[Fit, float]]) -> Iterator[SetWithCurve]:
     grams: dict[Design, list[FloatArray]] = {}
     plain = float(np.log1p(-_JUMPING - _BENDING))
-    for fit, worth in fits:
+    for fit, score in fits:
         design = designs.about(fit)
         if design not in grams:
             grams[design] = [_gram(design.columns[:, curve.columns]) for curve in design.curves]
@@ -157,16 +157,16 @@ def _with_curves(problem: Problem, designs: Designs, fits: Sequence[tuple[Fit, f
             found = curve_evidence(left, b[curve.columns], curve.basis.priors)
             # All curves of a kind that the data chose from share what one has.
             chosen = replace(found, nats=found.nats - float(np.log(curve.basis.ways)))
-            beside.append(SetWithCurve(fit, designs.paced(fit, curve), chosen, worth + chosen.nats + share + plain))
+            beside.append(SetWithCurve(fit, designs.paced(fit, curve), chosen, score + chosen.nats + share + plain))
         yield from beside
         if fit.ids <= fits[0][0].ids:  # in its place an effect may have taken up the jump
-            hints = [rival.curve for rival in sorted(beside, key=lambda rival: -rival.worth)[:_HINTS]]
+            hints = [rival.curve for rival in sorted(beside, key=lambda rival: -rival.log_posterior)[:_HINTS]]
             for curve, found in fine_curves(problem, fit, hints):
-                yield SetWithCurve(fit, curve, found, worth + found.nats + share + float(np.log(_BENDING)))
+                yield SetWithCurve(fit, curve, found, score + found.nats + share + float(np.log(_BENDING)))
             for curve, found in step_curves(
                 problem, fit, [*hints, *(c for c in gains_over_own_rate(design.curves) if c not in hints)]
             ):
-                yield SetWithCurve(fit, curve, found, worth + found.nats + share + float(np.log(_JUMPING)))
+                yield SetWithCurve(fit, curve, found, score + found.nats + share + float(np.log(_JUMPING)))
 
 
 def _gram(columns: FloatArray) -> FloatArray:

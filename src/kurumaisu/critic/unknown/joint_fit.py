@@ -58,15 +58,15 @@ def fit_with_curve(problem: Problem, fit: Fit, curve: Curve, prior: FloatArray) 
     values, vectors = np.linalg.eigh(prior)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     extension = FitWithCurve(fit, curve, prior, np.zeros(curve.basis.size), prior)
-    worth = _log_density(problem, extension, root)
+    density = _log_density(problem, extension, root)
     for _ in range(_ROUNDS):
         whole = _step(problem, extension, root)
         for share in _SHARES:
             moved = whole if share == 1.0 else _part(problem, extension, whole, share)
-            gained = _log_density(problem, moved, root) - worth
+            gained = _log_density(problem, moved, root) - density
             if gained > 0:
                 break
-        extension, worth = (moved, worth + gained) if gained > 0 else (_where(extension, whole), worth)
+        extension, density = (moved, density + gained) if gained > 0 else (_where(extension, whole), density)
         if gained < _ENOUGH:
             break
     return extension

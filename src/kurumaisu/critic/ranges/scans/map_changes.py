@@ -32,7 +32,7 @@ class MapChange:
     high: FloatArray
     off: float
 
-    def told(self) -> Iterator[Unknown]:
+    def unknowns(self) -> Iterator[Unknown]:
         """Yield what is outside the catalogue, over x and y of the map."""
         if not self.readings.any():
             return

@@ -36,7 +36,7 @@ class PassingObjects:
         """Whether there are enough of them to be told."""
         return self.scans >= _SCANS
 
-    def told(self) -> Iterator[Unknown]:
+    def unknowns(self) -> Iterator[Unknown]:
         """Yield what is outside the catalogue: when it is there, and where."""
         if self.many:
             shape = (

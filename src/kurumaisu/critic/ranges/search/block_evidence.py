@@ -32,8 +32,8 @@ class SetWithBlock:
 
     fit: FittedForms
     free: Block
-    curve_evidence: CurveEvidence
-    worth: float
+    evidence: CurveEvidence
+    log_posterior: float
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class BlockComparison:
     def least(self) -> float:
         """Lead that a curve needs [nat]: an effect of the catalogue of a slightly other form leaves some, too."""
         nothing = max((fit.score for fit in self.found.fits if not fit.forms), default=0.0)
-        curve = next((rival.worth for rival in self.rivals if rival.free.basis is not None), nothing)
+        curve = next((rival.log_posterior for rival in self.rivals if rival.free.basis is not None), nothing)
         return max(BEYOND, LEFT * (curve - nothing))
 
     @property
@@ -65,16 +65,16 @@ class BlockComparison:
             best = next((rival for rival in self.rivals if rival.free.basis is None), best)
         if best.free.basis is not None:
             return self._plainest(best) if self.lead > self.least else None
-        return best if best.worth > self.found.best.score else None
+        return best if best.log_posterior > self.found.best.score else None
 
     def _plainest(self, best: SetWithBlock) -> SetWithBlock:
         """Return the curve of the best rival beside as few effects as explain much of what it explains.
 
         Straight lines between knots miss a step, say, by a little, which then looks like one more effect.
         """
-        least = LEFT * best.belief.nats
+        least = LEFT * best.evidence.nats
         same = [rival for rival in self.rivals if rival.free.id == best.free.id and rival.fit.ids <= best.fit.ids]
-        return max(same, key=lambda rival: rival.worth - least * len(rival.fit.ids))
+        return max(same, key=lambda rival: rival.log_posterior - least * len(rival.fit.ids))
 
 
 def compare_blocks(found: FormPosterior, free: Sequence[Block], gram: FloatArray) -> BlockComparison:
@@ -87,27 +87,27 @@ def compare_blocks(found: FormPosterior, free: Sequence[Block], gram: FloatArray
     rivals = []
     for fit in _tried(found.fits):
         rivals += [_with_block(fit, each, gram, shares[each.id]) for each in free if each.id not in fit.ids]
-    rivals.sort(key=lambda rival: -rival.worth)
+    rivals.sort(key=lambda rival: -rival.log_posterior)
     rivals = [*_pruned(rivals[:_PRUNED], known, gram, shares), *rivals]
-    rivals.sort(key=lambda rival: -rival.worth)
+    rivals.sort(key=lambda rival: -rival.log_posterior)
     plain = [(fit.ids, fit.score) for fit in found.fits]
-    plain += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in rivals if rival.free.basis is None]
+    plain += [(rival.fit.ids | {rival.free.id}, rival.log_posterior) for rival in rivals if rival.free.basis is None]
     curved = [rival for rival in rivals if rival.free.basis is not None]
-    total = logsumexp([*(worth for _, worth in plain), *(rival.worth for rival in curved)])
-    sets = [*plain, *((rival.fit.ids, rival.worth) for rival in curved)]
-    weights = [(ids, float(np.exp(worth - total))) for ids, worth in sets]
+    total = logsumexp([*(score for _, score in plain), *(rival.log_posterior for rival in curved)])
+    sets = [*plain, *((rival.fit.ids, rival.log_posterior) for rival in curved)]
+    weights = [(ids, float(np.exp(score - total))) for ids, score in sets]
     best = max(plain, key=lambda each: each[1])
     p, confounded = confusion(weights, best[0], ids)
-    lead = curved[0].worth - best[1] if curved else -np.inf
+    lead = curved[0].log_posterior - best[1] if curved else -np.inf
     by_curve = {each.id: 0.0 for each in free if each.basis is not None}
     for rival in curved:
-        by_curve[rival.free.id] += float(np.exp(rival.worth - total))
+        by_curve[rival.free.id] += float(np.exp(rival.log_posterior - total))
     made = BlockComparison(replace(found, p=p, confounded=confounded), tuple(rivals), lead, by_curve)
     if lead > made.least:
         return made
     # A curve that does not lead by enough takes nothing from the effects that it imitates.
-    total = logsumexp([worth for _, worth in plain])
-    p, confounded = confusion([(names, float(np.exp(worth - total))) for names, worth in plain], best[0], ids)
+    total = logsumexp([score for _, score in plain])
+    p, confounded = confusion([(names, float(np.exp(score - total))) for names, score in plain], best[0], ids)
     return replace(made, found=replace(found, p=p, confounded=confounded))
 
 
@@ -135,15 +135,15 @@ def _pruned(
             done |= {(fit.ids, best.free.id) for fit in fits}
             tried = [_with_block(fit, best.free, gram, shares[best.free.id]) for fit in fits]
             yield from tried
-            top = max(tried, key=lambda each: each.worth, default=best)
-            if top.worth <= best.worth:
+            top = max(tried, key=lambda each: each.log_posterior, default=best)
+            if top.log_posterior <= best.log_posterior:
                 break
             best = top
 
 
 def fit_with_block(rival: SetWithBlock, gram: FloatArray) -> tuple[FittedForms, FloatArray, FloatArray]:
     """Return the forms fitted beside the block, and the block's coefficients (m,) and their covariance (m, m)."""
-    values, vectors = np.linalg.eigh(rival.belief.prior)
+    values, vectors = np.linalg.eigh(rival.evidence.prior)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     fixed, own = _use(rival.fit), np.arange(rival.free.span.start, rival.free.span.stop)
     use = np.concatenate([fixed, own])

@@ -39,7 +39,7 @@ def confounded(
                 own = _with_block(winner.fit, winner.free, gram)
             else:
                 own = _worth(found.best)
-            group |= {other for other, worth in _others(found, fits, blocks, gram) if own - worth < _LOSS}
+            group |= {other for other, nats in _others(found, fits, blocks, gram) if own - nats < _LOSS}
         for known in [known for known in groups if known & group]:
             groups.remove(known)
             group |= known

@@ -52,7 +52,7 @@ class MeanEffects:
         """Whether a curve acts, which is in no catalogue."""
         return self.winner is not None and self.winner.free.basis is not None
 
-    def beside(self, assembly: Assembly, normal: NormalEquations) -> MeanEffects:
+    def without_spurious(self, assembly: Assembly, normal: NormalEquations) -> MeanEffects:
         """Return the same without effects that others of another form explain; of a curve, which is unlike any, all."""
         made = replace(self, others=form_families(assembly, normal, self.fit))
         if self.curve:
@@ -65,7 +65,7 @@ class MeanEffects:
         fit, winner, coefficients, covariance = _with(winner, normal)
         return replace(made, fit=fit, winner=winner, coefficients=coefficients, covariance=covariance)
 
-    def and_more(self, assembly: Assembly, normal: NormalEquations, more: FurtherEffects) -> MeanEffects:
+    def with_further(self, assembly: Assembly, normal: NormalEquations, more: FurtherEffects) -> MeanEffects:
         """Return the same with what acts beside it."""
         fit = more.added_to(self.fit)
         return replace(self, fit=fit, others=form_families(assembly, normal, fit), more=more)
@@ -111,7 +111,7 @@ def settled(
         if gone:
             made = replace(made, fit=made.fit.without(gone))
         elif made.more is None and (more := further_effects(assembly, normal, made.found, made.fit, fit, made.others)):
-            made = made.and_more(assembly, normal, more)
+            made = made.with_further(assembly, normal, more)
         else:
             break
         fit = refitted(assembly, normal, made, truth)
@@ -127,6 +127,6 @@ def gain_of(made: MeanEffects, name: str) -> float:
         # A curve that does not lead by enough is out of the running here, too, as it is where p comes from.
         running = [rival for rival in made.weighed.rivals if made.curve or rival.free.basis is None]
         sets = [(fit.ids, fit.score) for fit in made.found.fits]
-        sets += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in running]
-    own = max((worth for ids, worth in sets if name in ids), default=-np.inf)
-    return float(own - max((worth for ids, worth in sets if name not in ids), default=-np.inf))
+        sets += [(rival.fit.ids | {rival.free.id}, rival.log_posterior) for rival in running]
+    own = max((score for ids, score in sets if name in ids), default=-np.inf)
+    return float(own - max((score for ids, score in sets if name not in ids), default=-np.inf))

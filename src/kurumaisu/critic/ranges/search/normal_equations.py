@@ -117,12 +117,12 @@ class Assembly:
         trust = usable_readings(self.shots, self.marks.seen, self.marks.base)
         return BeamNoise(sd, 0.0, trust & smooth & self.mapped)
 
-    def told(self) -> list[Unknown]:
+    def unknowns(self) -> list[Unknown]:
         """Return what stands where the map has it not, rides with the chair, or comes and goes."""
         riding = described(self.blocked, self.shots.measured, self.shots.laser.bearings)
-        staying = list(self.displaced.told())
+        staying = list(self.displaced.unknowns())
         known = {each.covariate for each in staying}
-        return [*riding, *staying, *(each for each in self.strangers.told() if each.covariate not in known)]
+        return [*riding, *staying, *(each for each in self.strangers.unknowns() if each.covariate not in known)]
 
     @property
     def strange(self) -> bool:
@@ -259,7 +259,7 @@ class Assembly:
         )
         return Assembly(shots, frozenset())
 
-    def beside(self, others: Sequence[FormFamily]) -> Assembly:
+    def with_families(self, others: Sequence[FormFamily]) -> Assembly:
         """Return the same scans with columns of what effects may do instead, of which no noise is made, either."""
         out, count = copy(self), self.columns.shape[2]
         more = [each.columns(self.shots, self.marks.seen).astype(np.float32) for each in others]

@@ -94,7 +94,7 @@ def fit_parameters(
         if moving:
             # Where the chair was, which scans count and how they scatter: all of that was found without the effect.
             # What beams keep beyond an equation is no error of whole scans, of which each has other beams that count.
-            assembly = assembly.again(_settings(forms, at)).beside([*curves, beam_family(assembly.shots)])
+            assembly = assembly.again(_settings(forms, at)).with_families([*curves, beam_family(assembly.shots)])
             normal = normal if winner is not None else assembly.settle(truth)
         before = _values(free, at)
         for _ in range(_STEPS):
@@ -258,6 +258,6 @@ def _block(assembly: Assembly, winner: SetWithBlock | None) -> FloatArray:
     """Return the columns (k, b, m) of a block, in units in which its coefficients have a prior sd of 1."""
     if winner is None:
         return np.empty((*assembly.residual.shape, 0))
-    values, vectors = np.linalg.eigh(winner.belief.prior)
+    values, vectors = np.linalg.eigh(winner.evidence.prior)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     return np.asarray(assembly.columns[:, :, winner.free.span] @ root)

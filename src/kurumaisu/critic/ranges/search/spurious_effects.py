@@ -52,9 +52,9 @@ def without_spurious(
     """
     fit, winner = acting
     while others and len(fit.forms) + (winner is not None) > 1:
-        worth = _JointGram(assembly, normal, fit, winner, others).worth(len(found.p))
-        weakest = min(worth, key=lambda name: worth[name])
-        if worth[weakest] >= _SURE:
+        log_odds = _JointGram(assembly, normal, fit, winner, others).log_odds(len(found.p))
+        weakest = min(log_odds, key=lambda name: log_odds[name])
+        if log_odds[weakest] >= _SURE:
             break
         if winner is not None and weakest == winner.free.id:
             winner = None
@@ -92,7 +92,7 @@ class _JointGram:
         self._gram = assembly.products(normal, np.concatenate(columns, axis=2), assembly.residual)
         self._forms_of = {form.id: sum(each.id == form.id for each in assembly.forms) for form in fit.forms}
 
-    def worth(self, count: int) -> dict[str, float]:
+    def log_odds(self, count: int) -> dict[str, float]:
         """Return the log odds [nat] of each effect beside other forms of the rest; count: effects that might act."""
         out = {}
         for name in self._own:
@@ -100,7 +100,7 @@ class _JointGram:
             drawn = [(self._free[other], self._prior(other)) for other in others]
             block = self._winner
             if block is not None and name != block.free.id:
-                drawn.append((self._own[block.free.id], block.belief.prior))
+                drawn.append((self._own[block.free.id], block.evidence.prior))
             gram = _without(self._gram, drawn)
             rest = self._columns([form.id for form in self._fit.forms if form.id != name])
             own, b = _left(gram, self._own[name], rest)
