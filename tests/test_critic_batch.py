@@ -18,7 +18,7 @@ from kurumaisu.critic.app.cli import main
 from kurumaisu.critic.app.display import Display, Plain, Terminal
 from kurumaisu.critic.app.job import Job, Outcome
 from kurumaisu.critic.data.csv_writer import write_csv_run
-from kurumaisu.critic.processes.worker import Progress, Worker
+from kurumaisu.critic.processes.worker import ProgressMessage, Worker
 from kurumaisu.errors import Error
 
 QUICK = ["--only", "base.gain_v", "--quiet"]
@@ -87,7 +87,7 @@ def die(progress):
 def test_what_kills_a_worker_is_told(seen_by_workers):
     worker = Worker()
     worker.send(die)
-    assert worker.receive() == Progress("dying")
+    assert worker.receive() == ProgressMessage("dying")
     with pytest.raises(EOFError):
         worker.receive()
     assert "SIGKILL" in worker.died_of()

@@ -60,7 +60,7 @@ def test_a_lever_to_the_side_is_exactly_a_leak_of_turns_and_said_as_a_set():
 
 
 def test_a_set_of_which_nothing_matters_is_not_told(monkeypatch):
-    for share in ("moved_share", "felt_share"):
+    for share in ("share_of_way", "share_of_noise"):
         monkeypatch.setattr(explain, share, lambda problem, settings, without: 0.0)
     verdict = pipeline.criticise(with_lever(recording(None, 0.0, 71, 40.0), 0.0, 0.05), MD100, lambda _: None).verdict
     assert (verdict.verdict, verdict.confounded) == ("none", ())

@@ -8,7 +8,7 @@ import pytest
 from scipy.special import logit
 
 from kurumaisu.critic.engine import coarsened_posterior
-from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.values.prior import odds
 
 EFFECTS = dict.fromkeys(("strong", "small", "rival", "other"), 0.0)
@@ -40,7 +40,7 @@ def believed(strong, lead):
     p = EFFECTS | {"strong": 1.0, "small": weights[0], "rival": weights[1]}
     with np.errstate(divide="ignore"):
         odds = {name: float(logit(share)) for name, share in p.items()}
-    return coarsened_posterior.believed(Naming(tuple(fits), p, (), 0.0), odds)
+    return coarsened_posterior.of_effects(SearchResult(tuple(fits), p, (), 0.0), odds)
 
 
 def test_the_same_evidence_is_worth_less_beside_a_strong_cause():
@@ -64,13 +64,13 @@ def test_where_nothing_acts_probabilities_stay_as_they_are():
     fits = (fit_of({}, 0.0), fit_of({"small": 3.0}, -1.0))
     p = EFFECTS | {"small": 0.27}
     odds = {name: float(logit(share)) for name, share in p.items()}
-    assert coarsened_posterior.believed(Naming(fits, p, (), 0.0), odds)[0] == pytest.approx(p)
+    assert coarsened_posterior.of_effects(SearchResult(fits, p, (), 0.0), odds)[0] == pytest.approx(p)
 
 
 def test_a_cause_that_drowns_all_else_is_certain():
     """At z = 250 log odds are 31 000: as a probability they would be 1 - 1e-16, that is 36, and be no more than 2.4."""
     fits = (fit_of({"strong": 250.0}, 31000.0), fit_of({"strong": 250.0, "small": 1.0}, 30995.0), fit_of({}, 0.0))
-    p, sets = coarsened_posterior.believed(Naming(fits, EFFECTS, (), 0.0), {"strong": 31000.0, "small": -5.0})
+    p, sets = coarsened_posterior.of_effects(SearchResult(fits, EFFECTS, (), 0.0), {"strong": 31000.0, "small": -5.0})
     assert p["strong"] > 0.999
     assert p["small"] == pytest.approx(np.exp(-5.0), rel=0.01)  # the doubt about the strong one makes it no likelier
     assert sets == ()
@@ -85,7 +85,7 @@ def test_what_fits_worse_than_nothing_makes_no_cause_stronger():
         fit_of({"other": 0.0}, -1e4),
     )
     fits[-1].log_likelihood = -1e4
-    p, _ = coarsened_posterior.believed(Naming(fits, EFFECTS, (), 0.0), {"strong": 4.9})
+    p, _ = coarsened_posterior.of_effects(SearchResult(fits, EFFECTS, (), 0.0), {"strong": 4.9})
     assert p["strong"] > 0.98
 
 
@@ -93,10 +93,10 @@ def test_a_simpler_cause_of_the_same_is_certain_however_strong_it_is():
     """A factor of -1 needs nothing to be fitted; a gain of -2 does the same, and costs 20 nats."""
 
     def p_of(name, odds):
-        found = Naming(
+        found = SearchResult(
             (fit_of({name: 300.0}, 44980.0), fit_of({"rival": 300.0}, 44960.0), fit_of({}, 0.0)), EFFECTS, (), 0.0
         )
-        return coarsened_posterior.believed(found, {name: odds})[0][name]
+        return coarsened_posterior.of_effects(found, {name: odds})[0][name]
 
     assert p_of("sign", 20.0) > 0.999
     assert p_of("strong", 20.0) < 0.9  # what is fitted as well only happened to be likelier
@@ -106,9 +106,9 @@ def test_a_simpler_cause_of_the_same_is_certain_however_strong_it_is():
 @pytest.mark.parametrize("p", [0.0, 0.3, 0.93, 1.0])
 def test_what_a_set_leaves_is_doubted_as_the_set_is(p):
     """Noise that grows is judged by the residuals, which strong causes leave larger where they are large."""
-    weak, strong = (Naming((fit_of({"strong": z}, 10.0), fit_of({}, 0.0)), EFFECTS, (), 0.0) for z in (1.0, 60.0))
-    assert coarsened_posterior.doubted(weak, p) == pytest.approx(p, abs=1e-3)
+    weak, strong = (SearchResult((fit_of({"strong": z}, 10.0), fit_of({}, 0.0)), EFFECTS, (), 0.0) for z in (1.0, 60.0))
+    assert coarsened_posterior.of_finding(weak, p) == pytest.approx(p, abs=1e-3)
     if 0.5 < p < 1.0:
-        assert 0.5 < coarsened_posterior.doubted(strong, p) < p - 0.05
+        assert 0.5 < coarsened_posterior.of_finding(strong, p) < p - 0.05
     else:
-        assert coarsened_posterior.doubted(strong, p) >= p
+        assert coarsened_posterior.of_finding(strong, p) >= p

@@ -11,7 +11,7 @@ from kurumaisu.bench.hidden.base import recordings
 from kurumaisu.bench.hidden.generator.motion import Fault, Form
 from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.data.elapsed import timed
+from kurumaisu.critic.data.elapsed import with_elapsed_time
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import shipped
 
@@ -28,7 +28,7 @@ def run_at(name, start, end, **columns):
 
 def times_of(*runs, train=("a", "b")):
     """Return the recording time at the start and end of each run."""
-    told = timed(Recording("r", runs, train=train))
+    told = with_elapsed_time(Recording("r", runs, train=train))
     return [run.covariates["recording_time"].values[:, 0].tolist() for run in told.runs]
 
 
@@ -48,11 +48,11 @@ def test_stamps_that_go_on_tell_the_breaks():
 
 def test_one_run_and_what_was_measured_and_runs_without_times_are_left_alone():
     one = Recording("r", (run_at("a", 0.0, 10.0), run_at("t", 0.0, 3.0)), train=("a",), test=("t",))
-    assert timed(one) is one
+    assert with_elapsed_time(one) is one
     own = Recording("r", (run_at("a", 0.0, 1.0, recording_time=7.0), run_at("b", 0.0, 1.0)), train=("a", "b"))
-    assert timed(own) is own
+    assert with_elapsed_time(own) is own
     empty = Recording("r", (run_at("a", 0.0, 1.0), Run("b")), train=("a", "b"))
-    assert timed(empty) is empty
+    assert with_elapsed_time(empty) is empty
 
 
 def criticised(change):

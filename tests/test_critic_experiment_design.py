@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal, norm
 from kurumaisu.bench.critic import next_experiment as bench
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.experiment import design, plan, rehearse
-from kurumaisu.critic.experiment.design import Prediction, divergence, left_over
+from kurumaisu.critic.experiment.design import DrivePrediction, divergence, left_over
 from kurumaisu.errors import Error
 from kurumaisu.experiments import samples, shipped_script
 from kurumaisu.experiments.timeline import PERIOD
@@ -19,7 +19,7 @@ MD100 = load_model(shipped("launch/md100.yaml"))
 
 def prediction(rng, k, n=6):
     root = rng.standard_normal((k, k))
-    return Prediction(rng.standard_normal(n), rng.standard_normal((n, k)), root @ root.T)
+    return DrivePrediction(rng.standard_normal(n), rng.standard_normal((n, k)), root @ root.T)
 
 
 def whole(p):

@@ -11,7 +11,7 @@ from kurumaisu.bench.hidden.base import catalogue
 from kurumaisu.bench.hidden.generator.motion import STEP, Form
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.engine import form_error_fit
-from kurumaisu.critic.engine.form_error import Missed, Muted, change
+from kurumaisu.critic.engine.form_error import FormError, FormErrorWhitener, change
 from kurumaisu.params import EffectSetting, shipped
 
 MD100 = shipped("launch/md100.yaml")
@@ -19,7 +19,7 @@ MD100 = shipped("launch/md100.yaml")
 
 def test_what_may_be_off_is_muted_until_all_is_white_again():
     columns = np.random.default_rng(0).standard_normal((40, 3)) * [0.1, 2.0, 30.0]
-    muted = Muted(columns).whiten(np.eye(40))
+    muted = FormErrorWhitener(columns).whiten(np.eye(40))
     np.testing.assert_allclose(muted @ (np.eye(40) + columns @ columns.T) @ muted.T, np.eye(40), atol=1e-9)
 
 
@@ -33,7 +33,7 @@ def test_marks_are_beside_what_a_fit_does_itself():
     def sized(size):
         return (EffectSetting("a", {"size": size}),)
 
-    marks = Missed(sized(1.0), ((sized(0.5), False, 1.0), (sized(3.0), False, 0.5)), (sized(1.0 + 1e-6),)).marks(
+    marks = FormError(sized(1.0), ((sized(0.5), False, 1.0), (sized(3.0), False, 0.5)), (sized(1.0 + 1e-6),)).marks(
         simulated, np.asarray
     )
     slope = np.outer(np.linspace(0.0, 1.0, 5), [1.0, 2.0, 0.0]).ravel()
@@ -44,13 +44,13 @@ def test_marks_are_beside_what_a_fit_does_itself():
 @pytest.mark.parametrize(("form", "exact"), [("plain", True), ("other", False)])
 def test_a_lag_that_is_not_of_the_first_order_is_a_lag_and_nothing_else(form, exact, tmp_path, monkeypatch):
     """Its rest passed for an acceleration limit or a clock; where the equation is exact, nothing is missed."""
-    told, missed = [], form_error_fit.missed
+    told, missed = [], form_error_fit.likeliest_form_error
 
     def heard(problem, found):
         told.append(missed(problem, found))
         return told[-1]
 
-    monkeypatch.setattr(form_error_fit, "missed", heard)
+    monkeypatch.setattr(form_error_fit, "likeliest_form_error", heard)
     case = make(Ask("single", ("base.lag_v",), 150.0, form, regime="usual", family="base"), 31240, tmp_path)
     verdict = pipeline.criticise(case.recording, MD100, lambda _: None).verdict
     assert [cause.id for cause in verdict.causes] == ["base.lag_v"]

@@ -49,7 +49,9 @@ def hidden(name, size, seed=1):
 
 def measured(data, settings, noise=NOISE):
     drives = [prepare(run, MODEL) for run in data.runs]
-    return drive_gain.measure(MODEL, drive_gain.folds(drives, []), lambda _: drive_gain.Fitted(settings), noise, noise)
+    return drive_gain.measure(
+        MODEL, drive_gain.folds(drives, []), lambda _: drive_gain.FittedExtension(settings), noise, noise
+    )
 
 
 def test_channels_add_up_and_say_where_the_gain_is():
@@ -107,7 +109,7 @@ def test_withheld_drives_are_judged_by_beside_the_others_but_not_across_gaps():
     assert max(np.diff(piece.times).max() for piece in pieces) < 0.5
     assert sum(len(piece.times) for piece in pieces) == keep.sum()
     settings = (EffectSetting("base.gain_v", {"gain": 0.08}),)
-    worth = drive_gain.measure(MODEL, splits, lambda _: drive_gain.Fitted(settings), NOISE, NOISE)
+    worth = drive_gain.measure(MODEL, splits, lambda _: drive_gain.FittedExtension(settings), NOISE, NOISE)
     assert worth.log_density_per_sample.lo90 > 0
     alone = replace(held, times=held.times[:2], poses=held.poses[:2])
     assert drive_gain.with_withheld([], train, [alone]) == []

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.judge.scan_verdict import criticise
-from kurumaisu.critic.ranges.scans.blocked_beams import blocked, told
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -31,7 +31,7 @@ def test_a_beam_is_blocked_if_it_reads_the_same_while_walls_come_and_go(reads, w
     noise = 0.003 * rng.standard_normal((40, 1))
     known = {"rides": 0.35 + noise, "wall": wall + noise, "digit": np.full((40, 1), 0.35)}.get(reads)
     measured = np.where(np.arange(40)[:, np.newaxis] < 5, 0.35 + noise, np.nan) if known is None else known
-    assert blocked(measured, wall).tolist() == [expected]
+    assert blocked_beams(measured, wall).tolist() == [expected]
 
 
 def test_readings_that_are_cut_off_are_nothing_that_rides_there():
@@ -41,16 +41,16 @@ def test_readings_that_are_cut_off_are_nothing_that_rides_there():
     walls[:, :100] = rng.uniform(1.0, 3.5, (40, 100))
     measured = np.round(np.minimum(walls + 0.002 * rng.standard_normal(walls.shape), 2.4), 3)
     assert np.mean(measured == 2.4) > 0.5
-    assert not blocked(measured, walls).any()
+    assert not blocked_beams(measured, walls).any()
 
 
 def test_where_beams_are_blocked_is_told_the_widest_first():
     beams = np.zeros(30, dtype=bool)
     beams[[2, 10, 11, 12]] = True
-    (found,) = told(beams, np.full((3, 30), 0.4), np.linspace(-1.45, 1.45, 30))
+    (found,) = described(beams, np.full((3, 30), 0.4), np.linspace(-1.45, 1.45, 30))
     assert (found.channel, found.covariate) == ("laser.bias", "bearing")
     assert found.shape.startswith("beams from -0.45 to -0.25 rad read 0.4 m; beams from -1.25 to -1.25 rad")
-    assert not list(told(np.zeros(30, dtype=bool), np.full((3, 30), 0.4), np.zeros(30)))
+    assert not list(described(np.zeros(30, dtype=bool), np.full((3, 30), 0.4), np.zeros(30)))
 
 
 def test_what_rides_before_the_laser_is_unknown_and_hides_no_cause(tmp_path):
@@ -59,6 +59,6 @@ def test_what_rides_before_the_laser_is_unknown_and_hides_no_cause(tmp_path):
     values = run.scan.values.copy()
     values[:, BEAMS] = np.round(0.35 + 0.003 * rng.standard_normal(values[:, BEAMS].shape), 3)
     data = replace(data, runs=(replace(run, scan=replace(run.scan, values=values)),))
-    finding = criticise(data, MODEL, lambda _: None)
+    finding = criticise_scans(data, MODEL, lambda _: None)
     assert [unknown.covariate for unknown in finding.unknown] == ["bearing"]
     assert {cause.id for cause in finding.causes} == {"laser.dropout"}

@@ -7,12 +7,12 @@ import pytest
 from kurumaisu import effects
 from kurumaisu.critic.judge.scan_verdict import size_of
 from kurumaisu.critic.ranges.noise.scan_noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate
-from kurumaisu.critic.ranges.search.effect_sets import Search
+from kurumaisu.critic.ranges.search.effect_sets import FormSearch
 from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
-from kurumaisu.critic.scatter.common_offset import beyond, own_sd, with_whole_scans
-from kurumaisu.critic.scatter.likelihood import Kinds, Likeness
+from kurumaisu.critic.scatter.common_offset import beyond_own_offset, own_sd, with_common_offset
+from kurumaisu.critic.scatter.likelihood import StatisticKinds, StatisticsLikelihood
 from kurumaisu.critic.scatter.scatter_fit import ScatterFit
-from kurumaisu.critic.scatter.scatter_search import Scatter, ScatterSearch
+from kurumaisu.critic.scatter.scatter_search import ScatterEffect, ScatterSearch
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import NORMAL90
 from kurumaisu.params import EffectSetting
@@ -25,7 +25,7 @@ class _Powers:
 
     def kinds(self):
         none = np.zeros(11, dtype=bool)
-        return Kinds(none, none)
+        return StatisticKinds(none, none)
 
     def null(self, effect):
         return {p.name: p.null for p in effect.parameters}
@@ -62,10 +62,10 @@ def test_two_effects_act_together_though_each_explains_nearly_all_alone():
 
 def test_numbers_that_nothing_explains_yet_do_not_bend_what_explains_others():
     nulls = np.random.default_rng(1).standard_normal((50, 3))
-    likeness = Likeness(
+    likeness = StatisticsLikelihood(
         nulls,
         np.array([80.0, 5.0, 5.0]),
-        Kinds(np.zeros(3, dtype=bool), np.zeros(3, dtype=bool)),
+        StatisticKinds(np.zeros(3, dtype=bool), np.zeros(3, dtype=bool)),
         np.ones(3, dtype=bool),
     )
     right, bent = np.array([0.0, 5.0, 5.0]), np.array([2.0, 17.0, 17.0])
@@ -77,8 +77,11 @@ def test_numbers_that_nothing_explains_yet_do_not_bend_what_explains_others():
 def test_a_tenth_more_readings_beyond_three_deviations_matters_to_nobody():
     """So many come with a spread that differs by less than anyone minds."""
     nulls = np.array([24.0, 1.2]) + 0.1 * np.random.default_rng(1).standard_normal((50, 2))
-    likeness = Likeness(
-        nulls, np.array([25.2, 1.2]), Kinds(np.ones(2, dtype=bool), np.zeros(2, dtype=bool)), np.ones(2, dtype=bool)
+    likeness = StatisticsLikelihood(
+        nulls,
+        np.array([25.2, 1.2]),
+        StatisticKinds(np.ones(2, dtype=bool), np.zeros(2, dtype=bool)),
+        np.ones(2, dtype=bool),
     )
     many, few = likeness.units(likeness.measured + np.array([0.0, 3.0]))
     assert many < 0.9
@@ -92,7 +95,7 @@ def test_what_grows_with_the_range_otherwise_than_its_law_is_one_doubt_not_many(
     measured = 2.0 * (1 + 0.15 * along)
     costs = []
     for trends in (np.empty((0, 0)), along[np.newaxis]):
-        likeness = Likeness(nulls, measured, Kinds(none, none, trends), ~none)
+        likeness = StatisticsLikelihood(nulls, measured, StatisticKinds(none, none, trends), ~none)
         costs.append(likeness.cost(np.full(4, 2.0)) - likeness.cost(measured))
     assert costs[0] > 2.0
     assert costs[1] < 1.0
@@ -107,7 +110,7 @@ def test_noise_of_a_footprint_is_noise_by_obliqueness_and_not_by_the_range_as_we
     law = np.full(4, np.mean(footprint))
     costs = []
     for known in (folds, np.zeros(4)):
-        likeness = Likeness(nulls, footprint, Kinds(none, none, folds=known), ~none)
+        likeness = StatisticsLikelihood(nulls, footprint, StatisticKinds(none, none, folds=known), ~none)
         costs.append(likeness.cost(law) - likeness.cost(footprint))
     assert costs[0] < 8.0
     assert costs[1] > 50.0
@@ -127,7 +130,7 @@ def test_what_hardly_varies_with_the_temperature_is_an_offset(slope, named):
     x = np.stack([np.ones(400), temperature - 10.0, temperature - 40.0], axis=1)
     y = 0.2 + slope * (temperature - 20.5) + 0.5 * np.random.default_rng(2).standard_normal(400)
     rows = np.column_stack([x, y]) / 0.5
-    found = Search(_forms(), rows.T @ rows).run()
+    found = FormSearch(_forms(), rows.T @ rows).run()
     assert found.best.ids == {named}
     assert found.p[named] > 0.95
     assert found.confounded == ()
@@ -173,8 +176,8 @@ def test_all_scans_tell_whether_they_have_a_common_mode(seed):
 @pytest.mark.parametrize(("common", "own", "news"), [(3e-4, 3e-4, False), (9e-4, 3e-4, True), (0.0, 3e-4, True)])
 def test_scans_that_are_off_together_as_in_the_model_are_no_news(common, own, news):
     seen, noise = _weighed(common, 2, own)
-    found = with_whole_scans([], seen, noise, _recording(), None)
-    assert [each.setting.id for each in beyond(found, 2e-4, own)] == (["laser.common_mode"] if news else [])
+    found = with_common_offset([], seen, noise, _recording(), None)
+    assert [each.setting.id for each in beyond_own_offset(found, 2e-4, own)] == (["laser.common_mode"] if news else [])
     assert own_sd([_at("laser.common_mode", sd=own, rho=0.7), _at("laser.dropout", probability=0.1)]) == own
 
 
@@ -182,7 +185,7 @@ def test_scans_that_are_off_by_as_much_as_they_may_have_something_else_that_is_w
     """Walls that stand elsewhere had a common mode of 0.1 m beside them."""
     seen, noise = _weighed(0.3, 1)
     assert noise.common_sd == pytest.approx(0.1)
-    assert with_whole_scans([], seen, noise, _recording(), None) == []
+    assert with_common_offset([], seen, noise, _recording(), None) == []
 
 
 def _recording():
@@ -193,7 +196,7 @@ def _recording():
 
 def test_what_is_known_by_its_log_has_the_interval_of_its_log():
     noise, vague = ScanNoise(0.005, 0.005, 4e-4, 0.05), CommonMode(20.0, 0.3, 1.5)
-    (found,) = with_whole_scans([], vague, noise, _recording(), None)
+    (found,) = with_common_offset([], vague, noise, _recording(), None)
     for name, ends in (
         ("sd", 4e-4 * np.exp(NORMAL90 * 0.3 * np.array([-1, 1]))),
         ("rho", np.exp(-0.1 / (0.05 * np.exp(NORMAL90 * 1.5 * np.array([-1, 1]))))),
@@ -205,20 +208,20 @@ def test_what_is_known_by_its_log_has_the_interval_of_its_log():
 
 def test_a_common_mode_that_all_scans_show_is_named_unless_something_may_stand_in_for_it():
     noise, sure = ScanNoise(0.005, 0.005, 4e-4, 0.45), CommonMode(20.0, 0.1, 0.2)
-    (found,) = with_whole_scans([], sure, noise, _recording(), None)
+    (found,) = with_common_offset([], sure, noise, _recording(), None)
     assert found.setting.id == "laser.common_mode"
     assert found.p > 0.99
     assert found.setting.parameters["sd"] == pytest.approx(4e-4)
     assert found.setting.parameters["rho"] == pytest.approx(np.exp(-0.1 / 0.45))
-    assert with_whole_scans([], CommonMode(3.0, 0.5, 0.9), noise, _recording(), None) == []
-    taken = Scatter(_at("laser.heavy_tails", inverse_nu=0.2), 0.6, 9.0, {}, {"laser.common_mode": 0.4})
-    assert with_whole_scans([taken], sure, noise, _recording(), None) == [taken]
+    assert with_common_offset([], CommonMode(3.0, 0.5, 0.9), noise, _recording(), None) == []
+    taken = ScatterEffect(_at("laser.heavy_tails", inverse_nu=0.2), 0.6, 9.0, {}, {"laser.common_mode": 0.4})
+    assert with_common_offset([taken], sure, noise, _recording(), None) == [taken]
 
 
 def test_a_common_mode_as_small_as_what_equations_miss_is_none():
     seen = [
-        Scatter(_at("laser.common_mode", sd=4e-4, rho=0.5), 1.0, 20.0, {}, {}),
-        Scatter(_at("laser.dropout"), 1.0, 20.0, {}, {}),
+        ScatterEffect(_at("laser.common_mode", sd=4e-4, rho=0.5), 1.0, 20.0, {}, {}),
+        ScatterEffect(_at("laser.dropout"), 1.0, 20.0, {}, {}),
     ]
-    assert beyond(seen, 3e-4) == seen
-    assert beyond(seen, 5e-4) == seen[1:]
+    assert beyond_own_offset(seen, 3e-4) == seen
+    assert beyond_own_offset(seen, 5e-4) == seen[1:]

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.judge.scan_verdict import criticise
-from kurumaisu.critic.ranges.search.block_evidence import Rival
-from kurumaisu.critic.ranges.search.effect_sets import Fitted
-from kurumaisu.critic.ranges.search.false_seconds import company, forms_beside
-from kurumaisu.critic.ranges.signals.coefficient_blocks import Free
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
+from kurumaisu.critic.ranges.search.effect_sets import FittedForms
+from kurumaisu.critic.ranges.search.spurious_effects import form_families, without_spurious
+from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.ranges.signals.effect_columns import Form
-from kurumaisu.critic.ranges.signals.form_error import OtherForm, other_form, without
-from kurumaisu.critic.unknown.curves import Belief
-from kurumaisu.critic.unknown.effect_likeness import FORM
+from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
+from kurumaisu.critic.unknown.curves import CurveEvidence
+from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -51,7 +51,7 @@ def scene(rng):
 def test_what_an_effect_follows_is_found_by_drawing_what_it_does(covariate, change):
     shots, seen, _ = scene(np.random.default_rng(0))
     moved = change(shots, seen)
-    found = other_form(moved, shots, seen, np.ones(moved.shape, dtype=bool))
+    found = form_family(moved, shots, seen, np.ones(moved.shape, dtype=bool))
     assert (found and found.covariate) == covariate
     if found is None:
         return
@@ -61,7 +61,7 @@ def test_what_an_effect_follows_is_found_by_drawing_what_it_does(covariate, chan
     gram = columns.T @ columns
     prior = found.scaled(gram, float(moved.ravel() @ moved.ravel()))
     # Drawn from that, curves are as large as the share that nobody can refuse.
-    assert np.trace(gram @ prior) == pytest.approx(FORM**2 * np.sum(moved**2))
+    assert np.trace(gram @ prior) == pytest.approx(FORM_ERROR**2 * np.sum(moved**2))
 
 
 @pytest.mark.parametrize("readings", [0, 1, SCANS * BEAMS])
@@ -69,7 +69,7 @@ def test_what_is_the_same_everywhere_is_drawn_by_finite_curves(readings):
     """All walls are as dark; and of no reading, nothing is drawn."""
     shots, seen, _ = scene(np.random.default_rng(4))
     change = np.full(seen.ranges.shape, 0.01)
-    found = other_form(change, shots, seen, np.arange(change.size).reshape(change.shape) < readings)
+    found = form_family(change, shots, seen, np.arange(change.size).reshape(change.shape) < readings)
     assert (found is None) == (readings < 2)
     if found is not None:
         assert np.isfinite(found.columns(shots, seen)).all()
@@ -80,7 +80,7 @@ def test_coefficients_integrated_out_are_noise_of_their_covariance():
     rng = np.random.default_rng(1)
     every, root = rng.standard_normal((40, 5)), rng.standard_normal((2, 2))
     prior = root @ root.T
-    found = without(every.T @ every, np.array([3, 1]), prior)
+    found = integrated_out(every.T @ every, np.array([3, 1]), prior)
     covariance = np.eye(40) + every[:, [3, 1]] @ prior @ every[:, [3, 1]].T
     kept = np.ix_([0, 2, 4], [0, 2, 4])
     assert found[kept] == pytest.approx((every.T @ np.linalg.solve(covariance, every))[kept])
@@ -110,26 +110,28 @@ def test_dark_walls_that_are_read_by_another_law_are_not_walls_that_are_off(move
     )
     normal = SimpleNamespace(beam_noise=SimpleNamespace(valid=np.ones(dark.shape, dtype=bool)))
     size = float(np.sum(dark * residual) / np.sum(dark**2))
-    fit = Fitted((form,), np.array([size]), np.array([0.1]), 1e5, 1e5)
-    none = Fitted((), np.empty(0), np.empty(0), 0.0, 0.0)
-    walls = Free("world.map_error", SimpleNamespace(), None, (np.eye(WALLS),), slice(1, 1 + WALLS))
-    winner = Rival(fit, walls, Belief(100.0, np.eye(WALLS)), 1e5 + 100)
+    fit = FittedForms((form,), np.array([size]), np.array([0.1]), 1e5, 1e5)
+    none = FittedForms((), np.empty(0), np.empty(0), 0.0, 0.0)
+    walls = Block("world.map_error", SimpleNamespace(), None, (np.eye(WALLS),), slice(1, 1 + WALLS))
+    winner = SetWithBlock(fit, walls, CurveEvidence(100.0, np.eye(WALLS)), 1e5 + 100)
     found = SimpleNamespace(fits=(fit, none), p={f"effect {i}": 0.0 for i in range(25)})
-    others = forms_beside(assembly, normal, fit)
+    others = form_families(assembly, normal, fit)
     assert others["laser.reflectance"].covariate == "returns"
-    assert company(assembly, normal, found, (fit, winner), {}) == (fit, winner)
-    assert company(assembly, normal, found, (fit, winner), others) == (fit, winner if moved else None)
+    assert without_spurious(assembly, normal, found, (fit, winner), {}) == (fit, winner)
+    assert without_spurious(assembly, normal, found, (fit, winner), others) == (fit, winner if moved else None)
 
 
 @pytest.mark.parametrize("common", [0.0, 0.002])
 def test_a_warm_up_of_another_form_leaves_no_common_mode_and_hides_none(tmp_path, common):
     data = recording(tmp_path, "laser.warmup", 0.05, 3, scans=120, common=common)
-    seen = criticise(data, MODEL, lambda _: None, frozenset({"laser.warmup", "laser.common_mode", "laser.offset"}))
+    seen = criticise_scans(
+        data, MODEL, lambda _: None, frozenset({"laser.warmup", "laser.common_mode", "laser.offset"})
+    )
     named = {cause.id for cause in seen.causes}
     assert named == ({"laser.warmup", "laser.common_mode"} if common else {"laser.warmup"})
 
 
 def test_steps_of_reflectance_need_no_straight_lines():
-    found = OtherForm("returns", np.array([0.4, 1.0]), np.eye(2))
+    found = FormFamily("returns", np.array([0.4, 1.0]), np.eye(2))
     seen = SimpleNamespace(returns=np.array([[1.0, 0.4, 1.0]]))
     assert found.columns(SimpleNamespace(), seen).tolist() == [[[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]]

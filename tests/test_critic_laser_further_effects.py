@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from laser_scene import FIRST, INCREMENT, recording
 
-from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.scans.beams import gather
 from kurumaisu.critic.ranges.scans.valid_readings import edges
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
-from kurumaisu.critic.ranges.signals.form_error import of_beams
+from kurumaisu.critic.ranges.signals.form_error import beam_family
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -28,7 +28,7 @@ def with_readings(data, of):
 
 
 def named(data):
-    found = criticise(data, MODEL, lambda _: None, MEAN)
+    found = criticise_scans(data, MODEL, lambda _: None, MEAN)
     assert (found.confounded, found.unknown) == ((), ())
     return {cause.id: cause for cause in found.causes}
 
@@ -53,7 +53,9 @@ def test_what_beams_keep_is_no_error_of_whole_scans(tmp_path):
     bearings = FIRST + INCREMENT * np.arange(682)
     data = recording(tmp_path, None, 0.0, 7, scans=SCANS)
     seen = Assembly(gather(with_readings(data, lambda r: r + 0.002 * np.cos(2 * bearings)), MODEL), frozenset())
-    alone, beside = (one.settle((0.003, 0.003)).scan_noise for one in (seen, seen.beside([of_beams(seen.shots)])))
+    alone, beside = (
+        one.settle((0.003, 0.003)).scan_noise for one in (seen, seen.with_families([beam_family(seen.shots)]))
+    )
     assert alone.common_sd > 3e-4
     assert beside.common_sd < 2e-4  # what is usual beforehand
 

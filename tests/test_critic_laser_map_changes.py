@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.scans.beams import gather
-from kurumaisu.critic.ranges.scans.map_changes import displaced
-from kurumaisu.critic.ranges.scans.passing_objects import strangers
+from kurumaisu.critic.ranges.scans.map_changes import map_change
+from kurumaisu.critic.ranges.scans.passing_objects import passing_objects
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.params import load_model, shipped
 
@@ -34,12 +34,12 @@ def test_a_part_of_a_wall_is_displaced_if_nearly_all_its_readings_are_far_off(of
     measured, ranges, hits = wall()
     part = (hits[:, :, 0] > 1.0) & (hits[:, :, 0] < 2.0)
     measured[part & (np.random.default_rng(2).random(part.shape) < share)] += off
-    found = displaced(measured, ranges, hits, OBLIQUE)
+    found = map_change(measured, ranges, hits, OBLIQUE)
     assert found.readings.any() == expected
     if expected:
         assert found.readings[part].all()
         assert found.off == pytest.approx(off, abs=0.01)
-        first, second = found.told()
+        first, second = found.unknowns()
         assert (first.covariate, second.covariate) == ("hit y", "hit x")
         assert "x 1 to 2 m" in first.shape
 
@@ -47,8 +47,8 @@ def test_a_part_of_a_wall_is_displaced_if_nearly_all_its_readings_are_far_off(of
 def test_where_most_readings_are_off_no_part_of_the_map_is_to_blame():
     measured, ranges, hits = wall()
     measured[hits[:, :, 0] > 1.0] += 0.9
-    assert not displaced(measured, ranges, hits, OBLIQUE).readings.any()
-    assert not displaced(np.full_like(ranges, np.nan), ranges, hits, OBLIQUE).readings.any()
+    assert not map_change(measured, ranges, hits, OBLIQUE).readings.any()
+    assert not map_change(np.full_like(ranges, np.nan), ranges, hits, OBLIQUE).readings.any()
 
 
 @pytest.mark.parametrize(("nearer", "expected"), [(0.2, False), (0.5, True)])
@@ -56,7 +56,7 @@ def test_a_beam_along_a_wall_that_is_a_little_nearer_meets_it_much_earlier(neare
     _, ranges, hits = wall()
     part = hits[:, :, 0] > 6.0  # where 0.2 m nearer is 0.28 m earlier and more
     measured = ranges * np.where(part, (2.0 - nearer) / 2.0, 1.0)
-    assert displaced(measured, ranges, hits, OBLIQUE).readings.any() == expected
+    assert map_change(measured, ranges, hits, OBLIQUE).readings.any() == expected
 
 
 def person(measured, ranges, scans, width=20, depth=1.0):
@@ -72,9 +72,9 @@ def person(measured, ranges, scans, width=20, depth=1.0):
 )
 def test_what_stands_before_a_wall_is_as_wide_as_a_thing(width, depth, told):
     measured, ranges, _ = wall()
-    found = strangers(person(measured, ranges, 30, width, depth), ranges, BEARINGS)
+    found = passing_objects(person(measured, ranges, 30, width, depth), ranges, BEARINGS)
     assert found.many == told
-    assert bool(list(found.told())) == told
+    assert bool(list(found.unknowns())) == told
     if told:
         assert found.scans == 30
         assert found.readings[0, 100 : 100 + width].all()
@@ -86,7 +86,7 @@ def test_a_pole_of_the_map_seen_a_little_aside_is_no_stranger():
     ranges = np.full((40, 300), 3.0)
     ranges[:, 100:130] = 1.5
     for shift in (6, -6):
-        assert not strangers(np.roll(ranges, shift, axis=1), ranges, BEARINGS).readings.any()
+        assert not passing_objects(np.roll(ranges, shift, axis=1), ranges, BEARINGS).readings.any()
 
 
 def test_light_of_others_agrees_on_no_place():
@@ -94,7 +94,7 @@ def test_light_of_others_agrees_on_no_place():
     rng = np.random.default_rng(3)
     lit = rng.random(measured.shape) < 0.2
     measured[lit] = rng.uniform(0.1, 2.0, int(lit.sum()))
-    assert not strangers(measured, ranges, BEARINGS).many
+    assert not passing_objects(measured, ranges, BEARINGS).many
 
 
 def _with(data, change):
@@ -112,7 +112,7 @@ def test_somebody_who_walks_by_is_unknown_and_is_not_taken_for_light_of_others(t
             values[k, beams] = np.nanmin(values[k, beams]) - 0.5
         return values
 
-    finding = criticise(_with(data, walks), MODEL, lambda _: None)
+    finding = criticise_scans(_with(data, walks), MODEL, lambda _: None)
     assert sorted(unknown.covariate for unknown in finding.unknown) == ["hit x", "hit y", "time"]
     assert {cause.id for cause in finding.causes} == {"laser.mount_x"}
 
@@ -128,6 +128,6 @@ def test_a_wall_that_is_not_where_the_map_has_it_is_unknown(tmp_path):
         values[: len(part)][part] += 0.8
         return values
 
-    finding = criticise(_with(data, moved), MODEL, lambda _: None)
+    finding = criticise_scans(_with(data, moved), MODEL, lambda _: None)
     assert {unknown.covariate for unknown in finding.unknown} == {"hit x", "hit y"}
     assert {cause.id for cause in finding.causes} == {"laser.mount_x"}

@@ -4,7 +4,7 @@
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.judge.scan_verdict import criticise
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.processes import laser_process as module
 from kurumaisu.critic.processes.worker import Worker
 from kurumaisu.params import load_model, shipped
@@ -24,7 +24,7 @@ class Dying(Worker):
 def alone(tmp_path_factory):
     """A recording, and what is found of it in this process."""
     data = recording(tmp_path_factory.mktemp("room"), "laser.quadratic", 0.003, 7, scans=20)
-    return data, criticise(data, MODEL, lambda _: None)
+    return data, criticise_scans(data, MODEL, lambda _: None)
 
 
 @pytest.mark.parametrize("worker", [Worker, Dying])
@@ -34,7 +34,7 @@ def test_where_scans_are_criticised_makes_no_difference(alone, monkeypatch, work
     monkeypatch.setattr(module, "_MANY", 10)
     monkeypatch.setattr(module.os, "sched_getaffinity", lambda _: {0, 1})
     monkeypatch.setattr(module, "Worker", lambda: asked.append(worker) or worker())
-    with module.aside(data, MODEL, MD100, None) as scans_say:
+    with module.criticise_aside(data, MODEL, MD100, None) as scans_say:
         found = scans_say(here.append)
     assert asked == [worker]
     assert bool(here) == (worker is Dying)

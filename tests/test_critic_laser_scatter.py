@@ -9,15 +9,15 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.noise.reading_noise import BeamNoise, _repeated, refined
+from kurumaisu.critic.ranges.noise.reading_noise import BeamNoise, _repeated, estimate_reading_noise
 from kurumaisu.critic.ranges.noise.scan_noise import Layout, ScanNoise
 from kurumaisu.critic.ranges.scans.beams import gather
 from kurumaisu.critic.ranges.scans.range_step import grid_step
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
-from kurumaisu.critic.scatter.likelihood import Kinds
-from kurumaisu.critic.scatter.scatter_fit import Piece, ScatterFit
+from kurumaisu.critic.scatter.likelihood import StatisticKinds
+from kurumaisu.critic.scatter.scatter_fit import ScatterFit, ScatterPiece
 from kurumaisu.critic.scatter.scatter_search import ScatterSearch, _weighed
-from kurumaisu.critic.scatter.simulation import Simulator
+from kurumaisu.critic.scatter.simulation import ScatterSimulator
 from kurumaisu.critic.scatter.statistics import Statistics, _lasting, _mixed, _spacing
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -32,7 +32,7 @@ class _Linear:
 
     def kinds(self):
         none = np.zeros(5, dtype=bool)
-        return Kinds(none, none)
+        return StatisticKinds(none, none)
 
     def null(self, effect):
         return {p.name: p.null for p in effect.parameters}
@@ -78,7 +78,7 @@ def test_it_is_not_certain_which_of_two_alike_acts():
 
 def test_odds_between_effects_of_which_none_fits_are_worth_less():
     def piece(name, nats):
-        return Piece(effects.by_id(name), at(name), (), 0.0, nats)
+        return ScatterPiece(effects.by_id(name), at(name), (), 0.0, nats)
 
     likeliest, other = piece("laser.quantisation", 40.0), piece("laser.incidence_noise", 36.0)
     assert _weighed([likeliest, other]).p > 0.98
@@ -97,7 +97,7 @@ def test_what_may_have_either_sign_crosses_zero_though_it_was_taken_for_next_to_
     ids = frozenset({"laser.range_noise"})
     fit = ScatterFit(simulate, simulate([at("laser.range_noise", share=0.3, slope=0.0013)], 5), (), ids)
     start = at("laser.range_noise", share=0.6, slope=-5e-5)
-    (found,), _ = fit.together([Piece(effects.by_id(start.id), start, ("share", "slope"), 0.0, 0.0)], ())
+    (found,), _ = fit.together([ScatterPiece(effects.by_id(start.id), start, ("share", "slope"), 0.0, 0.0)], ())
     assert found.setting.parameters["slope"] == pytest.approx(0.0013, rel=0.2)
 
 
@@ -126,7 +126,7 @@ def test_noise_of_heavy_tails_hardly_goes_as_far_as_readings_of_something_else(t
     assembly = _assembly(tmp_path)
     statistics = Statistics(assembly, ScanNoise(0.002, 0.001, 1e-4, 1.0))
     missed = np.empty((*assembly.residual.shape, 0))
-    simulate, names = Simulator(assembly, statistics, missed), statistics.names()
+    simulate, names = ScatterSimulator(assembly, statistics, missed), statistics.names()
     far = next(i for i, name in enumerate(names) if name.startswith("readings more than 25"))
     plain, tails, bursts = (
         simulate(settings, 3)[far]
@@ -172,7 +172,7 @@ def test_how_few_steep_readings_scatter_is_known_for_them():
     seen = SimpleNamespace(ranges=ranges, incidence=steep)
     left = sd * rng.standard_normal(sd.shape)
     layout = Layout(np.arange(200.0), np.zeros(200, dtype=int), np.full(200, -1))
-    found = refined(first, first, lambda _: left, seen, layout, 0.001).sd
+    found = estimate_reading_noise(first, first, lambda _: left, seen, layout, 0.001).sd
     assert np.sqrt(np.mean((sd / found)[steep > np.radians(65)] ** 2)) == pytest.approx(1.0, abs=0.1)
 
 
@@ -219,14 +219,14 @@ def test_what_came_while_another_was_fitted_ill_goes_when_that_is_mended():
     stale = at("laser.beam_correlation", rho=0.001)
     search = ScatterSearch(ScatterFit(simulate, simulate([truth], 5), (), frozenset({truth.id, stale.id})))
     pieces = [
-        Piece(effects.by_id(truth.id), truth, ("step",), 1.0, 700.0),
-        Piece(effects.by_id(stale.id), stale, ("rho",), 1.0, 53.0),
+        ScatterPiece(effects.by_id(truth.id), truth, ("step",), 1.0, 700.0),
+        ScatterPiece(effects.by_id(stale.id), stale, ("rho",), 1.0, 53.0),
     ]
     assert [piece.setting.id for piece in search._polished(pieces)] == [truth.id]
 
 
 def _pieces(*pieces):
-    return [Piece(effects.by_id(setting.id), setting, free, 1.0, nats) for setting, free, nats in pieces]
+    return [ScatterPiece(effects.by_id(setting.id), setting, free, 1.0, nats) for setting, free, nats in pieces]
 
 
 def test_a_probability_is_that_in_the_company_found_last():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from kurumaisu.critic.noise.minimiser import lowest
+from kurumaisu.critic.noise.minimiser import minimise
 
 OPTIONS = {"eps": 0.01, "ftol": 3e-6, "maxiter": 60}
 
@@ -30,7 +30,7 @@ def likelihood(at):
 def test_it_ends_where_the_differences_lead(begin):
     bounds = np.array([[-3.0, 3.0], [-3.0, 3.0]])
     ours, theirs = Counted(likelihood), Counted(likelihood)
-    where, least = lowest(ours, np.array(begin), bounds)
+    where, least = minimise(ours, np.array(begin), bounds)
     wanted = minimize(theirs, np.array(begin), method="L-BFGS-B", bounds=bounds, options=OPTIONS)
     np.testing.assert_allclose(where, wanted.x, atol=1e-5)
     assert least == pytest.approx(wanted.fun, abs=1e-2)
@@ -38,7 +38,7 @@ def test_it_ends_where_the_differences_lead(begin):
 
 
 def test_it_keeps_within_its_bounds():
-    where, _ = lowest(likelihood, np.array([2.0, 1.0]), np.array([[0.7, 3.0], [-3.0, -0.2]]))
+    where, _ = minimise(likelihood, np.array([2.0, 1.0]), np.array([[0.7, 3.0], [-3.0, -0.2]]))
     np.testing.assert_allclose(where, [0.7, -0.2])
 
 
@@ -56,7 +56,7 @@ def test_trials_that_lead_back_are_left_out_and_nothing_else(seed):
     cost, begin = valley(seed)
     bounds = np.array([[-3.0, 3.0]] * 5)
     ours, theirs = Counted(cost), Counted(cost)
-    where, least = lowest(ours, begin, bounds)
+    where, least = minimise(ours, begin, bounds)
     wanted = minimize(theirs, begin, method="L-BFGS-B", bounds=bounds, options=OPTIONS)
     assert least == cost(where)
     assert least <= wanted.fun + 1e-6

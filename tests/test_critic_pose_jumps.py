@@ -19,7 +19,7 @@ def circle(rng, seconds=60.0):
 
 
 def said(t, poses, command=None):
-    return pose_jumps.words(Series(t, poses, ("x", "y", "theta")), command)
+    return pose_jumps.problems(Series(t, poses, ("x", "y", "theta")), command)
 
 
 @pytest.mark.parametrize("heard", [True, False])

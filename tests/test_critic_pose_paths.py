@@ -6,7 +6,7 @@ import pytest
 
 from kurumaisu import geometry
 from kurumaisu.critic.base.drive import GRID, Drive
-from kurumaisu.critic.base.pose_paths import ways
+from kurumaisu.critic.base.pose_paths import pose_paths
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 
 STEP = 0.0005  # [s]
@@ -42,7 +42,7 @@ def test_errors_act_along_the_way(late, size, rates):
     error = size * (0.5 + late * (np.arange(len(t)) % 200 / 200 + STEP - 0.5))  # the same in each increment
     drive = drive_of(3.0, error * 0.1 * (rates != "w"), error * (rates != "v"))
     change = drive.measured - simulated(drive)
-    c, s, x, y, late_c, late_s, late_x, late_y = drive.ways.T
+    c, s, x, y, late_c, late_s, late_x, late_y = drive.pose_paths.T
     mean, lateness = 0.1 * size * 0.5, 0.1 * size * late / 12
     told = 0.1 * (rates != "w") * np.stack([c * mean + late_c * lateness, s * mean + late_s * lateness])
     told += (rates != "v") * np.stack([-y * mean - late_y * lateness, x * mean + late_x * lateness])
@@ -78,5 +78,5 @@ def test_turns_are_counted_the_short_way():
     path = np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.1]])
     poses = path.copy()
     poses[1, 2] += 2 * np.pi
-    np.testing.assert_allclose(ways(times, poses, edges, path), ways(times, path, edges, path), atol=1e-9)
+    np.testing.assert_allclose(pose_paths(times, poses, edges, path), pose_paths(times, path, edges, path), atol=1e-9)
     np.testing.assert_allclose(geometry.wrap(poses[1, 2]), 0.1)

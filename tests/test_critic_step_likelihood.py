@@ -211,7 +211,7 @@ def test_a_tooth_is_sought_anew_beside_what_was_found_since():
     problem, chosen = steps_beside(0.0523, 1.0, cross_v_to_w=0.03, cross_w_to_v=-0.06)
     stuck = problem.fit_candidates(chosen, {(STEP, "step"): 0.06})
     assert stuck.start[STEP, "step"] != pytest.approx(0.0523, rel=5e-3)
-    begin = problem.teeth.anew(stuck.terms, stuck.values, STEP)
+    begin = problem.start_values.with_best_step(stuck.terms, stuck.values, STEP)
     assert begin[STEP, "step"] == pytest.approx(0.0523, rel=2e-3)
     assert search.search(problem, lambda _: None, stuck).best.start[STEP, "step"] == pytest.approx(0.0523, rel=2e-3)
 
@@ -224,5 +224,5 @@ def test_edges_that_held_voltages_cross_do_not_use_up_the_sizes(step, cut):
     """
     problem, chosen = steps_beside(step, cut)
     rough = next(candidate for candidate in chosen if candidate.id == STEP)
-    begin = problem.teeth.first(rough.terms, {})
+    begin = problem.start_values.first(rough.terms, {})
     assert begin[[term.key for term in rough.terms].index((STEP, "step"))] == pytest.approx(step, rel=5e-3)

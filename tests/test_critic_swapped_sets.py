@@ -11,7 +11,7 @@ from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.catalogue import Candidate, Term
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.swapped_sets import exchanges
+from kurumaisu.critic.engine.swapped_sets import swapped_sets
 from kurumaisu.effects import Parameter
 from kurumaisu.params import load_model, shipped
 
@@ -34,7 +34,7 @@ def names(sets):
 
 def test_a_twin_is_tried_in_the_company_of_the_other():
     fits = [fit(0.0, veer=1.0, zone=2.0), fit(-0.3, cross=3.0, zone=2.1), fit(1.5, sag=4.0, veer=1.1, zone=1.5)]
-    tried = names(exchanges(fits, OF))
+    tried = names(swapped_sets(fits, OF))
     assert set(tried) == {("cross", "sag", "zone")}
     assert tried["cross", "sag", "zone"] == {("cross", "size"): 3.0, ("sag", "size"): 4.0, ("zone", "size"): 1.5}
 
@@ -46,7 +46,7 @@ def test_what_is_no_twin_or_hardly_likely_is_not_exchanged():
         fit(-4.0, cross=3.0, zone=2.1),
         fit(-5.0, veer=1.0, sag=1.0),
     ]
-    assert exchanges([fit(0.0, veer=1.0, zone=2.0), *others], OF) == []
+    assert swapped_sets([fit(0.0, veer=1.0, zone=2.0), *others], OF) == []
 
 
 def test_one_effect_that_does_what_two_others_do_does_not_hide_them():

@@ -17,18 +17,18 @@ from kurumaisu.bench.hidden.base.catalogue import BASE
 from kurumaisu.bench.hidden.generator.noise import REGIMES
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.unknown import curves, joint_fit, sentences, shapes
 from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.unknown.beyond_catalogue import false_alarm
 from kurumaisu.critic.unknown.comparison import compare
 from kurumaisu.critic.unknown.designs import Designs
-from kurumaisu.critic.unknown.effect_likeness import Likeness
-from kurumaisu.critic.unknown.joint_fit import Extension, extend
+from kurumaisu.critic.unknown.effect_likeness import EffectLikeness
+from kurumaisu.critic.unknown.joint_fit import FitWithCurve, fit_with_curve
 from kurumaisu.critic.values.prior import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -36,7 +36,7 @@ MD100 = shipped("launch/md100.yaml")
 
 
 def drives_of(recording):
-    return [informed(prepare(run, hidden.MODEL), run) for run in recording.runs]
+    return [with_covariates(prepare(run, hidden.MODEL), run) for run in recording.runs]
 
 
 @pytest.fixture(scope="module")
@@ -80,10 +80,10 @@ def test_evidence_is_that_of_a_normal_distribution():
         total.append(logsumexp(-0.5 * (c**2 / spread + np.log(spread)).sum(axis=1) + 0.5 * c @ c, b=weights))
     one = 9.0 * priors[0] / np.trace(x @ priors[0] @ x.T)
     by_hand = multivariate_normal(np.zeros(40), np.eye(40) + x @ one @ x.T).logpdf(y) - nulls
-    own = curves.belief(x.T @ x, x.T @ y, [priors[0]])
+    own = curves.curve_evidence(x.T @ x, x.T @ y, [priors[0]])
     assert own.nats == pytest.approx(total[0], abs=0.2)  # a coarse grid stands for the integral
     assert own.nats > by_hand + np.log(0.9 / 8) - 1e-9
-    both = curves.belief(x.T @ x, x.T @ y, priors).nats
+    both = curves.curve_evidence(x.T @ x, x.T @ y, priors).nats
     assert both == pytest.approx(logsumexp(total) - np.log(2), abs=0.2)
 
 
@@ -96,7 +96,7 @@ def test_null_draws_have_the_evidence_of_noise(problem):
     for _ in range(40):
         b = design.columns.T @ rng.standard_normal(len(design.columns))
         parts = [(design.columns[:, c.columns], b[c.columns], c.basis.priors) for c in design.curves]
-        slow.append(max(curves.belief(own.T @ own, of, priors).nats for own, of, priors in parts))
+        slow.append(max(curves.curve_evidence(own.T @ own, of, priors).nats for own, of, priors in parts))
     assert np.median(slow) == pytest.approx(np.median(quick), abs=0.6)
     assert np.quantile(quick, 0.99) < 7.0
 
@@ -107,7 +107,7 @@ def test_each_unknown_kind_is_found_where_it_is(name):
     kind = hidden.KINDS[name]
     case = hidden.make(kind, 20.0, 1001, seconds=40.0, runs=2)
     problem = Problem(drives_of(case.recording), hidden.MODEL, hidden.USUAL)
-    rivalry = compare(problem, Naming((problem.fit_candidates((), {}),), {}, (), 1.0))
+    rivalry = compare(problem, SearchResult((problem.fit_candidates((), {}),), {}, (), 1.0))
     assert rivalry.rivals[0].curve.id == f"smooth.{kind.name}.{kind.covariate}"
     assert rivalry.lead > 20
 
@@ -116,7 +116,7 @@ def test_their_null_is_left_alone():
     """The kinds above share drives and noise, so they have one null."""
     case = hidden.make(hidden.KINDS["gully"], 20.0, 1001, seconds=40.0, runs=2)
     problem = Problem(drives_of(case.null), hidden.MODEL, hidden.USUAL)
-    rivalry = compare(problem, Naming((problem.fit_candidates((), {}),), {}, (), 1.0))
+    rivalry = compare(problem, SearchResult((problem.fit_candidates((), {}),), {}, (), 1.0))
     assert rivalry.winner is None
     assert false_alarm(problem, rivalry) > 0.01
 
@@ -125,14 +125,14 @@ def test_what_the_catalogue_explains_is_left_to_it():
     case = hidden.make(hidden.KINDS["gully"], 10.0, 1002, seconds=40.0, runs=2, gain_w=0.06)
     problem = Problem(drives_of(case.null), hidden.MODEL, hidden.USUAL)
     empty, right = problem.fit_candidates((), {}), problem.fit(["base.gain_w"], {})
-    rivalry = compare(problem, Naming((right, empty), {"base.gain_w": 1.0}, (), 0.0))
+    rivalry = compare(problem, SearchResult((right, empty), {"base.gain_w": 1.0}, (), 0.0))
     assert rivalry.winner is None
     assert rivalry.p_effects["base.gain_w"] > 0.95
     # Without the right effect the same drives look as if something unknown changed the yaw rate.
-    blind = compare(problem, Naming((empty,), {}, (), 1.0))
+    blind = compare(problem, SearchResult((empty,), {}, (), 1.0))
     assert blind.winner.curve.channel in ("w", "w_gain")
     assert blind.least < rivalry.least  # beside nothing there is no other form that a curve might draw
-    strong = Naming(
+    strong = SearchResult(
         (replace(right, log_likelihood=empty.log_likelihood + 12000.0), empty), {"base.gain_w": 1.0}, (), 0.0
     )
     assert compare(problem, strong).least > 5 * rivalry.least  # what its equation misses looks like curves
@@ -143,13 +143,13 @@ def test_a_curve_has_to_beat_those_that_speak_for_an_effect(monkeypatch):
     """Where the best curve is an effect in another form, what is next to it is no news from outside the catalogue."""
     case = hidden.make(hidden.KINDS["gully"], 20.0, 1001, seconds=40.0, runs=2)
     problem = Problem(drives_of(case.recording), hidden.MODEL, hidden.USUAL)
-    found = Naming((problem.fit_candidates((), {}),), {"base.gain_w": 0.0}, (), 1.0)
+    found = SearchResult((problem.fit_candidates((), {}),), {"base.gain_w": 0.0}, (), 1.0)
     first = compare(problem, found).rivals[0].curve.id
 
     def drawn(_self, _fit, curve, _belief):
         return {"base.gain_w": 1e3} if curve.id == first else {}
 
-    monkeypatch.setattr(Likeness, "drawn", drawn)
+    monkeypatch.setattr(EffectLikeness, "drawn", drawn)
     rivalry = compare(problem, found)
     assert rivalry.lead < 0
     assert rivalry.winner is None
@@ -169,10 +169,12 @@ def slipping():
 def test_effects_beside_a_curve_over_the_same_are_not_named(slipping):
     """What a curve beside them does as well, they only seem to do."""
     problem, bent = slipping
-    rivalry = compare(problem, Naming((bent, problem.fit_candidates((), {})), dict.fromkeys(bent.ids, 1.0), (), 0.0))
-    only = compare(problem, Naming((bent,), dict.fromkeys(bent.ids, 1.0), (), 0.0))
+    rivalry = compare(
+        problem, SearchResult((bent, problem.fit_candidates((), {})), dict.fromkeys(bent.ids, 1.0), (), 0.0)
+    )
+    only = compare(problem, SearchResult((bent,), dict.fromkeys(bent.ids, 1.0), (), 0.0))
     assert (only.winner.curve.id, only.winner.fit.ids) == ("smooth.w_gain.abs_w", bent.ids)
-    assert only.winner.worth < rivalry.winner.worth
+    assert only.winner.log_posterior < rivalry.winner.log_posterior
     assert max(only.p_effects.values()) < 0.01
 
 
@@ -191,14 +193,14 @@ def test_an_effect_is_part_of_a_curve_over_what_it_follows(problem, name, curve,
     fit = replace(fit, values=np.full(len(fit.terms), 0.1), settings=settings_of(fit.terms, [0.1] * len(fit.terms)))
     designs = Designs(problem, fit)
     (own,) = (c for c in designs.about(fit).curves if c.id == curve)
-    assert Likeness(problem, fit, designs).part_of(fit, own) == ({name} if part else set())
+    assert EffectLikeness(problem, fit, designs).part_of(fit, own) == ({name} if part else set())
 
 
 def test_a_finer_curve_leaves_little_of_a_step(problem):
     """Eight knots leave a half of a step between them; four times as many, which can do the same and more, do not."""
     design, fit = curves.Design(problem, ()), problem.fit_candidates((), {})
     (curve,) = (c for c in design.curves if c.id == "smooth.v_gain.time")
-    extension = Extension(fit, curve, curve.basis.priors[0], np.zeros(curve.basis.size), np.eye(curve.basis.size))
+    extension = FitWithCurve(fit, curve, curve.basis.priors[0], np.zeros(curve.basis.size), np.eye(curve.basis.size))
     drive = problem.drives[0]
     edged = replace(curve, basis=replace(curve.basis, knots=np.array([16.4, 16.41])))
     step = curves.raw_columns(drive, problem.model, (), [edged])[:, 1]
@@ -225,10 +227,10 @@ def test_a_curve_beside_nothing_is_one_over_rates_that_nothing_has_bent(slipping
     problem, bent = slipping
     names, empty = bent.ids, problem.fit_candidates((), {})
     assert all(bent.start[key] < -0.2 for key in (("base.dead_zone_w", "width"), ("base.gain_w", "gain")))
-    rivalry = compare(problem, Naming((bent, empty), dict.fromkeys(names, 1.0), (), 0.0))
-    alone = compare(problem, Naming((empty,), dict.fromkeys(names, 0.0), (), 0.0))
+    rivalry = compare(problem, SearchResult((bent, empty), dict.fromkeys(names, 1.0), (), 0.0))
+    alone = compare(problem, SearchResult((empty,), dict.fromkeys(names, 0.0), (), 0.0))
     assert (rivalry.winner.curve.id, rivalry.winner.fit.ids) == ("smooth.w_gain.abs_w", frozenset())
-    assert rivalry.winner.belief.nats == pytest.approx(alone.winner.belief.nats, abs=1e-6)
+    assert rivalry.winner.evidence.nats == pytest.approx(alone.winner.evidence.nats, abs=1e-6)
     assert max(rivalry.p_effects.values()) < 0.01
 
 
@@ -236,8 +238,8 @@ def test_a_curve_and_an_effect_of_the_catalogue_are_fitted_together():
     case = hidden.make(hidden.KINDS["corrugated floor"], 30.0, 1003, seconds=40.0, runs=2, gain_w=0.06)
     problem = Problem(drives_of(case.recording), hidden.MODEL, hidden.USUAL)
     right = problem.fit(["base.gain_w"], {})
-    best = compare(problem, Naming((right,), {"base.gain_w": 1.0}, (), 0.0)).rivals[0]
-    extension = extend(problem, best.fit, best.curve, best.belief.prior)
+    best = compare(problem, SearchResult((right,), {"base.gain_w": 1.0}, (), 0.0)).rivals[0]
+    extension = fit_with_curve(problem, best.fit, best.curve, best.evidence.prior)
     assert extension.fit.values[0] == pytest.approx(0.06, abs=4 * extension.fit.sds[0])
     assert sentences.shape(extension).startswith("periodic, period 2 pi/3, amplitude")
     size = shapes.shape_of(extension).size
@@ -257,9 +259,11 @@ def test_a_curve_and_effects_that_draw_the_same_are_fitted_no_worse_than_without
     both = problem.fit(["base.curvature_v", "base.dead_zone_v"], {})
     (curve,) = (c for c in curves.Design(problem, both.settings).curves if c.id == "smooth.v.v")
     free = curves.columns(problem, both.settings, [curve])
-    y, own = curves.taken_up(problem, both)
+    y, own = curves.own_span(problem, both)
     free = free - own @ (own.T @ free)
-    extension = extend(problem, both, curve, curves.belief(free.T @ free, free.T @ y, curve.basis.priors).prior)
+    extension = fit_with_curve(
+        problem, both, curve, curves.curve_evidence(free.T @ free, free.T @ y, curve.basis.priors).prior
+    )
     curved = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
     left = curved.residual(extension.fit.terms, extension.fit.values)
     assert -0.5 * left @ left > both.log_likelihood + 10
@@ -270,7 +274,7 @@ def drawn(law, sd):
     knots = np.linspace(0.0, 4.0, 8)
     basis = Basis("time", knots, {}, (), 0.0, 4.0)
     curve = curves.Curve("v", basis, slice(0, 8))
-    return Extension(None, curve, np.eye(8), np.array([law(k) for k in knots]), sd**2 * np.eye(8))
+    return FitWithCurve(None, curve, np.eye(8), np.array([law(k) for k in knots]), sd**2 * np.eye(8))
 
 
 @pytest.mark.parametrize(
@@ -328,7 +332,7 @@ def test_the_extended_model_leaves_nothing_to_find(carpet):
     case, criticism = carpet
     settings = tuple(setting for setting in criticism.settings if setting.id.startswith("smooth."))
     problem = Problem(drives_of(case.recording), replay.extend(hidden.MODEL, settings), hidden.USUAL)
-    assert compare(problem, Naming((problem.fit_candidates((), {}),), {}, (), 1.0)).lead < 0
+    assert compare(problem, SearchResult((problem.fit_candidates((), {}),), {}, (), 1.0)).lead < 0
 
 
 def test_columns_of_words_are_no_covariates_and_constant_ones_neither():

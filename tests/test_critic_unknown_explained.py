@@ -8,7 +8,7 @@ import pytest
 import unknown_effects as hidden
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.heldout.materiality import nearer
+from kurumaisu.critic.heldout.materiality import simulates_nearer
 from kurumaisu.critic.judge import explain_unknown
 from kurumaisu.critic.values.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
 from kurumaisu.params import shipped
@@ -30,20 +30,20 @@ def test_surprises_do_not_hide_that_the_chair_is_simulated_nearer(channels, low,
     """In one direction, and in none farther off."""
     worse = ChannelGain(LOST, RmseGain(0.1, 0.15, -0.05, -0.06, -0.04, "m"))
     one = gain(low)
-    assert nearer(replace(one, channels={**one.channels, "dy": worse}), channels) is near
+    assert simulates_nearer(replace(one, channels={**one.channels, "dy": worse}), channels) is near
 
 
 @pytest.mark.parametrize(("hi", "moved", "near"), [(-0.05, -0.1, False), (-0.05, 0.1, True), (0.1, -0.1, True)])
 def test_what_loses_density_for_sure_and_misses_the_place_as_well_is_not_nearer(hi, moved, near):
     path = {"position after 2 s": RmseGain(0.9, 0.9 - moved, moved, moved - 0.2, moved + 0.2, "m")}
     lost = replace(gain(0.01), log_density_per_sample=replace(LOST, hi90=hi), rmse=path)
-    assert nearer(lost, ("dx",)) is near
+    assert simulates_nearer(lost, ("dx",)) is near
 
 
 def test_what_is_not_known_confirms_nothing():
-    assert not nearer(None, ("dx",))
-    assert not nearer(gain(0.01), ("dtheta",))
-    assert not nearer(gain(0.01), ("dy",))
+    assert not simulates_nearer(None, ("dx",))
+    assert not simulates_nearer(gain(0.01), ("dtheta",))
+    assert not simulates_nearer(gain(0.01), ("dy",))
 
 
 @pytest.mark.parametrize(("winner", "nats"), [("a curve", 5.0), (None, 62.0)])
@@ -61,7 +61,7 @@ def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, leas
     """Nothing is extended by what did not hold, and no curve is certain."""
     recording = hidden.make(hidden.KINDS["carpet edge"], 30.0, 1003, seconds=30.0, runs=2).recording
     monkeypatch.setattr(explain_unknown, "confirmed", lambda worth, nats, free: False)
-    monkeypatch.setattr(explain_unknown, "nearer", lambda worth, channels: False)
+    monkeypatch.setattr(explain_unknown, "simulates_nearer", lambda worth, channels: False)
     monkeypatch.setattr(explain_unknown, "NO_NOISE", least)
     found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None)
     assert (found.verdict.verdict, found.verdict.causes) == (verdict, ())

@@ -7,23 +7,25 @@ import numpy as np
 import pytest
 import unknown_effects as hidden
 
-from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.unknown import sentences
 from kurumaisu.critic.unknown.bases import Basis, knots_of
 from kurumaisu.critic.unknown.comparison import compare
 from kurumaisu.critic.unknown.designs import Designs
-from kurumaisu.critic.unknown.effect_likeness import Likeness
-from kurumaisu.critic.unknown.periods import girth
+from kurumaisu.critic.unknown.effect_likeness import EffectLikeness
+from kurumaisu.critic.unknown.periods import wave_period
 from kurumaisu.effects import Motion
 
 GIRTH = 1.137  # [m]
 
 
 def problem_of(recording):
-    return Problem([informed(prepare(run, hidden.MODEL), run) for run in recording.runs], hidden.MODEL, hidden.USUAL)
+    return Problem(
+        [with_covariates(prepare(run, hidden.MODEL), run) for run in recording.runs], hidden.MODEL, hidden.USUAL
+    )
 
 
 def dent(s, a, b):
@@ -41,7 +43,7 @@ def dented():
 def test_the_period_of_a_flat_spot_is_that_of_a_turn(dented):
     """Of the way as it was made: each overtone is as large, and out of step after some turns."""
     problem, gain, _ = dented
-    found, _ = girth(problem, gain.settings)
+    found, _ = wave_period(problem, gain.settings)
     assert found == pytest.approx(GIRTH, rel=0.008)
 
 
@@ -56,7 +58,7 @@ def test_waves_come_as_often_beside_an_effect_that_makes_more_of_the_way(dented)
 
 def test_what_a_flat_spot_costs_on_the_mean_is_no_certain_gain_beside_its_waves(dented):
     problem, gain, empty = dented
-    rivalry = compare(problem, Naming((gain, empty), {"base.gain_v": 1.0}, (), 0.0))
+    rivalry = compare(problem, SearchResult((gain, empty), {"base.gain_v": 1.0}, (), 0.0))
     assert rivalry.winner.curve.id == "smooth.v_gain.distance"
     assert rivalry.p_effects["base.gain_v"] < 0.9
     assert {rival.curve.basis.harmonics for rival in rivalry.rivals if not rival.fit.ids} >= {4, 12}
@@ -65,11 +67,11 @@ def test_what_a_flat_spot_costs_on_the_mean_is_no_certain_gain_beside_its_waves(
 def test_a_narrow_gust_is_drawn_by_a_curve_that_bends_often():
     gust = hidden.Kind(2, "y", lambda s, a, b: hidden.bump((s.y - 0.3) / 0.12))
     problem = problem_of(hidden.make(gust, 40.0, 1021, seconds=60.0).recording)
-    rivalry = compare(problem, Naming((problem.fit_candidates((), {}),), {}, (), 1.0))
-    usual = max(r.worth for r in rivalry.rivals if len(r.curve.basis.knots) == 8)
+    rivalry = compare(problem, SearchResult((problem.fit_candidates((), {}),), {}, (), 1.0))
+    usual = max(r.log_posterior for r in rivalry.rivals if len(r.curve.basis.knots) == 8)
     assert (sentences.channel(rivalry.winner.curve), rivalry.winner.curve.basis.covariate) == ("base.w", "y")
     assert len(rivalry.winner.curve.basis.knots) == 22
-    assert rivalry.winner.worth > usual + 10
+    assert rivalry.winner.log_posterior > usual + 10
 
 
 def test_a_top_speed_without_a_corner_is_one_though_a_bent_law_mends_it():
@@ -79,8 +81,8 @@ def test_a_top_speed_without_a_corner_is_one_though_a_bent_law_mends_it():
     sharp = {one.id: one for one in problem.candidates if one.usual}  # limits with a corner
     mended = problem.fit_candidates([sharp["base.saturation"], sharp["base.curvature_v"]], {})
     designs = Designs(problem, mended)
-    rivals = compare(problem, Naming((mended, empty), {}, (), 0.0)).rivals
-    drawn = [Likeness(problem, mended, designs).drawn_alone(r.fit, r.curve, r.belief) for r in rivals[:3]]
+    rivals = compare(problem, SearchResult((mended, empty), {}, (), 0.0)).rivals
+    drawn = [EffectLikeness(problem, mended, designs).drawn_alone(r.fit, r.curve, r.evidence) for r in rivals[:3]]
     assert any("base.saturation" in names for names in drawn)
 
 

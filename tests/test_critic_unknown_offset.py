@@ -6,13 +6,13 @@ import unknown_effects as hidden
 import yaml
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.unknown import sentences
 from kurumaisu.critic.unknown.comparison import compare
-from kurumaisu.critic.unknown.joint_fit import extend
+from kurumaisu.critic.unknown.joint_fit import fit_with_curve
 from kurumaisu.params import load_model, shipped
 
 
@@ -20,10 +20,12 @@ from kurumaisu.params import load_model, shipped
 def test_what_follows_nothing_is_no_curve_over_something(channel, name):
     drift = hidden.Kind(channel, "moving", lambda s, a, b: 1.0)
     case = hidden.make(drift, 12.0, 1007, seconds=40.0, runs=2)
-    problem = Problem([informed(prepare(r, hidden.MODEL), r) for r in case.recording.runs], hidden.MODEL, hidden.USUAL)
-    best = compare(problem, Naming((problem.fit_candidates((), {}),), {}, (), 1.0)).rivals[0]
+    problem = Problem(
+        [with_covariates(prepare(r, hidden.MODEL), r) for r in case.recording.runs], hidden.MODEL, hidden.USUAL
+    )
+    best = compare(problem, SearchResult((problem.fit_candidates((), {}),), {}, (), 1.0)).rivals[0]
     assert best.curve.id == f"smooth.{name}.moving"
-    extension = extend(problem, best.fit, best.curve, best.belief.prior)
+    extension = fit_with_curve(problem, best.fit, best.curve, best.evidence.prior)
     assert extension.coefficients[0] == pytest.approx(case.size, rel=0.25)
     assert sentences.shape(extension).startswith("constant, ")
     assert "follows no known quantity" in sentences.headline(extension)

@@ -64,6 +64,6 @@ def test_a_sparse_basis_does_what_it_does_written_out(drive, channel):
 def test_waves_that_are_turned_on_from_one_to_the_next_are_waves():
     way = np.linspace(0.0, 80.0, 500)
     waves = np.linspace(0.4, 3.3, 37)  # more than go at once, and no multiple of it
-    waved = np.column_stack(list(periods._waved(way, waves))).reshape(len(way), -1, 2)
+    waved = np.column_stack(list(periods._waves(way, waves))).reshape(len(way), -1, 2)
     phase = 2 * np.pi * np.multiply.outer(way, waves)
     np.testing.assert_allclose(waved, np.stack([np.cos(phase), np.sin(phase)], axis=-1), atol=1e-11)

@@ -14,7 +14,7 @@ from kurumaisu.critic.engine.search import search
 from kurumaisu.critic.unknown import comparison
 from kurumaisu.critic.unknown.comparison import compare
 from kurumaisu.critic.unknown.designs import Designs
-from kurumaisu.critic.unknown.effect_likeness import Likeness
+from kurumaisu.critic.unknown.effect_likeness import EffectLikeness
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -37,10 +37,10 @@ def test_a_curve_of_the_yaw_rate_draws_both_together(found):
     designs = Designs(problem, naming.best)
     alone = [rival for rival in compare(problem, naming).rivals if not rival.fit.ids]
     other = next(rival for rival in alone if rival.curve.channel == "v")
-    likeness = Likeness(problem, naming.best, designs)
-    assert set(likeness.drawn_together(alone[0].fit, alone[0].curve, alone[0].belief)) == set(TWO)
-    assert likeness.drawn_together(other.fit, other.curve, other.belief) == {}
-    assert likeness.drawn_together(naming.best, alone[0].curve, alone[0].belief) == {}  # nothing is missing there
+    likeness = EffectLikeness(problem, naming.best, designs)
+    assert set(likeness.drawn_together(alone[0].fit, alone[0].curve, alone[0].evidence)) == set(TWO)
+    assert likeness.drawn_together(other.fit, other.curve, other.evidence) == {}
+    assert likeness.drawn_together(naming.best, alone[0].curve, alone[0].evidence) == {}  # nothing is missing there
 
 
 def test_two_effects_are_believed_more_where_a_curve_that_explains_less_is_them(found, monkeypatch):

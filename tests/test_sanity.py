@@ -70,7 +70,7 @@ def test_the_warthogs_poses_wait_and_the_rest_of_them_do_not():
     told = {}
     for name, poses in (("all", log.all_poses), ("kept", log.pose)):
         rows = warthog.between(poses, 134.0, 218.0)
-        told[name] = pose_stamps.words(Series(rows[:, 0], rows[:, 1:], ("x", "y", "theta")))
+        told[name] = pose_stamps.problem(Series(rows[:, 0], rows[:, 1:], ("x", "y", "theta")))
     assert told["kept"] is None
     assert "times of arrival" in told["all"]
 
@@ -131,7 +131,7 @@ def test_poses_that_are_held_while_it_moves_are_said_beside_rests():
 def test_the_lag_of_white_noise_behind_itself_is_found():
     rng = np.random.default_rng(1)
     a = rng.normal(size=2000)
-    found = rates.likeness(np.roll(a, 7), a, (0.01, 0.01), 5.0)
+    found = rates.shift_correlation(np.roll(a, 7), a, (0.01, 0.01), 5.0)
     at = int(np.argmax(found.nats))
     assert found.lags[at] == pytest.approx(0.7)
     assert found.correlation[at] == pytest.approx(1.0, abs=0.01)

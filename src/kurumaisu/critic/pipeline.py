@@ -7,26 +7,26 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import Drive, driven, prepare
 from kurumaisu.critic.base.replay import model_of
-from kurumaisu.critic.data.elapsed import timed
+from kurumaisu.critic.data.elapsed import with_elapsed_time
 from kurumaisu.critic.data.long_runs import bounded
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment import proposal as next_experiment
 from kurumaisu.critic.heldout import drive_gain, extension_gain
 from kurumaisu.critic.judge import excitation, explain, explain_unknown
-from kurumaisu.critic.judge.decide import Decision, decide, scatter
+from kurumaisu.critic.judge.decide import Decision, decide, noise_residuals
 from kurumaisu.critic.judge.extended_model import write_extended
 from kurumaisu.critic.judge.forecast import forecast_of
-from kurumaisu.critic.judge.held_out_pruning import in_turn, pruned, unmet
-from kurumaisu.critic.judge.merge import with_laser
+from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
+from kurumaisu.critic.judge.merge import with_scans
 from kurumaisu.critic.judge.reference_point import from_base_link
-from kurumaisu.critic.judge.scan_verdict import criticise as look
+from kurumaisu.critic.judge.scan_verdict import criticise_scans as look
 from kurumaisu.critic.noise import base_noise
 from kurumaisu.critic.predict import predictions
 from kurumaisu.critic.predict.motion import Settings
-from kurumaisu.critic.processes.laser_process import aside
+from kurumaisu.critic.processes.laser_process import criticise_aside
 from kurumaisu.critic.report.page import write_report
 from kurumaisu.critic.sanity import early_stamps, examination
 from kurumaisu.critic.values.criticism import Criticism
@@ -66,8 +66,8 @@ def criticise(
     moved = any(driven(run) for run in recording.runs if run.name in recording.train)
     if not moved and all(run.scan is None for run in recording.runs):
         raise Error(f"{recording.runs[0].name}: has neither voltages nor commands nor odometry, and no scans either")
-    with aside(recording, model, model_file, ids) as scans_say:
-        whole = timed(recording)
+    with criticise_aside(recording, model, model_file, ids) as scans_say:
+        whole = with_elapsed_time(recording)
         base, extension = _criticise_base(whole, model, progress, ids) if moved else (None, _UNDRIVEN)
         if base is not None and base.verdict.verdict == "invalid_data":
             return base
@@ -76,7 +76,7 @@ def criticise(
     scans, settings = from_base_link(
         found.verdict.causes, scans, recording, model, lambda moved: look(moved, model, progress, ids)
     )
-    found = with_laser(found, scans)
+    found = with_scans(found, scans)
     found = _with_worth(found, whole, replace(extension, scans=settings), progress, slam=slam)
     if not predictions.asked(recording):
         return found
@@ -106,7 +106,7 @@ def _drives(recording: Recording, model: Model) -> dict[str, Drive]:
     drives = {}
     for run in filter(driven, recording.runs):
         try:
-            drives[run.name] = informed(prepare(run, model), run)
+            drives[run.name] = with_covariates(prepare(run, model), run)
         except Error:
             if not _withheld(recording, run):
                 raise
@@ -122,18 +122,20 @@ def _criticise_base(
         ids = beside_odometry(ids)
     rough, first = _begun(recording, model, drives, ids)
     by = early_stamps.lead(first, progress)
-    if by > early_stamps.taste([run for run in recording.runs if run.name in drives]):
-        return explain.invalid(recording, model, [early_stamps.words(by)]), _UNDRIVEN
+    if by > early_stamps.tolerated_lead([run for run in recording.runs if run.name in drives]):
+        return explain.invalid(recording, model, [early_stamps.problem(by)]), _UNDRIVEN
     if by > 0:
         recording = replace(recording, problems=(*recording.problems, early_stamps.note(by)))
-        drives = {name: early_stamps.mended(drive, by) for name, drive in drives.items()}
+        drives = {name: early_stamps.restamped(drive, by) for name, drive in drives.items()}
         rough, first = _begun(recording, model, drives, ids)
     train = list(first.drives)
     test = [drives[name] for name in recording.test if name in drives]
     made = decide(first, recording.truth, progress)
 
     progress("measuring the gain on held-out drives")
-    baseline = scatter(rough, rough.fit((), {}), recording.truth, project=False).estimate(made.problem.noise).noise
+    baseline = (
+        noise_residuals(rough, rough.fit((), {}), recording.truth, project=False).estimate(made.problem.noise).noise
+    )
     withheld = [drives[run.name] for run in recording.runs if run.name in drives and _withheld(recording, run)]
     names = {drive.name for drive in withheld}
     whole = [drive for drive in test if drive.name not in names]
@@ -142,16 +144,18 @@ def _criticise_base(
     def worth_of(one: Decision) -> Gain:
         return drive_gain.measure(model, splits, one.refit, baseline, one.problem.noise)
 
-    made, held = pruned(made, worth_of(made) if splits and made.something else None, worth_of)
+    made, held = confirmed_part(made, worth_of(made) if splits and made.something else None, worth_of)
     if whole and len(train) > 1:
         more = [*drive_gain.folds(train, ()), *splits]
-        held = in_turn(made, held, lambda: drive_gain.measure(model, more, made.refit, baseline, made.problem.noise))
-    made = replace(made, unmet=bool(whole) and unmet(made, held, whole))
+        held = leave_one_out(
+            made, held, lambda: drive_gain.measure(model, more, made.refit, baseline, made.problem.noise)
+        )
+    made = replace(made, untested=bool(whole) and untested(made, held, whole))
     progress("planning the next drive")
     scripts = next_experiment.drives()
     proposal = next_experiment.propose(made.problem, made.found, scripts)
     judge = explain.criticism if made.beyond.extension is None else explain_unknown.criticism
-    judged = excitation.told(judge(recording, made, held, train + test, proposal), made, train, scripts)
+    judged = excitation.with_shortcomings(judge(recording, made, held, train + test, proposal), made, train, scripts)
     forecast = forecast_of(made, judged.settings, baseline)
 
     def refit(name: str) -> Settings:
@@ -167,7 +171,7 @@ def _begun(
 ) -> tuple[Problem, Problem]:
     """Return the problem of the drives to fit, with any noise and with a first estimate of theirs."""
     rough = Problem([drives[name] for name in recording.train if name in drives], model, base_noise.START, ids=ids)
-    left = scatter(rough, rough.fit((), {}), recording.truth, project=True)
+    left = noise_residuals(rough, rough.fit((), {}), recording.truth, project=True)
     return rough, rough.changed(noise=left.estimate().noise)
 
 

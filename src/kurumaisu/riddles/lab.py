@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu.critic.experiment.rehearsal import Manner, Rehearsal
 from kurumaisu.critic.experiment.rehearse import manner
-from kurumaisu.critic.judge.scan_verdict import criticise as criticise_laser
+from kurumaisu.critic.judge.scan_verdict import criticise_scans as criticise_laser
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import LaserMount, Recording, Series
 from kurumaisu.experiments import Place, Script, shipped_script

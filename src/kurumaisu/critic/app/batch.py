@@ -11,7 +11,7 @@ from typing import Any
 
 from kurumaisu.critic.app.display import Display
 from kurumaisu.critic.app.job import Job, Outcome, run
-from kurumaisu.critic.processes.worker import Progress, Worker
+from kurumaisu.critic.processes.worker import ProgressMessage, Worker
 from kurumaisu.errors import Error
 
 _TICK = 0.5  # [s] between looks at the clock of the display
@@ -35,7 +35,7 @@ def on_processes(jobs: Sequence[Job], count: int, display: Display) -> Iterator[
                 assert isinstance(ready, Connection)
                 worker, job = busy[ready]
                 message = _received(worker, job)
-                if isinstance(message, Progress):
+                if isinstance(message, ProgressMessage):
                     display.tell(job.name, message.message)
                     continue
                 del busy[ready]

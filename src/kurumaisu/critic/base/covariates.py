@@ -12,7 +12,7 @@ from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.types import FloatArray
 
 
-def informed(drive: Drive, run: Run) -> Drive:
+def with_covariates(drive: Drive, run: Run) -> Drive:
     """Return the drive with what its run knows on the grid.
 
     Poses are the reference's, not the simulated ones: those drift away from where the chair was. Voltages are held,
@@ -20,10 +20,10 @@ def informed(drive: Drive, run: Run) -> Drive:
     """
     middle = _middle(drive)
     places = {name: np.interp(middle, drive.times, drive.poses[:, i]) for i, name in enumerate(("x", "y", "heading"))}
-    return replace(drive, known={**beside(drive, run).known, **places})
+    return replace(drive, known={**with_covariates_but_place(drive, run).known, **places})
 
 
-def beside(drive: Drive, run: Run) -> Drive:
+def with_covariates_but_place(drive: Drive, run: Run) -> Drive:
     """Return the drive with what its run knows on the grid, but for where the chair was."""
     middle = _middle(drive)
     known = {name: np.interp(middle, series.t, series.values[:, 0]) for name, series in run.covariates.items()}

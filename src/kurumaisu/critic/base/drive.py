@@ -12,8 +12,8 @@ import numpy as np
 
 from kurumaisu import _core, geometry
 from kurumaisu._core import AxisInverse
-from kurumaisu.critic.base.pose_paths import ways
-from kurumaisu.critic.base.voltage_signs import meant
+from kurumaisu.critic.base.pose_paths import pose_paths
+from kurumaisu.critic.base.voltage_signs import voltage_signs
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.effects import LATE
 from kurumaisu.errors import Error
@@ -96,11 +96,11 @@ class Drive:
         return np.asarray(np.where(moved > 0, moved, usual))
 
     @cached_property
-    def ways(self) -> FloatArray:
-        """How the chair went from each pose to the next, (m, 8): see ways.ways."""
+    def pose_paths(self) -> FloatArray:
+        """How the chair went from each pose to the next, (m, 8): see pose_paths."""
         edges = self.start + GRID * np.arange(len(self.v) + 1)
         asked = _core.integrate(self.v, self.w, np.full(len(self.v), GRID), [0.0, 0.0, 0.0])
-        return ways(self.times, self.poses, edges, asked)
+        return pose_paths(self.times, self.poses, edges, asked)
 
     @property
     def _moving(self) -> FloatArray:
@@ -215,7 +215,7 @@ def _inputs(run: Run, model: Model) -> tuple[str, FloatArray, FloatArray, FloatA
 def from_voltages(run: Run, model: Model) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return t [s] and the rates v, w that a run's voltages stand for, all (n,)."""
     assert run.voltage is not None
-    signs = meant(run.voltage, run.command, run.pose, model)
+    signs = voltage_signs(run.voltage, run.command, run.pose, model)
     v, w = (
         AxisInverse(law).rates(run.voltage.column(volts), signs[:, i])
         for i, (law, volts) in enumerate(((model.translation, "v_f"), (model.steering, "v_s")))

@@ -11,7 +11,7 @@ from kurumaisu.types import FloatArray
 _POINTS = 16  # of each increment: commands change once in it, seldom twice
 
 
-def ways(times: FloatArray, poses: FloatArray, edges: FloatArray, path: FloatArray) -> FloatArray:
+def pose_paths(times: FloatArray, poses: FloatArray, edges: FloatArray, path: FloatArray) -> FloatArray:
     """Return how a chair went from each reference pose to the next, (m, 8).
 
     Means of the heading's cosine and sine and of the way x, y [m] that lies ahead, in the frame of the first pose; and

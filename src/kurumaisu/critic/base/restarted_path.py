@@ -18,7 +18,7 @@ PICTURE = 0.1  # [s] between the poses drawn
 RESTART = 10.0
 
 
-def restarted(drive: Drive, path: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
+def restarted_path(drive: Drive, path: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
     """Yield the pieces of a simulated path (n, 3): rows of the drive's poses, and poses (k, 3) in the map there.
 
     The last row of a piece is the first of the next: there the one has ended, and the other begins.

@@ -17,7 +17,7 @@ _SIDES = (1.0, -1.0)
 _CHANGE = 0.1  # [s] on the wrong branch that a change from one to the other costs
 
 
-def meant(voltage: Series, command: Series | None, pose: Series | None, model: Model) -> FloatArray:
+def voltage_signs(voltage: Series, command: Series | None, pose: Series | None, model: Model) -> FloatArray:
     """Return the signs of v and w that voltages stand for, (n, 2), nan where nothing tells.
 
     They are those of the rates given beside the voltages, else of the command, else of what the chair made of them.
@@ -30,11 +30,11 @@ def meant(voltage: Series, command: Series | None, pose: Series | None, model: M
             held = np.searchsorted(command.t, voltage.t, side="right") - 1
             signs[:, i] = np.where(held >= 0, np.sign(command.column(rate)[np.maximum(held, 0)]), 0.0)
         elif pose is not None and len(pose.t) > 1:
-            signs[:, i] = _followed(law, voltage.t, voltage.column(volts), pose, i)
+            signs[:, i] = _signs_of_motion(law, voltage.t, voltage.column(volts), pose, i)
     return signs
 
 
-def _followed(law: AxisLaw, times: FloatArray, volts: FloatArray, pose: Series, channel: int) -> FloatArray:
+def _signs_of_motion(law: AxisLaw, times: FloatArray, volts: FloatArray, pose: Series, channel: int) -> FloatArray:
     """Return the signs (n,) of the branches of a law along which the chair moved, nan where there is but one.
 
     Of all ways along the branches, that which lies nearest to the motion; each change costs something, for motion
@@ -50,11 +50,11 @@ def _followed(law: AxisLaw, times: FloatArray, volts: FloatArray, pose: Series, 
     gap = float(np.median(both[undecided, 0] - both[undecided, 1]))
     rests = (volts[1:] == 0) | (volts[:-1] == 0)
     prices = np.where(np.diff(volts) == 0, np.inf, np.where(rests, 0.0, _CHANGE * gap**2))
-    chosen = _nearest_way(errors, prices)
+    chosen = _least_cost_branches(errors, prices)
     return np.where(undecided, np.array(_SIDES)[chosen], np.nan)
 
 
-def _nearest_way(errors: FloatArray, prices: FloatArray) -> IntArray:
+def _least_cost_branches(errors: FloatArray, prices: FloatArray) -> IntArray:
     """Return which of two states (n,) has the least sum of errors (n, 2) and prices (n - 1,) of changes."""
     total = errors[0]
     came = np.zeros(errors.shape, dtype=np.int64)

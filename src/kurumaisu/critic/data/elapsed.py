@@ -13,7 +13,7 @@ from kurumaisu.critic.values.recording import Recording, Run, Series
 _FEWEST = 2  # runs to learn from; one by itself has a time already
 
 
-def timed(recording: Recording) -> Recording:
+def with_elapsed_time(recording: Recording) -> Recording:
     """Return the recording with the time since its first run began as a covariate of each run.
 
     Runs follow each other as they are listed: by their stamps if these go on from one to the next, else, where each

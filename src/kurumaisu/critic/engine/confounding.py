@@ -24,7 +24,7 @@ _CLOSELY = 3.0  # times as closely as what it explains shows, from which a size 
 _TINY = 1e-9  # posterior of what no set has
 
 
-class Posterior:
+class SetPosterior:
     """Sets of effects, best first, and how likely each is; p: of each effect."""
 
     def __init__(self, ranked: Sequence[Fit], weights: FloatArray) -> None:
@@ -49,7 +49,7 @@ class Posterior:
         return one * rest > _RATHER * both * none
 
 
-def confounded(posterior: Posterior, p: Mapping[str, float] | None = None) -> tuple[tuple[str, ...], ...]:
+def confounded(posterior: SetPosterior, p: Mapping[str, float] | None = None) -> tuple[tuple[str, ...], ...]:
     """Return, for each uncertain effect of the best set, the set with those that could stand in, if one must act.
 
     p: of each effect, where more is known of it than the sets say, such as what curves do.
@@ -72,7 +72,7 @@ def confounded(posterior: Posterior, p: Mapping[str, float] | None = None) -> tu
     return tuple(tuple(sorted(_likeliest(posterior, group) | _as_good(posterior, group))) for group in kept)
 
 
-def _likeliest(posterior: Posterior, group: set[str]) -> set[str]:
+def _likeliest(posterior: SetPosterior, group: set[str]) -> set[str]:
     """Return a set without those of its members that all together act less than once in twenty, two at least."""
     ordered = sorted(group, key=lambda name: (posterior.p[name], name))
     left_out = np.cumsum([posterior.p[name] for name in ordered])
@@ -80,7 +80,7 @@ def _likeliest(posterior: Posterior, group: set[str]) -> set[str]:
     return set(ordered[few:])
 
 
-def _as_good(posterior: Posterior, group: set[str]) -> set[str]:
+def _as_good(posterior: SetPosterior, group: set[str]) -> set[str]:
     """Return what explains the drives as well as a member of the best set does, in its place, though less likely.
 
     Before the data its form may have been the less likely one: nobody who drove so could know. What has a size for
@@ -94,7 +94,7 @@ def _as_good(posterior: Posterior, group: set[str]) -> set[str]:
     return {name for fit, name in likely if not _by_chance(posterior, fit, name)}
 
 
-def _by_chance(posterior: Posterior, fit: Fit, name: str) -> bool:
+def _by_chance(posterior: SetPosterior, fit: Fit, name: str) -> bool:
     """Tell whether a size of an effect must be met far more closely than what it explains would show."""
     nothing = next((other for other in posterior.ranked if not other.ids), fit)
     z = np.sqrt(2 * max(fit.log_likelihood - nothing.log_likelihood, 0.0))
@@ -107,14 +107,14 @@ def _explained(fit: Fit) -> float:
     return fit.log_likelihood - 0.5 * fit.sizes
 
 
-def _needed(posterior: Posterior, group: set[str]) -> bool:
+def _needed(posterior: SetPosterior, group: set[str]) -> bool:
     """Tell whether it is no chance leaving that a group explains: what has none of it is out of the question."""
     rest = posterior.ranked[0].ids - group
     without = (w for w, fit in zip(posterior.weights, posterior.ranked, strict=True) if fit.ids <= rest)
     return bool(sum(without) < _CHANCE)
 
 
-def _alone(posterior: Posterior, name: str) -> set[str]:
+def _alone(posterior: SetPosterior, name: str) -> set[str]:
     """Return an effect with those that do alone what it does: what needs others beside it is another story."""
     best = posterior.ranked[0]
     without = best.ids - {name}
@@ -127,7 +127,7 @@ def _alone(posterior: Posterior, name: str) -> set[str]:
     return group
 
 
-def _exchanged(posterior: Posterior, name: str) -> frozenset[str]:
+def _exchanged(posterior: SetPosterior, name: str) -> frozenset[str]:
     """Return the effects that do in the place of one nearly as likely what it does, though they act beside it as often.
 
     Where many do, as at a single speed, any two of them explain the drives as well.
@@ -138,7 +138,7 @@ def _exchanged(posterior: Posterior, name: str) -> frozenset[str]:
     return frozenset[str]().union(*(own for own in likely if len(own) == 1))
 
 
-def _with_others(posterior: Posterior, name: str, group: set[str]) -> set[str]:
+def _with_others(posterior: SetPosterior, name: str, group: set[str]) -> set[str]:
     """Return the set with effects that do together what it does, the likeliest sets first, until one must act."""
     certain = {other for other, p in posterior.p.items() if p >= NAMED}
     for fit in posterior.ranked:

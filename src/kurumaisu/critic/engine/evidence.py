@@ -24,9 +24,9 @@ from kurumaisu.critic.engine.catalogue import (
     settings_of,
     showing,
 )
-from kurumaisu.critic.engine.form_error import Missed, Muted
-from kurumaisu.critic.engine.start_values import Teeth
-from kurumaisu.critic.engine.step_likelihood import Comb, Walked
+from kurumaisu.critic.engine.form_error import FormError, FormErrorWhitener
+from kurumaisu.critic.engine.start_values import StartValues
+from kurumaisu.critic.engine.step_likelihood import StepLikelihood, Walked
 from kurumaisu.critic.noise.base_noise import Noise, whitener
 from kurumaisu.critic.values.prior import Z_USUAL, in_proportion, log_prior, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
@@ -34,7 +34,7 @@ from kurumaisu.types import FloatArray
 
 _DERIVATIVE = 0.25  # finite differences about a fit, in units of a term's step
 _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole range, with many peaks
-_ROUGH_DERIVATIVE = 1e-4  # the same of what has a comb of likely values: right between its teeth
+_ROUGH_DERIVATIVE = 1e-4  # the same of what has many likely values: right between its peaks
 _AT_WILL = float(np.log(2.0))  # [nat] of a size beyond some, which every other one is
 _LARGER = 0.5  # by this share such sizes are made larger, to see it
 _ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
@@ -89,7 +89,7 @@ class Problem:
         terms: tuple[Term, ...] | None = None,
         ids: frozenset[str] | None = None,
         known: replay.Increments | None = None,
-        missed: Missed | None = None,
+        missed: FormError | None = None,
     ) -> None:
         """Take terms: those that such drives can show, where somebody has found them out; ids: effects that may act.
 
@@ -102,7 +102,7 @@ class Problem:
         self.ids = ids
         self.missed = missed
         self._known = known or replay.Increments(model)
-        self._whiteners: dict[int, tuple[Drive, Whitener, Muted | None]] = {}
+        self._whiteners: dict[int, tuple[Drive, Whitener, FormErrorWhitener | None]] = {}
         self._walked: Walked = {}
 
     def changed(
@@ -111,7 +111,7 @@ class Problem:
         drives: Sequence[Drive] | None = None,
         model: Model | None = None,
         noise: Noise | None = None,
-        missed: Missed | None = None,
+        missed: FormError | None = None,
     ) -> Problem:
         """Return the problem, with the same terms, of other drives, another model or noise, or with more missed."""
         known = None if model is not None else self._known
@@ -181,7 +181,7 @@ class Problem:
         if id(drive) not in self._whiteners:
             white, muted = whitener(drive, self.noise), None
             if self.missed is not None:
-                muted = Muted(self.missed.marks(partial(self.simulated, drive), white.whiten))
+                muted = FormErrorWhitener(self.missed.marks(partial(self.simulated, drive), white.whiten))
             self._whiteners[id(drive)] = drive, white, muted
         _, white, muted = self._whiteners[id(drive)]
         columns = white.whiten(columns)
@@ -204,7 +204,8 @@ class Problem:
             y = self.residual((), np.empty(0))
             likelihood = -0.5 * float(y @ y)
             return Fit(frozenset(), (), np.empty(0), np.empty(0), (), likelihood, likelihood)
-        solution = self.teeth.likeliest(terms, least_squares.least_squares(self, terms, self.teeth.first(terms, start)))
+        begun = least_squares.least_squares(self, terms, self.start_values.first(terms, start))
+        solution = self.start_values.likeliest(terms, begun)
         costs = self._occam(ordered, terms, solution)
         return Fit(
             frozenset(ordered),
@@ -217,9 +218,9 @@ class Problem:
         )
 
     @cached_property
-    def teeth(self) -> Teeth:
-        """Return what finds first values, and those of what has a comb of likely ones."""
-        return Teeth(self, lambda: Comb(self.drives, self.model, self.noise, self._walked))
+    def start_values(self) -> StartValues:
+        """Return what finds first values, and those of what has many likely values."""
+        return StartValues(self, lambda: StepLikelihood(self.drives, self.model, self.noise, self._walked))
 
     def _occam(self, chosen: Sequence[Candidate], terms: Sequence[Term], solution: least_squares.Solution) -> float:
         """Return what the set costs, in nats: Laplace's approximation about the fit, with the prior of each signal."""
@@ -233,7 +234,7 @@ class Problem:
             size = self._amplitudes(terms, solution, loud)
             ways = _ROUGH_WAYS if candidate.rough else 0.0
             size -= 0.0 if effects.by_id(candidate.id).separable else _proportion(terms, solution, loud)
-            cost += max(ways + size, _teeth(terms, solution, loud))
+            cost += max(ways + size, _step_cost(terms, solution, loud))
         if len(free) > 1:
             unit = solution.slopes[:, free] / np.maximum(np.linalg.norm(solution.slopes[:, free], axis=0), 1e-9)
             cost += 0.5 * float(np.linalg.slogdet(unit.T @ unit + np.eye(len(free)) / Z_USUAL**2)[1])
@@ -339,7 +340,7 @@ def _proportion(terms: Sequence[Term], solution: least_squares.Solution, loud: S
     return in_proportion(sizes, spread, own.T @ own)
 
 
-def _teeth(terms: Sequence[Term], solution: least_squares.Solution, loud: Sequence[int]) -> float:
+def _step_cost(terms: Sequence[Term], solution: least_squares.Solution, loud: Sequence[int]) -> float:
     """Return the cost of sizes that the data know so closely: by chance, one out of many would fit as well.
 
     A threshold that is met by little, too: it could be anywhere, and is where the drives just reach it.

@@ -15,7 +15,7 @@ Settings = tuple[EffectSetting, ...]
 
 
 @dataclass(frozen=True)
-class Missed:
+class FormError:
     """Marks by which a run may be off, each by a normal share of its own, but for what a fit does itself.
 
     here: effects as they act; moved: effects as they would with another size or shape, whether that counts only where
@@ -35,7 +35,7 @@ class Missed:
         own = [change(here, simulated(settings)) for settings in self.near]
         marks = [sd * change(here, simulated(settings), held_back=only) for settings, only, sd in self.moved]
         white = whiten(np.column_stack([*own, *marks]))
-        return beside(white[:, : len(own)], white[:, len(own) :])
+        return outside_span(white[:, : len(own)], white[:, len(own) :])
 
 
 def change(here: FloatArray, there: FloatArray, *, held_back: bool = False) -> FloatArray:
@@ -44,13 +44,13 @@ def change(here: FloatArray, there: FloatArray, *, held_back: bool = False) -> F
     return np.asarray(np.where(more * here < 0, more, 0.0) if held_back else more).ravel()
 
 
-def beside(own: FloatArray, marks: FloatArray) -> FloatArray:
+def outside_span(own: FloatArray, marks: FloatArray) -> FloatArray:
     """Return what of marks (rows, k) columns (rows, n) cannot do."""
     basis = np.linalg.qr(own)[0]
     return np.asarray(marks - basis @ (basis.T @ marks))
 
 
-class Muted:
+class FormErrorWhitener:
     """Whitens on, what is white but for columns that may be off by a normal share, sd 1."""
 
     def __init__(self, columns: FloatArray) -> None:

@@ -18,7 +18,7 @@ _SAME_SLOPES = 0.1  # [nat] a step that gains less, half a standard deviation at
 _DAMPING = (1e-4, 0.3, 8.0, 1e6)  # at first, on success, on failure, at last
 
 
-class Linear(Protocol):
+class Linearised(Protocol):
     """What can be fitted."""
 
     def residual(self, terms: Sequence[Term], values: FloatArray) -> FloatArray:
@@ -41,14 +41,14 @@ class Solution:
     slopes: FloatArray
 
 
-def least_squares(problem: Linear, terms: Sequence[Term], start: FloatArray) -> Solution:
+def least_squares(problem: Linearised, terms: Sequence[Term], start: FloatArray) -> Solution:
     """Return the best values within their bounds near a start."""
     unit = np.array([term.step * term.parameter.scale for term in terms])
     lower, upper = (np.array([getattr(term.parameter, side) for term in terms]) for side in ("lower", "upper"))
     null = np.array([term.null for term in terms])
     tight = np.array([term.step if term.shape else 0.0 for term in terms])  # 1 / sd of a shape's prior, per step
     values, damping = np.clip(start, lower, upper), _DAMPING[0]
-    # Slopes of what has a comb of likely values lead astray: where they lead nowhere, the others go on alone.
+    # Slopes of what has many likely values lead astray: where they lead nowhere, the others go on alone.
     rough, held = np.array([term.rough for term in terms]), np.zeros(len(terms), dtype=np.bool_)
 
     def cost_at(at: FloatArray, residual: FloatArray) -> float:
@@ -87,7 +87,7 @@ def least_squares(problem: Linear, terms: Sequence[Term], start: FloatArray) -> 
     return Solution(values, _sds(slopes, tight, lower == upper) * np.abs(unit), cost, residual, slopes)
 
 
-def _linearised(problem: Linear, terms: Sequence[Term], values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _linearised(problem: Linearised, terms: Sequence[Term], values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the residual and the slopes, which are 0 for what is fixed."""
     free = np.array([not term.fixed for term in terms])
     residual, some = problem.linearised(terms, values, [term for term in terms if not term.fixed])

@@ -17,13 +17,13 @@ from kurumaisu.types import FloatArray
 ALIKE = 0.9995  # correlation of columns from which no drive like these tells their effects apart
 _JOINT = 0.6  # correlation from which three changes are tried together: two may cancel
 _ENOUGH = 3  # residuals per parameter of the catalogue, at least
-_STAND_IN = 0.3  # correlation from which one effect may pass for another
+_COMMON_PART = 0.3  # correlation from which one effect may pass for another
 _SWAPS = 3  # changes to a set at most
 _LARGEST = 6  # effects in a set: what is in no catalogue and strong would be pieced together from a dozen, for minutes
 
 
 @dataclass(frozen=True)
-class Guess:
+class ScreenedSet:
     """A set with first values, and its log evidence with its prior, relative to other guesses."""
 
     chosen: frozenset[Candidate]
@@ -57,7 +57,7 @@ class Screen:
 
     def related(self, one: Candidate, other: Candidate) -> bool:
         """Tell whether one could stand in for the other: their columns have something in common, or one has none."""
-        return one.fixed or other.fixed or self._common(one, other) > _STAND_IN
+        return one.fixed or other.fixed or self._common(one, other) > _COMMON_PART
 
     def mends(self, fixed: Candidate, instead: Candidate | None = None) -> bool:
         """Tell whether the fit gets better with an effect that can only act or not, perhaps instead of another."""
@@ -67,12 +67,12 @@ class Screen:
         left = self.problem.residual(terms, np.array([start[term.key] for term in terms]))
         return 0.5 * float(left @ left) < -self.centre.log_likelihood
 
-    def guesses(self) -> list[Guess]:
+    def guesses(self) -> list[ScreenedSet]:
         """Return sets of up to _SWAPS changes to the fit's set, best first."""
         found = [guess for chosen in self._sets() if (guess := self._guess(chosen)) is not None]
         return sorted(found, key=lambda guess: -guess.score)
 
-    def parts(self) -> list[Guess]:
+    def parts(self) -> list[ScreenedSet]:
         """Return of each size below the set's, down to 1, the part that explains most alone."""
         own = sorted(self.centre.candidates, key=_name)
         found = []
@@ -111,7 +111,7 @@ class Screen:
         few = len(set(ids)) == len(ids) <= _LARGEST
         return few and not any(self.alike(a, b) for a, b in combinations(chosen, 2))
 
-    def _guess(self, chosen: frozenset[Candidate]) -> Guess | None:
+    def _guess(self, chosen: frozenset[Candidate]) -> ScreenedSet | None:
         """Return a set's estimate and score by the linearisation; None where a parameter leaves its bounds."""
         ordered = sorted(chosen, key=_name)
         use = [self._index[t.key] for c in ordered for t in c.terms if t.key in self._index and not t.shape]
@@ -119,7 +119,7 @@ class Screen:
         known, gram = self._known, self.gram
         prior = log_prior(len(chosen), of) - sum(float(np.log(c.ways)) for c in chosen)
         if not use:
-            return Guess(chosen, {}, -0.5 * float(known @ gram @ known) - float(self.b @ known) + prior)
+            return ScreenedSet(chosen, {}, -0.5 * float(known @ gram @ known) - float(self.b @ known) + prior)
         # All offsets from null: those of effects taken out of the fit fall back to 0 and return to the residual.
         target = (self.b + gram @ known)[use]
         offsets = covariance(gram[np.ix_(use, use)]) @ target
@@ -134,7 +134,7 @@ class Screen:
         step = -known
         step[use] += offsets
         gained = float(self.b @ step) - 0.5 * float(step @ gram @ step)
-        return Guess(chosen, start, gained - self._costs(use, offsets) + prior)
+        return ScreenedSet(chosen, start, gained - self._costs(use, offsets) + prior)
 
     def _costs(self, use: Sequence[int], offsets: FloatArray) -> float:
         signals = np.abs(offsets) * np.sqrt(np.diag(self.gram)[use])

@@ -10,20 +10,20 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.engine.catalogue import Candidate, Key, Term
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.linear_screening import Guess, Screen
-from kurumaisu.critic.engine.start_values import HOPE
+from kurumaisu.critic.engine.linear_screening import Screen, ScreenedSet
+from kurumaisu.critic.engine.start_values import STEP_EVIDENCE
 from kurumaisu.types import FloatArray
 
 CLOSE = 12.0  # [nat] behind the best guess that a refit may make good
-_HOPES = 3.0  # times what lines promise at most, about nothing, that something with a comb of likely values explains
+_HOPES = 3.0  # times what lines promise at most, about nothing, that something with many likely values explains
 _HOPELESS = 100.0  # [nat] behind the best set that nothing makes good
 
-Chosen = frozenset[Candidate]
+EffectSet = frozenset[Candidate]
 
 
-def neighbours(
+def neighbouring_sets(
     problem: Problem, screen: Screen, nothing: Screen, fit: Fit
-) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
+) -> Iterator[tuple[EffectSet, Mapping[Key, float]]]:
     """Yield the set without each of its effects, with what can only act or not, and with each rival instead."""
     kept = fit.start
     for one in sorted(fit.candidates, key=lambda candidate: candidate.id):
@@ -33,12 +33,12 @@ def neighbours(
             # What clips or swallows hides its rivals: beside it their columns are empty, without it they are not.
             alike = screen.related(one, other) or nothing.related(one, other)
             if new and (screen.mends(other, one) if other.fixed else alike):
-                # What fits one form of a comb is nowhere near what fits another.
+                # What fits one form of a step is nowhere near what fits another.
                 begin = {key: value for key, value in kept.items() if not other.rough or key[0] != other.id}
                 yield fit.candidates - {one} | {other}, begin
                 if other.id == one.id:  # what stood in for the right form may go with the wrong one
                     rest = fit.candidates - {one}
-                    sets = [rest - gone | {other} for gone in _that_stood_in(rest)]
+                    sets = [rest - gone | {other} for gone in _stand_ins(rest)]
                     # Steps are as large in another form, but beside what stood in others may look better.
                     yield from ((chosen, start) for chosen in sets for start in (begin, kept))
     for other in screen.fixed:
@@ -49,14 +49,16 @@ def neighbours(
             if not hopeless_alone(problem, other, nothing.centre, fit):
                 yield frozenset({other}), {}
             yield fit.candidates | {other}, kept
-    # Its tooth was the best one when less acted beside it.
+    # Its peak was the best one when less acted beside it.
     yield from (
-        (fit.candidates, problem.teeth.anew(fit.terms, fit.values, one.id)) for one in fit.candidates if one.rough
+        (fit.candidates, problem.start_values.with_best_step(fit.terms, fit.values, one.id))
+        for one in fit.candidates
+        if one.rough
     )
-    yield from _combs(problem, screen, fit)
+    yield from _step_sets(problem, screen, fit)
 
 
-def _that_stood_in(rest: Chosen) -> Iterator[Chosen]:
+def _stand_ins(rest: EffectSet) -> Iterator[EffectSet]:
     """Yield each effect of some, and each pair of which one shows in the forward speed and the other in the yaw rate.
 
     Steps of a converter are in both, so for their wrong form two may stand in.
@@ -70,37 +72,38 @@ def _in_v(candidate: Candidate) -> bool:
 
 
 def hopeless_alone(problem: Problem, rough: Candidate, empty: Fit, fit: Fit) -> bool:
-    """Tell whether something rough, even if it explains several times what its best tooth promises, is far behind.
+    """Tell whether something rough, even if it explains several times what its best peak promises, is far behind.
 
     Nobody asks what is thousands of nats behind, but to find that out would take as long as any other fit.
     """
     sizes = [term for term in rough.terms if not term.fixed and not term.shape]
     if not all(term.rough for term in sizes):
         return False
-    hope = max(problem.teeth.hope(rough.terms, empty.terms, empty.values), 0.0) * problem.teeth.share * len(sizes)
+    first = problem.start_values
+    hope = max(first.step_evidence(rough.terms, empty.terms, empty.values), 0.0) * first.share * len(sizes)
     return empty.log_likelihood + _HOPES * hope < fit.log_likelihood - _HOPELESS
 
 
-def _combs(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
-    """Yield what has a comb of likely values beside the part of the set that leaves it most to explain.
+def _step_sets(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[EffectSet, Mapping[Key, float]]]:
+    """Yield what has many likely values beside the part of the set that leaves it most to explain.
 
-    Smooth effects that draw the mean of its steps together leave no tooth that stands out beside all of them.
+    Smooth effects that draw the mean of its steps together leave no peak that stands out beside all of them.
     """
     parts = [(part, *_left(problem, part)) for part in screen.parts()]
     for other in problem.candidates if parts else ():
         if not other.rough or other in fit.candidates:
             continue
         hopes = [
-            (problem.teeth.hope(other.terms, terms, values), likelihood, part)
+            (problem.start_values.step_evidence(other.terms, terms, values), likelihood, part)
             for part, terms, values, likelihood in parts
         ]
         hope, likelihood, part = max(hopes, key=lambda found: found[0] + found[1])
-        if hope > HOPE and likelihood + hope > fit.log_likelihood - CLOSE:
+        if hope > STEP_EVIDENCE and likelihood + hope > fit.log_likelihood - CLOSE:
             begin = {key: value for key, value in part.start.items() if key[0] != other.id}
             yield frozenset(each for each in part.chosen if each.id != other.id) | {other}, begin
 
 
-def _left(problem: Problem, part: Guess) -> tuple[tuple[Term, ...], FloatArray, float]:
+def _left(problem: Problem, part: ScreenedSet) -> tuple[tuple[Term, ...], FloatArray, float]:
     """Return the terms and values of a guess, and its log likelihood when simulated."""
     ordered = sorted(part.chosen, key=lambda candidate: candidate.id)
     terms = tuple(term for candidate in ordered for term in candidate.terms)

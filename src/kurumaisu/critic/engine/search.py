@@ -11,25 +11,25 @@ from scipy.special import logsumexp
 
 from kurumaisu.critic.engine import confounding
 from kurumaisu.critic.engine.catalogue import Key
-from kurumaisu.critic.engine.confounding import Posterior, confounded
+from kurumaisu.critic.engine.confounding import SetPosterior, confounded
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
-from kurumaisu.critic.engine.linear_screening import Guess, Screen
-from kurumaisu.critic.engine.neighbouring_sets import CLOSE, Chosen, neighbours
-from kurumaisu.critic.engine.refit import begins_better, other_tooth
-from kurumaisu.critic.engine.swapped_sets import exchanges
+from kurumaisu.critic.engine.linear_screening import Screen, ScreenedSet
+from kurumaisu.critic.engine.neighbouring_sets import CLOSE, EffectSet, neighbouring_sets
+from kurumaisu.critic.engine.refit import other_step_size, start_is_better
+from kurumaisu.critic.engine.swapped_sets import swapped_sets
 
 NAMED, RIVAL = confounding.NAMED, confounding.RIVAL
 _REFITS = 10  # sets refitted after each scan
 _FEWER = 4  # of fewer effects than the best set has, besides
-_BENT = 0.05  # share of what a set explains by which lines may be off for one effect that does what two do
-_RIVALS = 2  # likely sets besides the best one from which others are looked for
+_LINE_ERROR = 0.05  # share of what a set explains by which lines may be off for one effect that does what two do
+_ALTERNATIVES = 2  # likely sets besides the best one from which others are looked for
 _ROUNDS = 8  # scans at most
 _MOST = 200  # refitted sets from which on none is looked for: where ten effects seem to act, each round has a hundred
 NULLS = 2000  # draws of the null calibration
 
 
 @dataclass(frozen=True)
-class Naming:
+class SearchResult:
     """Result of a search.
 
     fits: all refitted sets, best first; log_posterior of each (not normalised); p: posterior per effect;
@@ -64,20 +64,20 @@ class Naming:
         return tuple(name for name in sorted(self.best.ids) if self.p[name] >= NAMED)
 
 
-def search(problem: Problem, progress: Callable[[str], None], first: Fit | None = None) -> Naming:
+def search(problem: Problem, progress: Callable[[str], None], first: Fit | None = None) -> SearchResult:
     """Scan sets of effects linearly, refit the promising ones, and go on from the best until it stays the best.
 
     first: a set to begin with, such as an earlier search under another noise has found.
     """
     count = len({candidate.id for candidate in problem.candidates})
     empty = problem.fit_candidates((), {})
-    fits: dict[Chosen, Fit] = {empty.candidates: empty}
-    begun = set[tuple[Chosen, float]]()
+    fits: dict[EffectSet, Fit] = {empty.candidates: empty}
+    begun = set[tuple[EffectSet, float]]()
 
-    def try_sets(guesses: Iterable[tuple[Chosen, Mapping[Key, float]]]) -> Fit:
+    def try_sets(guesses: Iterable[tuple[EffectSet, Mapping[Key, float]]]) -> Fit:
         for chosen, start in guesses:
             old = fits.get(chosen)
-            if old is not None and not (other_tooth(old, start, begun) or begins_better(problem, old, start)):
+            if old is not None and not (other_step_size(old, start, begun) or start_is_better(problem, old, start)):
                 continue
             progress(f"fitting {', '.join(sorted(candidate.id for candidate in chosen))}")
             fit = problem.fit_candidates(chosen, start)
@@ -86,7 +86,7 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
         return max(fits.values(), key=lambda fit: log_posterior(fit, count))
 
     nothing = screen = Screen(problem, empty)
-    centre, screened = empty, set[Chosen]()
+    centre, screened = empty, set[EffectSet]()
     if first is not None and first.candidates:
         centre = try_sets([(first.candidates, first.start)])
         screen = Screen(problem, centre) if centre is not empty else nothing
@@ -95,31 +95,31 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
         near = _promising(guesses, centre, centre.log_likelihood - empty.log_likelihood)
         best = try_sets((guess.chosen, guess.start) for guess in near)
         if best is centre:  # the last word is by fits: could others stand in, and does each have to be there?
-            alone: list[tuple[Chosen, Mapping[Key, float]]] = [
+            alone: list[tuple[EffectSet, Mapping[Key, float]]] = [
                 (frozenset({other}), {}) for other in screen.fixed if nothing.mends(other)
             ]
-            best = try_sets([*alone, *neighbours(problem, screen, nothing, best)])
+            best = try_sets([*alone, *neighbouring_sets(problem, screen, nothing, best)])
         if best is centre:
-            best = try_sets(_beside_rivals(problem, _ranked(fits, count), count, screened))
+            best = try_sets(_about_alternatives(problem, _ranked(fits, count), count, screened))
         if best is centre or len(fits) > _MOST:
             break
         centre = best
         screen = Screen(problem, centre)
-    try_sets(exchanges(_ranked(fits, count), count))
+    try_sets(swapped_sets(_ranked(fits, count), count))
     ranked = _ranked(fits, count)
     weights = np.array([log_posterior(fit, count) for fit in ranked])
     weights = np.exp(weights - logsumexp(weights))
 
-    posterior = Posterior(ranked, weights)
+    posterior = SetPosterior(ranked, weights)
     p = {name: posterior.p.get(name, 0.0) for name in sorted({candidate.id for candidate in problem.candidates})}
-    return Naming(tuple(ranked), p, confounded(posterior), _false_alarm(nothing), nothing.enough)
+    return SearchResult(tuple(ranked), p, confounded(posterior), _false_alarm(nothing), nothing.enough)
 
 
-def _ranked(fits: Mapping[Chosen, Fit], of: int) -> list[Fit]:
+def _ranked(fits: Mapping[EffectSet, Fit], of: int) -> list[Fit]:
     return sorted(fits.values(), key=lambda fit: -log_posterior(fit, of))
 
 
-def _promising(guesses: Sequence[Guess], about: Fit, explained: float) -> list[Guess]:
+def _promising(guesses: Sequence[ScreenedSet], about: Fit, explained: float) -> list[ScreenedSet]:
     """Return the guesses that are worth a refit, of those about a fit; explained: what that explains [nat].
 
     Lines about two effects tell little of one that does what both do: it has the more to gain by a refit, and without
@@ -127,22 +127,22 @@ def _promising(guesses: Sequence[Guess], about: Fit, explained: float) -> list[G
     """
     best = max((guess.score for guess in guesses), default=0.0)
     close = [guess for guess in guesses[:_REFITS] if guess.score > best - CLOSE]
-    far = best - max(CLOSE, _BENT * explained)
+    far = best - max(CLOSE, _LINE_ERROR * explained)
     size = len(about.candidates)
     fewer = [guess for guess in guesses[len(close) :] if len(guess.chosen) < size and guess.score > far]
     # Parts of the fit's set are tried anyway.
     return close + [guess for guess in fewer if not guess.chosen < about.candidates][:_FEWER]
 
 
-def _beside_rivals(
-    problem: Problem, ranked: Sequence[Fit], of: int, screened: set[Chosen]
-) -> Iterator[tuple[Chosen, Mapping[Key, float]]]:
+def _about_alternatives(
+    problem: Problem, ranked: Sequence[Fit], of: int, screened: set[EffectSet]
+) -> Iterator[tuple[EffectSet, Mapping[Key, float]]]:
     """Yield what promises more than a likely rival of the best set, seen from there; screened: whence it was seen.
 
     Where one effect does what two others do together, the best set may be several exchanges away from the second best.
     """
     likely = [fit for fit in ranked[1:] if log_posterior(fit, of) > log_posterior(ranked[0], of) + np.log(RIVAL)]
-    for fit in likely[:_RIVALS]:
+    for fit in likely[:_ALTERNATIVES]:
         if fit.candidates and fit.candidates not in screened:
             screened.add(fit.candidates)
             guesses = Screen(problem, fit).guesses()

@@ -2,8 +2,8 @@
 """First values of parameters whose derivative says little: what every size does to the rates, weighed at once.
 
 The steps of a converter fit the voltages of a drive at one size and miss them at the next, so the likelihood of the
-size is a comb. What a change of the rates does to the reference is linear, though: worked out once for short times,
-it tells what any change would explain.
+size has many peaks. What a change of the rates does to the reference is linear, though: worked out once for short
+times, it tells what any change would explain.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ _GROWTH = (1e-4, 0.2)  # from one size to the next, as a share: least and most
 _SHIFT = 0.1
 _SIZES = 900  # at most
 _SEEN = 3.0  # z of a size below which there is none worth a look: what cuts off does more than what rounds
-_HALVINGS = 6  # of the way between two sizes: the narrowest teeth are that much closer than rates tell
+_HALVINGS = 6  # of the way between two sizes: the narrowest peaks are that much closer than rates tell
 _FAINT = 0.2  # of the norm of its neighbour
 _KNOTS = 8  # of a free curve over a rate, per direction
 _AT = np.arange(_KNOTS)
-_FEW = 0.2  # share of a change below which its teeth are not looked at by themselves
+_FEW = 0.2  # share of a change below which its peaks are not looked at by themselves
 _NOTHING = 1e-9  # share of the largest direction below which it is none
 _BEST = 6  # that are tried
 _PRECISION = np.float32  # of what only first values come of: half the room and half the time
@@ -48,7 +48,7 @@ Walked = dict[Way, tuple[FloatArray, FloatArray]]  # sizes (k,), and what each c
 
 
 @dataclass(frozen=True)
-class Start:
+class StepSize:
     """A value; how far the next one that was weighed is from it; what it explains, in nats, as far as lines go."""
 
     value: float
@@ -56,7 +56,7 @@ class Start:
     nats: float
 
 
-class Comb:
+class StepLikelihood:
     """What changes of the rates explain in some drives, about the model without effects."""
 
     def __init__(self, drives: Sequence[Drive], model: Model, noise: Noise, walked: Walked) -> None:
@@ -77,7 +77,7 @@ class Comb:
         self._smooth = _smooth(self._plain)
         self._squares: dict[Way, FloatArray] = {}
 
-    def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[Start]:
+    def starts(self, term: Term, fixed: Sequence[Term], residual: Sequence[FloatArray]) -> list[StepSize]:
         """Return the most promising values of a term beside fixed ones; residual: of each drive, whitened."""
         key = _way(term, fixed)
         values, changes = self._sizes(term, fixed)
@@ -91,7 +91,7 @@ class Comb:
         peaks = np.flatnonzero((gained >= np.append(gained[1:], -np.inf)) & (gained >= np.append(-np.inf, gained[:-1])))
         best = peaks[np.argsort(-gained[peaks])][:_BEST]
         apart = np.abs(np.diff(values, append=1.1 * values[-1]))
-        return [Start(float(values[k]), float(apart[k]), float(gained[k])) for k in best]
+        return [StepSize(float(values[k]), float(apart[k]), float(gained[k])) for k in best]
 
     def apart(self, term: Term, fixed: Sequence[Term], value: float) -> float:
         """Return how far apart the sizes about a value are that were weighed."""
@@ -111,13 +111,13 @@ class Comb:
     def _close(self, term: Term, fixed: Sequence[Term], found: Sequence[Walk]) -> tuple[FloatArray, FloatArray]:
         """Return sizes with what they change, and more between neighbours of which the drives see no likeness.
 
-        What steers and what drives show by so different amounts that rates alike may hide teeth of the weaker one.
+        What steers and what drives show by so different amounts that rates alike may hide peaks of the weaker one.
         """
         values, changes = np.array([value for value, _ in found]), np.array([change for _, change in found])
         if len(values) < 2:
             return values, changes
-        teeth = self._teeth(changes)
-        squares, between = self._products(teeth, np.roll(teeth, -1, axis=0))
+        steps = self._steps_alone(changes)
+        squares, between = self._products(steps, np.roll(steps, -1, axis=0))
         between = between[:-1]
         for _ in range(_HALVINGS):
             seen = np.minimum(squares[:-1], squares[1:]) > _FAINT**2 * np.maximum(squares[:-1], squares[1:])
@@ -127,12 +127,12 @@ class Comb:
                 break
             more = np.sqrt(values[far] * values[far + 1]) * np.sign(values[far])
             own = np.array([self._change(term, fixed, float(value)) for value in more])
-            cut = self._teeth(own)
-            square, before, after = self._products(cut, teeth[far], teeth[far + 1])
+            cut = self._steps_alone(own)
+            square, before, after = self._products(cut, steps[far], steps[far + 1])
             between = np.insert(between, far + 1, after)
             between[far + np.arange(len(far))] = before
             values, squares = np.insert(values, far + 1, more), np.insert(squares, far + 1, square)
-            changes, teeth = np.insert(changes, far + 1, own, axis=0), np.insert(teeth, far + 1, cut, axis=0)
+            changes, steps = np.insert(changes, far + 1, own, axis=0), np.insert(steps, far + 1, cut, axis=0)
         return values, changes
 
     def _products(self, changes: FloatArray, *others: FloatArray) -> list[FloatArray]:
@@ -170,7 +170,7 @@ class Comb:
             change = self._change(term, fixed, value)
             if size < least and float(self._products(change[np.newaxis])[0][0]) < _SEEN**2:
                 return
-            here = self._teeth(change)
+            here = self._steps_alone(change)
             alike = 1.0 if before is None else _alike(before, here)
             if alike < _ALIKE[0] and growth > max(_GROWTH[0], _SHIFT * size / room):
                 size, growth = size * (1 + growth) / (1 + growth / 2), growth / 2
@@ -180,11 +180,11 @@ class Comb:
             growth = min(1.5 * growth, _GROWTH[1]) if alike > _ALIKE[1] else growth
             size /= 1 + growth
 
-    def _teeth(self, changes: FloatArray) -> FloatArray:
+    def _steps_alone(self, changes: FloatArray) -> FloatArray:
         """Return of changes (..., bins) what no smooth law of either rate does, which all sizes have in common.
 
         Where the rest of a step is cut off, its mean is lost at any size: seen with it, all sizes are alike. All of a
-        change that has hardly any teeth.
+        change that has hardly any peaks.
         """
         rest = changes - (changes @ self._smooth) @ self._smooth.T
         few = np.linalg.norm(rest, axis=-1) < _FEW * np.linalg.norm(changes, axis=-1)

@@ -18,7 +18,7 @@ from kurumaisu.critic.engine.evidence import Fit, log_posterior
 _MOST = 8  # sets that are tried, the likeliest first: of a long recording, each takes a second
 
 
-def exchanges(ranked: Sequence[Fit], of: int) -> list[tuple[frozenset[Candidate], Mapping[Key, float]]]:
+def swapped_sets(ranked: Sequence[Fit], of: int) -> list[tuple[frozenset[Candidate], Mapping[Key, float]]]:
     """Return sets that are likely but for such exchanges, with first values; ranked: the fits there are, best first.
 
     of: effects that could show.
@@ -27,7 +27,7 @@ def exchanges(ranked: Sequence[Fit], of: int) -> list[tuple[frozenset[Candidate]
     known = {fit.candidates for fit in ranked}
     found: dict[frozenset[Candidate], Mapping[Key, float]] = {}
     for fit in likely:
-        for gone, new, start in _twins(ranked[0], likely):
+        for gone, new, start in _swaps(ranked[0], likely):
             own = next((each for each in fit.candidates if each.id == gone), None)
             if own is None or new.id in fit.ids:
                 continue
@@ -38,7 +38,7 @@ def exchanges(ranked: Sequence[Fit], of: int) -> list[tuple[frozenset[Candidate]
     return list(found.items())[:_MOST]
 
 
-def _twins(best: Fit, likely: Sequence[Fit]) -> Iterator[tuple[str, Candidate, Mapping[Key, float]]]:
+def _swaps(best: Fit, likely: Sequence[Fit]) -> Iterator[tuple[str, Candidate, Mapping[Key, float]]]:
     """Yield ids with what may stand in for each and its values there, either way."""
     for other in likely:
         mine, its = best.candidates - other.candidates, other.candidates - best.candidates

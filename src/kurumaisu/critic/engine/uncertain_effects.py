@@ -14,14 +14,14 @@ import numpy as np
 
 from kurumaisu.critic.engine import coarsened_posterior
 from kurumaisu.critic.engine.evidence import Fit
-from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.values.verdict import NORMAL90, Estimate
 
 _ACTS = 0.5  # probability from which an effect is in the best single model
 _LIKELY = 0.01  # below which a set says nothing about a size
 
 
-def left_out(found: Naming) -> Naming:
+def without_uncertain(found: SearchResult) -> SearchResult:
     """Return what was found with the median model first, if it was fitted; the members of a told set stay."""
     told = {name for group in found.confounded for name in group}
     kept = {name for name in found.best.ids if found.p[name] >= _ACTS or name in told}
@@ -31,12 +31,12 @@ def left_out(found: Naming) -> Naming:
     return replace(found, fits=(fit, *(other for other in found.fits if other is not fit)))
 
 
-def widened(found: Naming, name: str, parameters: Mapping[str, Estimate]) -> dict[str, Estimate]:
+def widened_intervals(found: SearchResult, name: str, parameters: Mapping[str, Estimate]) -> dict[str, Estimate]:
     """Return the parameters of an effect of the best set with what other likely sets make of them in the intervals."""
     return {key: _widened(found, name, key, one) for key, one in parameters.items()}
 
 
-def _widened(found: Naming, name: str, parameter: str, one: Estimate) -> Estimate:
+def _widened(found: SearchResult, name: str, parameter: str, one: Estimate) -> Estimate:
     form = _form(found.best, name)
     alike = [_form(fit, name) == form for fit in found.fits]  # another form has other sizes
     weights = coarsened_posterior.weights(found) * alike

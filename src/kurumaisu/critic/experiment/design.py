@@ -44,7 +44,7 @@ class Explanation:
 
 
 @dataclass(frozen=True)
-class Prediction:
+class DrivePrediction:
     """Of a drive, whitened: mean (n,), its slopes (n, k) by parameters of covariance (k, k)."""
 
     mean: FloatArray
@@ -73,11 +73,11 @@ def planned(script: Script, model: Model, settings: Sequence[EffectSetting]) -> 
     return replace(drive, poses=replay.path(drive, model, settings))
 
 
-def predict(drive: Drive, model: Model, noise: Noise, explanation: Explanation) -> Prediction:
+def predict(drive: Drive, model: Model, noise: Noise, explanation: Explanation) -> DrivePrediction:
     """Return what an explanation says of a drive."""
     terms, values = explanation.terms, explanation.values
     residual, slopes = Problem([drive], model, noise, ()).linearised(terms, values, free(terms))
-    return Prediction(-residual, slopes, explanation.covariance)
+    return DrivePrediction(-residual, slopes, explanation.covariance)
 
 
 def doubt(problem: Problem, terms: Sequence[Term], values: FloatArray) -> FloatArray:
@@ -96,7 +96,7 @@ def prior(terms: Sequence[Term]) -> FloatArray:
     return np.diag([(term.step / PRIOR) ** 2 for term in terms])
 
 
-def divergence(a: Prediction, b: Prediction) -> float:
+def divergence(a: DrivePrediction, b: DrivePrediction) -> float:
     """Return the log evidence [nat] for a over b that the drive is expected to bring where a holds."""
     apart = a.mean - b.mean
     # All that differs lies in the span of these few columns: the rest of the drive cancels.

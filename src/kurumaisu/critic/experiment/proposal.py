@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 
 from kurumaisu.critic.engine import coarsened_posterior, search
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.experiment import design
 from kurumaisu.critic.experiment.design import Explanation
 from kurumaisu.critic.values.digits import odds
@@ -30,7 +30,7 @@ class Option:
 
     script: Script
     nats: float
-    worth: float
+    expected_nats: float
     pairs: FloatArray
 
 
@@ -51,7 +51,7 @@ def drives() -> tuple[Script, ...]:
     return tuple(script for script in map(shipped_script, names()) if script.kind != "places")
 
 
-def propose(problem: Problem, found: Naming, scripts: Sequence[Script]) -> Proposal:
+def propose(problem: Problem, found: SearchResult, scripts: Sequence[Script]) -> Proposal:
     """Return the script with the highest expected information per second between the rivals of a search."""
     fits, weights = remaining(found)
     if len(fits) < 2:
@@ -60,7 +60,7 @@ def propose(problem: Problem, found: Naming, scripts: Sequence[Script]) -> Propo
     rivals = [Explanation(f.terms, f.values, design.doubt(problem, f.terms, f.values)) for f in fits]
     possible = [script for script in scripts if design.possible(script, problem.model)]
     options = [_option(problem, script, fits[0], rivals, weights) for script in possible]
-    options.sort(key=lambda option: -option.worth / option.script.seconds)
+    options.sort(key=lambda option: -option.expected_nats / option.script.seconds)
     listed = _listed(open_ids)
     if not options or max(option.nats for option in options) < design.NOTHING:
         return Proposal(None, f"No scripted drive can decide whether {listed} acts: measure it in another way.", ())
@@ -73,14 +73,14 @@ def propose(problem: Problem, found: Naming, scripts: Sequence[Script]) -> Propo
     return Proposal(experiment, sentence, tuple(options))
 
 
-def remaining(found: Naming) -> tuple[list[Fit], FloatArray]:
+def remaining(found: SearchResult) -> tuple[list[Fit], FloatArray]:
     """Return the explanations that are not much less probable than the best one, and their posterior, (h,).
 
     Of the ways in which the same effects may act, the most probable one stands for all.
     """
     best: dict[frozenset[str], tuple[float, Fit]] = {}
     for fit in found.fits:
-        log = coarsened_posterior.worth(found, fit)
+        log = coarsened_posterior.of_set(found, fit)
         if fit.ids not in best or log > best[fit.ids][0]:
             best[fit.ids] = (log, fit)
     ranked = sorted(best.values(), key=lambda pair: -pair[0])[:_RIVALS]

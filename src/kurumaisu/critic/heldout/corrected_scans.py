@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import laser_of, shapes
+from kurumaisu.critic.ranges.scans.beams import acts_on_readings, laser_of
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.effects import Beams, Echoes
 from kurumaisu.params import EffectSetting, Laser, Model
@@ -49,7 +49,7 @@ def corrected(
     laser = laser_of(model.laser, recording.laser, recording.runs)
     given = {setting.id for setting in settings}
     own = (own for own in model.effects if own.id not in given)
-    every = tuple(s for s in (*own, *settings) if shapes(s.id) and _steady(laser, s))
+    every = tuple(s for s in (*own, *settings) if acts_on_readings(s.id) and _steady(laser, s))
     chain = effects.build_laser(every, np.random.default_rng(0))
     stamps = run.scan.t[list(rows)]
     flat = np.zeros(laser.beams)

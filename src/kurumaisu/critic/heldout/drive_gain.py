@@ -35,7 +35,7 @@ class Fold:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedExtension:
     """What extends a model, as fitted to some drives.
 
     doubt: how the increments of a drive change, (3 m, k), by errors of the fit that are independent and normal with
@@ -47,7 +47,7 @@ class Fitted:
 
 
 Sides = tuple[list[FloatArray], list[FloatArray]]  # blocks of values by the baseline and by the extended model
-Refit = Callable[[Sequence[Drive]], Fitted]
+Refit = Callable[[Sequence[Drive]], FittedExtension]
 
 
 def folds(train: Sequence[Drive], test: Sequence[Drive]) -> list[Fold]:
@@ -83,7 +83,7 @@ def measure(model: Model, splits: Sequence[Fold], refit: Refit, baseline: Noise,
         for drive in fold.test:
             for horizon, squares in noise_floor.squares(drive, model, extension.settings, extended, HORIZONS):
                 floors[horizon].append(squares)
-            for side, (fitted, noise) in enumerate(((Fitted(()), baseline), (extension, extended))):
+            for side, (fitted, noise) in enumerate(((FittedExtension(()), baseline), (extension, extended))):
                 density[side].extend(_blocks(drive, _log_density(drive, model, fitted, noise)))
                 for horizon in HORIZONS:
                     errors[horizon][side].extend(_open_loop(drive, model, fitted.settings, horizon))
@@ -112,7 +112,7 @@ def _columns(sides: Sides, which: slice) -> Sides:
     return baseline, extended
 
 
-def _log_density(drive: Drive, model: Model, fitted: Fitted, noise: Noise) -> FloatArray:
+def _log_density(drive: Drive, model: Model, fitted: FittedExtension, noise: Noise) -> FloatArray:
     """Return the log density of each increment given those before it, (m, 3): dx, dy given dx, dtheta [nats]."""
     residual = drive.measured - replay.increments(drive, model, fitted.settings)
     residual[:, 2] = geometry.wrap(residual[:, 2])  # across a gap nobody counted the turns

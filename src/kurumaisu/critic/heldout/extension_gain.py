@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 from kurumaisu.critic.heldout import scan_gain, slam_gain
 from kurumaisu.critic.predict.motion import Forecast, Settings
-from kurumaisu.critic.predict.scan_poses import Places, joined
-from kurumaisu.critic.ranges.scans.beams import missing
+from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
+from kurumaisu.critic.ranges.scans.beams import why_not_usable
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.story import Overlay
@@ -35,23 +35,24 @@ class Extension:
 
 def with_laser_gain(criticism: Criticism, recording: Recording, extension: Extension) -> Criticism:
     """Return a criticism with the gain of what its settings for the laser do."""
-    worth = scan_gain.measure(recording, criticism.model, extension.forecast, extension.scans)
-    if worth is None:
+    measured = scan_gain.measure(recording, criticism.model, extension.forecast, extension.scans)
+    if measured is None:
         return criticism
-    gain = criticism.verdict.gain or Gain(worth.log_density_per_sample)
-    whole = replace(gain, channels={**gain.channels, scan_gain.CHANNEL: worth})
-    story = replace(criticism.story, details=(*criticism.story.details, _told(worth)))
+    gain = criticism.verdict.gain or Gain(measured.log_density_per_sample)
+    whole = replace(gain, channels={**gain.channels, scan_gain.CHANNEL: measured})
+    story = replace(criticism.story, details=(*criticism.story.details, _sentence(measured)))
     return replace(criticism, verdict=replace(criticism.verdict, gain=whole), story=story)
 
 
-def _told(worth: ChannelGain) -> str:
-    density = worth.log_density_per_sample
+def _sentence(measured: ChannelGain) -> str:
+    density = measured.log_density_per_sample
     text = (
         f"On held-out scans, the laser effects found gain {density.gain:+.3g} nats per reading "
         f"(90 % {density.lo90:+.3g} to {density.hi90:+.3g})"
     )
-    if worth.rmse is not None:
-        text += f"; rms error {1e3 * worth.rmse.baseline:.2g} mm before, {1e3 * worth.rmse.extended:.2g} mm after"
+    if measured.rmse is not None:
+        before, after = 1e3 * measured.rmse.baseline, 1e3 * measured.rmse.extended
+        text += f"; rms error {before:.2g} mm before, {after:.2g} mm after"
     return text + ("." if density.lo90 > 0 else ": not confirmed.")
 
 
@@ -61,7 +62,7 @@ def with_slam(criticism: Criticism, recording: Recording, extension: Extension) 
     if extension.empty or verdict.gain is None:
         return criticism
     seen = slam_gain.measure(recording, criticism.model, lambda name: _without(name, criticism, recording, extension))
-    told = replace(story, details=(*story.details, seen.told))
+    told = replace(story, details=(*story.details, seen.sentence))
     if seen.gain is None or seen.measured is None or seen.baseline is None:
         return replace(criticism, story=told)
     held_out = seen.gain.run in recording.test
@@ -75,7 +76,7 @@ def _without(name: str, criticism: Criticism, recording: Recording, extension: E
     """Return what extends the model as fitted without a run."""
     base, scans = extension.refit(name), extension.scans
     others = replace(recording, train=tuple(other for other in recording.train if other != name))
-    if scans and name not in recording.test and others.train and missing(others) is None:
-        places = Places(others, criticism.model, extension.forecast)
+    if scans and name not in recording.test and others.train and why_not_usable(others) is None:
+        places = ScanPoses(others, criticism.model, extension.forecast)
         scans = scan_gain.refit(joined(places.trained()), scans)
     return (*base, *scans)

@@ -28,38 +28,38 @@ CERTAIN = 12.0  # [nat] of evidence from which data held out need but gain
 HORIZON = 2.0  # [s] over which ways and turns are compared
 
 
-def confirmed(worth: Gain | None, nats: float, *, free: bool = False) -> bool:
+def confirmed(gain: Gain | None, nats: float, *, free: bool = False) -> bool:
     """Return whether drives held out confirm a finding that gains so much evidence on the drives it was fitted to.
 
     Blocks of a few drives scatter widely: what is certain by the evidence need not be so by the blocks again. A short
     drive held out may gain by chance as little as what is not there would lose, but for a free curve, which has sizes
     enough to fit what comes once.
     """
-    if worth is None:
+    if gain is None:
         return False
-    gain = worth.log_density_per_sample
-    sd = max(gain.hi90 - gain.lo90, 1e-12) / (2 * NORMAL90)
+    density = gain.log_density_per_sample
+    sd = max(density.hi90 - density.lo90, 1e-12) / (2 * NORMAL90)
     least = 0.0 if nats >= CERTAIN and not free else _LIKELY * sd
-    return gain.lo90 > 0 or (nats >= (STRONG_CURVE if free else _STRONG) and gain.gain > least)
+    return density.lo90 > 0 or (nats >= (STRONG_CURVE if free else _STRONG) and density.gain > least)
 
 
-def nearer(worth: Gain | None, channels: Sequence[str]) -> bool:
+def simulates_nearer(gain: Gain | None, channels: Sequence[str]) -> bool:
     """Return whether drives held out are simulated nearer to what was measured in one of some channels, in none less.
 
     What a curve or an equation leaves of something strong is no normal noise: a few surprises may cost all that the
     density gains. Where they cost so much for sure, the chair must also come nearer to where it came.
     """
-    if worth is None:
+    if gain is None:
         return False
-    path = next(iter(worth.rmse.values()), None)  # over the shortest horizon
-    if worth.log_density_per_sample.hi90 < 0 and path is not None and path.gain < 0:
+    path = next(iter(gain.rmse.values()), None)  # over the shortest horizon
+    if gain.log_density_per_sample.hi90 < 0 and path is not None and path.gain < 0:
         return False
-    errors = [worth.channels[name].rmse for name in channels if name in worth.channels]
+    errors = [gain.channels[name].rmse for name in channels if name in gain.channels]
     known = [error for error in errors if error is not None]
     return any(error.lo90 > 0 for error in known) and all(error.hi90 > 0 for error in known)
 
 
-def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
+def share_of_way(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
     """Return how far the chair is moved within HORIZON by what `settings` have and `without` lack.
 
     As a share of the way or of the turn made meanwhile (rms over all starts), whichever is larger.
@@ -74,7 +74,7 @@ def moved_share(problem: Problem, settings: Sequence[EffectSetting], without: Se
     return float(np.sqrt((moved / np.maximum(made, 1e-12)).max()))
 
 
-def felt_share(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
+def share_of_noise(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:
     """Return what `settings` have and `without` lack, in standard deviations of an increment's noise (rms)."""
     count = sum(len(drive.measured) for drive in problem.drives)
     return float(np.sqrt(2 * expected_nats(problem, problem.drives, settings, without) / count))

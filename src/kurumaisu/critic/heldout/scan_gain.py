@@ -13,8 +13,8 @@ from kurumaisu.critic.heldout.drive_gain import log_density_gain, rmse_gain
 from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.predict.scan import Expected, Joint, ScanModel, scattered
 from kurumaisu.critic.predict.scan_cache import Expectations
-from kurumaisu.critic.predict.scan_poses import Places, chosen, joined
-from kurumaisu.critic.ranges.scans.beams import Shots, missing
+from kurumaisu.critic.predict.scan_poses import ScanPoses, chosen, joined
+from kurumaisu.critic.ranges.scans.beams import Shots, why_not_usable
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import ChannelGain
 from kurumaisu.params import EffectSetting, Model
@@ -45,7 +45,7 @@ def measure(recording: Recording, model: Model, forecast: Forecast | None, setti
 
     forecast: of the base, None where nothing drove it; settings: the laser's and the map's.
     """
-    if not settings or missing(recording) is not None:
+    if not settings or why_not_usable(recording) is not None:
         return None
     sums: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     squares: tuple[list[FloatArray], list[FloatArray]] = ([], [])
@@ -90,7 +90,7 @@ def _side(split: Split, settings: Settings, truth: tuple[float, float] | None) -
 
 
 def _splits(recording: Recording, model: Model, forecast: Forecast | None) -> Iterator[Split]:
-    places = Places(recording, model, forecast)
+    places = ScanPoses(recording, model, forecast)
     parts = places.trained()
     tests = [run for run in recording.runs if run.name in recording.test and run.pose]
     picked = [(run, *chosen(run, _SCANS)) for run in tests]

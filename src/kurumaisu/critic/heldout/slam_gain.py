@@ -12,7 +12,7 @@ import numpy as np
 
 from kurumaisu import geometry, slam_score
 from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.covariates import beside
+from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import Drive, driven, prepare_all
 from kurumaisu.critic.heldout.corrected_scans import Corrected, corrected
 from kurumaisu.critic.heldout.drive_gain import rmse_gain
@@ -40,7 +40,7 @@ Refit = Callable[[str], Settings]  # what extends the model, fitted without the 
 class Downstream:
     """gain: None where SLAM was not run, for the reason told; paths (n, 2) [m] in the reference's frame."""
 
-    told: str
+    sentence: str
     gain: SlamGain | None = None
     measured: FloatArray | None = None
     baseline: FloatArray | None = None
@@ -141,7 +141,7 @@ def _rows(run: Run) -> list[int]:
 
 def _log(run: Run, model: Model, settings: Settings, scans: Corrected) -> ScanLog:
     slam = import_module("kurumaisu.slam")
-    drive = beside(prepare_all(run, model, float(scans.stamps[-1]) + 1.0), run)
+    drive = with_covariates_but_place(prepare_all(run, model, float(scans.stamps[-1]) + 1.0), run)
     times, poses = replay.odometry(_begun(drive), model, settings)
     fan = slam.Fan(
         angle_min=scans.angle_min,

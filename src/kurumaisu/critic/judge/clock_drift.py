@@ -28,7 +28,7 @@ class _Clock:
     half: float
 
 
-def one_clock(finding: LaserFinding, stamps: FloatArray) -> LaserFinding:
+def without_double_delay(finding: LaserFinding, stamps: FloatArray) -> LaserFinding:
     """Return a finding without a cause of its own for a delay that only says that the clocks agreed at the first scan.
 
     stamps [s] of the scans, since time 0 of the laser. The model keeps the delay: its clocks agree at time 0.

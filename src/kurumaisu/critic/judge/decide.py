@@ -16,7 +16,7 @@ from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.noise import base_noise
 from kurumaisu.critic.predict import parameter_doubt
 from kurumaisu.critic.unknown import beyond_catalogue, comparison, joint_fit
-from kurumaisu.critic.unknown.joint_fit import Extension
+from kurumaisu.critic.unknown.joint_fit import FitWithCurve
 from kurumaisu.critic.values.prior import odds
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.params import EffectSetting, Model
@@ -30,30 +30,32 @@ Truth = tuple[float, float] | None
 class Decision:
     """What acts, in a problem whose noise is that about it.
 
-    growth: whether the noise grows with the rates; beyond: what was found outside the catalogue; unmet: drives held out
-    can neither confirm nor refute it.
+    growth: whether the noise grows with the rates; beyond: what was found outside the catalogue; untested: drives held
+    out can neither confirm nor refute it.
     """
 
     problem: Problem
-    found: search.Naming
-    growth: base_noise.Growth
+    found: search.SearchResult
+    growth: base_noise.NoiseGrowth
     beyond: beyond_catalogue.Beyond
-    unmet: bool = False
+    untested: bool = False
 
     @property
     def something(self) -> bool:
         """Return whether there is anything to extend the model by."""
         return bool(self.found.best.ids) or self.beyond.extension is not None
 
-    def refit(self, drives: Sequence[Drive]) -> drive_gain.Fitted:
+    def refit(self, drives: Sequence[Drive]) -> drive_gain.FittedExtension:
         """Return what was found, fitted to other drives."""
         best, extension = self.found.best, self.beyond.extension
         if extension is not None:
-            curved = joint_fit.again(extension, drives, self.problem)
-            return drive_gain.Fitted(curved.settings, lambda drive: joint_fit.doubt(self.problem, drive, curved))
+            curved = joint_fit.refitted(extension, drives, self.problem)
+            return drive_gain.FittedExtension(
+                curved.settings, lambda drive: joint_fit.doubt(self.problem, drive, curved)
+            )
         other = self.problem.changed(drives=drives)
         fit = other.fit_candidates(best.candidates, best.start)
-        return drive_gain.Fitted(
+        return drive_gain.FittedExtension(
             fit.settings, parameter_doubt.doubt(other, fit.settings, parameter_doubt.about_fit(other, fit))
         )
 
@@ -65,7 +67,7 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
     if it then does not win, as if there had never been one.
     """
     found = search.search(first, progress)
-    hint = beyond_catalogue.hinted(first, found)
+    hint = beyond_catalogue.hinted_curve(first, found)
     if hint is not None:
         made = _judged(first, found, hint, truth, progress)
         rivalry = made.beyond.rivalry
@@ -80,15 +82,15 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
         found = made.found if better is None else replace(made.found, fits=(better, *made.found.fits))
         if found.best.ids == before:
             break
-    settled = made.found if made.beyond.extension is not None else uncertain_effects.left_out(made.found)
+    settled = made.found if made.beyond.extension is not None else uncertain_effects.without_uncertain(made.found)
     return made if settled is made.found else replace(made, found=settled)
 
 
-def uncurved(made: Decision) -> Decision:
+def without_curves(made: Decision) -> Decision:
     """Return what acts if nothing outside the catalogue does."""
-    found, beyond = made.found, beyond_catalogue.Beyond(comparison.no_rivals(made.found), None, 1.0)
-    p, still_open = coarsened_posterior.believed(found, beyond.rivalry.odds)
-    found = uncertain_effects.left_out(weighed_anew(replace(found, confounded=still_open), p))
+    found, beyond = made.found, beyond_catalogue.Beyond(comparison.no_curves(made.found), None, 1.0)
+    p, still_open = coarsened_posterior.of_effects(found, beyond.rivalry.odds)
+    found = uncertain_effects.without_uncertain(with_curve_odds(replace(found, confounded=still_open), p))
     return replace(made, found=found, beyond=beyond)
 
 
@@ -99,7 +101,7 @@ def _by_noise(first: Problem, made: Decision, truth: Truth) -> float:
     it speaks for it. Nobody knows the noise beforehand, so each side is heard with its own.
     """
     best = made.found.best
-    own = first.changed(noise=scatter(first, best, truth, project=True).estimate(first.noise).noise)
+    own = first.changed(noise=noise_residuals(first, best, truth, project=True).estimate(first.noise).noise)
     return max(_density(own, best) - _density(made.problem, best), 0.0)
 
 
@@ -111,35 +113,35 @@ def _density(problem: Problem, fit: Fit) -> float:
 
 
 def _judged(
-    first: Problem, found: search.Naming, beside: Extension | None, truth: Truth, progress: Progress
+    first: Problem, found: search.SearchResult, beside: FitWithCurve | None, truth: Truth, progress: Progress
 ) -> Decision:
     progress("estimating the noise again, with the effects found")
-    left = scatter(first, found.best, truth, project=True, beside=beside)
+    left = noise_residuals(first, found.best, truth, project=True, beside=beside)
     final = left.estimate(first.noise)
     growth = left.growth(final, odds(len(found.p)))
     if growth.p > 1 / 2 and found.best.ids and beside is None:
         # What a cause of another form leaves behind is no noise, and grows with the rates, too.
-        strict = scatter(first, found.best, truth, project=True, forms=True)
+        strict = noise_residuals(first, found.best, truth, project=True, forms=True)
         final = strict.estimate(final.noise)
         growth = strict.growth(final, odds(len(found.p)))
     elif growth.p > 1 / 2 and beside is not None:
         # The noise stays that about the curve as it is: what its knots leave is no effect of the catalogue either.
-        strict = scatter(first, found.best, truth, project=True, beside=beside, forms=True)
+        strict = noise_residuals(first, found.best, truth, project=True, beside=beside, forms=True)
         growth = strict.growth(strict.estimate(final.noise), odds(len(found.p)))
     problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
     again = search.search(problem, progress, found.best)
     if problem.missed is None:
-        missed, fit = form_error_fit.missed(problem, again)
+        missed, fit = form_error_fit.likeliest_form_error(problem, again)
         if missed is not None:
             problem = problem.changed(missed=missed)
             again = search.search(problem, progress, fit)
     beyond = beyond_catalogue.judge(problem, again, progress)
-    p, still_open = coarsened_posterior.believed(again, beyond.rivalry.odds)
-    growth = replace(growth, p=coarsened_posterior.doubted(again, growth.p))
-    return Decision(problem, weighed_anew(replace(again, confounded=still_open), p), growth, beyond)
+    p, still_open = coarsened_posterior.of_effects(again, beyond.rivalry.odds)
+    growth = replace(growth, p=coarsened_posterior.of_finding(again, growth.p))
+    return Decision(problem, with_curve_odds(replace(again, confounded=still_open), p), growth, beyond)
 
 
-def weighed_anew(found: search.Naming, p: dict[str, float]) -> search.Naming:
+def with_curve_odds(found: search.SearchResult, p: dict[str, float]) -> search.SearchResult:
     """Return what was found with the probabilities beside curves.
 
     What a curve draws speaks for its effect, which may decide what the effects alone left open: then it is no set.
@@ -148,15 +150,15 @@ def weighed_anew(found: search.Naming, p: dict[str, float]) -> search.Naming:
     return replace(found, p=p, confounded=tuple(still_open))
 
 
-def scatter(
+def noise_residuals(
     problem: Problem,
     fit: Fit,
     truth: Truth,
     *,
     project: bool,
-    beside: Extension | None = None,
+    beside: FitWithCurve | None = None,
     forms: bool = False,
-) -> base_noise.Scatter:
+) -> base_noise.NoiseResiduals:
     """Return what is left about a fit, or an extension, with all that may act projected out or nothing.
 
     forms: with what the causes of the fit would do in other forms projected out, too, and the chair at rest where they
@@ -176,7 +178,7 @@ def scatter(
 
     projected = [columns(drive, left.size) for drive, left in zip(problem.drives, residuals, strict=True)]
     drives = [_resting(drive, problem.model, settings) for drive in problem.drives] if forms else problem.drives
-    return base_noise.Scatter(drives, residuals, projected, truth)
+    return base_noise.NoiseResiduals(drives, residuals, projected, truth)
 
 
 def _resting(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> Drive:

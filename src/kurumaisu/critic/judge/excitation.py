@@ -27,7 +27,9 @@ _SHORT = 15.0  # [s] in all: too little to tell effects from noise
 _LISTED = 6
 
 
-def told(criticism: Criticism, made: Decision, drives: Sequence[Drive], scripts: Sequence[Script]) -> Criticism:
+def with_shortcomings(
+    criticism: Criticism, made: Decision, drives: Sequence[Drive], scripts: Sequence[Script]
+) -> Criticism:
     """Return the criticism, and where nothing was found because little could show, what to drive for it."""
     if criticism.verdict.verdict != "none" or (made.something and made.found.enough):
         return criticism
@@ -38,7 +40,7 @@ def told(criticism: Criticism, made: Decision, drives: Sequence[Drive], scripts:
         return criticism
     wanted = unseen if made.found.enough else ids
     best = _supplier(problem.model, scripts, wanted)
-    why = lacking(drives, enough=made.found.enough)
+    why = shortcomings(drives, enough=made.found.enough)
     listed = ", ".join(wanted[:_LISTED]) + (f" and {len(wanted) - _LISTED} more" if len(wanted) > _LISTED else "")
     some = f"None of the {len(ids)} effects can" if wanted == ids else f"{len(wanted)} of {len(ids)} effects cannot"
     sentence, headline = f"{some} be detected in this recording: {listed}.", f"{some} be detected, because {why}."
@@ -58,7 +60,7 @@ def told(criticism: Criticism, made: Decision, drives: Sequence[Drive], scripts:
     return replace(criticism, story=story, verdict=replace(criticism.verdict, next_experiment=best))
 
 
-def lacking(drives: Sequence[Drive], *, enough: bool) -> str:
+def shortcomings(drives: Sequence[Drive], *, enough: bool) -> str:
     """Return in words what drives lack; enough: there are more data than the catalogue could fit."""
     ahead = max(float(np.abs(drive.v).max()) for drive in drives)
     turn = max(float(np.abs(drive.w).max()) for drive in drives)

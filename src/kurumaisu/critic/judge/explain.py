@@ -11,21 +11,29 @@ import numpy as np
 import scipy
 
 from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import Drive, prepare
-from kurumaisu.critic.base.restarted_path import PICTURE, RESTART, restarted
+from kurumaisu.critic.base.restarted_path import PICTURE, RESTART, restarted_path
 from kurumaisu.critic.engine import search, uncertain_effects
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.drive_gain import CHANNELS
-from kurumaisu.critic.heldout.materiality import FELT, MATERIAL, NO_NOISE, confirmed, felt_share, moved_share, nearer
+from kurumaisu.critic.heldout.materiality import (
+    FELT,
+    MATERIAL,
+    NO_NOISE,
+    confirmed,
+    share_of_noise,
+    share_of_way,
+    simulates_nearer,
+)
 from kurumaisu.critic.judge import intervals, misfit, sentences
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording, Run
-from kurumaisu.critic.values.story import Misfit, Noise, Overlay, Story
+from kurumaisu.critic.values.story import Misfit, NoiseParameter, Overlay, Story
 from kurumaisu.critic.values.verdict import Cause, Estimate, Gain, Kind, Verdict
 from kurumaisu.critic.values.version import version
 from kurumaisu.errors import Error
@@ -44,7 +52,7 @@ def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Crit
     story = Story(
         recording=recording.name,
         model=model.name,
-        headline=sentences.wrong(problems),
+        headline=sentences.wrong_data(problems),
         details=tuple(problems),
         pose_source=_pose_source(recording),
         provenance=_provenance(recording),
@@ -69,19 +77,19 @@ def undriven(recording: Recording, model: Model) -> Criticism:
 def criticism(
     recording: Recording,
     made: Decision,
-    worth: Gain | None,
+    gain: Gain | None,
     drives: Sequence[Drive],
     proposal: Proposal,
 ) -> Criticism:
-    """Return the criticism after a search; worth: the gain on held-out drives, None when nothing was found."""
+    """Return the criticism after a search; gain: the gain on held-out drives, None when nothing was found."""
     problem, found, growth = made.problem, made.found, made.growth
     best = found.best
-    shares = {name: moved_share(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
+    shares = {name: share_of_way(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
     nats = found.nats(best)
     # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
-    held = confirmed(worth, nats) or (nats >= NO_NOISE and nearer(worth, tuple(CHANNELS)))
-    gains = found.enough and (held or made.unmet)
-    felt = {name: felt_share(problem, best.settings, _without(best, name)) for name in shares}
+    held = confirmed(gain, nats) or (nats >= NO_NOISE and simulates_nearer(gain, tuple(CHANNELS)))
+    gains = found.enough and (held or made.untested)
+    felt = {name: share_of_noise(problem, best.settings, _without(best, name)) for name in shares}
     matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
     told = tuple(group for group in found.confounded if not best.ids & set(group) or matters & set(group))
     if nats >= NO_NOISE and matters and not (told or matters & set(found.named)):
@@ -89,7 +97,7 @@ def criticism(
     found = replace(found, confounded=told)
     kind = _kind(found, matters)
     fitted = {
-        name: uncertain_effects.widened(found, name, intervals.estimates(problem, best, name))
+        name: uncertain_effects.widened_intervals(found, name, intervals.estimates(problem, best, name))
         for name in sorted(best.ids)
     }
     causes = tuple(_cause(problem, found, name, fitted[name]) for name in found.named if name in matters)
@@ -106,7 +114,7 @@ def criticism(
         confounded=found.confounded if kind != "none" else (),
         problems=recording.problems,
         next_experiment=proposal.experiment,
-        gain=worth,
+        gain=gain,
     )
     story = Story(
         recording=recording.name,
@@ -114,7 +122,7 @@ def criticism(
         headline=sentences.headline(verdict, found, matters, shares),
         details=(
             *sentences.details(problem, found, drives, fitted, shares, matters),
-            *((sentences.UNMET,) if matters and not held else ()),
+            *((sentences.UNTESTED,) if matters and not held else ()),
         ),
         pose_source=_pose_source(recording),
         provenance=_provenance(recording),
@@ -132,7 +140,7 @@ def _without(fit: Fit, name: str) -> tuple[EffectSetting, ...]:
     return tuple(setting for setting in fit.settings if setting.id != name)
 
 
-def _open(found: Naming) -> tuple[str, ...]:
+def _open(found: SearchResult) -> tuple[str, ...]:
     """Return the effects of the best set, or the one with its likeliest rival: something acts, though none is certain.
 
     Curves in no catalogue have the rest of the probability, but none of them enough to be told.
@@ -142,19 +150,19 @@ def _open(found: Naming) -> tuple[str, ...]:
     return tuple(sorted(best if len(best) > 1 or rival is None else best | {rival}))
 
 
-def _kind(found: Naming, matters: set[str]) -> Kind:
+def _kind(found: SearchResult, matters: set[str]) -> Kind:
     if not matters:
         return "none"
     return "named" if matters & set(found.named) else "confounded" if found.confounded else "none"
 
 
-def _cause(problem: Problem, found: Naming, name: str, parameters: dict[str, Estimate]) -> Cause:
+def _cause(problem: Problem, found: SearchResult, name: str, parameters: dict[str, Estimate]) -> Cause:
     rest = {candidate for candidate in found.best.candidates if candidate.id != name}
     without = problem.fit_candidates(rest, found.best.start)
     return Cause(name, min(found.p[name], 1.0), parameters, found.best.score - without.score)
 
 
-def _noise(problem: Problem) -> tuple[Noise, ...]:
+def _noise(problem: Problem) -> tuple[NoiseParameter, ...]:
     n = problem.noise
     rows: tuple[tuple[str, float, str], ...] = (
         ("reference position, each axis", n.position_sd, "m"),
@@ -177,10 +185,10 @@ def _noise(problem: Problem) -> tuple[Noise, ...]:
             ("reference heading, slowly varying part", n.lasting * n.heading_sd, "rad"),
             ("time constant of the slowly varying part", n.lasting_tau, "s"),
         )
-    return tuple(Noise(name, value, float("nan"), float("nan"), unit) for name, value, unit in rows)
+    return tuple(NoiseParameter(name, value, float("nan"), float("nan"), unit) for name, value, unit in rows)
 
 
-def _misfits(problem: Problem, found: Naming) -> tuple[Misfit, ...]:
+def _misfits(problem: Problem, found: SearchResult) -> tuple[Misfit, ...]:
     """Return a figure per effect of the best set; where that is empty, of the effect that comes nearest, if any."""
     fit = found.best if found.best.ids else next((fit for fit in found.fits if fit.ids), found.best)
     return misfit.figures(problem, fit.settings, sorted(fit.ids))
@@ -198,7 +206,7 @@ def overlays(
 
 
 def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *, held_out: bool) -> Overlay:
-    drive = informed(prepare(run, model, PICTURE), run)
+    drive = with_covariates(prepare(run, model, PICTURE), run)
     baseline, off = _restarted(drive, replay.path(drive, model, ()))
     extended, off_extended = None, None
     if settings is not None:
@@ -210,7 +218,7 @@ def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *
 def _restarted(drive: Drive, path: FloatArray) -> tuple[FloatArray, float | None]:
     """Return a simulated path (n, 2) in pieces that begin at measured poses, nan between, and how far off they end."""
     pieces, off = [], []
-    for rows, poses in restarted(drive, path):
+    for rows, poses in restarted_path(drive, path):
         pieces += [poses[:, :2], np.full((1, 2), np.nan)]
         if drive.times[rows][-1] - drive.times[rows][0] > RESTART / 2:
             off.append(np.sum((poses[-1] - drive.poses[rows][-1])[:2] ** 2))

@@ -12,7 +12,7 @@ from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.materiality import (
     FELT,
@@ -21,9 +21,9 @@ from kurumaisu.critic.heldout.materiality import (
     NO_NOISE,
     STRONG_CURVE,
     confirmed,
-    felt_share,
-    moved_share,
-    nearer,
+    share_of_noise,
+    share_of_way,
+    simulates_nearer,
 )
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.decide import Decision
@@ -31,11 +31,11 @@ from kurumaisu.critic.judge.extended_model import process_noise
 from kurumaisu.critic.judge.misfit import moments
 from kurumaisu.critic.unknown import sentences, shapes
 from kurumaisu.critic.unknown.beyond_catalogue import Beyond
-from kurumaisu.critic.unknown.joint_fit import Extension, extend
+from kurumaisu.critic.unknown.joint_fit import FitWithCurve, fit_with_curve
 from kurumaisu.critic.values.binned_means import bins
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
-from kurumaisu.critic.values.story import Misfit, Rival
+from kurumaisu.critic.values.story import Alternative, Misfit
 from kurumaisu.critic.values.verdict import NORMAL90, Gain, Unknown
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -46,7 +46,7 @@ _PLAUSIBLE = 0.02  # posterior from which another curve is listed
 
 
 def criticism(
-    recording: Recording, made: Decision, worth: Gain | None, drives: Sequence[Drive], proposal: Proposal
+    recording: Recording, made: Decision, gain: Gain | None, drives: Sequence[Drive], proposal: Proposal
 ) -> Criticism:
     """Return the criticism of drives in which a curve explains more than the catalogue."""
     problem, found, beyond = made.problem, made.found, made.beyond
@@ -56,14 +56,14 @@ def criticism(
     curved = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
     fit = curved.fit_candidates(extension.fit.candidates, extension.fit.start)
     inner = replace(found, fits=(fit, *found.fits), confounded=(), false_alarm=beyond.false_alarm)
-    beside = explain.criticism(recording, replace(made, problem=curved, found=inner), worth, drives, proposal)
+    beside = explain.criticism(recording, replace(made, problem=curved, found=inner), gain, drives, proposal)
     share, felt = _shares(made)
-    words = _told(extension, beyond, share)
-    if not _held(made, worth) or not _matters(share, felt):
+    words = _sentences(extension, beyond, share)
+    if not _confirmed(made, gain) or not _matters(share, felt):
         small = f"{words} It is too small to matter, or was not confirmed on held-out data."
         story = replace(beside.story, unexplained=(small, *beside.story.unexplained))
         kept = replace(beside, story=story, model=problem.model)
-        return _unheld(kept, problem, made, worth) if share >= MATERIAL else kept
+        return _unconfirmed(kept, problem, made, gain) if share >= MATERIAL else kept
     verdict = replace(beside.verdict, verdict="unknown", unknown=tuple(_unknowns(problem, beyond)))
     settings = (*extension.settings, process_noise(problem))
     story = replace(
@@ -77,14 +77,14 @@ def criticism(
     return Criticism(verdict, story, problem.model, settings)
 
 
-def _unheld(kept: Criticism, problem: Problem, made: Decision, worth: Gain | None) -> Criticism:
+def _unconfirmed(kept: Criticism, problem: Problem, made: Decision, gain: Gain | None) -> Criticism:
     """Return a criticism of what did not hold on data held out, as unknown where it cannot be noise.
 
     It follows more than one thing, or none that is known: the curves only say where to look, and extend nothing.
     """
     extension = made.beyond.extension
     assert extension is not None
-    if worth is None or not _no_noise(made):
+    if gain is None or not _no_noise(made):
         return kept
     curves = tuple(replace(one, p=min(one.p, _UNHELD)) for one in _unknowns(problem, made.beyond))
     headline = f"{sentences.headline(extension)} Held-out data do not confirm this: it is not the whole explanation."
@@ -92,10 +92,10 @@ def _unheld(kept: Criticism, problem: Problem, made: Decision, worth: Gain | Non
     return replace(kept, verdict=verdict, story=replace(kept.story, headline=headline))
 
 
-def told(made: Decision, worth: Gain | None) -> bool:
+def is_reported(made: Decision, gain: Gain | None) -> bool:
     """Tell whether a curve is told of: it matters, and held on data held out, or what it draws cannot be noise."""
     share, felt = _shares(made)
-    return (_held(made, worth) and _matters(share, felt)) or (_no_noise(made) and share >= MATERIAL)
+    return (_confirmed(made, gain) and _matters(share, felt)) or (_no_noise(made) and share >= MATERIAL)
 
 
 def _shares(made: Decision) -> tuple[float, float]:
@@ -103,32 +103,32 @@ def _shares(made: Decision) -> tuple[float, float]:
     extension = made.beyond.extension
     assert extension is not None
     settings, without = extension.settings, extension.fit.settings
-    return moved_share(made.problem, settings, without), felt_share(made.problem, settings, without)
+    return share_of_way(made.problem, settings, without), share_of_noise(made.problem, settings, without)
 
 
 def _matters(share: float, felt: float) -> bool:
     return share >= MATERIAL or felt >= FELT
 
 
-def _held(made: Decision, worth: Gain | None) -> bool:
+def _confirmed(made: Decision, gain: Gain | None) -> bool:
     assert made.beyond.extension is not None
     nats = _nats(made.found, made.beyond)
     rate = effects.CHANNELS[made.beyond.extension.curve.channel].rate
-    return confirmed(worth, nats, free=True) or (nats >= STRONG_CURVE and nearer(worth, (_SEEN_IN[rate],)))
+    return confirmed(gain, nats, free=True) or (nats >= STRONG_CURVE and simulates_nearer(gain, (_SEEN_IN[rate],)))
 
 
 def _no_noise(made: Decision) -> bool:
     best = made.beyond.rivalry.rivals[0]
-    return made.found.nats(best.fit) + best.belief.nats >= NO_NOISE
+    return made.found.nats(best.fit) + best.evidence.nats >= NO_NOISE
 
 
-def _nats(found: Naming, beyond: Beyond) -> float:
+def _nats(found: SearchResult, beyond: Beyond) -> float:
     """Return the evidence [nat] for what was found: over the catalogue, or, where an effect may be it, over nothing."""
     best = beyond.rivalry.rivals[0]
-    return beyond.rivalry.lead if beyond.rivalry.winner else found.nats(best.fit) + best.belief.nats
+    return beyond.rivalry.lead if beyond.rivalry.winner else found.nats(best.fit) + best.evidence.nats
 
 
-def figure(problem: Problem, extension: Extension) -> Misfit:
+def figure(problem: Problem, extension: FitWithCurve) -> Misfit:
     """Return the residual without the curve over the covariate, and the curve with its band."""
     _, covariate, unit = sentences.covariate(extension.curve)
     x, residual, left, use = (
@@ -156,7 +156,7 @@ def figure(problem: Problem, extension: Extension) -> Misfit:
 
 
 def _samples(
-    problem: Problem, drive: Drive, extension: Extension
+    problem: Problem, drive: Drive, extension: FitWithCurve
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Return covariate and residual rate without and with the curve, per increment, and which of them count.
 
@@ -183,7 +183,7 @@ def _samples(
     return x, residual, left, use
 
 
-def _told(extension: Extension, beyond: Beyond, share: float) -> str:
+def _sentences(extension: FitWithCurve, beyond: Beyond, share: float) -> str:
     curve = extension.curve
     where = f"{sentences.channel(curve)} {sentences.followed(curve)}"
     better = f"explains {beyond.rivalry.lead:.1f} nats more than the best effects of the catalogue"
@@ -201,19 +201,22 @@ def _unknowns(problem: Problem, beyond: Beyond) -> Iterator[Unknown]:
         if rival.curve.id in seen or len(seen) == _LISTED or (seen and p[rival.curve.id] < _PLAUSIBLE):
             continue
         seen.add(rival.curve.id)
-        own = extend(problem, rival.fit, rival.curve, rival.belief.prior)
+        own = fit_with_curve(problem, rival.fit, rival.curve, rival.evidence.prior)
         name = sentences.covariate(rival.curve)[0]
         yield Unknown(sentences.channel(rival.curve), name, sentences.shape(own), min(p[rival.curve.id], 1.0))
 
 
-def _rivals(found: Naming, beyond: Beyond) -> Iterator[Rival]:
+def _rivals(found: SearchResult, beyond: Beyond) -> Iterator[Alternative]:
     """Yield the best set of the catalogue, and the best other curves."""
     best = beyond.rivalry.rivals[0]
-    yield Rival(" + ".join(sorted(found.best.ids)) or "no effect", -beyond.rivalry.lead, "the best of the catalogue")
+    yield Alternative(
+        " + ".join(sorted(found.best.ids)) or "no effect", -beyond.rivalry.lead, "the best of the catalogue"
+    )
     seen = {best.curve.id}
     for rival in beyond.rivalry.rivals:
         if rival.curve.id not in seen and len(seen) <= _LISTED:
             seen.add(rival.curve.id)
             beside = "".join(f" + {name}" for name in sorted(rival.fit.ids))
             name = f"{sentences.channel(rival.curve)} {sentences.followed(rival.curve)}{beside}"
-            yield Rival(name, rival.worth - best.worth, "a curve over another quantity explains less")
+            behind = rival.log_posterior - best.log_posterior
+            yield Alternative(name, behind, "a curve over another quantity explains less")

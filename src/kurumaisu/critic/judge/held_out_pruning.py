@@ -10,35 +10,37 @@ from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Fit
 from kurumaisu.critic.heldout.materiality import CERTAIN, confirmed, expected_nats
 from kurumaisu.critic.judge import explain_unknown
-from kurumaisu.critic.judge.decide import Decision, uncurved
+from kurumaisu.critic.judge.decide import Decision, without_curves
 from kurumaisu.critic.values.verdict import Gain
 
 _TRIED = 2  # smaller sets, the likeliest first: each is fitted to all folds
 _MET = 3.0  # [nat] that drives held out must be able to tell for their silence to say anything
 
 
-def pruned(made: Decision, worth: Gain | None, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain | None]:
+def confirmed_part(
+    made: Decision, gain: Gain | None, measure: Callable[[Decision], Gain]
+) -> tuple[Decision, Gain | None]:
     """Return a decision with what it is worth, or that of what is confirmed in its place.
 
     That is a smaller set which keeps what is named, or, for a curve of which nobody would be told, the catalogue's own.
     """
     found = made.found
-    if worth is None:
-        return made, worth
+    if gain is None:
+        return made, gain
     if made.beyond.extension is not None:
-        return (made, worth) if explain_unknown.told(made, worth) else _uncurved(made, worth, measure)
-    if confirmed(worth, found.nats(found.best)):
-        return made, worth
+        return (made, gain) if explain_unknown.is_reported(made, gain) else _without_curves(made, gain, measure)
+    if confirmed(gain, found.nats(found.best)):
+        return made, gain
     smaller = [fit for fit in found.fits if fit.ids and set(found.named) <= fit.ids < found.best.ids]
     for fit in smaller[:_TRIED]:
         other = _with(made, fit)
         gained = measure(other)
         if confirmed(gained, found.nats(fit)):
             return other, gained
-    return made, worth
+    return made, gain
 
 
-def in_turn(made: Decision, held: Gain | None, measure: Callable[[], Gain]) -> Gain | None:
+def leave_one_out(made: Decision, held: Gain | None, measure: Callable[[], Gain]) -> Gain | None:
     """Return what effects are worth with each drive to fit left out in turn, too, if that confirms them.
 
     Only where drives held out decide nothing: nobody may have driven so as to meet what acts, such as a threshold.
@@ -49,7 +51,7 @@ def in_turn(made: Decision, held: Gain | None, measure: Callable[[], Gain]) -> G
     return again if confirmed(again, made.found.nats(made.found.best)) else held
 
 
-def unmet(made: Decision, held: Gain | None, drives: Sequence[Drive]) -> bool:
+def untested(made: Decision, held: Gain | None, drives: Sequence[Drive]) -> bool:
     """Tell whether drives held out can neither confirm nor refute effects that are certain: they hardly meet them.
 
     held: what the effects gain on these drives. What would be surprised there by more than chance is refuted.
@@ -65,13 +67,13 @@ def _unconfirmed(made: Decision, held: Gain) -> bool:
     return made.beyond.extension is None and nats >= CERTAIN and not confirmed(held, nats)
 
 
-def _uncurved(made: Decision, worth: Gain, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain]:
+def _without_curves(made: Decision, gain: Gain, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain]:
     """Return what acts if no curve does, where that is confirmed: a curve that is not must not hide it."""
-    other = uncurved(made)
+    other = without_curves(made)
     if not other.something:
-        return made, worth
+        return made, gain
     gained = measure(other)
-    return (other, gained) if confirmed(gained, other.found.nats(other.found.best)) else (made, worth)
+    return (other, gained) if confirmed(gained, other.found.nats(other.found.best)) else (made, gain)
 
 
 def _with(made: Decision, fit: Fit) -> Decision:

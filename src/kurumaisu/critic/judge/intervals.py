@@ -12,7 +12,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout.materiality import HORIZON, spans
-from kurumaisu.critic.unknown.effect_likeness import FORM, signal_of
+from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR, signal_of
 from kurumaisu.critic.values.verdict import NORMAL90, Estimate
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
@@ -21,8 +21,8 @@ _WAYS = 4  # in which a form may differ, of which one passes for another size
 _TRIES = 6  # residuals per end of an interval
 _NEAR = 0.05  # of NORMAL90, by which an end may be off
 _FARTHER = 3.0  # times as far as tried before, at most: a flat likelihood does not say how far it goes
-_TEETH = np.geomspace(1e-5, 1e-2, 24)  # shares of a size, at which what has a comb of likely values is tried
-_REFUSED = NORMAL90**2 / 2  # [nat] beyond which a tooth is none
+_PEAK_DISTANCES = np.geomspace(1e-5, 1e-2, 24)  # shares of a size, at which what has many likely values is tried
+_REFUSED = NORMAL90**2 / 2  # [nat] beyond which a peak is none
 
 
 def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
@@ -38,13 +38,13 @@ def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
     for at, term in enumerate(fit.terms):
         value = float(fit.values[at])
         if term.id == name and term.fixed:
-            out[term.parameter.name] = _told(problem.model, term, value, value, value)
+            out[term.parameter.name] = _estimate(problem.model, term, value, value, value)
         elif term.id == name:
             k = known.index(at)
             sd = float(np.sqrt(spread[k, k])) * abs(float(unit[k]))
             ridge = np.zeros(len(fit.terms))  # where the others go with this one
             ridge[known] = spread[:, k] * unit / (spread[k, k] * unit[k])
-            # Off its tooth, the step of a converter fits nothing: the way then goes on beside the step as it is.
+            # Off its peak, the step of a converter fits nothing: the way then goes on beside the step as it is.
             held = np.array([other.rough and i != at for i, other in enumerate(fit.terms)])
             ways = [ridge, np.where(held, 0.0, ridge)] if (ridge[held] != 0).any() else [ridge]
             lows, highs = zip(*(ends_of(problem, fit, at, way, sd) for way in ways), strict=True)
@@ -52,7 +52,7 @@ def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
             beyond = 0.0 if term.shape else order * abs(value - term.null)
             more = NORMAL90 * float(np.hypot(doubt[k] * sd, beyond))
             ends = value - np.hypot(value - low, more), value + np.hypot(high - value, more)
-            out[term.parameter.name] = _told(problem.model, term, value, *map(float, ends))
+            out[term.parameter.name] = _estimate(problem.model, term, value, *map(float, ends))
     return out
 
 
@@ -67,7 +67,7 @@ def _doubt(problem: Problem, fit: Fit, columns: FloatArray) -> FloatArray:
         if effects.by_id(name).empirical:
             signal = signal_of(problem, fit, name)
             norms = np.linalg.norm(columns, axis=0) * np.linalg.norm(signal)
-            out += FORM**2 * float(signal @ signal) / _WAYS * (columns.T @ signal / np.maximum(norms, 1e-12)) ** 2
+            out += FORM_ERROR**2 * float(signal @ signal) / _WAYS * (columns.T @ signal / np.maximum(norms, 1e-12)) ** 2
     return np.asarray(np.sqrt(out))
 
 
@@ -121,7 +121,7 @@ def ends_of(problem: Problem, fit: Fit, at: int, ridge: FloatArray, sd: float) -
     cost = fallen(0.0)
     ends = []
     for sign, room in ((-1.0, value - parameter.lower), (1.0, parameter.upper - value)):
-        far = _comb_end(fallen, sign, abs(value)) if fit.terms[at].rough else 0.0
+        far = _step_end(fallen, sign, abs(value)) if fit.terms[at].rough else 0.0
         ends.append(value + sign * max(_end(fallen, sign, sd, room), min(far, room)))
     return ends[0], ends[1]
 
@@ -144,13 +144,13 @@ def _end(fallen: Callable[[float], float], sign: float, sd: float, room: float) 
     return offset
 
 
-def _comb_end(fallen: Callable[[float], float], sign: float, size: float) -> float:
+def _step_end(fallen: Callable[[float], float], sign: float, size: float) -> float:
     """Return the farthest place to one side where the likelihood stands as high as at the ends of 90 %."""
-    likely = [share * size for share in _TEETH if fallen(sign * share * size) < _REFUSED]
+    likely = [share * size for share in _PEAK_DISTANCES if fallen(sign * share * size) < _REFUSED]
     return max(likely, default=0.0)
 
 
-def _told(model: Model, term: Term, value: float, low: float, high: float) -> Estimate:
+def _estimate(model: Model, term: Term, value: float, low: float, high: float) -> Estimate:
     """Return a fitted parameter with its 90 % interval, which its bounds cut."""
     unit = term.parameter.unit
     if unit == "V" and model.law_name == "identity":

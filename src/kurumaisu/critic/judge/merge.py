@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kurumaisu.critic.judge.sentences import named, wrong
+from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.verdict import Kind, Verdict
@@ -15,11 +15,11 @@ _PLACES = {"hit x": "x of the walls", "hit y": "y of the walls"}
 _TOLD = 4  # ids in a sentence; the verdict has them all
 
 
-def with_laser(criticism: Criticism, finding: LaserFinding) -> Criticism:
+def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
     """Return a criticism of the base with what the scans say besides."""
     if finding.wrong is not None:
         verdict = Verdict("invalid_data", problems=(finding.wrong, *criticism.verdict.problems))
-        told = replace(criticism.story, headline=wrong([finding.wrong]), details=(finding.wrong,))
+        told = replace(criticism.story, headline=wrong_data([finding.wrong]), details=(finding.wrong,))
         return replace(criticism, verdict=verdict, story=told, settings=())
     criticism = _with_drive(criticism, finding)
     verdict, story = criticism.verdict, criticism.story
@@ -84,7 +84,7 @@ def headline(finding: LaserFinding) -> str:
         over = _PLACES.get(first.covariate, first.covariate)
         return f"No effect in the catalogue explains the error of the ranges. It follows the {over}: {first.shape}."
     if finding.causes:
-        return named(finding.causes)
+        return named_causes(finding.causes)
     if finding.confounded:
         return f"The model lacks an effect, but these scans cannot tell which: {' or '.join(finding.confounded[0])}."
     return ""

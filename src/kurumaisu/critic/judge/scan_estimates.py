@@ -10,9 +10,9 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.engine.search import NAMED
 from kurumaisu.critic.ranges.search import block_evidence
-from kurumaisu.critic.ranges.search.block_evidence import Rival
-from kurumaisu.critic.ranges.search.normal_equations import Normal
-from kurumaisu.critic.scatter.scatter_search import Scatter
+from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
+from kurumaisu.critic.ranges.search.normal_equations import NormalEquations
+from kurumaisu.critic.scatter.scatter_search import ScatterEffect
 from kurumaisu.critic.values.verdict import NORMAL90, Cause, Estimate
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
@@ -33,7 +33,9 @@ def estimates_of(setting: EffectSetting, sds: Mapping[str, float]) -> dict[str, 
     return out
 
 
-def of_block(winner: Rival, coefficients: FloatArray, normal: Normal) -> tuple[EffectSetting, dict[str, Estimate]]:
+def of_block(
+    winner: SetWithBlock, coefficients: FloatArray, normal: NormalEquations
+) -> tuple[EffectSetting, dict[str, Estimate]]:
     """Return a block as a model file has it, and the estimate of its size."""
     free = winner.free
     if free.basis is not None:
@@ -41,13 +43,13 @@ def of_block(winner: Rival, coefficients: FloatArray, normal: Normal) -> tuple[E
     p = free.parameter
     assert p is not None
     at, low, high = (
-        float(np.clip(p.null + p.scale * x, p.lower, p.upper)) for x in block_evidence.size(winner, normal.gram)
+        float(np.clip(p.null + p.scale * x, p.lower, p.upper)) for x in block_evidence.block_size(winner, normal.gram)
     )
     nulls = {each.name: each.null for each in effects.by_id(free.id).parameters}
     return EffectSetting(free.id, {**nulls, p.name: at}), {p.name: Estimate(at, low, high, p.unit)}
 
 
-def another_map(winner: Rival | None, normal: Normal, lacking: float) -> str | None:
+def another_map(winner: SetWithBlock | None, normal: NormalEquations, lacking: float) -> str | None:
     """Return words for walls that are surely farther off than a map's errors; None where none are.
 
     lacking: share of the readings that are of something else than the map has there.
@@ -55,7 +57,7 @@ def another_map(winner: Rival | None, normal: Normal, lacking: float) -> str | N
     p = None if winner is None else winner.free.parameter
     if winner is None or p is None:
         return None
-    low = p.null + p.scale * block_evidence.size(winner, normal.gram)[1]
+    low = p.null + p.scale * block_evidence.block_size(winner, normal.gram)[1]
     if low < (_ANOTHER_LACKS if lacking > _LACKS else _ANOTHER) * p.upper:
         return None
     return (
@@ -65,7 +67,7 @@ def another_map(winner: Rival | None, normal: Normal, lacking: float) -> str | N
 
 
 def with_scatter(
-    causes: Sequence[Cause], settings: Mapping[str, EffectSetting], scatter: Sequence[Scatter]
+    causes: Sequence[Cause], settings: Mapping[str, EffectSetting], scatter: Sequence[ScatterEffect]
 ) -> tuple[tuple[Cause, ...], tuple[EffectSetting, ...]]:
     """Return causes and settings, also of what acts on the scatter."""
     known, out = {cause.id: cause for cause in causes}, dict(settings)
@@ -82,7 +84,7 @@ def _off_null(setting: EffectSetting) -> dict[str, float]:
     return {name: value for name, value in setting.parameters.items() if value != nulls[name]}
 
 
-def _joined(cause: Cause | None, scatter: Scatter) -> Cause:
+def _joined(cause: Cause | None, scatter: ScatterEffect) -> Cause:
     parameters = {p.name: p for p in effects.by_id(scatter.setting.id).parameters}
     estimates = dict(cause.parameters) if cause is not None else {}
     for name, (below, above) in scatter.sds.items():

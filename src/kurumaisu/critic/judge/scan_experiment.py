@@ -11,8 +11,8 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.experiment.proposal import DECIDED
 from kurumaisu.critic.ranges.noise.scan_noise import ScanNoise
-from kurumaisu.critic.ranges.scans.beams import gather, look, predict
-from kurumaisu.critic.ranges.search.normal_equations import Assembly, Normal
+from kurumaisu.critic.ranges.scans.beams import gather, hits_of, predict
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.signals.effect_columns import Form
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import NextExperiment
@@ -32,7 +32,9 @@ _TRUTH = (0.005, 0.005)  # [m, rad] of a reference as surveyed marks give it, wh
 _COMMON = (2e-4, 1.0)  # [m, s] of whole scans
 
 
-def supplier(model: Model, wanted: Sequence[str], truth: tuple[float, float] | None) -> NextExperiment | None:
+def supplying_experiment(
+    model: Model, wanted: Sequence[str], truth: tuple[float, float] | None
+) -> NextExperiment | None:
     """Return the experiment for the laser that tells most of these effects from one another, the shorter one of two.
 
     truth: sd of the reference [m, rad], None where nobody knows. None where no experiment tells any.
@@ -40,7 +42,7 @@ def supplier(model: Model, wanted: Sequence[str], truth: tuple[float, float] | N
     options = []
     for script in map(shipped_script, names()):
         if script.kind == "places" and script.seconds <= _LONGEST:
-            nats = _told_apart(_planned(script, model, frozenset(wanted), truth or _TRUTH), wanted)
+            nats = _distinguishable(_planned(script, model, frozenset(wanted), truth or _TRUTH), wanted)
             told = tuple(name for name, each in zip(wanted, nats, strict=True) if each.min() >= _TOLD)
             expected = float(np.minimum(nats, DECIDED).mean())
             options.append((len(told), -script.seconds, NextExperiment(script.name, script.seconds, expected, told)))
@@ -69,16 +71,16 @@ def _planned(
     pose = Series(stood, np.repeat(poses, 2, axis=0), ("x", "y", "theta"))
     run = Run("plan", pose=pose, scan=blank)
     shots = gather(Recording(script.name, (run,), train=("plan",), world=path, truth=truth), model)
-    measured = predict(shots, (), look(shots, (), 0), 0)
+    measured = predict(shots, (), hits_of(shots, (), 0), 0)
     assembly = Assembly(replace(shots, measured=measured), wanted)
     noise = ScanNoise(*truth, *_COMMON)
     count = sum(len(form.columns) for form in assembly.forms)
-    normal = Normal(np.empty((0, 0)), noise, noise, assembly.first, 0)
+    normal = NormalEquations(np.empty((0, 0)), noise, noise, assembly.first, 0)
     gram = assembly.products(normal, assembly.columns[:, :, :count].astype(float), np.zeros_like(assembly.residual))
     return assembly.forms, gram
 
 
-def _told_apart(planned: tuple[list[Form], FloatArray], wanted: Sequence[str]) -> FloatArray:
+def _distinguishable(planned: tuple[list[Form], FloatArray], wanted: Sequence[str]) -> FloatArray:
     """Return the expected log evidence [nat] for each effect at its usual size over each other one, (n, n - 1).
 
     Of a single effect, over none.

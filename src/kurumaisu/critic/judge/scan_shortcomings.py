@@ -13,7 +13,7 @@ _MOVED = 0.05  # [m] between the places of a laser, at least
 _DISTANCES = 1.2  # ratio of the farthest to the nearest reading, at least
 
 
-def lacking(assembly: Assembly) -> list[str]:
+def shortcomings(assembly: Assembly) -> list[str]:
     """Return sentences about what the scans did not see, with the scripted drive that shows it."""
     seen, trust = assembly.marks.seen, assembly.geometry
     if not trust.any():

@@ -11,10 +11,10 @@ from kurumaisu import effects
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.search import Naming
+from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.heldout.materiality import HORIZON, MATERIAL
 from kurumaisu.critic.values.digits import quantities, with_interval
-from kurumaisu.critic.values.story import Rival
+from kurumaisu.critic.values.story import Alternative
 from kurumaisu.critic.values.verdict import Cause, Estimate, Verdict, grouped
 
 _MINUTE = 60.0  # [s]
@@ -22,16 +22,16 @@ _CAUSES_TOLD = 4  # in a headline
 _KINDS_TOLD = 2  # of problems in a headline
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
-UNMET = "The held-out drives hardly show this effect, so they neither confirm nor refute it."
+UNTESTED = "The held-out drives hardly show this effect, so they neither confirm nor refute it."
 
 
-def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[str, float]) -> str:
+def headline(verdict: Verdict, found: SearchResult, matters: set[str], shares: dict[str, float]) -> str:
     """Return the verdict in one sentence.
 
     matters: effects of the best set that move the chair enough, as data held out confirm; shares: how far each does.
     """
     if verdict.verdict == "named":
-        return named(verdict.causes)
+        return named_causes(verdict.causes)
     if verdict.verdict == "confounded":
         group = " or ".join(verdict.confounded[0])
         return f"The model lacks an effect, but these drives cannot tell which: {group}."
@@ -51,14 +51,14 @@ def headline(verdict: Verdict, found: Naming, matters: set[str], shares: dict[st
     return "These drives show no effect that the model lacks."
 
 
-def wrong(problems: Sequence[str]) -> str:
+def wrong_data(problems: Sequence[str]) -> str:
     """Return in a sentence that the data are wrong, and what is wrong first of all."""
     kinds = [kind for kind, _ in grouped(problems)]
     more = f"; and {len(kinds) - _KINDS_TOLD} more" if len(kinds) > _KINDS_TOLD else ""
     return f"The data are wrong, so nothing was fitted: {'; '.join(kinds[:_KINDS_TOLD])}{more}."
 
 
-def named(causes: Sequence[Cause]) -> str:
+def named_causes(causes: Sequence[Cause]) -> str:
     """Return in a sentence what acts, with ids and sizes."""
     text = "; ".join(f"{effects.by_id(cause.id).sentence} ({_sizes(cause)})" for cause in causes[:_CAUSES_TOLD])
     rest = f"; and {', '.join(cause.id for cause in causes[_CAUSES_TOLD:])}" if len(causes) > _CAUSES_TOLD else ""
@@ -72,7 +72,7 @@ def _sizes(cause: Cause) -> str:
 
 def details(
     problem: Problem,
-    found: Naming,
+    found: SearchResult,
     drives: Sequence[Drive],
     sizes: Mapping[str, Mapping[str, Estimate]],
     shares: dict[str, float],
@@ -106,7 +106,7 @@ def details(
     return tuple(said)
 
 
-def _weight(name: str, found: Naming, shares: dict[str, float], matters: set[str]) -> str:
+def _weight(name: str, found: SearchResult, shares: dict[str, float], matters: set[str]) -> str:
     if name not in matters:
         small = shares[name] < MATERIAL
         return ": detectable, but too small to matter" if small else ": not confirmed on held-out data"
@@ -115,7 +115,7 @@ def _weight(name: str, found: Naming, shares: dict[str, float], matters: set[str
     return "" if found.p[name] >= search.NAMED else ": not certain enough to be named"
 
 
-def suspects(found: Naming) -> tuple[str, ...]:
+def suspects(found: SearchResult) -> tuple[str, ...]:
     """Return a sentence on the effects that may act, for all that these drives show."""
     some = sorted((name for name in found.p if search.RIVAL <= found.p[name] < search.NAMED), key=lambda n: -found.p[n])
     if not some:
@@ -124,7 +124,7 @@ def suspects(found: Naming) -> tuple[str, ...]:
     return (f"Suspected, but not certain enough to be named: {listed}.",)
 
 
-def rivals(found: Naming) -> tuple[Rival, ...]:
+def rivals(found: SearchResult) -> tuple[Alternative, ...]:
     """Return sets with other causes and sets with more or fewer, the best of each kind, by their evidence."""
     best = found.best
     # Of the ways in which the same effects may act, the best one stands for all.
@@ -136,7 +136,7 @@ def rivals(found: Naming) -> tuple[Rival, ...]:
     return tuple(_rival(fit, best) for fit in shown)
 
 
-def _rival(fit: Fit, best: Fit) -> Rival:
+def _rival(fit: Fit, best: Fit) -> Alternative:
     likelihood = fit.log_likelihood - best.log_likelihood
     if fit.score > best.score:
         why = f"fits better by {likelihood:.1f} nats, too little for one more effect, which is improbable a priori"
@@ -146,4 +146,4 @@ def _rival(fit: Fit, best: Fit) -> Rival:
         why = f"fits worse by {-likelihood:.1f} nats"
     else:
         why = f"fits better by {likelihood:.1f} nats, but needs more effects"
-    return Rival(" + ".join(sorted(fit.ids)) or "no effect", fit.score - best.score, why)
+    return Alternative(" + ".join(sorted(fit.ids)) or "no effect", fit.score - best.score, why)

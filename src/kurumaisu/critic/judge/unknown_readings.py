@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu.critic.ranges.search import block_evidence
-from kurumaisu.critic.ranges.search.block_evidence import Rival, Weighed
+from kurumaisu.critic.ranges.search.block_evidence import BlockComparison, SetWithBlock
 from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.unknown.shapes import grid, shape_of
-from kurumaisu.critic.values.laser_finding import CHANNEL
+from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import FloatArray
 
@@ -21,7 +21,7 @@ _UNITS = {"range": "m", "hit_x": "m", "hit_y": "m", "time": "s"}  # all others a
 
 
 @dataclass(frozen=True)
-class Described:
+class RangeCurve:
     """A curve with its coefficients (m,) and their covariance (m, m), as shapes describes it."""
 
     basis: Basis
@@ -29,7 +29,7 @@ class Described:
     covariance: FloatArray
 
 
-def unknowns(weighed: Weighed, gram: FloatArray) -> Iterator[Unknown]:
+def unknowns(weighed: BlockComparison, gram: FloatArray) -> Iterator[Unknown]:
     """Yield the curve that acts, and the next ones that could stand in for it."""
     seen: set[str] = set()
     first = () if weighed.winner is None else (weighed.winner,)
@@ -39,13 +39,13 @@ def unknowns(weighed: Weighed, gram: FloatArray) -> Iterator[Unknown]:
             continue
         seen.add(rival.free.id)
         p = min(weighed.p[rival.free.id], 1.0)
-        yield Unknown(CHANNEL, basis.covariate.replace("_", " "), shape(rival, basis, gram), p)
+        yield Unknown(UNKNOWN_CHANNEL, basis.covariate.replace("_", " "), shape(rival, basis, gram), p)
 
 
-def shape(rival: Rival, basis: Basis, gram: FloatArray) -> str:
+def shape(rival: SetWithBlock, basis: Basis, gram: FloatArray) -> str:
     """Return a curve's shape with place and size, each with its 90 % interval."""
-    _, coefficients, covariance = block_evidence.joint(rival, gram)
-    described = Described(basis, coefficients, covariance)
+    _, coefficients, covariance = block_evidence.fit_with_block(rival, gram)
+    described = RangeCurve(basis, coefficients, covariance)
     found, at = shape_of(described), grid(described)
     unit = _UNITS.get(basis.covariate, "rad")
     size, low, high = 1e3 * (np.abs(found.size) if found.kind == "line" else found.size)

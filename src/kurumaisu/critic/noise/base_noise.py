@@ -16,7 +16,7 @@ from scipy.special import expit
 
 from kurumaisu._core import Whitener
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.noise.minimiser import lowest
+from kurumaisu.critic.noise.minimiser import minimise
 from kurumaisu.critic.values.prior import occam
 from kurumaisu.types import FloatArray
 
@@ -91,7 +91,7 @@ def whitener(drive: Drive, noise: Noise) -> Whitener:
         drive.times,
         np.maximum(drive.activity, noise.rest) * grown,
         drive.rolling * grown,
-        drive.ways,
+        drive.pose_paths,
         position_sd=noise.position_sd * noise.louder,
         heading_sd=noise.heading_sd * noise.louder,
         process_sd=[
@@ -111,7 +111,7 @@ def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArra
 
 
 @dataclass(frozen=True)
-class Estimate:
+class NoiseEstimate:
     """The noise found, and minus its restricted log posterior up to a constant."""
 
     noise: Noise
@@ -119,7 +119,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Growth:
+class NoiseGrowth:
     """Does the noise grow with the rates? p: that it does; gain_nats: log evidence; noise: that which grows."""
 
     p: float
@@ -127,7 +127,7 @@ class Growth:
     noise: Noise
 
 
-class Scatter:
+class NoiseResiduals:
     """What the noise is estimated from: residuals about a model, with what might be the model's fault left out."""
 
     def __init__(
@@ -146,23 +146,23 @@ class Scatter:
         self._stacked = [np.column_stack([r.ravel(), c[:, kept]]) for r, c in zip(residuals, columns, strict=True)]
         self._truth = truth
 
-    def estimate(self, start: Noise = START) -> Estimate:
+    def estimate(self, start: Noise = START) -> NoiseEstimate:
         """Return the noise of one colour, or of two where they explain more; of a chair at rest as much as it has.
 
         The reference's errors are white, or last where that explains more.
         """
         plain = replace(start, slow_v=0.0, slow_lateral=0.0, slow_w=0.0, lasting=0.0)
-        one = self._restless(self._lasting(self._best(plain, _free(plain))))
+        one = self._restless(self._lasting(self._best(plain, _searched(plain))))
         second = start if start.slow_v else _SLOW
         slow = {name: getattr(second, name) for name in _SECOND}
         if not self._hints_at(one.noise, slow):
             return one
-        two = self._best(replace(one.noise, **slow), (*_free(one.noise), *_SECOND))
+        two = self._best(replace(one.noise, **slow), (*_searched(one.noise), *_SECOND))
         if two.cost >= one.cost - _WORTH:
             return one
         return two if two.noise.lasting else self._lasting(two)
 
-    def _lasting(self, white: Estimate) -> Estimate:
+    def _lasting(self, white: NoiseEstimate) -> NoiseEstimate:
         """Return the noise of a reference whose errors last for longer than one pose, if that explains more."""
         tried = (
             self._as_known(replace(white.noise, lasting=size, lasting_tau=tau))
@@ -172,7 +172,7 @@ class Scatter:
         cost, start = min(((self._cost(noise), noise) for noise in tried), key=itemgetter(0))
         if cost > self._cost(white.noise):
             return white
-        found = self._best(start, (*_free(start), *(_SECOND if start.slow_v else ())))
+        found = self._best(start, (*_searched(start), *(_SECOND if start.slow_v else ())))
         return found if found.cost < white.cost - _WORTH else white
 
     def _as_known(self, noise: Noise) -> Noise:
@@ -182,7 +182,7 @@ class Scatter:
         position_sd, heading_sd = np.maximum(self._truth, _FLOOR["position_sd"]) / noise.louder
         return replace(noise, position_sd=float(position_sd), heading_sd=float(heading_sd))
 
-    def _restless(self, still: Estimate) -> Estimate:
+    def _restless(self, still: NoiseEstimate) -> NoiseEstimate:
         """Return the noise of a chair that fluctuates at rest, too, if that explains more."""
         if still.noise.rest > START.rest:
             return still
@@ -192,7 +192,7 @@ class Scatter:
             for k in (1.0, 0.7)
         )
         cost, start = min(((self._cost(noise), noise) for noise in tried), key=itemgetter(0))
-        return self._best(start, _free(start)) if cost <= self._cost(still.noise) - _WORTH else still
+        return self._best(start, _searched(start)) if cost <= self._cost(still.noise) - _WORTH else still
 
     def _hints_at(self, one: Noise, slow: dict[str, float]) -> bool:
         """Tell whether some of a second colour explains more than none: a tenth of the price of a search."""
@@ -210,23 +210,23 @@ class Scatter:
         alone = self._cost(one)
         return any(self._cost(noise) < alone for noise in tried)
 
-    def growth(self, about: Estimate, prior_odds: float) -> Growth:
+    def growth(self, about: NoiseEstimate, prior_odds: float) -> NoiseGrowth:
         """Return how likely it is that the noise grows with the rates, about the estimate of noise that does not."""
         growing = min(
             (self._best(start, names) for start, names in self._growing(about.noise)), key=_cost_of, default=about
         )
         better = max(about.cost - growing.cost, 0.0)
         nats = better - float(occam(np.sqrt(2 * better), sides=1))
-        return Growth(float(expit(nats + np.log(prior_odds))), nats, growing.noise)
+        return NoiseGrowth(float(expit(nats + np.log(prior_odds))), nats, growing.noise)
 
     def _growing(self, about: Noise) -> Iterator[tuple[Noise, tuple[str, ...]]]:
         """Yield what to begin with, and what is searched for; nothing where some growth explains no more than none."""
         alone = self._cost(about)
-        if min(self._cost(_grown(about, size)) for size in _HINTED_GROWTH) < alone - _HINTED:
-            names = (*_free(about), *(_SECOND if about.slow_v else ()), "growth")
-            yield from ((_grown(about, size), names) for size in _GROWN)
+        if min(self._cost(_growing_noise(about, size)) for size in _HINTED_GROWTH) < alone - _HINTED:
+            names = (*_searched(about), *(_SECOND if about.slow_v else ()), "growth")
+            yield from ((_growing_noise(about, size), names) for size in _GROWN)
 
-    def _best(self, start: Noise, names: Sequence[str]) -> Estimate:
+    def _best(self, start: Noise, names: Sequence[str]) -> NoiseEstimate:
         if self._truth is not None:
             names = [name for name in names if name not in ("position_sd", "heading_sd")]
         centre = np.log([getattr(_SLOW, name) for name in names])
@@ -241,8 +241,8 @@ class Scatter:
             return self._cost(noise_at(log_values)) + 0.5 * float(distance @ distance)
 
         begin = np.clip(np.log([getattr(start, name) for name in names]), *bounds.T)
-        where, least = lowest(cost, begin, bounds)
-        return Estimate(noise_at(where), least)
+        where, least = minimise(cost, begin, bounds)
+        return NoiseEstimate(noise_at(where), least)
 
     def _cost(self, noise: Noise) -> float:
         """Return minus the restricted log likelihood, up to a constant."""
@@ -256,18 +256,18 @@ class Scatter:
         return 0.5 * float(log_determinant + rest + np.linalg.slogdet(inner)[1])
 
 
-def _free(noise: Noise) -> tuple[str, ...]:
+def _searched(noise: Noise) -> tuple[str, ...]:
     """Return what is searched for in noise of one colour."""
     rest = ("rest",) if noise.rest > START.rest else ()
     return (*ONE_COLOUR, *rest, *(_LASTING if noise.lasting else ()))
 
 
-def _grown(noise: Noise, growth: float) -> Noise:
+def _growing_noise(noise: Noise, growth: float) -> Noise:
     """Return noise that grows, and is about as large as before at usual rates."""
     return replace(noise, growth=growth, **{name: getattr(noise, name) / (1 + growth) for name in _GROWING})
 
 
-def _cost_of(estimate: Estimate) -> float:
+def _cost_of(estimate: NoiseEstimate) -> float:
     return estimate.cost
 
 

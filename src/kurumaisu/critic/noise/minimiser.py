@@ -23,7 +23,7 @@ class _StuckError(Exception):
     pass
 
 
-def lowest(cost: Cost, begin: FloatArray, bounds: FloatArray) -> tuple[FloatArray, float]:
+def minimise(cost: Cost, begin: FloatArray, bounds: FloatArray) -> tuple[FloatArray, float]:
     """Return the place (k,) of a local minimum within bounds (k, 2), searched for from another, and its cost.
 
     Where it is stuck it forgets what it has learnt, and begins anew from there, until that is of no use.

@@ -11,7 +11,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Fit, Problem, covariance
-from kurumaisu.critic.unknown.joint_fit import Extension
+from kurumaisu.critic.unknown.joint_fit import FitWithCurve
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
@@ -39,7 +39,7 @@ def about_fit(problem: Problem, fit: Fit) -> tuple[Settings, ...]:
     return tuple(others)
 
 
-def about_curve(extension: Extension) -> tuple[Settings, ...]:
+def about_curve(extension: FitWithCurve) -> tuple[Settings, ...]:
     """Return settings that differ from an extension's by one standard deviation of its curve each."""
     values, vectors = np.linalg.eigh(extension.covariance)
     sizes = np.sqrt(np.maximum(values, 0.0))

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic.base.covariates import beside
+from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import driven, prepare_all
 from kurumaisu.critic.predict.motion import Forecast, motion_ahead
 from kurumaisu.critic.predict.reference_path import Paths
-from kurumaisu.critic.predict.scan_matching import trained
-from kurumaisu.critic.predict.scan_poses import Places
-from kurumaisu.critic.ranges.scans.beams import missing
+from kurumaisu.critic.predict.scan_matching import trained_matcher
+from kurumaisu.critic.predict.scan_poses import ScanPoses
+from kurumaisu.critic.ranges.scans.beams import why_not_usable
 from kurumaisu.critic.values.prediction import Prediction
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.errors import Error
@@ -64,9 +64,9 @@ def ranges(recording: Recording, model: Model, forecast: Forecast | None, settin
     wanted = [run for run in asked(recording) if len(stamps[run.name])]
     if not wanted:
         return
-    able = missing(recording) is None
-    places = Places(recording, model, forecast) if able else None
-    refiner = trained(places, settings, recording.truth) if places else None
+    able = why_not_usable(recording) is None
+    places = ScanPoses(recording, model, forecast) if able else None
+    refiner = trained_matcher(places, settings, recording.truth) if places else None
     for run in wanted:
         if places is None or refiner is None or run.pose is None:
             beams = _beams(recording, model)
@@ -92,7 +92,7 @@ def motions_of(run: Run, forecast: Forecast, queries: FloatArray) -> list[Predic
     """Return the motions of a driven run for queries (q, 2) of t0 < t1 [s]."""
     if not len(queries):
         return []
-    drive = beside(prepare_all(run, forecast.model, float(queries.max())), run)
+    drive = with_covariates_but_place(prepare_all(run, forecast.model, float(queries.max())), run)
     paths = Paths(drive, forecast.model, forecast.settings, forecast.others)
     out = []
     for t0, t1 in queries.tolist():

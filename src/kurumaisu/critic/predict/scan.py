@@ -10,8 +10,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import Look, Shots, look, predict, thin
-from kurumaisu.critic.ranges.scans.valid_readings import trusted_place
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, hits_of, predict, thin
+from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -62,18 +62,18 @@ class ScanModel:
 
 def expected(shots: Shots, settings: Settings) -> Expected:
     """Return what shots are to read with these effects, and what makes them scatter."""
-    settings = undrawn(shots, settings)
+    settings = without_random(shots, settings)
     return seen_from(shots, settings, looks(shots, settings))
 
 
-def looks(shots: Shots, settings: Settings) -> list[Look]:
+def looks(shots: Shots, settings: Settings) -> list[BeamHits]:
     """Return what the beams meet, and what they would from poses that are moved back and forth, along each axis."""
-    seen = look(shots, settings, 0)
+    seen = hits_of(shots, settings, 0)
     moves = [sign * size * np.eye(3)[i] for i, size in enumerate(_MOVE) for sign in (-1.0, 1.0)]
-    return [seen, *(look(shots, settings, 0, shift=move, like=seen) for move in moves)]
+    return [seen, *(hits_of(shots, settings, 0, shift=move, like=seen) for move in moves)]
 
 
-def seen_from(shots: Shots, settings: Settings, around: Sequence[Look]) -> Expected:
+def seen_from(shots: Shots, settings: Settings, around: Sequence[BeamHits]) -> Expected:
     """Return what expected does; settings: without what is drawn; around: of looks with the same settings."""
     seen = around[0]
     mean = predict(shots, settings, seen, 0)
@@ -88,10 +88,10 @@ def seen_from(shots: Shots, settings: Settings, around: Sequence[Look]) -> Expec
         moved[i] = 0.5 * (low**2 + high**2)  # at an edge one side jumps
         shared[:, :, i] = 0.5 * (high - low)
     parts = np.array([own, moved[0] + moved[1], moved[2], np.ones_like(mean)])
-    return Expected(mean, parts, shared, trusted_place(shots, seen, np.nan_to_num(mean)))
+    return Expected(mean, parts, shared, usable_beams(shots, seen, np.nan_to_num(mean)))
 
 
-def undrawn(shots: Shots, settings: Settings) -> Settings:
+def without_random(shots: Shots, settings: Settings) -> Settings:
     """Return the effects without those of their parameters whose mark on the mean is drawn: nobody can expect it."""
     few, out = thin(shots, _PROBE), list(settings)
     for i, setting in enumerate(settings):
@@ -107,7 +107,7 @@ def undrawn(shots: Shots, settings: Settings) -> Settings:
 
 
 def _steady(shots: Shots, settings: Settings) -> bool:
-    drawn = [predict(shots, settings, look(shots, settings, seed), seed) for seed in (0, 1)]
+    drawn = [predict(shots, settings, hits_of(shots, settings, seed), seed) for seed in (0, 1)]
     return np.array_equal(drawn[0], drawn[1], equal_nan=True)
 
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 
 from kurumaisu import effects
-from kurumaisu.critic.predict.scan import Expected, looks, seen_from, undrawn
-from kurumaisu.critic.ranges.scans.beams import Look, Shots
+from kurumaisu.critic.predict.scan import Expected, looks, seen_from, without_random
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import IntArray
 
@@ -24,13 +24,13 @@ class Expectations:
         self._own = {setting.id for setting in shots.own}
         self._plain: dict[Hashable, Settings] = {}
         self._known: dict[Hashable, Expected] = {}
-        self._looks: dict[Hashable, list[Look]] = {}
+        self._looks: dict[Hashable, list[BeamHits]] = {}
 
     def of(self, settings: Settings) -> Expected:
         """Return what the shots are to read with these effects."""
         asked = _key(settings)
         if asked not in self._plain:
-            self._plain[asked] = tuple(undrawn(self.shots, settings))
+            self._plain[asked] = tuple(without_random(self.shots, settings))
         plain = self._plain[asked]
         key = _key(plain)
         if key not in self._known:
@@ -44,7 +44,7 @@ class Expectations:
         what = self.of(settings)
         return Expected(what.mean[rows], what.parts[:, rows], what.shared[rows], what.place[rows])
 
-    def _seen(self, settings: Settings) -> list[Look]:
+    def _seen(self, settings: Settings) -> list[BeamHits]:
         """Return looks, which effects that act on readings alone do not change."""
         placing = [each for each in settings if each.id in self._own or not _reads(each.id)]
         key = _key(placing)
@@ -59,7 +59,7 @@ def _reads(name: str) -> bool:
     return issubclass(effects.by_id(name), effects.ReadingEffect)
 
 
-def _forget(known: dict[Hashable, Expected] | dict[Hashable, list[Look]], most: int) -> None:
+def _forget(known: dict[Hashable, Expected] | dict[Hashable, list[BeamHits]], most: int) -> None:
     """Leave room for one more: the first stays, for it is that without effects, to which all are compared."""
     if len(known) >= most:
         del known[list(known)[1]]

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.predict.scan import ScanModel, expected, fit_scatter
-from kurumaisu.critic.predict.scan_poses import Places, joined
-from kurumaisu.critic.ranges.scans.beams import Shots, Track, rows_of
+from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
+from kurumaisu.critic.ranges.scans.beams import Shots, Track, some_scans
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray, IntArray
@@ -25,41 +25,41 @@ Settings = tuple[EffectSetting, ...]
 
 
 @dataclass(frozen=True)
-class Refiner:
+class ScanMatcher:
     """Models of scans: alone, and after others that correct the pose by a share of what they say; None: no use."""
 
     alone: ScanModel
     after: ScanModel | None
     share: float
 
-    def predict(self, places: Places, run: Run, stamps: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def predict(self, places: ScanPoses, run: Run, stamps: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return means and sds (k, b) [m] of the scans of a run at stamps (k,) [s], nan where nothing is expected."""
         shots = places.of(run, stamps)
         means, sds = self.alone.predict(shots)
         if self.after is None:
             return means, sds
-        errors = off(shots, run, places.zero, self.alone)
+        errors = pose_errors(shots, run, places.zero, self.alone)
         if errors:
             able = np.array(sorted(errors))
-            means[able], sds[able] = self.after.predict(moved(shots, errors, self.share))
+            means[able], sds[able] = self.after.predict(pose_corrected(shots, errors, self.share))
         return means, sds
 
 
-def trained(places: Places, settings: Settings, truth: tuple[float, float] | None) -> Refiner:
+def trained_matcher(places: ScanPoses, settings: Settings, truth: tuple[float, float] | None) -> ScanMatcher:
     """Return what predicts scans, as it proves on the scans of the runs to fit."""
     runs = places.trained_runs()
     whole = joined([shots for _, shots in runs])
     alone = fit_scatter(whole, settings, truth)
     best, after, share = -np.inf, None, 0.0
-    parts = [(shots, off(shots, run, places.zero, alone)) for run, shots in runs]
+    parts = [(shots, pose_errors(shots, run, places.zero, alone)) for run, shots in runs]
     parts = [(shots, errors) for shots, errors in parts if errors]
     for tried in _SHARES if sum(len(errors) for _, errors in parts) >= _FEWEST else ():
-        some = joined([moved(shots, errors, tried) for shots, errors in parts])
+        some = joined([pose_corrected(shots, errors, tried) for shots, errors in parts])
         model = fit_scatter(some, settings, None)
         density = _density(model, some)
         if density > best:
             best, after, share = density, model, tried
-    return Refiner(alone, after if share > 0 else None, share)
+    return ScanMatcher(alone, after if share > 0 else None, share)
 
 
 def _density(model: ScanModel, shots: Shots) -> float:
@@ -70,7 +70,7 @@ def _density(model: ScanModel, shots: Shots) -> float:
     return -float(np.mean(0.5 * np.minimum(z[use] ** 2, _OUTLIER**2) + np.log(sds[use])))
 
 
-def off(shots: Shots, run: Run, zero: float, model: ScanModel) -> dict[int, FloatArray]:
+def pose_errors(shots: Shots, run: Run, zero: float, model: ScanModel) -> dict[int, FloatArray]:
     """Return the errors (3,) of the poses of shots by the scans before them, by row, for those that have any."""
     if run.scan is None:
         return {}
@@ -82,12 +82,12 @@ def off(shots: Shots, run: Run, zero: float, model: ScanModel) -> dict[int, Floa
     return _errors(_seen(shots, owner, run.scan.t[rows] - zero, run.scan.values[rows]), owner, model)
 
 
-def moved(shots: Shots, errors: Mapping[int, FloatArray], share: float) -> Shots:
+def pose_corrected(shots: Shots, errors: Mapping[int, FloatArray], share: float) -> Shots:
     """Return the shots that have errors, on tracks of their own from which a share of them is taken."""
     rows = sorted(errors)
     tracks = [(shots.tracks[shots.run[k]], errors[k]) for k in rows]
     return replace(
-        rows_of(shots, np.array(rows)),
+        some_scans(shots, np.array(rows)),
         tracks=tuple(Track(track.times, track.poses + share * error) for track, error in tracks),
         run=np.arange(len(rows)),
     )

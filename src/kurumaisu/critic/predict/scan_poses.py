@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.base.covariates import beside
+from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import Drive, driven, prepare_all
 from kurumaisu.critic.predict.motion import Forecast, motion_ahead
 from kurumaisu.critic.predict.reference_path import Paths
@@ -25,7 +25,7 @@ _SAME = 1e-3  # [s]
 _RANDOM = 60  # scans that the scatter is estimated from
 
 
-class Places:
+class ScanPoses:
     """Shots of a recording's laser, each scan on the track that is known for it."""
 
     def __init__(self, recording: Recording, model: Model, forecast: Forecast | None) -> None:
@@ -78,7 +78,7 @@ class Places:
         if self._forecast is None or not driven(run):
             return [Track(run.pose.t, run.pose.values[:, :3])]
         forecast = self._forecast
-        drive = beside(prepare_all(run, forecast.model, float(stamps.max()) + _AROUND[-1]), run)
+        drive = with_covariates_but_place(prepare_all(run, forecast.model, float(stamps.max()) + _AROUND[-1]), run)
         paths = Paths(drive, forecast.model, forecast.settings, ())
         return [_around(drive, paths, forecast, stamp) for stamp in stamps.tolist()]
 

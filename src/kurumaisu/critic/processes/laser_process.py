@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from kurumaisu.critic.judge.scan_verdict import criticise
-from kurumaisu.critic.processes.worker import Progress, Worker
-from kurumaisu.critic.ranges.scans.beams import missing
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.processes.worker import ProgressMessage, Worker
+from kurumaisu.critic.ranges.scans.beams import why_not_usable
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import Model, load_model
@@ -21,7 +21,7 @@ Tell = Callable[[str], None]
 
 
 @contextmanager
-def aside(
+def criticise_aside(
     recording: Recording, model: Model, model_file: Path, ids: frozenset[str] | None
 ) -> Iterator[Callable[[Tell], LaserFinding]]:
     """Give a function that returns what the scans say, which may have been found out meanwhile.
@@ -35,7 +35,7 @@ def aside(
 
     def finding(progress: Tell) -> LaserFinding:
         found = None if worker is None else _received(worker)
-        return found or criticise(recording, model, progress, ids)
+        return found or criticise_scans(recording, model, progress, ids)
 
     try:
         yield finding
@@ -46,17 +46,17 @@ def aside(
 
 def _worth_it(recording: Recording) -> bool:
     scans = sum(len(run.scan.t) for run in recording.runs if run.scan is not None)
-    return scans >= _MANY and len(os.sched_getaffinity(0)) > 1 and missing(recording) is None
+    return scans >= _MANY and len(os.sched_getaffinity(0)) > 1 and why_not_usable(recording) is None
 
 
 def _criticise(recording: Recording, model_file: Path, ids: frozenset[str] | None, progress: Tell) -> LaserFinding:
-    return criticise(recording, load_model(model_file), progress, ids)
+    return criticise_scans(recording, load_model(model_file), progress, ids)
 
 
 def _received(worker: Worker) -> LaserFinding | None:
     """Return what came of it; None where the process has died, of whatever it was."""
     try:
-        while isinstance(found := worker.receive(), Progress):
+        while isinstance(found := worker.receive(), ProgressMessage):
             pass
     except EOFError:
         return None

@@ -24,7 +24,7 @@ Task = Callable[..., Any]  # of a module, with the arguments to send and last a 
 
 
 @dataclass(frozen=True)
-class Progress:
+class ProgressMessage:
     """A worker's word on how far it is."""
 
     message: str
@@ -89,7 +89,7 @@ def main(descriptor: int) -> None:
     threading.Thread(target=_listen, args=(connection, received), daemon=True).start()
     while True:
         task, arguments = pickle.loads(received.get())  # from our own parent
-        connection.send(task(*arguments, lambda message: connection.send(Progress(message))))
+        connection.send(task(*arguments, lambda message: connection.send(ProgressMessage(message))))
 
 
 def _listen(connection: Connection, received: SimpleQueue[bytes]) -> None:

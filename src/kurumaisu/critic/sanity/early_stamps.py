@@ -39,16 +39,16 @@ def lead(problem: Problem, progress: Progress) -> float:
     if by < _LEAST:
         return 0.0
     found, other = search.search(problem, progress), search.search(_later(problem, by), progress)
-    won = coarsened_posterior.worth(other, other.best) - coarsened_posterior.worth(found, found.best)
+    won = coarsened_posterior.of_set(other, other.best) - coarsened_posterior.of_set(found, found.best)
     return by if won > _WIN * coarsened_posterior.variance(found) else 0.0
 
 
-def mended(drive: Drive, by: float) -> Drive:
+def restamped(drive: Drive, by: float) -> Drive:
     """Return a drive whose reference is stamped later [s]."""
     return drive.seen_at(drive.times + by, drive.poses)
 
 
-def taste(runs: Sequence[Run]) -> float:
+def tolerated_lead(runs: Sequence[Run]) -> float:
     """Return the lead [s] up to which it is a matter of taste: a stamp may mean either end of a period."""
     return _TASTE * period(runs)
 
@@ -60,7 +60,7 @@ def period(runs: Sequence[Run]) -> float:
     return min(max(float(np.median(some)) if len(some) else _PAUSE for some in steps), _PAUSE)
 
 
-def words(by: float) -> str:
+def problem(by: float) -> str:
     """Return what is wrong with the clocks, in words."""
     return f"all runs: the motion comes {by:.3f} s before its command; try t of the reference pose {by:+.3f} s"
 
@@ -71,7 +71,7 @@ def note(by: float) -> str:
 
 
 def _later(problem: Problem, by: float) -> Problem:
-    return problem.changed(drives=[mended(drive, by) for drive in problem.drives])
+    return problem.changed(drives=[restamped(drive, by) for drive in problem.drives])
 
 
 def _cost(problem: Problem, by: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from kurumaisu.critic.base.drive import from_voltages
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.ranges.scans.beams import laser_of, zero_of
+from kurumaisu.critic.ranges.scans.beams import laser_of, time_zero
 from kurumaisu.critic.sanity import (
     headings,
     input_match,
@@ -72,17 +72,17 @@ def _of_scans(run: Run, laser: LaserMount | None, model: Model, segments: FloatA
     """Return what is wrong with scans; segments (m, 4) of the map [m], None to leave it out."""
     if run.scan is None or len(run.scan.t) < 2:
         return []
-    words = scans.words(run.scan, run.pose, laser, model.laser.range_max)
+    words = scans.problems(run.scan, run.pose, laser, model.laser.range_max)
     if words or laser is None or segments is None or run.pose is None or run.pose_source != "measured":
         return words
-    return _one(map_agreement.words(run.scan, run.pose, laser, segments, _mean_error(model)))
+    return _one(map_agreement.problem(run.scan, run.pose, laser, segments, _mean_error(model)))
 
 
 def _drifts(recording: Recording, laser: LaserMount, model: Model, segments: FloatArray) -> bool:
     """Tell whether the laser's clock runs fast or slow, which the catalogue has: no run alone can tell it."""
     runs = [run for run in recording.runs if run.scan is not None]
     both = [(run.scan, run.pose) for run in runs if run.scan and run.pose and run.pose_source == "measured"]
-    return map_agreement.drifts(both, laser, segments, _mean_error(model), zero_of(runs))
+    return map_agreement.drifts(both, laser, segments, _mean_error(model), time_zero(runs))
 
 
 def _mean_error(model: Model) -> FloatArray:
@@ -92,7 +92,7 @@ def _mean_error(model: Model) -> FloatArray:
 
 
 def _of_run(run: Run, model: Model) -> list[str]:
-    untimely = time_units.words(run)
+    untimely = time_units.problems(run)
     if untimely or run.pose is None or len(run.pose.t) < 3:
         return untimely
     found = headings.course(run.pose)
@@ -107,11 +107,11 @@ def _of_run(run: Run, model: Model) -> list[str]:
         follows[name] = plain.correlation
         lawful &= match is plain
     words = _one(headings.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
-    words += [*pose_jumps.words(run.pose, run.command), *_one(rows.blocks(run.pose, "pose"))]
+    words += [*pose_jumps.problems(run.pose, run.command), *_one(rows.blocks(run.pose, "pose"))]
     words += _one(headings.folded(run.pose))
     # Poses that were worked out repeat themselves at rest, to the last bit; measured ones never do.
     measured = run.pose_source == "measured"
-    words += _one(pose_stamps.words(run.pose)) if measured else []
+    words += _one(pose_stamps.problem(run.pose)) if measured else []
     told = [
         line
         for name, part, rates in inputs
@@ -138,7 +138,7 @@ def _against(
     name: str, part: Series, pose: Series | None, rates: tuple[Rates, Rates], model: Model, follows: FloatArray
 ) -> list[str]:
     """Return what is wrong with an input, or with measured poses in its light; follows: as volts have it."""
-    words = voltages.words(part, rates[1], model, follows) if name == "voltage" else []
+    words = voltages.problems(part, rates[1], model, follows) if name == "voltage" else []
     if pose is None:
         return words
     times = rows.repeats(pose, rates[1])

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.sanity.rates import SPAN, STEP, Likeness, Rates, likeness
+from kurumaisu.critic.sanity.rates import SPAN, STEP, Rates, ShiftCorrelation, shift_correlation
 from kurumaisu.types import BoolArray, FloatArray
 
 _LATE = 1.5  # [s] motion may come after its command by this much: a delay and a lag
@@ -95,21 +95,24 @@ def _beginning(asked: Rates, driven: Rates) -> tuple[Rates, Rates]:
     return Rates(asked.t[piece], asked.values[piece]), Rates(driven.t[piece], driven.values[piece])
 
 
-def _pairs(asked: FloatArray, driven: FloatArray) -> list[list[Likeness]]:
+def _pairs(asked: FloatArray, driven: FloatArray) -> list[list[ShiftCorrelation]]:
     """Return how alike each channel driven (rows) is to each asked for."""
     noise = (1e-9, 1e-9)
-    return [[likeness(driven[:, i], asked[:, j], (noise[i], _LEAST[j]), _LONGEST) for j in range(2)] for i in range(2)]
+    return [
+        [shift_correlation(driven[:, i], asked[:, j], (noise[i], _LEAST[j]), _LONGEST) for j in range(2)]
+        for i in range(2)
+    ]
 
 
-def _total(pairs: list[list[Likeness]], *, swapped: bool) -> FloatArray:
+def _total(pairs: list[list[ShiftCorrelation]], *, swapped: bool) -> FloatArray:
     return np.asarray(sum(pairs[i][1 - i if swapped else i].nats for i in range(2)))
 
 
-def _strongest(pairs: list[list[Likeness]], at: int, swapped: bool) -> float:
+def _strongest(pairs: list[list[ShiftCorrelation]], at: int, swapped: bool) -> float:
     return float(max(abs(pairs[i][1 - i if swapped else i].correlation[at]) for i in range(2)))
 
 
-def _is_swap(pairs: list[list[Likeness]], crossed: FloatArray, possible: BoolArray) -> bool:
+def _is_swap(pairs: list[list[ShiftCorrelation]], crossed: FloatArray, possible: BoolArray) -> bool:
     """Whether the other channel explains one well, and its own neither: a chair that veers follows both."""
     at = int(np.argmax(np.where(possible, crossed, -1.0)))
     follows = [pairs[i][i].nats[possible].max(initial=0.0) > pairs[i][1 - i].nats[at] + _WIN for i in range(2)]
@@ -124,7 +127,7 @@ def _shift_words(name: str, lag: float, alike: float, plain: float) -> str:
     )
 
 
-def _swap_words(name: str, pairs: list[list[Likeness]], at: int) -> str:
+def _swap_words(name: str, pairs: list[list[ShiftCorrelation]], at: int) -> str:
     cross = [abs(pairs[i][1 - i].correlation[at]) for i in range(2)]
     own = [abs(pairs[i][i].correlation[at]) for i in range(2)]
     return (
@@ -149,7 +152,7 @@ def _scale_words(asked: Rates, driven: Rates, name: str, base: float) -> list[st
         values = np.column_stack(
             [np.interp(at, asked.t[known], asked.values[known, i], left=np.nan, right=np.nan) for i in range(2)]
         )
-        found = [likeness(goal[:, i], values[:, i], (1e-9, _LEAST[i]), 30.0) for i in range(2)]
+        found = [shift_correlation(goal[:, i], values[:, i], (1e-9, _LEAST[i]), 30.0) for i in range(2)]
         total = np.asarray(found[0].nats + found[1].nats)
         k = int(np.argmax(total))
         alike = float(max(abs(one.correlation[k]) for one in found))

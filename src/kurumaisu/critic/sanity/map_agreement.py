@@ -10,8 +10,8 @@ import numpy as np
 
 from kurumaisu import geometry
 from kurumaisu._core import Scene
-from kurumaisu.critic.ranges.scans.map_changes import FEW, elsewhere
-from kurumaisu.critic.ranges.scans.valid_readings import uncut
+from kurumaisu.critic.ranges.scans.map_changes import FEW, changed_places
+from kurumaisu.critic.ranges.scans.valid_readings import without_cut_off
 from kurumaisu.critic.sanity.map_placement import nearest_maps
 from kurumaisu.critic.values.recording import LaserMount, Series
 from kurumaisu.types import FloatArray
@@ -43,7 +43,7 @@ class _View:
     ranges: FloatArray
 
 
-def words(scan: Series, pose: Series, laser: LaserMount, segments: FloatArray, mean_error: FloatArray) -> str | None:
+def problem(scan: Series, pose: Series, laser: LaserMount, segments: FloatArray, mean_error: FloatArray) -> str | None:
     """Return what is wrong with scans, mounting or map, None where they agree or too little is seen.
 
     segments (m, 4) [m] of the map; mean_error: slope and offset [m] of a reading of a range, (2,).
@@ -147,7 +147,7 @@ class _Check:
         """Return the share of the readings that are, from wherever they are taken, of something else than the map's."""
         origins = self.origins(view.times)
         ranges, expected = view.ranges, self._expected(origins, view)
-        found, _ = elsewhere(ranges, expected, _ends(origins, view, expected), many=_MANY, either=True)
+        found, _ = changed_places(ranges, expected, _ends(origins, view, expected), many=_MANY, either=True)
         return float(found.sum() / max(np.isfinite(ranges).sum(), 1))
 
     def _expected(self, origins: FloatArray, view: _View) -> FloatArray:
@@ -180,7 +180,7 @@ def _thinned(scan: Series, pose: Series, laser: LaserMount, mean_error: FloatArr
     inside = np.flatnonzero((scan.t >= pose.t[0]) & (scan.t <= pose.t[-1]))
     few = inside[np.unique(np.linspace(0, len(inside) - 1, _SCANS).astype(int))] if len(inside) else inside
     beams = np.unique(np.linspace(0, scan.values.shape[1] - 1, _BEAMS).astype(int))
-    ranges = (uncut(scan.values[np.ix_(few, beams)]) - mean_error[1]) / mean_error[0]
+    ranges = (without_cut_off(scan.values[np.ix_(few, beams)]) - mean_error[1]) / mean_error[0]
     ranges = np.where(np.isfinite(ranges) & (ranges > 0), ranges, np.nan)
     seen = np.isfinite(ranges).sum(axis=1) > _FEWEST
     return _View(scan.t[few][seen], laser.angle_min + laser.angle_increment * beams, ranges[seen])

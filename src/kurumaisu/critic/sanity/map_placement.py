@@ -23,7 +23,7 @@ _KEPT = 0.7  # share of the points that are nearest to a wall, in the fit
 
 
 @dataclass(frozen=True)
-class Fitted:
+class MapPlacement:
     """A map as it would have to lie: segments (m, 4) [m], the words for it, and whether it hardly moved."""
 
     segments: FloatArray
@@ -31,7 +31,7 @@ class Fitted:
     small: bool
 
 
-def nearest_maps(points: FloatArray, segments: FloatArray) -> Iterator[Fitted]:
+def nearest_maps(points: FloatArray, segments: FloatArray) -> Iterator[MapPlacement]:
     """Yield maps moved so that most of the points (n, 2) [m] lie on the walls (m, 4), the simplest changes first."""
     walls = _along(segments)
     few = points[np.linspace(0, len(points) - 1, min(len(points), _POINTS)).astype(int)]
@@ -45,7 +45,7 @@ def nearest_maps(points: FloatArray, segments: FloatArray) -> Iterator[Fitted]:
             moved = (_changed(segments.reshape(-1, 2), turn, scale, mirrored) + shift).reshape(-1, 4)
             same = scale == 1.0 and not mirrored
             far = float(np.abs(moved - segments).max()) if same else np.inf
-            yield Fitted(moved, _words(turn, scale, mirrored, shift), far < _HARDLY * size)
+            yield MapPlacement(moved, _words(turn, scale, mirrored, shift), far < _HARDLY * size)
 
 
 def _best_turn(points: FloatArray, walls: FloatArray) -> tuple[float, FloatArray]:

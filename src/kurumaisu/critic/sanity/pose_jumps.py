@@ -19,7 +19,7 @@ _LATE = 1.0  # [s] after which a chair has done what it was asked for
 _PAUSE = 5.0  # [s] without a pose after which nobody knows how far the robot was driven, or carried
 
 
-def words(pose: Series, command: Series | None = None) -> list[str]:
+def problems(pose: Series, command: Series | None = None) -> list[str]:
     """Return what jumps, in words; command: v, w, for which a chair may be fast for once."""
     new = fresh(pose)
     if len(new.t) < 20:

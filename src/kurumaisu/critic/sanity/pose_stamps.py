@@ -21,7 +21,7 @@ _TRUE = 0.7  # of the stamps' variation that the way follows, below which
 _SURE = 4.0  # standard errors away from it the stamps are wrong
 
 
-def words(pose: Series) -> str | None:
+def problem(pose: Series) -> str | None:
     """Return what is wrong with the stamps of a reference, in words; None when the way made follows them.
 
     Over neighbouring intervals of a drive the way made is regressed on their lengths. True stamps give 1 whatever the

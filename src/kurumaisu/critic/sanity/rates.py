@@ -60,7 +60,7 @@ def of_input(times: FloatArray, values: FloatArray, t: FloatArray) -> Rates:
 
 
 @dataclass(frozen=True)
-class Likeness:
+class ShiftCorrelation:
     """How alike two rates are.
 
     correlation (k,) at lags (k,) [s] by which the second is early, 0 where too little is known; number (k,) of
@@ -77,7 +77,7 @@ class Likeness:
         return np.asarray(-0.5 * self.number * np.log1p(-np.clip(self.correlation**2, 0.0, 0.9999)))
 
 
-def likeness(a: FloatArray, b: FloatArray, least: tuple[float, float], longest: float) -> Likeness:
+def shift_correlation(a: FloatArray, b: FloatArray, least: tuple[float, float], longest: float) -> ShiftCorrelation:
     """Return how alike a (n,) is to b (n,) delayed, both on the grid, up to a longest shift [s].
 
     least: the sd below which each says nothing.
@@ -99,7 +99,7 @@ def likeness(a: FloatArray, b: FloatArray, least: tuple[float, float], longest: 
     alive = (xx > least[0] ** 2) & (yy > least[1] ** 2) & (number * STEP > max(10.0, 0.4 * n * STEP))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = np.where(alive, xy / np.sqrt(np.maximum(xx * yy, 1e-300)), 0.0)
-    return Likeness(lags, np.clip(correlation, -1, 1), number * STEP / SPAN)
+    return ShiftCorrelation(lags, np.clip(correlation, -1, 1), number * STEP / SPAN)
 
 
 def _centred(a: FloatArray) -> FloatArray:

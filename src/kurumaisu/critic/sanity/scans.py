@@ -19,7 +19,7 @@ _PAIRS = 10
 _MOST = 4000  # scans that are looked at
 
 
-def words(scan: Series, pose: Series | None, laser: LaserMount | None, farthest: float) -> list[str]:
+def problems(scan: Series, pose: Series | None, laser: LaserMount | None, farthest: float) -> list[str]:
     """Return what is wrong with scans, in words; farthest: where the laser's range ends [m]."""
     few = np.unique(np.linspace(0, len(scan.t) - 1, min(len(scan.t), _MOST)).astype(int))
     ranges = scan.values[few]

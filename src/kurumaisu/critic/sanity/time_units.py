@@ -13,7 +13,7 @@ _NEAR = 0.35  # relative distance of two spans that are the same drive
 _MOVED = 0.05  # [m] driven at least, where way asked for and way driven are compared
 
 
-def words(run: Run) -> list[str]:
+def problems(run: Run) -> list[str]:
     """Return what is wrong with the units of the times, in words; empty when they can be seconds."""
     parts = {name: getattr(run, name) for name in ("command", "voltage", "pose", "odom", "scan")}
     there = {name: part for name, part in parts.items() if part is not None and len(part.t) > 10}

@@ -29,7 +29,7 @@ class _Line:
     correlation: float
 
 
-def words(voltage: Series, driven: Rates, model: Model, follows: FloatArray) -> list[str]:
+def problems(voltage: Series, driven: Rates, model: Model, follows: FloatArray) -> list[str]:
     """Return what is wrong with unit or zero of the voltages, in words; driven: what the chair made of them.
 
     follows (2,): correlation of that with what the voltages ask for. Where two rates answer to one voltage, that of a

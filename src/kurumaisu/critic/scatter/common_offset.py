@@ -13,7 +13,7 @@ from scipy.special import expit
 from kurumaisu import effects
 from kurumaisu.critic.engine.search import NAMED, RIVAL
 from kurumaisu.critic.ranges.noise.scan_noise import CommonMode, ScanNoise
-from kurumaisu.critic.scatter.scatter_search import Scatter
+from kurumaisu.critic.scatter.scatter_search import ScatterEffect
 from kurumaisu.critic.values.prior import log_prior
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import NORMAL90
@@ -25,7 +25,7 @@ _BEAMS = 8  # of a scan on which it is tried what an effect does to all of them
 
 
 @dataclass(frozen=True)
-class Together:
+class CommonOffset:
     """The effect that has whole scans off together: its size [m], and its correlation with the next scan's [1]."""
 
     id: str
@@ -34,14 +34,18 @@ class Together:
 
 
 @cache
-def together() -> tuple[Together, ...]:
+def common_offsets() -> tuple[CommonOffset, ...]:
     """Return the effects that move all beams of a scan alike, each scan by another draw; found by trying."""
     return tuple(_tried())
 
 
-def with_whole_scans(
-    scatter: Sequence[Scatter], seen: CommonMode, noise: ScanNoise, recording: Recording, ids: frozenset[str] | None
-) -> list[Scatter]:
+def with_common_offset(
+    scatter: Sequence[ScatterEffect],
+    seen: CommonMode,
+    noise: ScanNoise,
+    recording: Recording,
+    ids: frozenset[str] | None,
+) -> list[ScatterEffect]:
     """Return effects on the scatter with a common mode of the scans where the likelihood of all scans calls for one.
 
     Its sizes are taken from there even where the scatter has shown it: there, only some of the scans were looked at.
@@ -50,7 +54,7 @@ def with_whole_scans(
     count, out = len(effects.LASER), list(scatter)
     nats = seen.nats + log_prior(1, count) - log_prior(0, count)
     p = float(expit(nats))
-    for whole in together() if p >= NAMED else ():
+    for whole in common_offsets() if p >= NAMED else ():
         known = next((each for each in out if each.setting.id == whole.id), None)
         if known is None and any(each.rivals.get(whole.id, 0.0) >= RIVAL for each in out):
             continue  # what stands in its place was weighed against it
@@ -65,7 +69,10 @@ def with_whole_scans(
         memories = np.exp(-_period(recording) / taus)
         sds = {whole.size.name: _reach(noise.common_sd, sizes), whole.memory.name: _reach(rho, memories)}
         rest = [each for each in out if each is not known]
-        out = [*rest, Scatter(EffectSetting(whole.id, values), p, max(nats, known.nats if known else nats), sds, {})]
+        out = [
+            *rest,
+            ScatterEffect(EffectSetting(whole.id, values), p, max(nats, known.nats if known else nats), sds, {}),
+        ]
     return out
 
 
@@ -77,16 +84,16 @@ def _reach(value: float, ends: FloatArray) -> tuple[float, float]:
 
 def own_sd(own: Sequence[EffectSetting]) -> float:
     """Return the sd [m] of whole scans in a model with these effects."""
-    sizes = {whole.id: whole.size.name for whole in together()}
+    sizes = {whole.id: whole.size.name for whole in common_offsets()}
     return float(np.linalg.norm([each.parameters[sizes[each.id]] for each in own if each.id in sizes]))
 
 
-def beyond(scatter: Sequence[Scatter], least: float, own: float = 0.0) -> list[Scatter]:
+def beyond_own_offset(scatter: Sequence[ScatterEffect], least: float, own: float = 0.0) -> list[ScatterEffect]:
     """Return effects on the scatter without those that have whole scans off together by less than `least` [m].
 
     own [m]: by which they are in the model already.
     """
-    known = {whole.id for whole in together()}
+    known = {whole.id for whole in common_offsets()}
     return [
         each
         for each in scatter
@@ -94,7 +101,7 @@ def beyond(scatter: Sequence[Scatter], least: float, own: float = 0.0) -> list[S
     ]
 
 
-def _tried() -> Iterator[Together]:
+def _tried() -> Iterator[CommonOffset]:
     for effect in effects.LASER:
         nulls = {p.name: p.null for p in effect.parameters}
         for size in effect.parameters:
@@ -103,7 +110,7 @@ def _tried() -> Iterator[Together]:
                 continue
             one, other = (_moved(EffectSetting(effect.id, {**nulls, size.name: size.scale}), seed) for seed in (0, 1))
             if np.any(one) and not np.array_equal(one, other) and np.ptp(one) < 1e-9:
-                yield Together(effect.id, size, others[0])
+                yield CommonOffset(effect.id, size, others[0])
 
 
 def _moved(setting: EffectSetting, seed: int) -> FloatArray:

@@ -27,7 +27,7 @@ _POWER = 0.5
 
 
 @dataclass(frozen=True)
-class Kinds:
+class StatisticKinds:
     """Which numbers (m,) are roots of counts, of the same sd, few or many; and which are places, alike in any form.
 
     trends (g, m): from -1 to 1 over numbers of readings from near to far, or from straight to oblique; 0 elsewhere.
@@ -40,10 +40,10 @@ class Kinds:
     folds: FloatArray = field(default_factory=lambda: np.empty(0))
 
 
-class Likeness:
+class StatisticsLikelihood:
     """Normal numbers about those of a simulation, with the covariance of the model's own."""
 
-    def __init__(self, nulls: FloatArray, measured: FloatArray, kinds: Kinds, heard: BoolArray) -> None:
+    def __init__(self, nulls: FloatArray, measured: FloatArray, kinds: StatisticKinds, heard: BoolArray) -> None:
         """Take numbers of simulations of the model as it is (n, m), and the measured ones (m,).
 
         kinds: of which they are; heard: numbers that say anything.

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kurumaisu.critic.ranges.noise.reading_noise import near
+from kurumaisu.critic.ranges.noise.reading_noise import expected_readings
 from kurumaisu.critic.ranges.noise.scan_noise import ScanNoise
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -85,7 +85,7 @@ class ScanFit:
         z = error / self._sd
         known = self._trust & np.isfinite(z)
         fitted = np.zeros_like(z)
-        inside = near(z, known, self._reach)
+        inside = expected_readings(z, known, self._reach)
         coefficients = np.zeros(self._solve.shape[:2])
         for _ in range(_ROUNDS):
             filled = np.where(inside, np.nan_to_num(z), fitted).astype(np.float32)

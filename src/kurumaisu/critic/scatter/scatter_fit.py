@@ -13,8 +13,8 @@ from itertools import pairwise
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.scatter.likelihood import Likeness
-from kurumaisu.critic.scatter.simulation import Simulator
+from kurumaisu.critic.scatter.likelihood import StatisticsLikelihood
+from kurumaisu.critic.scatter.simulation import ScatterSimulator
 from kurumaisu.critic.values.verdict import NORMAL90
 from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
@@ -37,7 +37,7 @@ _OTHER = 2.0
 
 
 @dataclass(frozen=True)
-class Rough:
+class RoughFit:
     """An effect with the best of some sizes of its parameters, and the misfit then."""
 
     low: float
@@ -46,7 +46,7 @@ class Rough:
 
 
 @dataclass(frozen=True)
-class Push:
+class StatisticsChange:
     """What a parameter at a value does to the statistics."""
 
     effect: type[Mechanism]
@@ -56,7 +56,7 @@ class Push:
 
 
 @dataclass(frozen=True)
-class Piece:
+class ScatterPiece:
     """An effect that acts: its setting, which parameters are fitted, posterior and log evidence of it.
 
     rivals: effects, fitted likewise, that might have done what it does.
@@ -67,7 +67,7 @@ class Piece:
     free: tuple[str, ...]
     p: float
     nats: float
-    rivals: tuple[Piece, ...] = ()
+    rivals: tuple[ScatterPiece, ...] = ()
 
     @property
     def price(self) -> float:
@@ -80,7 +80,7 @@ class ScatterFit:
 
     def __init__(
         self,
-        simulate: Simulator,
+        simulate: ScatterSimulator,
         measured: FloatArray,
         means: Sequence[str],
         ids: frozenset[str] | None = None,
@@ -95,11 +95,11 @@ class ScatterFit:
         self._simulate, self._means = simulate, set(means)
         self._known: dict[tuple[object, ...], FloatArray] = {}
         self._shapes: set[tuple[str, str]] = set()
-        self.likeness = Likeness(
+        self.likeness = StatisticsLikelihood(
             nulls, measured, simulate.kinds(), np.ones(len(measured), dtype=bool) if heard is None else heard
         )
 
-    def overlap(self, one: Piece, other: Piece) -> float:
+    def overlap(self, one: ScatterPiece, other: ScatterPiece) -> float:
         """Return the cosine of what two effects do to the statistics, whatever its sign."""
         plain = self.statistics((), (1, 2))
         a, b = (
@@ -107,27 +107,29 @@ class ScatterFit:
         )
         return float(abs(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-9))
 
-    def pushes(self) -> Iterator[Push]:
+    def pushes(self) -> Iterator[StatisticsChange]:
         """Yield what each parameter alone does to the statistics, at some values, the largest last."""
         plain = self._numbers((), 1)
         for effect in self.candidates(set()):
             null = self._simulate.null(effect)
             for p in self._parameters(effect):
-                found: list[Push] = []
+                found: list[StatisticsChange] = []
                 least = 0.0
                 for value in sorted(_sizes(p), key=lambda value: -abs(value - p.null)):
                     moved = self._numbers((EffectSetting(effect.id, {**null, p.name: value}),), 1)
                     if np.array_equal(moved, plain):
                         least = value
                         break  # it only shapes what others do, or does nothing when it is smaller
-                    found.append(Push(effect, p.name, value, moved - plain))
+                    found.append(StatisticsChange(effect, p.name, value, moved - plain))
                 if not found:
                     self._shapes.add((effect.id, p.name))
                 yield from reversed(found)
                 if any(self.likeness.moves_places(push.change) for push in found):
                     yield from self._between(found, least, plain)
 
-    def _between(self, found: Sequence[Push], least: float, plain: FloatArray) -> Iterator[Push]:
+    def _between(
+        self, found: Sequence[StatisticsChange], least: float, plain: FloatArray
+    ) -> Iterator[StatisticsChange]:
         """Yield a parameter's pushes at values between those tried; least: one that did nothing.
 
         Where readings pile up is known to a step of them: from half or twice as far off no small step leads there.
@@ -164,7 +166,7 @@ class ScatterFit:
         """Return how ill simulations with effects agree with what was measured [nat]."""
         return self.likeness.cost(self.statistics(settings, (1, 2)))
 
-    def rough(self, pushes: Sequence[Push], at: FloatArray) -> Rough:
+    def rough(self, pushes: Sequence[StatisticsChange], at: FloatArray) -> RoughFit:
         """Return the best of some sizes of an effect's parameters, as if changes of the statistics were sums."""
         low, best = np.inf, dict[str, float]()
         for name in dict.fromkeys(push.name for push in pushes):
@@ -173,9 +175,11 @@ class ScatterFit:
                 misfit = self.likeness.cost(known + push.change) if push.name == name else np.inf
                 if misfit < low - _FREE:
                     low, best = misfit, {**{k: v for k, v in best.items() if k != name}, name: push.value}
-        return Rough(low, pushes[0].effect, best)
+        return RoughFit(low, pushes[0].effect, best)
 
-    def halves(self, piece: Piece, rival: Piece, beside: Sequence[EffectSetting]) -> tuple[Piece, float]:
+    def halves(
+        self, piece: ScatterPiece, rival: ScatterPiece, beside: Sequence[EffectSetting]
+    ) -> tuple[ScatterPiece, float]:
         """Return the second of two effects that were fitted in each other's place, fitted together, and the misfit.
 
         Each begins with half of its power.
@@ -192,12 +196,12 @@ class ScatterFit:
         (_, new), misfit = self.together(pair, beside)
         return new, misfit
 
-    def plain(self, start: Rough) -> Piece:
+    def plain(self, start: RoughFit) -> ScatterPiece:
         """Return an effect of such sizes, nothing fitted yet."""
         setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.values})
-        return Piece(start.effect, setting, tuple(start.values), 0.0, 0.0)
+        return ScatterPiece(start.effect, setting, tuple(start.values), 0.0, 0.0)
 
-    def alone(self, start: Rough, beside: Sequence[EffectSetting]) -> tuple[Piece, float]:
+    def alone(self, start: RoughFit, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
         (piece,), low = self.together([self.plain(start)], beside)
         for _ in range(_PASSES):
@@ -209,7 +213,9 @@ class ScatterFit:
                 break
         return piece, low
 
-    def _with(self, p: Parameter, piece: Piece, low: float, beside: Sequence[EffectSetting]) -> tuple[Piece, float]:
+    def _with(
+        self, p: Parameter, piece: ScatterPiece, low: float, beside: Sequence[EffectSetting]
+    ) -> tuple[ScatterPiece, float]:
         """Return an effect with a further parameter fitted, where that helps, and its misfit; low: without it."""
         name, values = piece.setting.id, piece.setting.parameters
         tried = [EffectSetting(name, {**values, p.name: value}) for value in _sizes(p)]
@@ -224,13 +230,15 @@ class ScatterFit:
             return piece, low
         return (better, least) if least < low - _FREE else (piece, low)
 
-    def together(self, pieces: Sequence[Piece], beside: Sequence[EffectSetting]) -> tuple[list[Piece], float]:
+    def together(
+        self, pieces: Sequence[ScatterPiece], beside: Sequence[EffectSetting]
+    ) -> tuple[list[ScatterPiece], float]:
         """Return effects fitted together beside others, and the misfit."""
         places = [(i, p) for i, each in enumerate(pieces) for p in each.effect.parameters if p.name in each.free]
         centre = np.array([pieces[i].setting.parameters[p.name] for i, p in places])
         step = np.array([_step(p, x) for x, (_, p) in zip(centre.tolist(), places, strict=True)])
 
-        def at(x: FloatArray) -> list[Piece]:
+        def at(x: FloatArray) -> list[ScatterPiece]:
             values = [dict(piece.setting.parameters) for piece in pieces]
             for (i, p), value in zip(places, (centre + step * x).tolist(), strict=True):
                 values[i][p.name] = float(np.clip(value, p.lower, p.upper))
@@ -256,7 +264,7 @@ class ScatterFit:
                 break
         return at(x), low
 
-    def errors(self, piece: Piece, every: Sequence[EffectSetting]) -> dict[str, tuple[float, float]]:
+    def errors(self, piece: ScatterPiece, every: Sequence[EffectSetting]) -> dict[str, tuple[float, float]]:
         """Return sds below and above the parameters that were fitted, from how the statistics follow each.
 
         The effect's other parameters are in doubt, too, fitted or not: as far as is usual. So is its form.
@@ -293,7 +301,7 @@ class ScatterFit:
         return {p.name: (low, high) for p, (low, high) in zip(parameters, both, strict=True) if p.name in piece.free}
 
 
-def _of_form(piece: Piece, p: Parameter) -> tuple[float, float]:
+def _of_form(piece: ScatterPiece, p: Parameter) -> tuple[float, float]:
     """Return the sds below and above a parameter by which another form passes for another size.
 
     What cannot change its sign is off by a factor either way, of anything else as much of its size.

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu import effects
-from kurumaisu.critic.scatter.scatter_fit import Piece, Push, Rough, ScatterFit
+from kurumaisu.critic.scatter.scatter_fit import RoughFit, ScatterFit, ScatterPiece, StatisticsChange
 from kurumaisu.critic.values.prior import log_prior, occam
 from kurumaisu.critic.values.story import Comparison
 from kurumaisu.effects import Mechanism
@@ -34,7 +34,7 @@ _OVERLAP = 0.3  # cosine of two effects' changes of the statistics, from which t
 
 
 @dataclass(frozen=True)
-class Scatter:
+class ScatterEffect:
     """Effects on the scatter: a setting each, with the posterior, the log evidence, and sds below and above parameters.
 
     rivals: posterior of effects that may act in its place.
@@ -47,28 +47,28 @@ class Scatter:
     rivals: Mapping[str, float]
 
 
-def _low(rough: Rough) -> float:
+def _low(rough: RoughFit) -> float:
     return rough.low
 
 
-def _cost(fitted: tuple[list[Piece], float]) -> float:
+def _cost(fitted: tuple[list[ScatterPiece], float]) -> float:
     return fitted[1]
 
 
-def _nats(piece: Piece) -> float:
+def _nats(piece: ScatterPiece) -> float:
     return piece.nats
 
 
-def _but(pieces: Sequence[Piece], one: Piece) -> list[Piece]:
+def _without_piece(pieces: Sequence[ScatterPiece], one: ScatterPiece) -> list[ScatterPiece]:
     return [piece for piece in pieces if piece.effect is not one.effect]
 
 
-def _of_any(piece: Piece) -> float:
+def _of_any(piece: ScatterPiece) -> float:
     """Return the evidence [nat] that a piece or one of its rivals acts."""
     return float(logsumexp([piece.nats, *(rival.nats for rival in piece.rivals)]))
 
 
-def _by_effect(pieces: Sequence[Piece]) -> list[list[Piece]]:
+def _by_effect(pieces: Sequence[ScatterPiece]) -> list[list[ScatterPiece]]:
     """Return the pieces of each effect."""
     effects_there = dict.fromkeys(piece.effect for piece in pieces)
     return [[piece for piece in pieces if piece.effect is effect] for effect in effects_there]
@@ -81,12 +81,12 @@ class ScatterSearch:
         self._fit = fit
         self._likeness = self._fit.likeness
 
-    def run(self) -> list[Scatter]:
+    def run(self) -> list[ScatterEffect]:
         """Return the effects, added while the evidence grows."""
         if not self._off(self._likeness.offset):
             return []
         pushes = list(self._fit.pushes())
-        chosen: list[Piece] = []
+        chosen: list[ScatterPiece] = []
         gone: set[type[Mechanism]] = set()
         while len(chosen) < _LARGEST:
             new = self._step(pushes, chosen, gone)
@@ -96,7 +96,7 @@ class ScatterSearch:
         chosen = self._certain(self._polished(chosen))
         settings = [piece.setting for piece in chosen]
         return [
-            Scatter(
+            ScatterEffect(
                 piece.setting,
                 piece.p,
                 piece.nats,
@@ -121,7 +121,9 @@ class ScatterSearch:
     def _heat(self, settings: Sequence[EffectSetting]) -> float:
         return self._likeness.heat(self._fit.statistics(settings, (1, 2)))
 
-    def _step(self, pushes: Sequence[Push], chosen: Sequence[Piece], gone: set[type[Mechanism]]) -> Piece | None:
+    def _step(
+        self, pushes: Sequence[StatisticsChange], chosen: Sequence[ScatterPiece], gone: set[type[Mechanism]]
+    ) -> ScatterPiece | None:
         """Return the effect to add; None where there is too little."""
         beside = [piece.setting for piece in chosen]
         at = self._fit.statistics(beside, (1, 2))
@@ -132,7 +134,7 @@ class ScatterSearch:
         }
         starts = [self._fit.rough(own, at) for own in by_effect.values() if own]
         starts = sorted((start for start in starts if start.low < here), key=_low)
-        tried: list[Piece] = []
+        tried: list[ScatterPiece] = []
         for start in starts[:_REFITS]:
             if here - start.low < _CLOSE * (here - starts[0].low):
                 break
@@ -146,7 +148,9 @@ class ScatterSearch:
             return None
         return _weighed([best, *best.rivals], self._heat([*beside, best.setting]))
 
-    def _halved(self, chosen: Sequence[Piece], without: set[type[Mechanism]], here: float) -> Iterator[Piece]:
+    def _halved(
+        self, chosen: Sequence[ScatterPiece], without: set[type[Mechanism]], here: float
+    ) -> Iterator[ScatterPiece]:
         """Yield rivals of the chosen effects, each fitted together with the one that was taken for it.
 
         Of two that act, each alone explains nearly all, and the other one added to that much of it then nothing.
@@ -158,7 +162,7 @@ class ScatterSearch:
                     new, misfit = self._fit.halves(piece, rival, beside)
                     yield _valued(new, here - misfit)
 
-    def _straightened(self, pushes: Sequence[Push], chosen: Sequence[Piece]) -> list[Piece]:
+    def _straightened(self, pushes: Sequence[StatisticsChange], chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
         """Return the pieces, those of several parameters begun anew with the plainest where that is better.
 
         Before the others were known, its further parameters may have bent to do what they do: beams that are lost where
@@ -176,27 +180,29 @@ class ScatterSearch:
                 out[i] = replace(old, setting=new.setting, free=new.free)
         return out
 
-    def _certain(self, chosen: Sequence[Piece]) -> list[Piece]:
+    def _certain(self, chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
         """Return the pieces weighed in the company that is there last, without those that it makes superfluous."""
         if len(chosen) < 2:
             return list(chosen)
         known = {piece.effect: piece.rivals for piece in chosen}
         while True:
             weighed = self._reweighed(chosen)
-            weak = [piece for piece in weighed if _of_any(piece) < self._least(_but(weighed, piece), piece)]
+            weak = [piece for piece in weighed if _of_any(piece) < self._least(_without_piece(weighed, piece), piece)]
             if not weak or len(weighed) < 2:
                 return weighed
-            left = [replace(one, rivals=known.get(one.effect, ())) for one in _but(weighed, min(weak, key=_nats))]
+            left = [
+                replace(one, rivals=known.get(one.effect, ())) for one in _without_piece(weighed, min(weak, key=_nats))
+            ]
             chosen = self._polished(left)
 
-    def _reweighed(self, chosen: Sequence[Piece]) -> list[Piece]:
+    def _reweighed(self, chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
         """Return the pieces, each weighed against its rivals and none beside all others, not known when it came.
 
         Where the whole does not fit, evidence for another part of it is worth as much less, that it acts, too.
         """
         out = list(chosen)
         for i, piece in enumerate(chosen):
-            others = _but(out, piece)
+            others = _without_piece(out, piece)
             there = {other.effect for other in others}
             beside = [other.setting for other in others]
             without = self._without(piece, others)
@@ -208,20 +214,24 @@ class ScatterSearch:
         swapped = any(one.effect is not other.effect for one, other in zip(out, chosen, strict=True))
         return self._polished(out) if swapped else out
 
-    def _without(self, piece: Piece, others: Sequence[Piece]) -> float:
+    def _without(self, piece: ScatterPiece, others: Sequence[ScatterPiece]) -> float:
         """Return the misfit of the others without a piece, those like it fitted to what it would leave them."""
         like = [other for other in others if self._fit.overlap(other, piece) > _OVERLAP]
         rest = [other.setting for other in others if other not in like]
         return self._fit.together(like, rest)[1] if like else self._fit.misfit(rest)
 
-    def _least(self, chosen: Sequence[Piece], new: Piece) -> float:
+    def _least(self, chosen: Sequence[ScatterPiece], new: ScatterPiece) -> float:
         """Return the evidence from which an effect is taken beside others [nat]: they may act in another form."""
         left = (_LEFT * piece.nats * self._fit.overlap(piece, new) ** 2 for piece in chosen)
         return max(_ENOUGH, *(min(_MOST_LEFT, nats) for nats in left)) if chosen else _ENOUGH
 
     def _settled(
-        self, pushes: Sequence[Push], chosen: Sequence[Piece], new: Piece, gone: set[type[Mechanism]]
-    ) -> list[Piece]:
+        self,
+        pushes: Sequence[StatisticsChange],
+        chosen: Sequence[ScatterPiece],
+        new: ScatterPiece,
+        gone: set[type[Mechanism]],
+    ) -> list[ScatterPiece]:
         """Return the pieces with a new one, fitted together with those like it; what it makes superfluous is gone."""
         like = [piece for piece in chosen if self._fit.overlap(piece, new) > _OVERLAP]
         rest = [piece for piece in chosen if piece not in like]
@@ -243,8 +253,12 @@ class ScatterSearch:
         return [*rest, *group]
 
     def _other_way(
-        self, pushes: Sequence[Push], like: Sequence[Piece], new: Piece, beside: Sequence[EffectSetting]
-    ) -> Iterator[tuple[list[Piece], float]]:
+        self,
+        pushes: Sequence[StatisticsChange],
+        like: Sequence[ScatterPiece],
+        new: ScatterPiece,
+        beside: Sequence[EffectSetting],
+    ) -> Iterator[tuple[list[ScatterPiece], float]]:
         """Yield fits of an effect and a new one as if the new one had come first, and their misfits.
 
         Alone, one of several shapes had bent to do what the other does, too, from where no small step leads back.
@@ -264,7 +278,7 @@ class ScatterSearch:
             )
             yield self._fit.together([*others, *both], beside)
 
-    def _polished(self, chosen: Sequence[Piece]) -> list[Piece]:
+    def _polished(self, chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
         """Return all pieces fitted together, without weak ones that stood in for wrong sizes of others."""
         if len(chosen) < 2:
             return list(chosen)
@@ -283,14 +297,14 @@ class ScatterSearch:
         return group
 
 
-def _valued(piece: Piece, gain: float) -> Piece:
+def _valued(piece: ScatterPiece, gain: float) -> ScatterPiece:
     """Return a piece with its log evidence, for what it gains [nat] of log likelihood."""
     count, z = len(effects.LASER), np.sqrt(max(2 * gain, 0.0))
     cost = float(occam(np.array(z))) + piece.price
     return replace(piece, nats=gain - cost + log_prior(1, count) - log_prior(0, count))
 
 
-def _weighed(tried: Sequence[Piece], heat: float = 1.0, doubt: float = 1.0) -> Piece:
+def _weighed(tried: Sequence[ScatterPiece], heat: float = 1.0, doubt: float = 1.0) -> ScatterPiece:
     """Return the likeliest of some pieces with its posterior, and the others as its rivals with theirs.
 
     heat: by how much what the likeliest leaves is more than chance [1]; where none of them fits, odds between them are

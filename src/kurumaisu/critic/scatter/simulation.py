@@ -8,16 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import own_with, read
+from kurumaisu.critic.ranges.scans.beams import model_effects_with, read
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
-from kurumaisu.critic.scatter.likelihood import Kinds
+from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.statistics import Statistics
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 
-class Simulator:
+class ScatterSimulator:
     """Statistics of the shots with effects on how readings scatter."""
 
     def __init__(self, assembly: Assembly, statistics: Statistics, missed: FloatArray) -> None:
@@ -26,7 +26,7 @@ class Simulator:
         self._statistics = statistics
         self._missed = missed
 
-    def kinds(self) -> Kinds:
+    def kinds(self) -> StatisticKinds:
         """Return of which kinds the statistics are."""
         return self._statistics.kinds()
 
@@ -49,7 +49,7 @@ class Simulator:
         """Return the statistics of readings that are off (k, b) [m] from where they are expected."""
         shots, seen, base = self._assembly.shots, self._assembly.marks.seen, self._assembly.marks.base
         rng = np.random.default_rng([seed, 7])
-        chain = effects.build_laser(own_with(shots, settings), np.random.default_rng(seed))
+        chain = effects.build_laser(model_effects_with(shots, settings), np.random.default_rng(seed))
         error = shots.laser.error
         raw = read(shots, seen, chain, rng.standard_normal(base.shape), self._statistics.pose_errors(rng))
         readings = error.reading(error.range(raw), np.zeros_like(raw))

@@ -12,9 +12,9 @@ from scipy.ndimage import maximum_filter1d
 
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
 from kurumaisu.critic.ranges.noise.scan_noise import ScanNoise
-from kurumaisu.critic.ranges.scans.valid_readings import piles, within
+from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_ends
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
-from kurumaisu.critic.scatter.likelihood import Kinds
+from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, fluctuating, steepest
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -52,7 +52,7 @@ class Groups:
 
 
 @dataclass(frozen=True)
-class Told:
+class Statistic:
     """A number: what a reader calls it, whether it is the root of a count, and whether it follows readings' errors.
 
     group: of the readings that it is of, None of all.
@@ -96,7 +96,7 @@ class Statistics:
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
         """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
         said = readings[self._trust]
-        ends = piles(said)
+        ends = cut_off_ends(said)
         left, common = self._leftover(error, ends)
         inside = self._trust & np.isfinite(left)
         z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
@@ -119,11 +119,11 @@ class Statistics:
         """Return what a reader calls the numbers, in their order."""
         return [one.name for one in self._told()]
 
-    def kinds(self) -> Kinds:
+    def kinds(self) -> StatisticKinds:
         """Return which of the numbers are roots of counts, which are places of piles, and which follow one another."""
         counts = np.array([one.count for one in self._told()])
         places = np.arange(len(counts)) >= len(counts) - _PLACES
-        return Kinds(counts, places, _trends(self._told(), self._groups.kinds), self._folds())
+        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), self._folds())
 
     def _folds(self) -> FloatArray:
         """Return the folds of the numbers that tell how far readings scatter: the first ones, by groups."""
@@ -134,27 +134,30 @@ class Statistics:
         """Return which of the numbers follow how far readings are off their mean."""
         return np.array([one.off for one in self._told()])
 
-    def _told(self) -> list[Told]:
+    def _told(self) -> list[Statistic]:
         """Return what the numbers are, in their order."""
         groups = list(enumerate(self._groups.names))
         return [
-            *(Told(f"spread, {name}", count=False, off=True, group=i) for i, name in groups),
-            *(Told(f"correlation of beams {lag} apart", count=False, off=True) for lag in (1, 2, 4)),
-            *(Told(f"readings more than {far:g} sd off", count=True, off=True) for far in (3, 4.5, _FAR, ELSEWHERE)),
-            Told(f"neighbours more than {_FAR:g} sd off", count=True, off=True),
-            Told("spread of whole scans", count=False, off=True),
-            Told("correlation of whole scans", count=False, off=True),
-            Told("spread of the means per beam", count=False, off=True),
-            Told("spread of the means per place", count=False, off=True),
-            *(Told(f"missing readings, {name}", count=True, off=False, group=i) for i, name in groups),
-            Told("readings without return", count=True, off=True),
-            Told("readings inside range jumps", count=True, off=True),
-            Told("number of different values", count=False, off=False),
-            Told("readings of the smallest value", count=True, off=True),
-            Told("readings of the largest value", count=True, off=True),
-            Told("step between values", count=False, off=False),
-            Told("lower cut-off of the readings", count=False, off=False),
-            Told("upper cut-off of the readings", count=False, off=False),
+            *(Statistic(f"spread, {name}", count=False, off=True, group=i) for i, name in groups),
+            *(Statistic(f"correlation of beams {lag} apart", count=False, off=True) for lag in (1, 2, 4)),
+            *(
+                Statistic(f"readings more than {far:g} sd off", count=True, off=True)
+                for far in (3, 4.5, _FAR, ELSEWHERE)
+            ),
+            Statistic(f"neighbours more than {_FAR:g} sd off", count=True, off=True),
+            Statistic("spread of whole scans", count=False, off=True),
+            Statistic("correlation of whole scans", count=False, off=True),
+            Statistic("spread of the means per beam", count=False, off=True),
+            Statistic("spread of the means per place", count=False, off=True),
+            *(Statistic(f"missing readings, {name}", count=True, off=False, group=i) for i, name in groups),
+            Statistic("readings without return", count=True, off=True),
+            Statistic("readings inside range jumps", count=True, off=True),
+            Statistic("number of different values", count=False, off=False),
+            Statistic("readings of the smallest value", count=True, off=True),
+            Statistic("readings of the largest value", count=True, off=True),
+            Statistic("step between values", count=False, off=False),
+            Statistic("lower cut-off of the readings", count=False, off=False),
+            Statistic("upper cut-off of the readings", count=False, off=False),
         ]
 
     def _piles(self, ends: tuple[float, float]) -> list[float]:
@@ -172,7 +175,7 @@ class Statistics:
         if ends not in self._fits:
             if len(self._fits) >= _KEPT:
                 del self._fits[next(iter(self._fits))]
-            trust = self._trust & within(self._base, ends, _WITHIN * self._reach)
+            trust = self._trust & inside_ends(self._base, ends, _WITHIN * self._reach)
             self._fits[ends] = ScanFit(self._basis, self._size, self._sd, trust, self._stand)
         return self._fits[ends].leftover(error)
 
@@ -190,7 +193,7 @@ def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, retu
     return Groups(kinds, names, masks, np.nan_to_num(np.array(logs) - np.nanmean(logs)))
 
 
-def _trends(told: Sequence[Told], kinds: Sequence[str]) -> FloatArray:
+def _trends(told: Sequence[Statistic], kinds: Sequence[str]) -> FloatArray:
     """Return weights (g, m) from -1 to 1 over each numbers' groups of ranges, and of incidences; kinds: of groups."""
     out = []
     for off, kind in product((True, False), _ALONG):

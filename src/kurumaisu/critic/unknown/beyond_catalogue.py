@@ -12,10 +12,10 @@ from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine import coarsened_posterior, search
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.search import Naming
-from kurumaisu.critic.unknown.comparison import Rivalry, compare, no_rivals
-from kurumaisu.critic.unknown.curves import Design, beside, null_evidence
-from kurumaisu.critic.unknown.joint_fit import Extension, extend
+from kurumaisu.critic.engine.search import SearchResult
+from kurumaisu.critic.unknown.comparison import CurveComparison, compare, no_curves
+from kurumaisu.critic.unknown.curves import Design, null_evidence, without_own_span
+from kurumaisu.critic.unknown.joint_fit import FitWithCurve, fit_with_curve
 
 _ALARM = 0.01  # share of null draws with as much evidence above which a curve is not believed
 _NEVER = float(np.log(1e3 / 1e-7))  # [nat] that no draw has of the curves, of which there are hundreds
@@ -33,13 +33,13 @@ class Beyond:
     effects without a curve that the search had missed, and that beats its best one.
     """
 
-    rivalry: Rivalry
-    extension: Extension | None
+    rivalry: CurveComparison
+    extension: FitWithCurve | None
     false_alarm: float
     better: Fit | None = None
 
 
-def hinted(problem: Problem, found: Naming) -> Extension | None:
+def hinted_curve(problem: Problem, found: SearchResult) -> FitWithCurve | None:
     """Return the best set with a curve if one may well act, for an estimate of the noise about it."""
     if not _asked(problem) or not found.enough:
         return None
@@ -50,23 +50,23 @@ def hinted(problem: Problem, found: Naming) -> Extension | None:
     return _extension(easy, rivalry) if rivalry.lead > _HINT else None
 
 
-def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> Beyond:
+def judge(problem: Problem, found: SearchResult, progress: Callable[[str], None]) -> Beyond:
     """Return whether a curve beats the catalogue, and the best one with the effects that act beside it."""
     if not _asked(problem) or not found.enough:
-        return Beyond(no_rivals(found), None, 1.0)
+        return Beyond(no_curves(found), None, 1.0)
     progress("trying errors outside the catalogue")
     rivalry = compare(problem, found)
     if rivalry.winner is None and not undecided(found, rivalry):
         return Beyond(rivalry, None, 1.0)
     first = _extension(problem, rivalry)
     if not _holds(problem, found, first, _HOPELESS):
-        return Beyond(no_rivals(found), None, 1.0)
+        return Beyond(no_curves(found), None, 1.0)
     curved = replay.extend(problem.model, [first.unknown])
     # With the curve in, sets may be best that nobody would have tried without it.
     other = search.search(problem.changed(model=curved), progress, first.fit).best
     if other.candidates not in {fit.candidates for fit in found.fits}:
         more = problem.fit_candidates(other.candidates, other.start)
-        if coarsened_posterior.worth(found, more) > coarsened_posterior.worth(found, found.best):
+        if coarsened_posterior.of_set(found, more) > coarsened_posterior.of_set(found, found.best):
             return Beyond(rivalry, None, 1.0, more)
         found = replace(found, fits=(*found.fits, more))
     rivalry = compare(problem, found, also=other.candidates)
@@ -74,12 +74,12 @@ def judge(problem: Problem, found: Naming, progress: Callable[[str], None]) -> B
         return Beyond(rivalry, None, 1.0)
     extension = _extension(problem, rivalry)
     if not _holds(problem, found, extension, 0.0):
-        return Beyond(no_rivals(found), None, 1.0)
+        return Beyond(no_curves(found), None, 1.0)
     alarm = false_alarm(problem, rivalry)
     return Beyond(rivalry, extension if alarm <= _ALARM else None, alarm)
 
 
-def undecided(found: Naming, rivalry: Rivalry) -> bool:
+def undecided(found: SearchResult, rivalry: CurveComparison) -> bool:
     """Tell whether something acts for sure, but it may as well be a curve as any effect of the best set."""
     if not found.best.ids or found.confounded or not rivalry.rivals or rivalry.p_nothing > 1 - search.NAMED:
         return False
@@ -87,7 +87,7 @@ def undecided(found: Naming, rivalry: Rivalry) -> bool:
     return surest < search.NAMED <= surest + sum(rivalry.p.values())
 
 
-def _holds(problem: Problem, found: Naming, extension: Extension, behind: float) -> bool:
+def _holds(problem: Problem, found: SearchResult, extension: FitWithCurve, behind: float) -> bool:
     """Tell whether a curve that wins by straight lines about a fit is not so many nats behind when it is simulated.
 
     Where the model is far off, as with another steering law, lines lead astray by any number of nats.
@@ -97,26 +97,26 @@ def _holds(problem: Problem, found: Naming, extension: Extension, behind: float)
     return -0.5 * float(left @ left) > found.best.log_likelihood - behind
 
 
-def false_alarm(problem: Problem, rivalry: Rivalry) -> float:
+def false_alarm(problem: Problem, rivalry: CurveComparison) -> float:
     """Return how often noise alone gives some curve, beside the same effects, the evidence of the best one.
 
     Evidence is a ratio of densities, whose mean over draws of noise is 1: of them, exp(-x) at most have x nats. More
     than all that is left is no evidence, but columns of which rounding makes something.
     """
     best = rivalry.rivals[0]
-    if best.belief.nats > -best.fit.log_likelihood:
+    if best.evidence.nats > -best.fit.log_likelihood:
         return 1.0
-    if best.belief.nats > _NEVER:
+    if best.evidence.nats > _NEVER:
         return 0.0
     design = Design(problem, best.fit.settings)
-    drawn = null_evidence(design, beside(problem, best.fit, design.columns)[1], search.NULLS)
-    return float(np.mean(drawn >= best.belief.nats))
+    drawn = null_evidence(design, without_own_span(problem, best.fit, design.columns)[1], search.NULLS)
+    return float(np.mean(drawn >= best.evidence.nats))
 
 
 def _asked(problem: Problem) -> bool:
     return problem.ids is None or effects.SMOOTH in problem.ids
 
 
-def _extension(problem: Problem, rivalry: Rivalry) -> Extension:
+def _extension(problem: Problem, rivalry: CurveComparison) -> FitWithCurve:
     best = rivalry.rivals[0]
-    return extend(problem, best.fit, best.curve, best.belief.prior)
+    return fit_with_curve(problem, best.fit, best.curve, best.evidence.prior)

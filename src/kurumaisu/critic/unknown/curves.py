@@ -20,8 +20,8 @@ from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.unknown.bases import Basis, bases
-from kurumaisu.critic.unknown.offset import CHANNELS, level
-from kurumaisu.critic.unknown.periods import girth
+from kurumaisu.critic.unknown.offset import CHANNELS, constant_offset
+from kurumaisu.critic.unknown.periods import wave_period
 from kurumaisu.critic.values.prior import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -54,7 +54,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Belief:
+class CurveEvidence:
     """Log evidence of a curve over its absence [nat]; prior (k, k): of its coefficients, at the best size."""
 
     nats: float
@@ -68,7 +68,7 @@ class Design:
         taken = {setting.id for setting in problem.model.effects}
         self.curves: list[Curve] = []
         at = 0
-        for basis in bases(problem.drives, problem.model, settings, girth(problem, settings)):
+        for basis in bases(problem.drives, problem.model, settings, wave_period(problem, settings)):
             for channel in _channels(basis.covariate):
                 if effects.smooth_id(channel, basis.covariate) not in taken:
                     self.curves.append(Curve(channel, basis, slice(at, at + basis.size)))
@@ -76,7 +76,7 @@ class Design:
         end = max((float(drive.times[-1] - drive.start) for drive in problem.drives), default=0.0)
         for channel in CHANNELS if self.curves else ():
             if effects.smooth_id(channel, effects.MOVING) not in taken:
-                self.curves.append(Curve(channel, level(end), slice(at, at + 1)))
+                self.curves.append(Curve(channel, constant_offset(end), slice(at, at + 1)))
                 at += 1
         self.columns = columns(problem, settings, self.curves)
 
@@ -112,13 +112,13 @@ def raw_columns(drive: Drive, model: Model, settings: Sequence[EffectSetting], c
     return out
 
 
-def beside(problem: Problem, fit: Fit, of: FloatArray) -> tuple[FloatArray, FloatArray]:
+def without_own_span(problem: Problem, fit: Fit, of: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the residual at a fit and columns `of`, both without what the fit's own parameters could take up."""
-    y, own = taken_up(problem, fit)
+    y, own = own_span(problem, fit)
     return y, of - own @ (own.T @ of)
 
 
-def taken_up(problem: Problem, fit: Fit) -> tuple[FloatArray, FloatArray]:
+def own_span(problem: Problem, fit: Fit) -> tuple[FloatArray, FloatArray]:
     """Return the residual at a fit without what its own parameters could take up, and an orthonormal basis of that."""
     y, slopes = problem.linearised(fit.terms, fit.values, fit.terms)
     if not slopes.shape[1]:
@@ -128,12 +128,12 @@ def taken_up(problem: Problem, fit: Fit) -> tuple[FloatArray, FloatArray]:
     return y - own @ (own.T @ y), own
 
 
-def belief(gram: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> Belief:
+def curve_evidence(gram: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> CurveEvidence:
     """Return how much a curve explains: b = X'y, gram = X'X of its whitened columns; any of the priors may hold."""
-    return beliefs(gram[None], b[None], priors)[0]
+    return curve_evidences(gram[None], b[None], priors)[0]
 
 
-def beliefs(grams: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> list[Belief]:
+def curve_evidences(grams: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> list[CurveEvidence]:
     """Return how much each of several curves (n, k, k), (n, k) explains."""
     count = len(priors)
     scaled, axes, sizes = _axes(np.repeat(grams, count, axis=0), np.tile(np.stack(priors), (len(grams), 1, 1)))
@@ -143,7 +143,7 @@ def beliefs(grams: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> l
     totals = logsumexp(weighed, axis=1) - np.log(count)
     rows = count * np.arange(len(grams)) + best // len(_SIZES)
     found = zip(totals, rows, best % len(_SIZES), strict=True)
-    return [Belief(float(total), _SIZES[size] ** 2 * scaled[row]) for total, row, size in found]
+    return [CurveEvidence(float(total), _SIZES[size] ** 2 * scaled[row]) for total, row, size in found]
 
 
 def null_evidence(design: Design, columns: FloatArray, draws: int) -> FloatArray:

@@ -10,17 +10,17 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.engine.catalogue import Candidate
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.unknown.curves import Belief, Curve, columns, taken_up
+from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, columns, own_span
 from kurumaisu.critic.unknown.designs import Designs
-from kurumaisu.critic.unknown.step_curves import Jump
+from kurumaisu.critic.unknown.step_curves import StepCurve
 from kurumaisu.types import FloatArray
 
 _ALIKE = 0.9  # correlation of signals from which a curve draws an effect; noise alone bends a curve by as much
 _CHANCE = 3.0  # [nat] that a level more and the best of many places explain of noise
-FORM = 0.15  # share of its signal by which a chair's fault may differ from the catalogue's equation for it
+FORM_ERROR = 0.15  # share of its signal by which a chair's fault may differ from the catalogue's equation for it
 
 
-class Likeness:
+class EffectLikeness:
     """How alike curves are to the effects of a fit, as both explain the drives."""
 
     def __init__(self, problem: Problem, best: Fit, designs: Designs) -> None:
@@ -28,7 +28,7 @@ class Likeness:
         self._signals = {name: signal_of(problem, best, name) for name in sorted(best.ids)}
         self._fits: dict[frozenset[Candidate], Fit] = {}
 
-    def drawn(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
+    def drawn(self, fit: Fit, curve: Curve, belief: CurveEvidence) -> dict[str, float]:
         """Return what this curve draws of the best fit's effects, beside another fit that lacks them.
 
         By effect, of which there is one at most: evidence [nat] by which the curve may be better for nothing but the
@@ -41,7 +41,7 @@ class Likeness:
         signals = {name: self._signals[name] for name in missing}
         return self._like(signals, fit, curve, belief, self._best.log_likelihood)
 
-    def drawn_together(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
+    def drawn_together(self, fit: Fit, curve: Curve, belief: CurveEvidence) -> dict[str, float]:
         """Return the effects of the best fit, several, that do together what this curve draws beside a part of it.
 
         A free curve over the yaw rate is any law of it: for one that explains less than they do it is no news.
@@ -53,7 +53,7 @@ class Likeness:
         found = self._like({"": together}, fit, curve, belief, self._best.log_likelihood)
         return dict.fromkeys(missing, found[""]) if found else {}
 
-    def drawn_alone(self, fit: Fit, curve: Curve, belief: Belief) -> dict[str, float]:
+    def drawn_alone(self, fit: Fit, curve: Curve, belief: CurveEvidence) -> dict[str, float]:
         """Return the one effect of the best fit that draws what this curve does, beside a fit that lacks several.
 
         The others may only mend its form, as a bent law does of a limit that has no corner.
@@ -76,17 +76,17 @@ class Likeness:
         return self._fits[candidates]
 
     def _like(
-        self, signals: dict[str, FloatArray], fit: Fit, curve: Curve, belief: Belief, likelihood: float
+        self, signals: dict[str, FloatArray], fit: Fit, curve: Curve, belief: CurveEvidence, likelihood: float
     ) -> dict[str, float]:
         """Return those of some effects of which a curve beside a fit draws the signals; likelihood: of them instead."""
-        y, own = taken_up(self._problem, fit)
+        y, own = own_span(self._problem, fit)
         free = self._designs.columns(fit, curve)
         free = free - own @ (own.T @ free)
         spread = np.eye(free.shape[1]) + belief.prior @ (free.T @ free)
         drawn = free @ np.linalg.solve(spread, belief.prior @ (free.T @ y))
         signals = {name: signal - own @ (own.T @ signal) for name, signal in signals.items()}
         found = {
-            name: 0.5 * float(FORM**2 * signal @ signal)
+            name: 0.5 * float(FORM_ERROR**2 * signal @ signal)
             for name, signal in signals.items()
             if _correlation(drawn, signal) > _ALIKE
         }
@@ -97,9 +97,9 @@ class Likeness:
 
         No other form of an equation jumps: what a jump explains beyond it, and beyond chance, is no form.
         """
-        if not isinstance(curve.basis, Jump):
+        if not isinstance(curve.basis, StepCurve):
             return found
-        y, own = taken_up(self._problem, fit)
+        y, own = own_span(self._problem, fit)
         free = self._designs.columns(fit, curve)
         free = free - own @ (own.T @ free)
         better = 0.5 * float(y @ free @ np.linalg.lstsq(free, y, rcond=None)[0]) - already
@@ -116,7 +116,7 @@ class Likeness:
         own = _span(self._finer(fit, curve))
         signals = {name: signal_of(self._problem, fit, name) for name in sorted(self._best.ids)}
         found = {
-            name: 0.5 * float(FORM**2 * signal @ signal)
+            name: 0.5 * float(FORM_ERROR**2 * signal @ signal)
             for name, signal in signals.items()
             if _norm(own.T @ signal) > _ALIKE * _norm(signal)
         }

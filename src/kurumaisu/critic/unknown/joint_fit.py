@@ -24,7 +24,7 @@ _SHARES = (1.0, 0.5, 0.2, 0.05)
 
 
 @dataclass(frozen=True)
-class Extension:
+class FitWithCurve:
     """fit: of the catalogue's effects beside the curve; coefficients of the curve and their covariance.
 
     prior: covariance of the coefficients before the data.
@@ -52,27 +52,27 @@ class Extension:
         return (*self.fit.settings, self.unknown)
 
 
-def extend(problem: Problem, fit: Fit, curve: Curve, prior: FloatArray) -> Extension:
+def fit_with_curve(problem: Problem, fit: Fit, curve: Curve, prior: FloatArray) -> FitWithCurve:
     """Return a set's fit and a curve's coefficients, each beside the other."""
     curve = replace(curve, columns=slice(0, curve.basis.size))
     values, vectors = np.linalg.eigh(prior)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    extension = Extension(fit, curve, prior, np.zeros(curve.basis.size), prior)
-    worth = _worth(problem, extension, root)
+    extension = FitWithCurve(fit, curve, prior, np.zeros(curve.basis.size), prior)
+    density = _log_density(problem, extension, root)
     for _ in range(_ROUNDS):
         whole = _step(problem, extension, root)
         for share in _SHARES:
             moved = whole if share == 1.0 else _part(problem, extension, whole, share)
-            gained = _worth(problem, moved, root) - worth
+            gained = _log_density(problem, moved, root) - density
             if gained > 0:
                 break
-        extension, worth = (moved, worth + gained) if gained > 0 else (_where(extension, whole), worth)
+        extension, density = (moved, density + gained) if gained > 0 else (_where(extension, whole), density)
         if gained < _ENOUGH:
             break
     return extension
 
 
-def _worth(problem: Problem, extension: Extension, root: FloatArray) -> float:
+def _log_density(problem: Problem, extension: FitWithCurve, root: FloatArray) -> float:
     """Return the log posterior density of a curve's coefficients and the effects beside it, up to a constant."""
     curved = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
     left = curved.residual(extension.fit.terms, extension.fit.values)
@@ -80,7 +80,7 @@ def _worth(problem: Problem, extension: Extension, root: FloatArray) -> float:
     return -0.5 * float(left @ left + sizes @ sizes)
 
 
-def _part(problem: Problem, extension: Extension, whole: Extension, share: float) -> Extension:
+def _part(problem: Problem, extension: FitWithCurve, whole: FitWithCurve, share: float) -> FitWithCurve:
     """Return an extension that is moved by a share of the way to another one."""
     values = extension.fit.values + share * (whole.fit.values - extension.fit.values)
     settings = replay.completed(problem.model, settings_of(extension.fit.terms, values))
@@ -88,19 +88,19 @@ def _part(problem: Problem, extension: Extension, whole: Extension, share: float
     return replace(whole, fit=replace(whole.fit, values=values, settings=settings), coefficients=coefficients)
 
 
-def _where(extension: Extension, whole: Extension) -> Extension:
+def _where(extension: FitWithCurve, whole: FitWithCurve) -> FitWithCurve:
     """Return an extension where it is, with the doubts of another one."""
     return replace(extension, fit=replace(extension.fit, sds=whole.fit.sds), covariance=whole.covariance)
 
 
-def again(extension: Extension, drives: Sequence[Drive], problem: Problem) -> Extension:
+def refitted(extension: FitWithCurve, drives: Sequence[Drive], problem: Problem) -> FitWithCurve:
     """Return the extension fitted to other drives."""
     other = problem.changed(drives=drives)
     fit = other.fit_candidates(extension.fit.candidates, extension.fit.start)
-    return extend(other, fit, extension.curve, extension.prior)
+    return fit_with_curve(other, fit, extension.curve, extension.prior)
 
 
-def simulated_columns(problem: Problem, drive: Drive, extension: Extension, *, finer: bool) -> FloatArray:
+def simulated_columns(problem: Problem, drive: Drive, extension: FitWithCurve, *, finer: bool) -> FloatArray:
     """Return the derivative of a drive's increments by all effects of the catalogue and by the curve, (3 m, k).
 
     finer: with more knots. What few of them leave of a step grows with the rates, and is no noise that does.
@@ -113,14 +113,14 @@ def simulated_columns(problem: Problem, drive: Drive, extension: Extension, *, f
     return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [curve])])
 
 
-def doubt(problem: Problem, drive: Drive, extension: Extension) -> FloatArray:
+def doubt(problem: Problem, drive: Drive, extension: FitWithCurve) -> FloatArray:
     """Return how a drive's increments change by errors of the curve, normal with sd 1 each, (3 m, k)."""
     values, vectors = np.linalg.eigh(extension.covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     return np.asarray(raw_columns(drive, problem.model, extension.fit.settings, [extension.curve]) @ root)
 
 
-def _step(problem: Problem, extension: Extension, root: FloatArray) -> Extension:
+def _step(problem: Problem, extension: FitWithCurve, root: FloatArray) -> FitWithCurve:
     fit = extension.fit
     beside = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
     y, slopes = beside.linearised(fit.terms, fit.values, fit.terms)

@@ -18,7 +18,7 @@ CHANNELS = ("v", "lateral", "w")  # a share of a rate that is off by as much eve
 
 
 @dataclass(frozen=True)
-class Level(Basis):
+class Offset(Basis):
     """One number. What it is pictured over is the time, between low and high."""
 
     @property
@@ -43,6 +43,6 @@ class Level(Basis):
         return {"knot_0": 0.0, "value_0": float(coefficients[0])}
 
 
-def level(seconds: float) -> Level:
+def constant_offset(seconds: float) -> Offset:
     """Return the number, as known of drives of so many seconds."""
-    return Level(effects.MOVING, np.empty(0), {}, (np.eye(1),), 0.0, seconds)
+    return Offset(effects.MOVING, np.empty(0), {}, (np.eye(1),), 0.0, seconds)

@@ -24,7 +24,7 @@ _PARTS = (1, 2, 3)  # of a turn, after which it may be as large as after all of 
 _CLOSER = 8  # periods for one about the best: an overtone is out of step sooner
 
 
-def girth(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, int] | None:
+def wave_period(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, int] | None:
     """Return the period [m] of waves of either rate that explain most beside effects, and out of how many.
 
     None where the drives are too short for any.
@@ -36,7 +36,7 @@ def girth(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, i
         return None
     low, high = max(1 / _LONGEST, _TURNS / longest), 1 / _SHORTEST
     waves = np.linspace(low, high, int(np.clip(2 * longest * (high - low), 2, _MOST)))
-    sought = _Sought(problem, settings, motions, ways)
+    sought = _PeriodSearch(problem, settings, motions, ways)
     gained = np.stack([sought.gained(channel, waves, 1) for channel in _WAVING])
     channel, best = np.unravel_index(int(np.argmax(gained)), gained.shape)
     # What comes once per turn, but briefly, has overtones as large, any of which may stand out.
@@ -48,7 +48,7 @@ def girth(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, i
     return float(1 / likeliest), gained.size
 
 
-class _Sought:
+class _PeriodSearch:
     """What is left about simulated drives, and what waves along their ways explain of it."""
 
     def __init__(
@@ -69,7 +69,7 @@ class _Sought:
         size = 2 * overtones
         gram, pull = np.zeros((len(waves), size, size)), np.zeros((len(waves), size))
         for drive, sensitivity, way, white in self._drives:
-            tones = zip(*(_waved(way, times * waves) for times in range(1, overtones + 1)), strict=True)
+            tones = zip(*(_waves(way, times * waves) for times in range(1, overtones + 1)), strict=True)
             at = 0
             for some in tones:
                 here = slice(at, at + some[0].shape[1] // 2)
@@ -86,7 +86,7 @@ class _Sought:
         return np.asarray(np.einsum("ki,ki->k", pull, along))
 
 
-def _waved(way: FloatArray, waves: FloatArray) -> Iterator[FloatArray]:
+def _waves(way: FloatArray, waves: FloatArray) -> Iterator[FloatArray]:
     """Yield pairs of cosine and sine (n, 2 k) of evenly spaced waves along a way (n,), few at a time.
 
     Each is the one before it, turned on by as much again.

@@ -7,7 +7,7 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.unknown.curves import Curve
-from kurumaisu.critic.unknown.joint_fit import Extension
+from kurumaisu.critic.unknown.joint_fit import FitWithCurve
 from kurumaisu.critic.unknown.shapes import Shape, grid, shape_of
 
 # How a reader calls them, and their units.
@@ -64,7 +64,7 @@ def unit_of(curve: Curve) -> str:
     return _SHARES.get(curve.channel, effects.CHANNELS[curve.channel].unit)
 
 
-def shape(extension: Extension, *, intervals: bool = True) -> str:
+def shape(extension: FitWithCurve, *, intervals: bool = True) -> str:
     """Return the curve's shape with place and size, each with its unit and, if asked for, its 90 % interval."""
     found = shape_of(extension)
     unit, rate = covariate(extension.curve)[2], unit_of(extension.curve)
@@ -89,7 +89,7 @@ def shape(extension: Extension, *, intervals: bool = True) -> str:
     return f"{found.kind} at {place} {what[found.kind]}".replace(" ;", ";")
 
 
-def headline(extension: Extension) -> str:
+def headline(extension: FitWithCurve) -> str:
     """Return the finding in one sentence."""
     name = covariate(extension.curve)[1]
     if extension.curve.basis.covariate == effects.MOVING:

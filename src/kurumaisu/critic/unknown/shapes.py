@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from kurumaisu.critic.unknown.bases import Basis
-from kurumaisu.critic.unknown.offset import Level
-from kurumaisu.critic.unknown.step_curves import Jump
+from kurumaisu.critic.unknown.offset import Offset
+from kurumaisu.critic.unknown.step_curves import StepCurve
 from kurumaisu.types import FloatArray
 
 _POINTS = 60  # at which a curve is described
@@ -20,7 +20,7 @@ _PLACES = 25  # of a template along the covariate
 _TURN = 2 * np.pi
 
 
-class Described(Protocol):
+class DescribedCurve(Protocol):
     """A curve over a covariate: basis, coefficients (m,) and their covariance (m, m)."""
 
     @property
@@ -83,12 +83,12 @@ TEMPLATES: dict[str, tuple[Callable[[FloatArray, float], FloatArray], ...]] = {
 }
 
 
-def grid(described: Described) -> FloatArray:
+def grid(described: DescribedCurve) -> FloatArray:
     """Return values of the covariate at which its curve is known."""
     basis = described.basis
-    if isinstance(basis, Level):
+    if isinstance(basis, Offset):
         return np.array([basis.low, basis.high])
-    if isinstance(basis, Jump):
+    if isinstance(basis, StepCurve):
         return np.sort(np.append(np.linspace(basis.low, basis.high, _POINTS), basis.knots))
     if len(basis.knots):
         low, high = max(basis.low, float(basis.knots[0])), min(basis.high, float(basis.knots[-1]))
@@ -96,25 +96,25 @@ def grid(described: Described) -> FloatArray:
     return np.linspace(0.0, basis.constants["period"], _POINTS, endpoint=False)
 
 
-def band(described: Described, at: FloatArray) -> FloatArray:
+def band(described: DescribedCurve, at: FloatArray) -> FloatArray:
     """Return the curve and its standard deviation at values of the covariate, (2, n)."""
     matrix = described.basis.matrix(at)
     variance = np.einsum("ij,jk,ik->i", matrix, described.covariance, matrix)
     return np.stack([matrix @ described.coefficients, np.sqrt(np.maximum(variance, 0.0))])
 
 
-def shape_of(described: Described) -> Shape:
+def shape_of(described: DescribedCurve) -> Shape:
     """Return the template that describes the curve best, with intervals from draws of its coefficients."""
     at = grid(described)
     draws = np.random.default_rng(0).multivariate_normal(
         described.coefficients, described.covariance, size=_DRAWS, check_valid="ignore"
     )
     curves = np.vstack([described.coefficients, draws]) @ described.basis.matrix(at).T
-    if isinstance(described.basis, Level):
+    if isinstance(described.basis, Offset):
         return Shape("constant", np.full(3, (at[0] + at[-1]) / 2), _interval(curves[:, 0]))
     if not len(described.basis.knots):
         return _periodic(described, np.vstack([described.coefficients, draws]))
-    if isinstance(described.basis, Jump):
+    if isinstance(described.basis, StepCurve):
         return Shape(
             "jump", described.basis.place, _interval(np.diff(np.vstack([described.coefficients, draws]))[:, 0])
         )
@@ -129,7 +129,7 @@ def shape_of(described: Described) -> Shape:
     return Shape(kind, at[0] + (at[-1] - at[0]) * _interval(places), _interval(sizes))
 
 
-def _periodic(described: Described, coefficients: FloatArray) -> Shape:
+def _periodic(described: DescribedCurve, coefficients: FloatArray) -> Shape:
     """Return the strongest harmonic."""
     count = (coefficients.shape[1] - 1) // 2
     sizes = np.hypot(coefficients[:, 1 : 1 + count], coefficients[:, 1 + count :])

@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.unknown.bases import FINER, Basis
-from kurumaisu.critic.unknown.curves import Belief, Curve, beliefs, columns, taken_up
+from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, columns, curve_evidences, own_span
 from kurumaisu.types import FloatArray
 
 _PLACES = 24  # with as many samples between them
@@ -29,7 +29,7 @@ _PRIORS = (np.diag([0.0, 1.0]), np.diag([1.0, 0.0]), np.eye(2))
 
 
 @dataclass(frozen=True)
-class Jump(Basis):
+class StepCurve(Basis):
     """Two levels with a jump between them; the knots are its two sides.
 
     place: of the jump, with its 90 % interval, (3,); hats: knots of the curve over the same that does not jump.
@@ -60,7 +60,7 @@ class _Sides(Basis):
 
 
 @dataclass
-class _Tried:
+class _StepPlaces:
     """Places of a jump of one curve, what each explains and how likely it is beforehand, both in nats."""
 
     curve: Curve
@@ -74,7 +74,7 @@ class _Tried:
     def add(self, gram: FloatArray, b: FloatArray) -> None:
         """Weigh the places by normal equations of a column of ones and one for each, and choose closer ones."""
         grams, pulls = _two_sided(gram, b)
-        found = beliefs(grams, pulls, _PRIORS)
+        found = curve_evidences(grams, pulls, _PRIORS)
         seen = np.einsum("nii->ni", grams).min(axis=1) > _SEEN * gram[0, 0]
         nats = np.where(seen, [belief.nats for belief in found], -np.inf)
         best = int(np.argmax(nats))
@@ -86,7 +86,7 @@ class _Tried:
         self.prior += float(np.log((1 + (0 < best < len(nats) - 1)) / len(nats)))
         self.places = np.linspace(low, high, _FINER + 2)[1:-1]
 
-    def rival(self) -> tuple[Curve, Belief]:
+    def rival(self) -> tuple[Curve, CurveEvidence]:
         """Return the curve with a jump at the best place, and its evidence, whatever the place."""
         level = int(np.argmax([nats.max() for nats in self.nats]))
         total = max(
@@ -97,7 +97,7 @@ class _Tried:
         basis = self.curve.basis
         half = _WIDTH / 2 * (basis.high - basis.low)
         low, high = self._interval()
-        jump = Jump(
+        jump = StepCurve(
             basis.covariate,
             np.array([place - half, place + half]),
             basis.constants,
@@ -107,7 +107,7 @@ class _Tried:
             place=np.array([place, min(low, place), max(high, place)]),
             hats=basis.knots,
         )
-        return replace(self.curve, basis=jump, columns=slice(0, 2)), Belief(total, self.priors[level])
+        return replace(self.curve, basis=jump, columns=slice(0, 2)), CurveEvidence(total, self.priors[level])
 
     def _interval(self) -> FloatArray:
         """Return the 90 % interval of the place: the log likelihood is taken to be straight between the places."""
@@ -119,7 +119,7 @@ class _Tried:
         return np.interp(np.array([0.05, 0.95]) * weights.sum(), np.cumsum(weights), close)
 
 
-def over_own(curves: Iterable[Curve]) -> Iterator[Curve]:
+def gains_over_own_rate(curves: Iterable[Curve]) -> Iterator[Curve]:
     """Yield curves of the factors of a rate over that rate itself: gears, and wheels that slip from a speed on.
 
     Without a jump they would be the sum of a rate and a curve again.
@@ -129,10 +129,10 @@ def over_own(curves: Iterable[Curve]) -> Iterator[Curve]:
             yield replace(curve, channel=f"{curve.channel}_gain")
 
 
-def jumps(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[tuple[Curve, Belief]]:
+def step_curves(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[tuple[Curve, CurveEvidence]]:
     """Yield, for each of the curves beside a fit that has knots, the one that jumps instead, and what it explains."""
     tried = list(_first(problem, fit, curves))
-    y, own = taken_up(problem, fit)
+    y, own = own_span(problem, fit)
     for _ in range(3):
         sides = [
             replace(one.curve, basis=_Sides(one.curve.basis.covariate, one.places, one.curve.basis.constants, (), 0, 0))
@@ -147,7 +147,7 @@ def jumps(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[tuple
     yield from (one.rival() for one in tried if np.isfinite(one.nats[0]).any())
 
 
-def _first(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[_Tried]:
+def _first(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[_StepPlaces]:
     motions = [replay.motion(drive, problem.model, fit.settings) for drive in problem.drives]
     moving = [motion.moving for motion in motions]
     for curve in curves:
@@ -156,7 +156,7 @@ def _first(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[_Tri
         values = np.concatenate([curve.basis.samples(m)[moved] for m, moved in zip(motions, moving, strict=True)])
         known = np.unique(np.quantile(values[np.isfinite(values)], np.linspace(0.0, 1.0, _PLACES + 1)))
         if len(known) > 1:  # between values that were driven: at one of them it is not known which side it is on
-            yield _Tried(curve, (known[1:] + known[:-1]) / 2, 0.0)
+            yield _StepPlaces(curve, (known[1:] + known[:-1]) / 2, 0.0)
 
 
 def _two_sided(gram: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kurumaisu.critic.values.story import Comparison, Misfit, Noise, Rival
+from kurumaisu.critic.values.story import Alternative, Comparison, Misfit, NoiseParameter
 from kurumaisu.critic.values.verdict import Cause, NextExperiment, Unknown
 from kurumaisu.params import EffectSetting
 
-CHANNEL = "laser.bias"  # that of what is outside the catalogue
+UNKNOWN_CHANNEL = "laser.bias"  # that of what is outside the catalogue
 
 
 @dataclass(frozen=True)
@@ -17,8 +17,8 @@ class Pictures:
     """What a finding adds to the report."""
 
     misfits: tuple[Misfit, ...] = ()
-    rivals: tuple[Rival, ...] = ()
-    noise: tuple[Noise, ...] = ()
+    rivals: tuple[Alternative, ...] = ()
+    noise: tuple[NoiseParameter, ...] = ()
     comparisons: tuple[Comparison, ...] = ()
 
 

@@ -93,7 +93,7 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Rival:
+class Alternative:
     """An explanation that was weighed and lost: log evidence over the winner [nat], and why it lost."""
 
     id: str
@@ -102,7 +102,7 @@ class Rival:
 
 
 @dataclass(frozen=True)
-class Noise:
+class NoiseParameter:
     """One estimated parameter of the noise with its 90 % interval, nan where it has none."""
 
     name: str
@@ -130,7 +130,7 @@ class Story:
     overlays: tuple[Overlay, ...] = ()
     misfits: tuple[Misfit, ...] = ()
     comparisons: tuple[Comparison, ...] = ()
-    rivals: tuple[Rival, ...] = ()
-    noise: tuple[Noise, ...] = ()
+    rivals: tuple[Alternative, ...] = ()
+    noise: tuple[NoiseParameter, ...] = ()
     unexplained: tuple[str, ...] = ()
     next_drive: str = ""

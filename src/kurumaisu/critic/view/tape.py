@@ -10,9 +10,9 @@ import numpy as np
 
 from kurumaisu import geometry
 from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.covariates import informed
+from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.base.restarted_path import PICTURE, RESTART, restarted
+from kurumaisu.critic.base.restarted_path import PICTURE, RESTART, restarted_path
 from kurumaisu.critic.ranges.scans.beams import laser_of
 from kurumaisu.critic.ranges.scans.walls import Rays, walls_at
 from kurumaisu.critic.values.recording import Run, Series
@@ -99,8 +99,8 @@ class Showing:
         tracks: dict[str, Track] = {}
         try:
             for name, model in self._models.items():
-                drive = informed(prepare(run, model, PICTURE), run)
-                pieces = list(restarted(drive, replay.path(drive, model, ())))
+                drive = with_covariates(prepare(run, model, PICTURE), run)
+                pieces = list(restarted_path(drive, replay.path(drive, model, ())))
                 times = np.concatenate([drive.times[rows] for rows, _ in pieces])
                 tracks[name] = Track(times, np.concatenate([poses for _, poses in pieces]))
         except Error as error:

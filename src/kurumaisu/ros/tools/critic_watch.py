@@ -20,7 +20,7 @@ from sensor_msgs.msg import BatteryState, LaserScan, Temperature
 from kurumaisu import program
 from kurumaisu.critic.app.options import add_effects, whole_number
 from kurumaisu.critic.app.results import causes
-from kurumaisu.critic.app.watch import Rolled, Rolling
+from kurumaisu.critic.app.watch import ContinuousCritic, WatchedCriticism
 from kurumaisu.critic.app.window import Heard, Window
 from kurumaisu.critic.data import messages
 from kurumaisu.critic.data.clean import Faults
@@ -79,9 +79,9 @@ class CriticWatch:
         self._every = options.every
         self._lock = threading.Lock()
         self._window = Window(tuple(_TOPICS), options.window, _LIMIT)
-        self._rolling = Rolling(model, ids)
+        self._rolling = ContinuousCritic(model, ids)
         self._begun = -self._every
-        self._last = Rolled(None, "nothing has been criticised yet")
+        self._last = WatchedCriticism(None, "nothing has been criticised yet")
         self._answered: float | None = None  # ROS time [s]
         self._number = 0
         self._problems: tuple[str, ...] = ()
@@ -106,7 +106,7 @@ class CriticWatch:
         try:
             recording = self._recording()
         except Error as error:
-            self._begun, self._last = now, Rolled(None, one_line(error))
+            self._begun, self._last = now, WatchedCriticism(None, one_line(error))
             return
         if recording is not None:
             self._begun = now

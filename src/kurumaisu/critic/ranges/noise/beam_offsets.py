@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from kurumaisu.critic.ranges.noise.scan_noise import Gram, Layout, ScanNoise, own_sizes, precision
+from kurumaisu.critic.ranges.noise.scan_noise import Gram, Layout, ScanNoise, own_pose_sds, precision
 from kurumaisu.types import BoolArray, FloatArray
 
 _FLOOR = 1e-7  # [m] below which no sd of the beams' offsets counts
 
 
 @dataclass(frozen=True)
-class Crossed:
+class OffsetProducts:
     """What the beams' offsets (b,) have in common with the other columns, whitened within each scan.
 
     own: for each scan (b, own + shared); common (b, p + 1): summed over the scans; inner (b, b): with one another.
@@ -27,7 +27,7 @@ class Crossed:
     inner: FloatArray
 
 
-def crossed(rows: FloatArray, valid: BoolArray, sd: FloatArray, rho: float, inner: FloatArray) -> FloatArray:
+def offset_products(rows: FloatArray, valid: BoolArray, sd: FloatArray, rho: float, inner: FloatArray) -> FloatArray:
     """Return (b, m) products of a scan's offsets with its whitened rows (n, m), and add theirs to inner (b, b)."""
     at = np.flatnonzero(valid)
     out = np.zeros((len(valid), rows.shape[1]))
@@ -47,11 +47,11 @@ def crossed(rows: FloatArray, valid: BoolArray, sd: FloatArray, rho: float, inne
     return out
 
 
-def without_beams(
-    grams: Sequence[Gram], cross: Crossed, layout: Layout, noise: ScanNoise, beam_sd: float
+def without_beam_offsets(
+    grams: Sequence[Gram], cross: OffsetProducts, layout: Layout, noise: ScanNoise, beam_sd: float
 ) -> FloatArray:
     """Return normal equations as noise.marginal, with an offset of sd beam_sd [m] of each beam integrated out too."""
-    size, beams = own_sizes(noise), len(cross.inner)
+    size, beams = own_pose_sds(noise), len(cross.inner)
     prior = precision(layout, noise)[0]
     scans, shared = len(grams), len(prior)
     common = cross.common.shape[1]

@@ -18,7 +18,7 @@ _ODD = 3.0  # times as far apart as those of other stands: what wanders has all 
 _MOST = 3  # stands that are split: of more, it is noise
 
 
-def jumps(off: FloatArray, stand: IntArray) -> IntArray:
+def level_jumps(off: FloatArray, stand: IntArray) -> IntArray:
     """Return the scans (n,) after which the others of the same stand are read otherwise.
 
     off (k, b) [m]: by how much readings are off, nan where there is none; stand (k,): of each scan, else -1.
@@ -35,7 +35,7 @@ def jumps(off: FloatArray, stand: IntArray) -> IntArray:
     return np.array(sorted(row for z, row in sorted(found, reverse=True)[:_MOST] if z > least), dtype=np.int64)
 
 
-def parted(knots: FloatArray, at: FloatArray, stand: IntArray, jumped: IntArray) -> tuple[FloatArray, FloatArray]:
+def knots_parted(knots: FloatArray, at: FloatArray, stand: IntArray, jumped: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return the knots of a curve over what scans have (k,) with those of some stands parted, and their places.
 
     jumped: scans after which a stand is parted. By its places a curve is as free from one part to the other as from

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.ranges.noise.scan_noise import Layout
-from kurumaisu.critic.ranges.scans.beams import Look
+from kurumaisu.critic.ranges.scans.beams import BeamHits
 from kurumaisu.types import BoolArray, FloatArray
 
 OUTLIER = 4.5  # deviations from which a reading does not count
@@ -33,7 +33,7 @@ class BeamNoise:
     own_sd: float = 0.0
 
 
-def near(z: FloatArray, known: BoolArray, reach: FloatArray) -> BoolArray:
+def expected_readings(z: FloatArray, known: BoolArray, reach: FloatArray) -> BoolArray:
     """Return which readings are of what was to be met; z: in deviations from there, nothing fitted yet.
 
     reach: by how many deviations errors that a scan shares move each of them, 1 sd. A scan whose first fit gives way to
@@ -44,11 +44,11 @@ def near(z: FloatArray, known: BoolArray, reach: FloatArray) -> BoolArray:
         return np.asarray(known & (np.abs(z) < np.maximum(max(ELSEWHERE, OUTLIER * width), OUTLIER * reach)))
 
 
-def refined(
+def estimate_reading_noise(
     first: BeamNoise,
     beam: BeamNoise,
     leftover: Callable[[BeamNoise], FloatArray],
-    seen: Look,
+    seen: BeamHits,
     layout: Layout,
     grid: float,
 ) -> BeamNoise:

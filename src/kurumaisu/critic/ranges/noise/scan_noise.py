@@ -76,11 +76,11 @@ class Layout:
 
     def kept(self, noise: ScanNoise) -> tuple[FloatArray, float]:
         """Return the precision of the errors of stands and stretches, x, y, yaw in turn, and its log determinant."""
-        lasting = np.maximum(np.sqrt(noise.lasting) * sizes(noise), _FLOOR) ** -2
+        lasting = np.maximum(np.sqrt(noise.lasting) * pose_sds(noise), _FLOOR) ** -2
         runs, middles = self._stretches[0].T
         along, log_det = autoregressive(middles, runs, noise.lasting_tau)
-        stands = np.diag(np.tile(sizes(noise) ** -2, self._stands))
-        logs = self._stands * np.log(sizes(noise) ** -2).sum() + 3 * log_det + len(middles) * np.log(lasting).sum()
+        stands = np.diag(np.tile(pose_sds(noise) ** -2, self._stands))
+        logs = self._stands * np.log(pose_sds(noise) ** -2).sum() + 3 * log_det + len(middles) * np.log(lasting).sum()
         return block_diag(stands, np.kron(along, np.diag(lasting))), float(logs)
 
     @property
@@ -120,7 +120,7 @@ def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[F
 
     The latter is that of the covariance, relative to independent readings.
     """
-    size = own_sizes(noise)
+    size = own_pose_sds(noise)
     prior, prior_log_det = precision(layout, noise)
     scans = len(grams)
     common = len(grams[0].matrix) - grams[0].own - grams[0].shared
@@ -142,14 +142,14 @@ def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[F
     return total - cross.T @ cho_solve(factor, cross), log_det
 
 
-def sizes(noise: ScanNoise) -> FloatArray:
+def pose_sds(noise: ScanNoise) -> FloatArray:
     """Return the sds (3,) of a reference pose."""
     return np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], _FLOOR)
 
 
-def own_sizes(noise: ScanNoise) -> FloatArray:
+def own_pose_sds(noise: ScanNoise) -> FloatArray:
     """Return the sds (3,) of what of a reference pose's error is its own."""
-    return np.asarray(np.sqrt(1 - noise.lasting) * sizes(noise))
+    return np.asarray(np.sqrt(1 - noise.lasting) * pose_sds(noise))
 
 
 def _alike(grams: Sequence[Gram]) -> list[list[int]]:
@@ -252,7 +252,7 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
     return _likeliest(likelihood, start, np.arange(known, 6), begun[known:])
 
 
-def wary_of(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
+def with_lasting_common_mode(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
     """Return a noise whose common mode, where there is one for sure, is the mean of those that last longer, too.
 
     The scans of a stand tell how far it wanders while they last. How far it comes until the next stand is told by no

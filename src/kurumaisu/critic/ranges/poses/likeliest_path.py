@@ -28,7 +28,7 @@ _SEEN = np.array([5e-4, 5e-4, 2.5e-4])  # [m, m, rad] by which a path in straigh
 
 
 @dataclass(frozen=True)
-class Sight:
+class PoseEvidence:
     """What a scan says of the errors of the reference's poses in rows (q,): inner (3 q, 3 q), outer (3 q,).
 
     Normal equations of the errors x, y [m], yaw [rad] of each pose in turn, whatever else the scan has integrated out.
@@ -39,8 +39,8 @@ class Sight:
     outer: FloatArray
 
 
-def likeliest(
-    times: FloatArray, reference: FloatArray, sights: Sequence[Sight], held: BoolArray, errors: FloatArray
+def likeliest_path(
+    times: FloatArray, reference: FloatArray, sights: Sequence[PoseEvidence], held: BoolArray, errors: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
     """Return poses (n, 3), and which of them rates jump at as they seldom do; times (n,) [s], reference (n, 3).
 
@@ -73,7 +73,7 @@ def likeliest(
 
 
 @dataclass(frozen=True)
-class Steady:
+class MotionEvidence:
     """What the motion says of the errors of the poses under a scan: rows (m, 3 q), and what is left of them (m,).
 
     In units in which each has a variance of 1.
@@ -83,7 +83,9 @@ class Steady:
     left: FloatArray
 
 
-def steady(times: FloatArray, reference: FloatArray, path: FloatArray, scans: Sequence[slice]) -> list[Steady]:
+def motion_evidence(
+    times: FloatArray, reference: FloatArray, path: FloatArray, scans: Sequence[slice]
+) -> list[MotionEvidence]:
     """Return how far errors of the poses under each scan can differ from one to the next, the chair moving as it does.
 
     path (n, 3): the likeliest one; scans: the rows of the poses that each rests on. Where rates jump, they say less;
@@ -99,13 +101,13 @@ def steady(times: FloatArray, reference: FloatArray, path: FloatArray, scans: Se
     ]
 
 
-def _steady(terms: _Changes, usual: FloatArray, unit: FloatArray, reference: FloatArray) -> Steady:
+def _steady(terms: _Changes, usual: FloatArray, unit: FloatArray, reference: FloatArray) -> MotionEvidence:
     precision = np.sqrt(_weights(unit)) / (usual * terms.sd)
     out = np.zeros((len(terms.rows), 3, len(reference), 3))
     for axis in range(3):
         for i, part in zip((-1, 0, 1), terms.parts, strict=True):
             out[range(len(part)), axis, terms.rows + i, axis] = precision[:, axis] * part
-    return Steady(out.reshape(-1, reference.size), -(precision * terms.of(reference)).ravel())
+    return MotionEvidence(out.reshape(-1, reference.size), -(precision * terms.of(reference)).ravel())
 
 
 def _weights(unit: FloatArray) -> FloatArray:

@@ -9,14 +9,18 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu.critic.ranges.noise.scan_noise import Layout
-from kurumaisu.critic.ranges.poses.likeliest_path import DOUBT, Sight, likeliest
+from kurumaisu.critic.ranges.poses.likeliest_path import DOUBT, PoseEvidence, likeliest_path
 from kurumaisu.critic.ranges.scans.beams import Shots, Track
-from kurumaisu.critic.ranges.scans.valid_readings import Hats
+from kurumaisu.critic.ranges.scans.valid_readings import PoseWeights
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 
-def moved(
-    shots: Shots, reference: Sequence[Track], hats: Sequence[Hats], layout: Layout, sights: Sequence[Sight]
+def pose_corrected(
+    shots: Shots,
+    reference: Sequence[Track],
+    hats: Sequence[PoseWeights],
+    layout: Layout,
+    sights: Sequence[PoseEvidence],
 ) -> tuple[Shots, list[BoolArray]]:
     """Return the shots on moved tracks, and for each track at which of its poses the chair's rates jump.
 
@@ -34,7 +38,7 @@ def moved(
                 rows = _alike(first, those[0])
                 held[rows], errors[rows] = True, _together(those)
         free = [sights[k] for k in own if layout.stand[k] < 0]
-        poses, jumps = likeliest(track.times, first.poses, free, held, errors)
+        poses, jumps = likeliest_path(track.times, first.poses, free, held, errors)
         tracks.append(replace(track, poses=poses))
         kinked.append(jumps)
     mean = [track.poses - first.poses for track, first in zip(tracks, reference, strict=True)]
@@ -42,18 +46,18 @@ def moved(
     return replace(shots, tracks=tuple(tracks), shift=np.array(shift)), kinked
 
 
-def _alike(track: Track, sight: Sight) -> IntArray:
+def _alike(track: Track, sight: PoseEvidence) -> IntArray:
     """Return the rows of the track that share the one error of a stand."""
     return np.flatnonzero((track.poses == track.poses[sight.rows.start]).all(axis=1))
 
 
-def _together(sights: Sequence[Sight]) -> FloatArray:
+def _together(sights: Sequence[PoseEvidence]) -> FloatArray:
     """Return the error (3,) of the one pose that all of some scans rest on."""
     inner = np.sum([sight.inner for sight in sights], axis=0) + np.diag(DOUBT**-2)
     return np.asarray(np.linalg.solve(inner, np.sum([sight.outer for sight in sights], axis=0)))
 
 
-def stands(shots: Shots) -> IntArray:
+def stands_of(shots: Shots) -> IntArray:
     """Return which scans were taken from one and the same row of reference poses, numbered, else -1."""
     out = np.full(len(shots.stamps), -1)
     known: dict[tuple[int, bytes], int] = {}

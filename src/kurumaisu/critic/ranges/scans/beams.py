@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects, geometry
-from kurumaisu.critic.ranges.scans.standstill import held, steadied
+from kurumaisu.critic.ranges.scans.standstill import stands_averaged, with_pause_rows
 from kurumaisu.critic.ranges.scans.walls import Rays, Walls, walls_at
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
 from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
@@ -57,7 +57,7 @@ class Shots:
 
 
 @dataclass(frozen=True)
-class Look:
+class BeamHits:
     """What beams meet, (k, b): ranges [m], level ones without tilt, incidence [rad], returns [1]; and the beams.
 
     origins (k, b, 3): poses of the laser when each is fired.
@@ -71,7 +71,7 @@ class Look:
     origins: FloatArray
 
 
-def missing(recording: Recording) -> str | None:
+def why_not_usable(recording: Recording) -> str | None:
     """Return why a recording's laser cannot be criticised, and what supplies what is missing; None when it can."""
     scanned = [run for run in recording.runs if run.name in recording.train and run.scan is not None]
     if not scanned:
@@ -100,14 +100,14 @@ def gather(recording: Recording, model: Model) -> Shots:
     runs = [run for run in recording.runs if run.name in recording.train and run.scan is not None and _referred(run)]
     chosen = [(i, index) for i, run in enumerate(runs) for index in _within(run)]
     chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, MOST_SCANS).astype(int))]
-    zero = zero_of(runs)
+    zero = time_zero(runs)
     tracks, stamps, measured = [], [], []
     names = set.intersection(*(set(run.covariates) for run in runs))
     known: dict[str, list[FloatArray]] = {name: [] for name in sorted(names)}
     for i, run in enumerate(runs):
         assert run.scan is not None
         assert run.pose is not None
-        tracks.append(Track(*held(run.pose.t - zero, steadied(run.pose.t, run.pose.values[:, :3]))))
+        tracks.append(Track(*with_pause_rows(run.pose.t - zero, stands_averaged(run.pose.t, run.pose.values[:, :3]))))
         rows = [index for j, index in chosen if j == i]
         stamps.append(run.scan.t[rows] - zero)
         measured.append(run.scan.values[rows])
@@ -131,7 +131,7 @@ def gather(recording: Recording, model: Model) -> Shots:
     )
 
 
-def zero_of(runs: Sequence[Run]) -> float:
+def time_zero(runs: Sequence[Run]) -> float:
     """Return the time 0 of a laser [s] by the clock of its runs: its first scan, where stamps are dates."""
     first = min(float(run.scan.t[0]) for run in runs if run.scan is not None)
     return first if first > _DAY else 0.0
@@ -170,31 +170,31 @@ def laser_of(laser: Laser, mount: LaserMount | None, runs: Sequence[Run]) -> Las
     return laser
 
 
-def own_with(shots: Shots, settings: Sequence[EffectSetting]) -> tuple[EffectSetting, ...]:
+def model_effects_with(shots: Shots, settings: Sequence[EffectSetting]) -> tuple[EffectSetting, ...]:
     """Return the model's own effects with these in place of those of the same id."""
     given = {setting.id for setting in settings}
     return (*(own for own in shots.own if own.id not in given), *settings)
 
 
-def look(
+def hits_of(
     shots: Shots,
     settings: Sequence[EffectSetting],
     seed: int,
     *,
     shift: FloatArray | None = None,
-    like: Look | None = None,
-) -> Look:
+    like: BeamHits | None = None,
+) -> BeamHits:
     """Return what the beams meet with these effects.
 
     seed: of what is drawn; shift (3,): added to all poses; like: has nearly the same incidence, which is taken over.
     """
-    every = own_with(shots, settings)
+    every = model_effects_with(shots, settings)
     chain = effects.build_laser(every, np.random.default_rng(seed))
     segments = shots.walls.segments
     for effect in effects.build_world(every, np.random.default_rng([seed, 1])):
         segments = effect.apply(segments)
     rays = Rays(replace(shots.walls, segments=segments))
-    beams = [chain.aim(_said(shots, stamp)) for stamp in shots.stamps.tolist()]
+    beams = [chain.aim(_stated_beams(shots, stamp)) for stamp in shots.stamps.tolist()]
     poses = poses_at(shots, np.array([each.times for each in beams]))
     if shift is not None:
         poses = poses + shift
@@ -206,16 +206,16 @@ def look(
     angles = incidence(rays.ranges, origins, bearings, level).reshape(shape) if like is None else like.incidence
     level = level.reshape(shape)
     ranges = np.array([slanted(row, each) for row, each in zip(level, beams, strict=True)])
-    return Look(ranges, level, angles, returns.reshape(shape), tuple(beams), placed)
+    return BeamHits(ranges, level, angles, returns.reshape(shape), tuple(beams), placed)
 
 
-def fired(shots: Shots, scan: int) -> FloatArray:
+def firing_times(shots: Shots, scan: int) -> FloatArray:
     """Return when the beams (b,) [s] of a scan leave by the model, its own effects at work."""
     chain = effects.build_laser(shots.own, np.random.default_rng(0))
-    return chain.aim(_said(shots, float(shots.stamps[scan]))).times
+    return chain.aim(_stated_beams(shots, float(shots.stamps[scan]))).times
 
 
-def _said(shots: Shots, stamp: float) -> Beams:
+def _stated_beams(shots: Shots, stamp: float) -> Beams:
     """Return the beams of a scan as its message says."""
     place = shots.laser.mount
     mount = np.array([place.x, place.y, place.yaw])
@@ -231,7 +231,9 @@ def poses_at(shots: Shots, times: FloatArray) -> FloatArray:
     return out
 
 
-def read(shots: Shots, seen: Look, chain: LaserChain, noise: FloatArray, moved: FloatArray | float = 0.0) -> FloatArray:
+def read(
+    shots: Shots, seen: BeamHits, chain: LaserChain, noise: FloatArray, moved: FloatArray | float = 0.0
+) -> FloatArray:
     """Return readings (k, b) [m] of what is met by a chain, for standard deviates (k, b); neither rounded nor gated.
 
     moved (k, b) [m]: added to the mean, as errors of the poses are.
@@ -246,12 +248,14 @@ def read(shots: Shots, seen: Look, chain: LaserChain, noise: FloatArray, moved: 
     return np.array(rows)
 
 
-def predict(shots: Shots, settings: Sequence[EffectSetting], seen: Look, seed: int, noise: float = 0.0) -> FloatArray:
+def predict(
+    shots: Shots, settings: Sequence[EffectSetting], seen: BeamHits, seed: int, noise: float = 0.0
+) -> FloatArray:
     """Return the mean readings (k, b) [m], nan where nothing is met; noise: deviations that each is off.
 
     Without what is random scan by scan.
     """
-    shaping = tuple(s for s in own_with(shots, settings) if shapes(s.id))
+    shaping = tuple(s for s in model_effects_with(shots, settings) if acts_on_readings(s.id))
     chain = effects.build_laser(shaping, np.random.default_rng(seed))
     mean = read(shots, seen, chain, np.full_like(seen.ranges, noise))
     return np.where(np.isfinite(mean), mean, np.nan)
@@ -259,10 +263,10 @@ def predict(shots: Shots, settings: Sequence[EffectSetting], seen: Look, seed: i
 
 def thin(shots: Shots, most: int) -> Shots:
     """Return at most so many of the scans, evenly taken."""
-    return rows_of(shots, np.unique(np.linspace(0, len(shots.stamps) - 1, most).astype(int)))
+    return some_scans(shots, np.unique(np.linspace(0, len(shots.stamps) - 1, most).astype(int)))
 
 
-def rows_of(shots: Shots, rows: IntArray) -> Shots:
+def some_scans(shots: Shots, rows: IntArray) -> Shots:
     """Return some of the scans."""
     return replace(
         shots,
@@ -274,7 +278,7 @@ def rows_of(shots: Shots, rows: IntArray) -> Shots:
     )
 
 
-def shapes(name: str) -> bool:
+def acts_on_readings(name: str) -> bool:
     """Return whether an effect acts on the mean or the deviation of readings, or on where beams leave from."""
     effect = effects.by_id(name)
     return issubclass(effect, effects.LaserEffect) and effect.stage <= effects.LaserStage.SPREAD

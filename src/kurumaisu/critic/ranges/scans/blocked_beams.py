@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kurumaisu.critic.ranges.scans.valid_readings import uncut
-from kurumaisu.critic.values.laser_finding import CHANNEL
+from kurumaisu.critic.ranges.scans.valid_readings import without_cut_off
+from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -20,12 +20,12 @@ _ELSEWHERE = 0.1  # [m] from the walls
 _TOLD = 3  # groups of neighbours in a sentence
 
 
-def blocked(measured: FloatArray, expected: FloatArray) -> BoolArray:
+def blocked_beams(measured: FloatArray, expected: FloatArray) -> BoolArray:
     """Return which beams (b,) read the same wherever the chair stands; measured, expected (k, b) [m].
 
     What is the same to the last digit is no distance: readings have been cut off there.
     """
-    seen = np.isfinite(expected) & np.isfinite(uncut(measured))
+    seen = np.isfinite(expected) & np.isfinite(without_cut_off(measured))
     out = np.zeros(measured.shape[1], dtype=bool)
     for beam in np.flatnonzero(seen.sum(axis=0) >= _MANY):
         here, walls = measured[seen[:, beam], beam], expected[seen[:, beam], beam]
@@ -35,7 +35,7 @@ def blocked(measured: FloatArray, expected: FloatArray) -> BoolArray:
     return out
 
 
-def told(beams: BoolArray, measured: FloatArray, bearings: FloatArray) -> Iterator[Unknown]:
+def described(beams: BoolArray, measured: FloatArray, bearings: FloatArray) -> Iterator[Unknown]:
     """Yield what is outside the catalogue where beams (b,) are blocked; bearings (b,) [rad]."""
     edges = np.flatnonzero(np.diff(np.r_[False, beams, False]))
     groups = sorted(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True), key=lambda ends: ends[0] - ends[1])
@@ -46,4 +46,4 @@ def told(beams: BoolArray, measured: FloatArray, bearings: FloatArray) -> Iterat
     ]
     if words:
         shape = f"{'; '.join(words)}, wherever the chair stands: something on the chair blocks them"
-        yield Unknown(CHANNEL, "bearing", shape, 1.0)
+        yield Unknown(UNKNOWN_CHANNEL, "bearing", shape, 1.0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.values.laser_finding import CHANNEL
+from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -24,7 +24,7 @@ _COVARIATES = ("hit x", "hit y")
 
 
 @dataclass(frozen=True)
-class Displaced:
+class MapChange:
     """readings (k, b): of where nearly all are of something else; low, high (2,) [m]: its ends; off [m]: the median."""
 
     readings: BoolArray
@@ -32,7 +32,7 @@ class Displaced:
     high: FloatArray
     off: float
 
-    def told(self) -> Iterator[Unknown]:
+    def unknowns(self) -> Iterator[Unknown]:
         """Yield what is outside the catalogue, over x and y of the map."""
         if not self.readings.any():
             return
@@ -41,18 +41,18 @@ class Displaced:
         shape = f"where the map has x {ends[0]}, y {ends[1]}, readings are {abs(self.off):.3g} m {longer} (median)"
         # The narrower the better it says where.
         for axis in np.argsort(self.high - self.low).tolist():
-            yield Unknown(CHANNEL, _COVARIATES[axis], shape, 1.0)
+            yield Unknown(UNKNOWN_CHANNEL, _COVARIATES[axis], shape, 1.0)
 
 
-def displaced(measured: FloatArray, expected: FloatArray, hits: FloatArray, incidence: FloatArray) -> Displaced:
+def map_change(measured: FloatArray, expected: FloatArray, hits: FloatArray, incidence: FloatArray) -> MapChange:
     """Return where a part of the map is not what stands there.
 
     measured, expected (k, b) [m], NaN where there is none; hits (k, b, 2) [m]: what beams meet by the map, incidence
     (k, b) [rad]: and how obliquely.
     """
     off = measured - expected
-    readings, bad = elsewhere(measured, expected, hits, incidence=incidence)
-    none = Displaced(np.zeros_like(readings), np.zeros(2), np.zeros(2), 0.0)
+    readings, bad = changed_places(measured, expected, hits, incidence=incidence)
+    none = MapChange(np.zeros_like(readings), np.zeros(2), np.zeros(2), 0.0)
     seen = np.isfinite(off)
     share = float(readings.sum() / max(seen.sum(), 1))
     if not _LEAST <= share <= FEW or abs(float(np.median(off[seen & ~readings]))) > _WELL:
@@ -63,10 +63,10 @@ def displaced(measured: FloatArray, expected: FloatArray, hits: FloatArray, inci
     whole = np.isfinite(expected)
     near = {(x + i, y + j) for x, y in bad.tolist() for i in (-1, 0, 1) for j in (-1, 0, 1)}
     whole[whole] = [tuple(cell) in near for cell in np.floor(hits[whole] / _CELL).astype(np.int64).tolist()]
-    return Displaced(whole, *ends, float(np.median(off[readings])))
+    return MapChange(whole, *ends, float(np.median(off[readings])))
 
 
-def elsewhere(
+def changed_places(
     measured: FloatArray,
     expected: FloatArray,
     hits: FloatArray,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.values.laser_finding import CHANNEL
+from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -24,7 +24,7 @@ _COVARIATES = ("time", "hit x", "hit y")
 
 
 @dataclass(frozen=True)
-class Strangers:
+class PassingObjects:
     """readings (k, b): of things that the map does not have; scans: with any; nearer [m]: than the map, the median."""
 
     readings: BoolArray
@@ -36,17 +36,17 @@ class Strangers:
         """Whether there are enough of them to be told."""
         return self.scans >= _SCANS
 
-    def told(self) -> Iterator[Unknown]:
+    def unknowns(self) -> Iterator[Unknown]:
         """Yield what is outside the catalogue: when it is there, and where."""
         if self.many:
             shape = (
                 f"in {self.scans} of {len(self.readings)} scans an object that is not in the map stands before its "
                 f"walls, {self.nearer:.2g} m nearer (median)"
             )
-            yield from (Unknown(CHANNEL, covariate, shape, 1.0) for covariate in _COVARIATES)
+            yield from (Unknown(UNKNOWN_CHANNEL, covariate, shape, 1.0) for covariate in _COVARIATES)
 
 
-def strangers(measured: FloatArray, expected: FloatArray, bearings: FloatArray) -> Strangers:
+def passing_objects(measured: FloatArray, expected: FloatArray, bearings: FloatArray) -> PassingObjects:
     """Return the readings of things that are not on the map; all others may be of it.
 
     measured, expected (k, b) [m], NaN where there is none; bearings (b,) [rad] of the beams, evenly apart.
@@ -67,8 +67,8 @@ def strangers(measured: FloatArray, expected: FloatArray, bearings: FloatArray) 
             scans.add(k)
             found += stop - first
     if found < _RARER * sum(stop - first for _, first, stop in longer):
-        return Strangers(np.zeros_like(out), 0, 0.0)
-    return Strangers(out, len(scans), float(np.median(depths)) if depths else 0.0)
+        return PassingObjects(np.zeros_like(out), 0, 0.0)
+    return PassingObjects(out, len(scans), float(np.median(depths)) if depths else 0.0)
 
 
 def _points(ranges: FloatArray, bearings: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:

@@ -20,7 +20,7 @@ def grid_step(measured: FloatArray) -> float:
     return _MILLIMETRE * float(np.median(np.diff(values))) if len(values) > 1 else _MILLIMETRE
 
 
-def regular(measured: FloatArray) -> FloatArray:
+def unrounded(measured: FloatArray) -> FloatArray:
     """Return readings [m] as a coarse grid has them, where there is one, before a message rounded its values.
 
     A grid of 9.97 mm beats with one of 1 mm: over 0.4 m of the range the message is off by half a millimetre either

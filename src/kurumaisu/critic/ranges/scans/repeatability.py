@@ -66,7 +66,7 @@ def repeatability(readings: FloatArray) -> Repeatability:
     return Repeatability(middle[use], sds, correlation, float(np.std(common)), float(np.mean(~np.isfinite(readings))))
 
 
-def words(recording: Recording, model: Model) -> tuple[str, ...]:
+def sentences(recording: Recording, model: Model) -> tuple[str, ...]:
     """Return how the laser repeats itself in runs of scans alone, beside what the model has; a sentence each."""
     told: list[str] = []
     for run in recording.runs:

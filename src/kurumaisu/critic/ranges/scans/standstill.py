@@ -16,7 +16,7 @@ _MOSTLY = 0.5  # share of what might be a stand that is one: of a slow drive som
 _OFF = 4.0  # sds of the jitter by which poses at the ends of a stand are off where the chair still rolls, or does again
 
 
-def steadied(times: FloatArray, poses: FloatArray) -> FloatArray:
+def stands_averaged(times: FloatArray, poses: FloatArray) -> FloatArray:
     """Return poses (n, 3), those of each stand replaced by their mean; times (n,) [s].
 
     A reference errs alike while the chair stands. Taken for so many independent poses it would seem to be far better
@@ -37,7 +37,7 @@ def steadied(times: FloatArray, poses: FloatArray) -> FloatArray:
     return out
 
 
-def held(times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+def with_pause_rows(times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return times (m,) [s] and poses (m, 3) with rows in the middle of pauses: until or from there a stand lasts.
 
     Between two stands the chair was carried, nobody knows when. A straight way from one to the other would have it

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from kurumaisu.critic.ranges.scans.beams import Look, Shots, fired
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, firing_times
 from kurumaisu.types import BoolArray, FloatArray
 
 _KINK = 1e-4  # departure from a straight wall, where 1/r(i+1) + 1/r(i-1) = 2 cos(increment) / r(i), relative to 1/r
@@ -22,7 +22,7 @@ _MICRON = 6  # decimals of a metre: readings a grid apart are not within it, how
 _GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
 
 
-def edges(seen: Look, increment: float, reach: float = 0.0) -> BoolArray:
+def edges(seen: BeamHits, increment: float, reach: float = 0.0) -> BoolArray:
     """Return (k, b) which beams have a corner or a jump of the range beside them; increment [rad] between beams.
 
     reach [m]: by how far corners may be elsewhere than on the map.
@@ -42,7 +42,7 @@ def edges(seen: Look, increment: float, reach: float = 0.0) -> BoolArray:
     return wide
 
 
-def trusted_place(shots: Shots, seen: Look, base: FloatArray, reach: float = 0.0) -> BoolArray:
+def usable_beams(shots: Shots, seen: BeamHits, base: FloatArray, reach: float = 0.0) -> BoolArray:
     """Return (k, b) which beams meet a wall where a reading may speak about the mean, whatever they read.
 
     reach [m]: as of edges.
@@ -52,13 +52,13 @@ def trusted_place(shots: Shots, seen: Look, base: FloatArray, reach: float = 0.0
     return np.asarray(inside & ~beside & (seen.incidence < _STEEPEST))
 
 
-def trusted(shots: Shots, seen: Look, base: FloatArray) -> BoolArray:
+def usable_readings(shots: Shots, seen: BeamHits, base: FloatArray) -> BoolArray:
     """Return (k, b) which readings may speak about the mean, outliers aside."""
-    inside = within(base, piles(shots.measured))
-    return np.asarray(trusted_place(shots, seen, base) & inside & np.isfinite(shots.measured))
+    inside = inside_ends(base, cut_off_ends(shots.measured))
+    return np.asarray(usable_beams(shots, seen, base) & inside & np.isfinite(shots.measured))
 
 
-def within(base: FloatArray, ends: tuple[float, float], doubt: FloatArray | float = 0.0) -> BoolArray:
+def inside_ends(base: FloatArray, ends: tuple[float, float], doubt: FloatArray | float = 0.0) -> BoolArray:
     """Return (k, b) which beams are to be read well inside the ends [m] at which readings are cut off.
 
     doubt [m]: by how much they may be read elsewhere, where that is more than a gate.
@@ -68,7 +68,7 @@ def within(base: FloatArray, ends: tuple[float, float], doubt: FloatArray | floa
     return np.asarray((base > low + gate) & (base < high - gate))
 
 
-def piles(readings: FloatArray) -> tuple[float, float]:
+def cut_off_ends(readings: FloatArray) -> tuple[float, float]:
     """Return the least and the greatest reading [m] where readings pile up there, as if cut off; else infinite ones.
 
     Of a pile that is not sharp, the end that lies inside.
@@ -83,27 +83,27 @@ def piles(readings: FloatArray) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
-def uncut(readings: FloatArray) -> FloatArray:
+def without_cut_off(readings: FloatArray) -> FloatArray:
     """Return readings [m] without those cut off, of which nobody knows where they are: NaN in their place."""
-    low, high = piles(readings)
+    low, high = cut_off_ends(readings)
     with np.errstate(invalid="ignore"):
         return np.where((readings > low) & (readings < high), readings, np.nan)
 
 
 @dataclass(frozen=True)
-class Hats:
+class PoseWeights:
     """The q reference poses around a scan: rows of its track, and (b, q) the weight of each in each beam's pose."""
 
     rows: slice
     weights: FloatArray
 
 
-def hats(shots: Shots, scan: int) -> Hats:
+def pose_weights(shots: Shots, scan: int) -> PoseWeights:
     """Return on which reference poses a scan rests: those around the times at which its beams leave by the model."""
     track = shots.tracks[shots.run[scan]]
-    times = fired(shots, scan)
+    times = firing_times(shots, scan)
     last = len(track.times) - 1
     first = min(max(int(np.searchsorted(track.times, times.min(), side="right")) - 1, 0), last)
     rows = slice(first, min(max(int(np.searchsorted(track.times, times.max())), first), last) + 1)
     knots = track.times[rows]
-    return Hats(rows, np.stack([np.interp(times, knots, unit) for unit in np.eye(len(knots))], axis=-1))
+    return PoseWeights(rows, np.stack([np.interp(times, knots, unit) for unit in np.eye(len(knots))], axis=-1))

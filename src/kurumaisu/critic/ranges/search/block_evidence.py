@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic.ranges.search.effect_sets import FORM, Fitted, Found, confusion
-from kurumaisu.critic.ranges.signals.coefficient_blocks import Free
-from kurumaisu.critic.unknown.curves import Belief, belief
+from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, FittedForms, FormPosterior, confusion
+from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
+from kurumaisu.critic.unknown.curves import CurveEvidence, curve_evidence
 from kurumaisu.critic.values.prior import odds
 from kurumaisu.types import FloatArray, IntArray
 
@@ -27,24 +27,24 @@ _SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in
 
 
 @dataclass(frozen=True)
-class Rival:
+class SetWithBlock:
     """A set of forms with a block beside it: log posterior, not normalised."""
 
-    fit: Fitted
-    free: Free
-    belief: Belief
-    worth: float
+    fit: FittedForms
+    free: Block
+    evidence: CurveEvidence
+    log_posterior: float
 
 
 @dataclass(frozen=True)
-class Weighed:
+class BlockComparison:
     """found: with blocks in the running; rivals: best first; lead: of the best curve over all without one [nat].
 
     p: posterior of each curve.
     """
 
-    found: Found
-    rivals: tuple[Rival, ...]
+    found: FormPosterior
+    rivals: tuple[SetWithBlock, ...]
     lead: float
     p: dict[str, float]
 
@@ -52,11 +52,11 @@ class Weighed:
     def least(self) -> float:
         """Lead that a curve needs [nat]: an effect of the catalogue of a slightly other form leaves some, too."""
         nothing = max((fit.score for fit in self.found.fits if not fit.forms), default=0.0)
-        curve = next((rival.worth for rival in self.rivals if rival.free.basis is not None), nothing)
+        curve = next((rival.log_posterior for rival in self.rivals if rival.free.basis is not None), nothing)
         return max(BEYOND, LEFT * (curve - nothing))
 
     @property
-    def winner(self) -> Rival | None:
+    def winner(self) -> SetWithBlock | None:
         """The block that acts, if any: a curve only if it is far better than the catalogue."""
         if not self.rivals:
             return None
@@ -65,19 +65,19 @@ class Weighed:
             best = next((rival for rival in self.rivals if rival.free.basis is None), best)
         if best.free.basis is not None:
             return self._plainest(best) if self.lead > self.least else None
-        return best if best.worth > self.found.best.score else None
+        return best if best.log_posterior > self.found.best.score else None
 
-    def _plainest(self, best: Rival) -> Rival:
+    def _plainest(self, best: SetWithBlock) -> SetWithBlock:
         """Return the curve of the best rival beside as few effects as explain much of what it explains.
 
         Straight lines between knots miss a step, say, by a little, which then looks like one more effect.
         """
-        least = LEFT * best.belief.nats
+        least = LEFT * best.evidence.nats
         same = [rival for rival in self.rivals if rival.free.id == best.free.id and rival.fit.ids <= best.fit.ids]
-        return max(same, key=lambda rival: rival.worth - least * len(rival.fit.ids))
+        return max(same, key=lambda rival: rival.log_posterior - least * len(rival.fit.ids))
 
 
-def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:
+def compare_blocks(found: FormPosterior, free: Sequence[Block], gram: FloatArray) -> BlockComparison:
     """Try every block beside the best sets, beside single effects, and beside none."""
     ids = tuple(dict.fromkeys([*found.p, *(each.id for each in free if each.basis is None)]))
     count = len(ids)
@@ -86,42 +86,45 @@ def weigh(found: Found, free: Sequence[Free], gram: FloatArray) -> Weighed:
     known = {fit.ids: fit for fit in reversed(found.fits)}
     rivals = []
     for fit in _tried(found.fits):
-        rivals += [_beside(fit, each, gram, shares[each.id]) for each in free if each.id not in fit.ids]
-    rivals.sort(key=lambda rival: -rival.worth)
+        rivals += [_with_block(fit, each, gram, shares[each.id]) for each in free if each.id not in fit.ids]
+    rivals.sort(key=lambda rival: -rival.log_posterior)
     rivals = [*_pruned(rivals[:_PRUNED], known, gram, shares), *rivals]
-    rivals.sort(key=lambda rival: -rival.worth)
+    rivals.sort(key=lambda rival: -rival.log_posterior)
     plain = [(fit.ids, fit.score) for fit in found.fits]
-    plain += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in rivals if rival.free.basis is None]
+    plain += [(rival.fit.ids | {rival.free.id}, rival.log_posterior) for rival in rivals if rival.free.basis is None]
     curved = [rival for rival in rivals if rival.free.basis is not None]
-    total = logsumexp([*(worth for _, worth in plain), *(rival.worth for rival in curved)])
-    sets = [*plain, *((rival.fit.ids, rival.worth) for rival in curved)]
-    weights = [(ids, float(np.exp(worth - total))) for ids, worth in sets]
+    total = logsumexp([*(score for _, score in plain), *(rival.log_posterior for rival in curved)])
+    sets = [*plain, *((rival.fit.ids, rival.log_posterior) for rival in curved)]
+    weights = [(ids, float(np.exp(score - total))) for ids, score in sets]
     best = max(plain, key=lambda each: each[1])
     p, confounded = confusion(weights, best[0], ids)
-    lead = curved[0].worth - best[1] if curved else -np.inf
+    lead = curved[0].log_posterior - best[1] if curved else -np.inf
     by_curve = {each.id: 0.0 for each in free if each.basis is not None}
     for rival in curved:
-        by_curve[rival.free.id] += float(np.exp(rival.worth - total))
-    made = Weighed(replace(found, p=p, confounded=confounded), tuple(rivals), lead, by_curve)
+        by_curve[rival.free.id] += float(np.exp(rival.log_posterior - total))
+    made = BlockComparison(replace(found, p=p, confounded=confounded), tuple(rivals), lead, by_curve)
     if lead > made.least:
         return made
     # A curve that does not lead by enough takes nothing from the effects that it imitates.
-    total = logsumexp([worth for _, worth in plain])
-    p, confounded = confusion([(names, float(np.exp(worth - total))) for names, worth in plain], best[0], ids)
+    total = logsumexp([score for _, score in plain])
+    p, confounded = confusion([(names, float(np.exp(score - total))) for names, score in plain], best[0], ids)
     return replace(made, found=replace(found, p=p, confounded=confounded))
 
 
-def _beside(fit: Fitted, free: Free, gram: FloatArray, share: float) -> Rival:
-    seen = belief(*beside(fit, free, gram), free.priors)
+def _with_block(fit: FittedForms, free: Block, gram: FloatArray, share: float) -> SetWithBlock:
+    seen = curve_evidence(*without_own_span(fit, free, gram), free.priors)
     # Walls that are each where they like have no equation that could be wrong by a share; curves have few knots.
     doubted = fit.log_likelihood + (seen.nats if free.basis is not None else 0.0)
-    left = FORM * doubted if fit.forms else 0.0
-    return Rival(fit, free, seen, fit.score + seen.nats + share - left)
+    left = LINE_ERROR * doubted if fit.forms else 0.0
+    return SetWithBlock(fit, free, seen, fit.score + seen.nats + share - left)
 
 
 def _pruned(
-    rivals: Sequence[Rival], known: Mapping[frozenset[str], Fitted], gram: FloatArray, shares: Mapping[str, float]
-) -> Iterator[Rival]:
+    rivals: Sequence[SetWithBlock],
+    known: Mapping[frozenset[str], FittedForms],
+    gram: FloatArray,
+    shares: Mapping[str, float],
+) -> Iterator[SetWithBlock]:
     """Yield the rivals with as few effects beside the block as are worth it."""
     done: set[tuple[frozenset[str], str]] = set()
     for rival in rivals:
@@ -130,17 +133,17 @@ def _pruned(
             fewer = [best.fit.ids - {name} for name in best.fit.ids]
             fits = [known[ids] for ids in fewer if ids in known and (ids, best.free.id) not in done]
             done |= {(fit.ids, best.free.id) for fit in fits}
-            tried = [_beside(fit, best.free, gram, shares[best.free.id]) for fit in fits]
+            tried = [_with_block(fit, best.free, gram, shares[best.free.id]) for fit in fits]
             yield from tried
-            top = max(tried, key=lambda each: each.worth, default=best)
-            if top.worth <= best.worth:
+            top = max(tried, key=lambda each: each.log_posterior, default=best)
+            if top.log_posterior <= best.log_posterior:
                 break
             best = top
 
 
-def joint(rival: Rival, gram: FloatArray) -> tuple[Fitted, FloatArray, FloatArray]:
+def fit_with_block(rival: SetWithBlock, gram: FloatArray) -> tuple[FittedForms, FloatArray, FloatArray]:
     """Return the forms fitted beside the block, and the block's coefficients (m,) and their covariance (m, m)."""
-    values, vectors = np.linalg.eigh(rival.belief.prior)
+    values, vectors = np.linalg.eigh(rival.evidence.prior)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     fixed, own = _use(rival.fit), np.arange(rival.free.span.start, rival.free.span.stop)
     use = np.concatenate([fixed, own])
@@ -155,9 +158,9 @@ def joint(rival: Rival, gram: FloatArray) -> tuple[Fitted, FloatArray, FloatArra
     return fit, at[n:], covariance[n:, n:]
 
 
-def size(rival: Rival, gram: FloatArray) -> tuple[float, float, float]:
+def block_size(rival: SetWithBlock, gram: FloatArray) -> tuple[float, float, float]:
     """Return the sd of a block's coefficients in units of its scale, with its 90 % interval."""
-    inner, b = beside(rival.fit, rival.free, gram)
+    inner, b = without_own_span(rival.fit, rival.free, gram)
     values, vectors = np.linalg.eigh(inner)
     c, values = vectors.T @ b, np.maximum(values, 0.0)
     square = _SIZES[:, np.newaxis] ** 2
@@ -167,13 +170,13 @@ def size(rival: Rival, gram: FloatArray) -> tuple[float, float, float]:
     return middle, low, high
 
 
-def elsewhere(rival: Rival, gram: FloatArray) -> float:
+def wall_error(rival: SetWithBlock, gram: FloatArray) -> float:
     """Return how far [m] a block may have put any wall of the map; of a curve, 0."""
     p = rival.free.parameter
-    return 0.0 if p is None else _FARTHEST * p.scale * size(rival, gram)[0]
+    return 0.0 if p is None else _FARTHEST * p.scale * block_size(rival, gram)[0]
 
 
-def _tried(fits: Sequence[Fitted]) -> Iterator[Fitted]:
+def _tried(fits: Sequence[FittedForms]) -> Iterator[FittedForms]:
     """Yield the best sets, the best single effects, and none."""
     yield from fits[:_FITS]
     rest = [fit for fit in fits[_FITS:] if len(fit.forms) <= 1]
@@ -181,11 +184,11 @@ def _tried(fits: Sequence[Fitted]) -> Iterator[Fitted]:
     yield from [fit for fit in rest if not fit.forms]
 
 
-def _use(fit: Fitted) -> IntArray:
+def _use(fit: FittedForms) -> IntArray:
     return np.concatenate([np.arange(0), *(np.arange(form.span.start, form.span.stop) for form in fit.forms)])
 
 
-def beside(fit: Fitted, free: Free, gram: FloatArray) -> tuple[FloatArray, FloatArray]:
+def without_own_span(fit: FittedForms, free: Block, gram: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return gram and target of a block, without what a set's own columns could take up."""
     use, own = _use(fit), np.arange(free.span.start, free.span.stop)
     inner, b = gram[np.ix_(own, own)], gram[own, -1]

@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kurumaisu.critic.ranges.search.block_evidence import Rival, beside
-from kurumaisu.critic.ranges.search.effect_sets import Fitted, Found
-from kurumaisu.critic.ranges.signals.coefficient_blocks import Free
-from kurumaisu.critic.unknown.curves import belief
+from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock, without_own_span
+from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior
+from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
+from kurumaisu.critic.unknown.curves import curve_evidence
 from kurumaisu.critic.values.prior import odds
 from kurumaisu.types import FloatArray
 
@@ -26,7 +26,9 @@ _RANK = 1e-6  # share of the largest eigenvalue below which a direction of a blo
 Groups = tuple[tuple[str, ...], ...]
 
 
-def twins(found: Found, winner: Rival | None, free: Sequence[Free], gram: FloatArray, names: Sequence[str]) -> Groups:
+def confounded(
+    found: FormPosterior, winner: SetWithBlock | None, free: Sequence[Block], gram: FloatArray, names: Sequence[str]
+) -> Groups:
     """Return for each of the named effects that has twins the set of them all; joined where they share one."""
     blocks = [each for each in free if each.basis is None]
     groups: list[set[str]] = []
@@ -37,7 +39,7 @@ def twins(found: Found, winner: Rival | None, free: Sequence[Free], gram: FloatA
                 own = _with_block(winner.fit, winner.free, gram)
             else:
                 own = _worth(found.best)
-            group |= {other for other, worth in _others(found, fits, blocks, gram) if own - worth < _LOSS}
+            group |= {other for other, nats in _others(found, fits, blocks, gram) if own - nats < _LOSS}
         for known in [known for known in groups if known & group]:
             groups.remove(known)
             group |= known
@@ -45,7 +47,7 @@ def twins(found: Found, winner: Rival | None, free: Sequence[Free], gram: FloatA
     return tuple(tuple(sorted(group)) for group in groups if len(group) > 1)
 
 
-def joined(one: Groups, other: Groups) -> Groups:
+def merged(one: Groups, other: Groups) -> Groups:
     """Return all groups, those that share an effect as one."""
     out: list[set[str]] = []
     for group in (*one, *other):
@@ -57,7 +59,7 @@ def joined(one: Groups, other: Groups) -> Groups:
     return tuple(tuple(sorted(group)) for group in out)
 
 
-def _sets(found: Found, winner: Rival | None, name: str) -> Iterator[frozenset[str]]:
+def _sets(found: FormPosterior, winner: SetWithBlock | None, name: str) -> Iterator[frozenset[str]]:
     """Yield what acts beside an effect; nothing where that is an effect beside a block, of which no swap is known."""
     if winner is None:
         yield found.best.ids - {name}
@@ -66,7 +68,7 @@ def _sets(found: Found, winner: Rival | None, name: str) -> Iterator[frozenset[s
 
 
 def _others(
-    found: Found, rest: frozenset[str], blocks: Sequence[Free], gram: FloatArray
+    found: FormPosterior, rest: frozenset[str], blocks: Sequence[Block], gram: FloatArray
 ) -> Iterator[tuple[str, float]]:
     """Yield effects that may act beside the rest, and what they explain with it."""
     for fit in found.fits:
@@ -78,18 +80,22 @@ def _others(
             yield block.id, _with_block(base, block, gram)
 
 
-def _by_chance(found: Found, base: Fitted, block: Free, gram: FloatArray) -> bool:
+def _by_chance(found: FormPosterior, base: FittedForms, block: Block, gram: FloatArray) -> bool:
     """Return whether a block's coefficients, drawn before the data, would hardly ever do what the best set does."""
-    evidence = base.score + belief(*beside(base, block, gram), block.priors).nats + float(np.log(odds(len(found.p))))
+    evidence = (
+        base.score
+        + curve_evidence(*without_own_span(base, block, gram), block.priors).nats
+        + float(np.log(odds(len(found.p))))
+    )
     return found.best.score - evidence > _CHANCE
 
 
-def _worth(fit: Fitted) -> float:
+def _worth(fit: FittedForms) -> float:
     return fit.log_likelihood - 0.5 * len(fit.coefficients)
 
 
-def _with_block(fit: Fitted, block: Free, gram: FloatArray) -> float:
-    inner, b = beside(fit, block, gram)
+def _with_block(fit: FittedForms, block: Block, gram: FloatArray) -> float:
+    inner, b = without_own_span(fit, block, gram)
     values, vectors = np.linalg.eigh(inner)
     shows = values > _RANK * values[-1]
     along = (vectors.T @ b)[shows]

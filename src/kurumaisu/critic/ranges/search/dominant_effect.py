@@ -13,22 +13,24 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.search.effect_sets import Fitted
+from kurumaisu.critic.ranges.search.effect_sets import FittedForms
 from kurumaisu.critic.ranges.search.misfits import Part, misfits
-from kurumaisu.critic.ranges.search.normal_equations import Assembly, Normal
-from kurumaisu.critic.ranges.search.parameter_fit import LOUD, Pinned, loudness
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
+from kurumaisu.critic.ranges.search.parameter_fit import STRONG, ParameterFit, strength
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.prior import Z_LOW
 from kurumaisu.critic.values.verdict import Cause
 from kurumaisu.params import EffectSetting
 
-_BENT = 0.5  # share of what an effect does by which its line may be off
+_LINE_ERROR = 0.5  # share of what an effect does by which its line may be off
 
 
-def leading(assembly: Assembly, normal: Normal, fit: Fitted, refitted: Pinned) -> EffectSetting | None:
+def dominant_effect(
+    assembly: Assembly, normal: NormalEquations, fit: FittedForms, refitted: ParameterFit
+) -> EffectSetting | None:
     """Return the loudest effect that moves beams and, refitted by simulation, does quite another thing than by line."""
     settings = {setting.id: setting for setting, _ in refitted.settings}
-    loudest, out, start = LOUD, None, 0
+    loudest, out, start = STRONG, None, 0
     for form in fit.forms:
         stop = start + len(form.columns)
         line = assembly.columns[:, :, form.span] @ fit.coefficients[start:stop]
@@ -36,13 +38,13 @@ def leading(assembly: Assembly, normal: Normal, fit: Fitted, refitted: Pinned) -
         if issubclass(effects.by_id(form.id), effects.ReadingEffect):
             continue
         change = assembly.marks.together([settings[form.id]])
-        size = loudness(assembly, normal, change)
-        if size > loudest and loudness(assembly, normal, change - line) > _BENT * size:
+        size = strength(assembly, normal, change)
+        if size > loudest and strength(assembly, normal, change - line) > _LINE_ERROR * size:
             loudest, out = size, settings[form.id]
     return out
 
 
-def taken_back(assembly: Assembly, fit: Fitted, refitted: Pinned) -> frozenset[str]:
+def vanished_effects(assembly: Assembly, fit: FittedForms, refitted: ParameterFit) -> frozenset[str]:
     """Return the effects that move beams of which, refitted by simulation, nothing is left.
 
     They had drawn what the line of another one misses.
@@ -61,8 +63,8 @@ def taken_back(assembly: Assembly, fit: Fitted, refitted: Pinned) -> frozenset[s
     return frozenset(out)
 
 
-def with_lead(
-    rest: LaserFinding, lead: EffectSetting, cause: Cause, assembly: Assembly, normal: Normal
+def with_dominant(
+    rest: LaserFinding, lead: EffectSetting, cause: Cause, assembly: Assembly, normal: NormalEquations
 ) -> LaserFinding:
     """Return what was found with an effect in place, and the effect; cause: as it was found at first."""
     again = next((each for each in rest.causes if each.id == lead.id), None)

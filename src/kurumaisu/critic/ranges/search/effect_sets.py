@@ -19,13 +19,13 @@ _WIDTH = 8  # sets that are extended at a time
 _WEAK = 1e-4  # prior precision of a coefficient, in units of its parameter's scale
 # Share of what a set explains that one more effect in it must bring: a real effect hardly has the catalogue's very
 # form, and what its form leaves is not another one.
-FORM = 0.02
+LINE_ERROR = 0.02
 _CONTAINED = 1e-4  # share of a column's power that a form may leave, and contain it
 _INSTEAD = 2.0  # times as likely without an effect as beside it is what stands in for it
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedForms:
     """Forms that act together: coefficients and their sds in units of the columns; score: log evidence and prior."""
 
     forms: tuple[Form, ...]
@@ -39,7 +39,7 @@ class Fitted:
         """The effects."""
         return frozenset(form.id for form in self.forms)
 
-    def without(self, ids: frozenset[str]) -> Fitted:
+    def without(self, ids: frozenset[str]) -> FittedForms:
         """Return the other effects, as they were fitted beside these."""
         keep = np.repeat([form.id not in ids for form in self.forms], [len(form.columns) for form in self.forms])
         forms = tuple(form for form in self.forms if form.id not in ids)
@@ -47,15 +47,15 @@ class Fitted:
 
 
 @dataclass(frozen=True)
-class Found:
+class FormPosterior:
     """Result of a search: all sets tried, best first; p: posterior per effect; confounded: sets of which one acts."""
 
-    fits: tuple[Fitted, ...]
+    fits: tuple[FittedForms, ...]
     p: dict[str, float]
     confounded: tuple[tuple[str, ...], ...]
 
     @property
-    def best(self) -> Fitted:
+    def best(self) -> FittedForms:
         """The most probable set."""
         return self.fits[0]
 
@@ -65,7 +65,7 @@ class Found:
         return tuple(form.id for form in self.best.forms if self.p[form.id] >= NAMED)
 
 
-class Search:
+class FormSearch:
     """Sets of forms, weighed by normal equations."""
 
     def __init__(self, forms: Sequence[Form], gram: FloatArray) -> None:
@@ -74,10 +74,10 @@ class Search:
         self._ids = tuple(dict.fromkeys(form.id for form in forms))
         self._count = {name: sum(form.id == name for form in forms) for name in self._ids}
         self._gram = gram
-        self._known: dict[frozenset[int], Fitted | None] = {}
+        self._known: dict[frozenset[int], FittedForms | None] = {}
         self._contains = {i: _contained(form, self._forms, gram) for i, form in self._forms.items()}
 
-    def run(self) -> Found:
+    def run(self) -> FormPosterior:
         """Extend, swap and prune the best sets until none is better."""
         frontier = [frozenset[int]()]
         best = -np.inf
@@ -115,7 +115,7 @@ class Search:
             fit = self._fit(tuple(self._forms[i] for i in sorted(chosen)))
             self._known[chosen] = None if fit is None or self._plainer(chosen, fit) else fit
 
-    def _plainer(self, chosen: frozenset[int], fit: Fitted) -> bool:
+    def _plainer(self, chosen: frozenset[int], fit: FittedForms) -> bool:
         """Return whether a form of fewer columns, which one of the set contains, explains as much in its place.
 
         What shows of a temperature that hardly varies, about a reference that is anywhere, is an offset.
@@ -130,11 +130,11 @@ class Search:
                         return True
         return False
 
-    def _fit(self, forms: tuple[Form, ...]) -> Fitted | None:
+    def _fit(self, forms: tuple[Form, ...]) -> FittedForms | None:
         """Return forms fitted together; None where a parameter leaves its bounds."""
         prior = log_prior(len(forms), len(self._ids))
         if not forms:
-            return Fitted((), np.empty(0), np.empty(0), 0.0, prior)
+            return FittedForms((), np.empty(0), np.empty(0), 0.0, prior)
         use = np.concatenate([np.arange(form.span.start, form.span.stop) for form in forms])
         gram, b = self._gram[np.ix_(use, use)], self._gram[use, -1]
         inverse = np.linalg.inv(gram + _WEAK * np.eye(len(use)))
@@ -150,15 +150,15 @@ class Search:
             # A direction among several columns is as free as z is large.
             cost += float(occam(np.array(z))) + (len(form.columns) - 1) * np.log(max(z, 1.0))
             cost += np.log(self._count[form.id])
-        cost += FORM * (len(forms) - 1) * likelihood
-        return Fitted(forms, at, np.sqrt(np.diag(inverse)), likelihood, likelihood - cost + prior)
+        cost += LINE_ERROR * (len(forms) - 1) * likelihood
+        return FittedForms(forms, at, np.sqrt(np.diag(inverse)), likelihood, likelihood - cost + prior)
 
-    def _found(self, fits: Sequence[Fitted | None]) -> Found:
+    def _found(self, fits: Sequence[FittedForms | None]) -> FormPosterior:
         known = [fit for fit in fits if fit is not None]
         scores = np.array([fit.score for fit in known])
         weights = np.exp(scores - logsumexp(scores))
         pairs = [(fit.ids, float(weight)) for fit, weight in zip(known, weights, strict=True)]
-        return Found(tuple(known), *confusion(pairs, known[0].ids, self._ids))
+        return FormPosterior(tuple(known), *confusion(pairs, known[0].ids, self._ids))
 
 
 def confusion(

@@ -8,13 +8,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.search.effect_sets import Fitted
+from kurumaisu.critic.ranges.search.effect_sets import FittedForms
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting
 
 
-def settings_of(assembly: Assembly, fit: Fitted) -> list[EffectSetting]:
+def settings_of(assembly: Assembly, fit: FittedForms) -> list[EffectSetting]:
     """Return the fitted effects as a model file has them."""
     out, start = [], 0
     for form in fit.forms:

@@ -16,26 +16,26 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.search.confounding import Groups, joined, twins
-from kurumaisu.critic.ranges.search.effect_sets import FORM, Fitted, Found, Search
-from kurumaisu.critic.ranges.search.normal_equations import Assembly, Normal
-from kurumaisu.critic.ranges.search.parameter_fit import Pinned
+from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merged
+from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, FittedForms, FormPosterior, FormSearch
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
+from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit
 from kurumaisu.critic.ranges.signals.effect_columns import Form
-from kurumaisu.critic.ranges.signals.form_error import OtherForm, other_form, without
+from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
 from kurumaisu.types import FloatArray
 
 
 @dataclass(frozen=True)
-class Besides:
+class FurtherEffects:
     """What acts beside a fit: found among the rest, forms as in the whole matrix; groups: sets that look alike."""
 
-    found: Found
+    found: FormPosterior
     groups: Groups
 
-    def added_to(self, fit: Fitted) -> Fitted:
+    def added_to(self, fit: FittedForms) -> FittedForms:
         """Return a fit with what acts beside it."""
         more = self.found.best
-        return Fitted(
+        return FittedForms(
             (*fit.forms, *more.forms),
             np.concatenate([fit.coefficients, more.coefficients]),
             np.concatenate([fit.sds, more.sds]),
@@ -44,9 +44,14 @@ class Besides:
         )
 
 
-def besides(
-    assembly: Assembly, normal: Normal, found: Found, fit: Fitted, refitted: Pinned, others: Mapping[str, OtherForm]
-) -> Besides | None:
+def further_effects(
+    assembly: Assembly,
+    normal: NormalEquations,
+    found: FormPosterior,
+    fit: FittedForms,
+    refitted: ParameterFit,
+    others: Mapping[str, FormFamily],
+) -> FurtherEffects | None:
     """Return what acts beside a fit that was refitted; None where nothing does.
 
     normal: with noise that was estimated whatever else acts; found: of the search that the fit is from; others: curves
@@ -66,32 +71,32 @@ def besides(
     gram = _gram([columns[:, :, form.span] for form in rest], refitted, curves)
     starts = np.cumsum([0, *(len(form.columns) for form in rest)])
     moved = [replace(form, start=int(start)) for form, start in zip(rest, starts[:-1], strict=True)]
-    seen = Search(moved, gram).run()
+    seen = FormSearch(moved, gram).run()
     if not seen.named and not seen.confounded:
         return None
     names = [*seen.named, *(name for group in seen.confounded for name in group if name in seen.best.ids)]
-    groups = joined(seen.confounded, twins(seen, None, (), gram, names))
+    groups = merged(seen.confounded, confounded(seen, None, (), gram, names))
     back = {form.start: known[_key(form)] for form in moved}
     fits = tuple(replace(one, forms=tuple(back[form.start] for form in one.forms)) for one in seen.fits)
-    return Besides(replace(seen, fits=fits), groups)
+    return FurtherEffects(replace(seen, fits=fits), groups)
 
 
 def _key(form: Form) -> tuple[object, ...]:
     return (form.id, *form.at.items(), *(column.parameter.name for column in form.columns))
 
 
-def _promising(found: Found, fit: Fitted) -> bool:
+def _promising(found: FormPosterior, fit: FittedForms) -> bool:
     """Return whether one more effect would be likelier if no share of what is there were asked of it."""
     return any(_unasked(one) > _unasked(fit) for one in found.fits if one.ids > fit.ids)
 
 
-def _unasked(fit: Fitted) -> float:
-    return fit.score + FORM * max(len(fit.forms) - 1, 0) * fit.log_likelihood
+def _unasked(fit: FittedForms) -> float:
+    return fit.score + LINE_ERROR * max(len(fit.forms) - 1, 0) * fit.log_likelihood
 
 
 def _curves(
-    assembly: Assembly, fit: Fitted, refitted: Pinned, others: Mapping[str, OtherForm]
-) -> list[tuple[OtherForm, FloatArray]]:
+    assembly: Assembly, fit: FittedForms, refitted: ParameterFit, others: Mapping[str, FormFamily]
+) -> list[tuple[FormFamily, FloatArray]]:
     """Return the curves that effects on readings may follow instead, and what these do (k, b) [m].
 
     Also of those whose equation is no family's simplest: a mirror may have overtones, an offset may drift.
@@ -105,13 +110,13 @@ def _curves(
         if form.id in others:
             out.append((others[form.id], change))
         elif issubclass(effects.by_id(form.id), effects.ReadingEffect):
-            curve = other_form(change, shots, seen, valid)
+            curve = form_family(change, shots, seen, valid)
             out += [(curve, change)] if curve is not None else []
     return out
 
 
 def _gram(
-    parts: Sequence[NDArray[np.float32]], refitted: Pinned, curves: Sequence[tuple[OtherForm, FloatArray]]
+    parts: Sequence[NDArray[np.float32]], refitted: ParameterFit, curves: Sequence[tuple[FormFamily, FloatArray]]
 ) -> FloatArray:
     """Return the normal equations of columns (k, b, m) and, last, of what the refitted leave, whatever their sizes."""
     there = refitted.assembly
@@ -130,4 +135,4 @@ def _gram(
     drawn = np.arange(count, ends[-1])
     keep = np.r_[np.arange(count), len(gram) - 1]
     prior = block_diag(np.eye(refitted.slopes.shape[2]), *priors)
-    return without(gram, drawn, prior)[np.ix_(keep, keep)]
+    return integrated_out(gram, drawn, prior)[np.ix_(keep, keep)]

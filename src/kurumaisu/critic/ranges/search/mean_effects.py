@@ -9,36 +9,36 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from kurumaisu.critic.ranges.search import block_evidence
-from kurumaisu.critic.ranges.search.block_evidence import Rival, Weighed
-from kurumaisu.critic.ranges.search.dominant_effect import taken_back
-from kurumaisu.critic.ranges.search.effect_sets import Fitted, Found
+from kurumaisu.critic.ranges.search.block_evidence import BlockComparison, SetWithBlock
+from kurumaisu.critic.ranges.search.dominant_effect import vanished_effects
+from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior
 from kurumaisu.critic.ranges.search.effect_settings import settings_of
-from kurumaisu.critic.ranges.search.false_seconds import company, forms_beside
-from kurumaisu.critic.ranges.search.further_effects import Besides, besides
+from kurumaisu.critic.ranges.search.further_effects import FurtherEffects, further_effects
 from kurumaisu.critic.ranges.search.misfits import Part
-from kurumaisu.critic.ranges.search.normal_equations import Assembly, Normal
-from kurumaisu.critic.ranges.search.parameter_fit import Pinned, pinned
-from kurumaisu.critic.ranges.signals.form_error import OtherForm
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
+from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
+from kurumaisu.critic.ranges.search.spurious_effects import form_families, without_spurious
+from kurumaisu.critic.ranges.signals.form_error import FormFamily
 from kurumaisu.types import FloatArray
 
 
 @dataclass(frozen=True)
-class Acting:
+class MeanEffects:
     """What acts on the mean: the forms' fit; winner: a block beside it, if any, its coefficients and covariance.
 
     others: curves that what acts may follow instead; more: what of the fit was found when the rest of it was in place.
     """
 
-    weighed: Weighed
-    fit: Fitted
-    winner: Rival | None
+    weighed: BlockComparison
+    fit: FittedForms
+    winner: SetWithBlock | None
     coefficients: FloatArray
     covariance: FloatArray
-    others: Mapping[str, OtherForm] = field(default_factory=dict)
-    more: Besides | None = None
+    others: Mapping[str, FormFamily] = field(default_factory=dict)
+    more: FurtherEffects | None = None
 
     @property
-    def found(self) -> Found:
+    def found(self) -> FormPosterior:
         """The search's result with blocks in the running, before more was found."""
         return self.weighed.found
 
@@ -52,12 +52,12 @@ class Acting:
         """Whether a curve acts, which is in no catalogue."""
         return self.winner is not None and self.winner.free.basis is not None
 
-    def beside(self, assembly: Assembly, normal: Normal) -> Acting:
+    def without_spurious(self, assembly: Assembly, normal: NormalEquations) -> MeanEffects:
         """Return the same without effects that others of another form explain; of a curve, which is unlike any, all."""
-        made = replace(self, others=forms_beside(assembly, normal, self.fit))
+        made = replace(self, others=form_families(assembly, normal, self.fit))
         if self.curve:
             return made
-        fit, winner = company(assembly, normal, self.found, (self.fit, self.winner), made.others)
+        fit, winner = without_spurious(assembly, normal, self.found, (self.fit, self.winner), made.others)
         if fit is self.fit and winner is self.winner:
             return made
         if winner is None:
@@ -65,10 +65,10 @@ class Acting:
         fit, winner, coefficients, covariance = _with(winner, normal)
         return replace(made, fit=fit, winner=winner, coefficients=coefficients, covariance=covariance)
 
-    def and_more(self, assembly: Assembly, normal: Normal, more: Besides) -> Acting:
+    def with_further(self, assembly: Assembly, normal: NormalEquations, more: FurtherEffects) -> MeanEffects:
         """Return the same with what acts beside it."""
         fit = more.added_to(self.fit)
-        return replace(self, fit=fit, others=forms_beside(assembly, normal, fit), more=more)
+        return replace(self, fit=fit, others=form_families(assembly, normal, fit), more=more)
 
     def parts(self) -> list[Part]:
         """Return what acts, one by one."""
@@ -80,43 +80,45 @@ class Acting:
         return [*out, Part(self.winner.free.id, self.winner.free.span, self.coefficients)] if self.winner else out
 
 
-def acting(assembly: Assembly, normal: Normal, found: Found) -> Acting:
+def mean_effects(assembly: Assembly, normal: NormalEquations, found: FormPosterior) -> MeanEffects:
     """Return what acts by a search, with blocks in the running."""
-    weighed = block_evidence.weigh(found, assembly.free, normal.gram)
+    weighed = block_evidence.compare_blocks(found, assembly.free, normal.gram)
     winner = weighed.winner
     if winner is None:
-        return Acting(weighed, found.best, None, np.empty(0), np.empty((0, 0)))
-    return Acting(weighed, *_with(winner, normal))
+        return MeanEffects(weighed, found.best, None, np.empty(0), np.empty((0, 0)))
+    return MeanEffects(weighed, *_with(winner, normal))
 
 
-def _with(winner: Rival, normal: Normal) -> tuple[Fitted, Rival, FloatArray, FloatArray]:
-    fit, coefficients, covariance = block_evidence.joint(winner, normal.gram)
+def _with(winner: SetWithBlock, normal: NormalEquations) -> tuple[FittedForms, SetWithBlock, FloatArray, FloatArray]:
+    fit, coefficients, covariance = block_evidence.fit_with_block(winner, normal.gram)
     return fit, winner, coefficients, covariance
 
 
-def refitted(assembly: Assembly, normal: Normal, made: Acting, truth: tuple[float, float] | None) -> Pinned:
+def refitted(
+    assembly: Assembly, normal: NormalEquations, made: MeanEffects, truth: tuple[float, float] | None
+) -> ParameterFit:
     """Return what acts, refitted by simulation; truth: known sd of the reference [m, rad]."""
     settings = settings_of(assembly, made.fit)
-    return pinned(assembly, normal, made.fit.forms, settings, made.winner, made.others, truth)
+    return fit_parameters(assembly, normal, made.fit.forms, settings, made.winner, made.others, truth)
 
 
-def cleared(
-    assembly: Assembly, normal: Normal, made: Acting, fit: Pinned, truth: tuple[float, float] | None
-) -> tuple[Acting, Pinned]:
+def settled(
+    assembly: Assembly, normal: NormalEquations, made: MeanEffects, fit: ParameterFit, truth: tuple[float, float] | None
+) -> tuple[MeanEffects, ParameterFit]:
     """Return what acts without what its refit takes back, and with what acts beside it, refitted."""
     while made.winner is None:
-        gone = taken_back(assembly, made.fit, fit)
+        gone = vanished_effects(assembly, made.fit, fit)
         if gone:
             made = replace(made, fit=made.fit.without(gone))
-        elif made.more is None and (more := besides(assembly, normal, made.found, made.fit, fit, made.others)):
-            made = made.and_more(assembly, normal, more)
+        elif made.more is None and (more := further_effects(assembly, normal, made.found, made.fit, fit, made.others)):
+            made = made.with_further(assembly, normal, more)
         else:
             break
         fit = refitted(assembly, normal, made, truth)
     return made, fit
 
 
-def gain_of(made: Acting, name: str) -> float:
+def gain_of(made: MeanEffects, name: str) -> float:
     """Return the log evidence of the best set over the best one without an effect [nat]."""
     more = made.more.found if made.more is not None else None
     if more is not None and name in more.best.ids:
@@ -125,6 +127,6 @@ def gain_of(made: Acting, name: str) -> float:
         # A curve that does not lead by enough is out of the running here, too, as it is where p comes from.
         running = [rival for rival in made.weighed.rivals if made.curve or rival.free.basis is None]
         sets = [(fit.ids, fit.score) for fit in made.found.fits]
-        sets += [(rival.fit.ids | {rival.free.id}, rival.worth) for rival in running]
-    own = max((worth for ids, worth in sets if name in ids), default=-np.inf)
-    return float(own - max((worth for ids, worth in sets if name not in ids), default=-np.inf))
+        sets += [(rival.fit.ids | {rival.free.id}, rival.log_posterior) for rival in running]
+    own = max((score for ids, score in sets if name in ids), default=-np.inf)
+    return float(own - max((score for ids, score in sets if name not in ids), default=-np.inf))

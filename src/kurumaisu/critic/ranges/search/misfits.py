@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.ranges.search.effect_sets import Found
-from kurumaisu.critic.ranges.search.normal_equations import Assembly, Normal
+from kurumaisu.critic.ranges.search.effect_sets import FormPosterior
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.values.binned_means import FOLLOWED, bins, explained
-from kurumaisu.critic.values.story import Misfit, Moments, Noise, Rival
+from kurumaisu.critic.values.story import Alternative, Misfit, Moments, NoiseParameter
 from kurumaisu.types import FloatArray, IntArray
 
 _SAMPLES = 20_000  # readings of which means are drawn, evenly taken: of 170 000, no mean is a picture's width off
-_RIVALS = 6
+_ALTERNATIVES = 6
 _LEAST = 1e-6  # [m], [rad] sd of an error that is none
 _NAN = float("nan")
 
@@ -29,7 +29,7 @@ class Part:
     coefficients: FloatArray
 
 
-def misfits(assembly: Assembly, normal: Normal, parts: Sequence[Part]) -> tuple[Misfit, ...]:
+def misfits(assembly: Assembly, normal: NormalEquations, parts: Sequence[Part]) -> tuple[Misfit, ...]:
     """Return per part what is wrong with the readings without it, over what it follows, and what it adds."""
     added = [np.asarray(assembly.columns[:, :, part.span] @ part.coefficients, dtype=np.float64) for part in parts]
     left = _left(assembly, normal, np.asarray(assembly.residual - sum(added, np.zeros(assembly.residual.shape))))
@@ -55,7 +55,7 @@ def _moments(assembly: Assembly, rows: IntArray) -> Moments:
     return Moments(shots.runs, shots.run[scan], shots.stamps[scan] + shots.zero, places)
 
 
-def _left(assembly: Assembly, normal: Normal, error: FloatArray) -> FloatArray:
+def _left(assembly: Assembly, normal: NormalEquations, error: FloatArray) -> FloatArray:
     """Return errors (k, b) [m] without what is most likely an error of the reference or of the whole scan."""
     scan, beam = normal.scan_noise, normal.beam_noise
     pose = np.maximum([scan.position_sd, scan.position_sd, scan.heading_sd], _LEAST)
@@ -70,23 +70,25 @@ def _left(assembly: Assembly, normal: Normal, error: FloatArray) -> FloatArray:
     return out
 
 
-def rivals(found: Found) -> tuple[Rival, ...]:
+def alternatives(found: FormPosterior) -> tuple[Alternative, ...]:
     """Return the best other sets of effects, and why each lost."""
     best, seen = found.best, {found.best.ids}
-    out: list[Rival] = []
+    out: list[Alternative] = []
     for fit in found.fits:
-        if fit.ids in seen or len(out) == _RIVALS:
+        if fit.ids in seen or len(out) == _ALTERNATIVES:
             continue
         seen.add(fit.ids)
         better = fit.log_likelihood - best.log_likelihood
         why = f"fits better by {better:.1f} nats, too little to justify another effect"
         if better <= 0:
             why = f"fits worse by {-better:.1f} nats"
-        out.append(Rival(" + ".join(sorted(fit.ids)) or "no effect on the mean reading", fit.score - best.score, why))
+        out.append(
+            Alternative(" + ".join(sorted(fit.ids)) or "no effect on the mean reading", fit.score - best.score, why)
+        )
     return tuple(out)
 
 
-def noise_rows(normal: Normal) -> tuple[Noise, ...]:
+def noise_rows(normal: NormalEquations) -> tuple[NoiseParameter, ...]:
     """Return the noise of the scans."""
     scan, beam = normal.scan_noise, normal.beam_noise
     rows = (
@@ -97,7 +99,7 @@ def noise_rows(normal: Normal) -> tuple[Noise, ...]:
         ("reference position at the scans, each axis", scan.position_sd, "m"),
         ("reference heading at the scans", scan.heading_sd, "rad"),
     )
-    return tuple(Noise(name, value, _NAN, _NAN, unit) for name, value, unit in rows)
+    return tuple(NoiseParameter(name, value, _NAN, _NAN, unit) for name, value, unit in rows)
 
 
 def _misfit(name: str, over: Mapping[str, tuple[str, FloatArray]], left: FloatArray, added: FloatArray) -> Misfit:

@@ -9,8 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.ranges.noise.beam_offsets import Crossed, crossed, without_beams
-from kurumaisu.critic.ranges.noise.reading_noise import MAD, OUTLIER, BeamNoise, near, refined
+from kurumaisu.critic.ranges.noise.beam_offsets import OffsetProducts, offset_products, without_beam_offsets
+from kurumaisu.critic.ranges.noise.reading_noise import (
+    MAD,
+    OUTLIER,
+    BeamNoise,
+    estimate_reading_noise,
+    expected_readings,
+)
 from kurumaisu.critic.ranges.noise.scan_noise import (
     CommonMode,
     Gram,
@@ -19,20 +25,20 @@ from kurumaisu.critic.ranges.noise.scan_noise import (
     common_mode,
     estimate,
     marginal,
-    wary_of,
     whitened,
+    with_lasting_common_mode,
 )
-from kurumaisu.critic.ranges.poses.likeliest_path import Sight, Steady, steady
-from kurumaisu.critic.ranges.poses.pose_corrections import moved, stands
-from kurumaisu.critic.ranges.scans.beams import Shots, look, own_with, predict, rows_of
-from kurumaisu.critic.ranges.scans.blocked_beams import blocked, told
-from kurumaisu.critic.ranges.scans.map_changes import displaced
-from kurumaisu.critic.ranges.scans.passing_objects import strangers
-from kurumaisu.critic.ranges.scans.range_step import grid_step, regular
-from kurumaisu.critic.ranges.scans.valid_readings import hats, trusted, trusted_place, uncut
+from kurumaisu.critic.ranges.poses.likeliest_path import MotionEvidence, PoseEvidence, motion_evidence
+from kurumaisu.critic.ranges.poses.pose_corrections import pose_corrected, stands_of
+from kurumaisu.critic.ranges.scans.beams import Shots, hits_of, model_effects_with, predict, some_scans
+from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
+from kurumaisu.critic.ranges.scans.map_changes import map_change
+from kurumaisu.critic.ranges.scans.passing_objects import passing_objects
+from kurumaisu.critic.ranges.scans.range_step import grid_step, unrounded
+from kurumaisu.critic.ranges.scans.valid_readings import pose_weights, usable_beams, usable_readings, without_cut_off
 from kurumaisu.critic.ranges.signals.coefficient_blocks import blocks
-from kurumaisu.critic.ranges.signals.effect_columns import Form, Marks
-from kurumaisu.critic.ranges.signals.form_error import OtherForm
+from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns, Form
+from kurumaisu.critic.ranges.signals.form_error import FormFamily
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -46,7 +52,7 @@ _BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau
 
 
 @dataclass(frozen=True)
-class Normal:
+class NormalEquations:
     """gram (p + 1, p + 1): normal equations of all columns and, last, the residual; noise that made them so.
 
     scan_noise: the likeliest; wary: with which the equations are made; nobody knows how long its common mode lasts.
@@ -64,28 +70,28 @@ class Assembly:
 
     def __init__(self, shots: Shots, ids: frozenset[str] | None = None) -> None:
         """Take the shots, and the effects to look for; None for all."""
-        self.hats = [hats(shots, row) for row in range(len(shots.stamps))]
-        self.layout = Layout(shots.stamps, shots.run, stands(shots))
+        self.hats = [pose_weights(shots, row) for row in range(len(shots.stamps))]
+        self.layout = Layout(shots.stamps, shots.run, stands_of(shots))
         self.tracks = shots.tracks
         self.kinked = [np.zeros(len(track.times), dtype=bool) for track in shots.tracks]
         self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
         self._linearise(shots, roughly=True)
-        self.motion: list[Steady] | None = None
-        self.blocked = blocked(shots.measured, self.marks.base)
-        somewhere = uncut(shots.measured)
-        self.displaced = displaced(somewhere, self.marks.base, self.hits(), self.marks.seen.incidence)
+        self.motion: list[MotionEvidence] | None = None
+        self.blocked = blocked_beams(shots.measured, self.marks.base)
+        somewhere = without_cut_off(shots.measured)
+        self.displaced = map_change(somewhere, self.marks.base, self.hits(), self.marks.seen.incidence)
         # Which readings (k, b) are of what the map has, as far as is known.
         self.mapped = ~self.blocked & ~self.displaced.readings
         others = np.where(self.mapped, somewhere, np.nan)
-        self.strangers = strangers(others, self.marks.base, shots.laser.bearings)
+        self.strangers = passing_objects(others, self.marks.base, shots.laser.bearings)
         self.mapped &= ~self.strangers.readings
         self.first = self._trust()
         for i in range(_SHIFTS):
-            found, self.kinked = moved(self.shots, self.tracks, self.hats, self.layout, self._sights())
+            found, self.kinked = pose_corrected(self.shots, self.tracks, self.hats, self.layout, self._sights())
             self._linearise(found, roughly=i < _SHIFTS - 1)
         self.motion = self._motion()
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
-        self.geometry = trusted_place(self.shots, self.marks.seen, self.marks.base) & self.mapped
+        self.geometry = usable_beams(self.shots, self.marks.seen, self.marks.base) & self.mapped
         self.forms, fixed = self.marks.forms(ids)
         self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
         self.columns = np.concatenate([fixed, more], axis=2)
@@ -100,23 +106,23 @@ class Assembly:
         roughly: where poses are only sought, one side of a difference will do.
         """
         self.shots = shots
-        self.marks = Marks(shots)
+        self.marks = EffectColumns(shots)
         self.poses = self._by_pose((1.0,) if roughly else (-1.0, 1.0))
-        self.residual = regular(shots.measured) - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
+        self.residual = unrounded(shots.measured) - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
 
     def _trust(self) -> BeamNoise:
         one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
         sd = np.maximum(np.nan_to_num(one), _LEAST)  # a beam that meets nothing has none
         smooth = self._on_smooth_path()[:, np.newaxis]
-        trust = trusted(self.shots, self.marks.seen, self.marks.base)
+        trust = usable_readings(self.shots, self.marks.seen, self.marks.base)
         return BeamNoise(sd, 0.0, trust & smooth & self.mapped)
 
-    def told(self) -> list[Unknown]:
+    def unknowns(self) -> list[Unknown]:
         """Return what stands where the map has it not, rides with the chair, or comes and goes."""
-        riding = told(self.blocked, self.shots.measured, self.shots.laser.bearings)
-        staying = list(self.displaced.told())
+        riding = described(self.blocked, self.shots.measured, self.shots.laser.bearings)
+        staying = list(self.displaced.unknowns())
         known = {each.covariate for each in staying}
-        return [*riding, *staying, *(each for each in self.strangers.told() if each.covariate not in known)]
+        return [*riding, *staying, *(each for each in self.strangers.unknowns() if each.covariate not in known)]
 
     @property
     def strange(self) -> bool:
@@ -135,11 +141,11 @@ class Assembly:
         sure = np.array([not self.kinked[self.shots.run[k]][hat.rows].any() for k, hat in enumerate(self.hats)])
         return sure if sure.mean() >= _SURE else np.ones_like(sure)
 
-    def _sights(self) -> list[Sight]:
+    def _sights(self) -> list[PoseEvidence]:
         """Return what each scan alone says of the errors of its poses, within what is plausible."""
         size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
         beam = self._begun()
-        out: list[Sight] = []
+        out: list[PoseEvidence] = []
         for _ in range(2):  # without outliers in the second round
             left, out = np.full_like(self.residual, np.nan), []
             for k, gram in enumerate(self.grams(beam)):
@@ -151,7 +157,7 @@ class Assembly:
                 # What nothing fits as well as its noise allows, says less by as much.
                 z = np.abs(left[k] / self.first.sd[k])[beam.valid[k]]
                 width = max(MAD * float(np.median(z)), 1.0) if len(z) else 1.0
-                out.append(_sight(gram, self.hats[k].rows, width))
+                out.append(_pose_evidence(gram, self.hats[k].rows, width))
             z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
             beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * MAD * np.nanmedian(z)))
         return out
@@ -161,7 +167,7 @@ class Assembly:
         size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
         with np.errstate(invalid="ignore"):
             reach = np.sqrt(np.sum((self.poses * size) ** 2, axis=2)) / self.first.sd
-            return replace(self.first, valid=near(self.residual / self.first.sd, self.first.valid, reach))
+            return replace(self.first, valid=expected_readings(self.residual / self.first.sd, self.first.valid, reach))
 
     def refine(self, fitted: Sequence[Form], beam: BeamNoise, scan: ScanNoise) -> None:
         """Put in place of each fitted form's shape the one between those of the grid that explains most."""
@@ -191,7 +197,7 @@ class Assembly:
     def thinned(self, rows: IntArray) -> Assembly:
         """Return some of the scans, without columns."""
         out = copy(self)
-        out.shots, out.marks = rows_of(self.shots, rows), self.marks.thinned(rows)
+        out.shots, out.marks = some_scans(self.shots, rows), self.marks.thinned(rows)
         out.columns = np.empty((*out.shots.measured.shape, 0), dtype=np.float32)
         out.hats = [self.hats[row] for row in rows]
         out.layout = Layout(self.layout.times[rows], self.layout.run[rows], self.layout.stand[rows])
@@ -200,7 +206,7 @@ class Assembly:
         out.first = BeamNoise(self.first.sd[rows], self.first.rho, self.first.valid[rows])
         return out
 
-    def settle(self, truth: tuple[float, float] | None, fitted: Sequence[Form] = ()) -> Normal:
+    def settle(self, truth: tuple[float, float] | None, fitted: Sequence[Form] = ()) -> NormalEquations:
         """Return the normal equations with the noise estimated from these very data; fitted: forms to project out.
 
         Without the blocks of many columns, but for those that change whole scans.
@@ -209,13 +215,15 @@ class Assembly:
         beam = self._begun()
         seen, layout, grid = self.marks.seen, self.layout, grid_step(self.shots.measured)
         for _ in range(_ROUNDS):
-            beam = refined(self.first, beam, lambda last: self.leftover(last, project), seen, layout, grid)
+            beam = estimate_reading_noise(
+                self.first, beam, lambda last: self.leftover(last, project), seen, layout, grid
+            )
         narrow = max(self._fixed, self._nuisance.stop, *(free.span.stop for free in self.free if free.whole))
         grams, cross = self._crossed(beam, narrow)
         scan = estimate(grams, self.layout, truth, project)
-        wary = wary_of(grams, self.layout, project, scan)
-        gram = without_beams(grams, cross, self.layout, wary, beam.own_sd)
-        return Normal(gram, scan, wary, beam, int(beam.valid.sum()))
+        wary = with_lasting_common_mode(grams, self.layout, project, scan)
+        gram = without_beam_offsets(grams, cross, self.layout, wary, beam.own_sd)
+        return NormalEquations(gram, scan, wary, beam, int(beam.valid.sum()))
 
     def _projected(self, fitted: Sequence[Form]) -> IntArray:
         """Return the columns of every effect, and of the blocks that change whole scans."""
@@ -224,7 +232,7 @@ class Assembly:
         return np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
 
     def common_mode(
-        self, normal: Normal, truth: tuple[float, float] | None, fitted: Sequence[Form], own_sd: float = 0.0
+        self, normal: NormalEquations, truth: tuple[float, float] | None, fitted: Sequence[Form], own_sd: float = 0.0
     ) -> CommonMode:
         """Return what says that whole scans are off together, whatever effects on the mean there are.
 
@@ -235,23 +243,23 @@ class Assembly:
         seen = common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise, own_sd)
         return replace(seen, wary=normal.wary)
 
-    def full(self, normal: Normal) -> Normal:
+    def full(self, normal: NormalEquations) -> NormalEquations:
         """Return the normal equations of all columns, in the noise that is known."""
         grams, cross = self._crossed(normal.beam_noise, self.columns.shape[2])
-        gram = without_beams(grams, cross, self.layout, normal.wary, normal.beam_noise.own_sd)
+        gram = without_beam_offsets(grams, cross, self.layout, normal.wary, normal.beam_noise.own_sd)
         return replace(normal, gram=gram)
 
     def again(self, settings: Sequence[EffectSetting]) -> Assembly:
         """Return the same scans predicted with effects at work, and poses sought anew; without columns."""
         shots = replace(
             self.shots,
-            own=own_with(self.shots, settings),
+            own=model_effects_with(self.shots, settings),
             tracks=self.tracks,
             shift=np.zeros_like(self.shots.shift),
         )
         return Assembly(shots, frozenset())
 
-    def beside(self, others: Sequence[OtherForm]) -> Assembly:
+    def with_families(self, others: Sequence[FormFamily]) -> Assembly:
         """Return the same scans with columns of what effects may do instead, of which no noise is made, either."""
         out, count = copy(self), self.columns.shape[2]
         more = [each.columns(self.shots, self.marks.seen).astype(np.float32) for each in others]
@@ -259,7 +267,7 @@ class Assembly:
         out._nuisance = slice(count, out.columns.shape[2])
         return out
 
-    def products(self, normal: Normal, columns: FloatArray, residual: FloatArray) -> FloatArray:
+    def products(self, normal: NormalEquations, columns: FloatArray, residual: FloatArray) -> FloatArray:
         """Return the normal equations of other columns (k, b, m) and another residual (k, b), in the noise known."""
         other = copy(self)
         other.columns, other.residual = columns.astype(np.float32), residual
@@ -267,9 +275,9 @@ class Assembly:
         grams, cross = other._crossed(
             replace(normal.beam_noise, valid=normal.beam_noise.valid & known), columns.shape[2]
         )
-        return without_beams(grams, cross, self.layout, normal.wary, normal.beam_noise.own_sd)
+        return without_beam_offsets(grams, cross, self.layout, normal.wary, normal.beam_noise.own_sd)
 
-    def _crossed(self, beam: BeamNoise, count: int) -> tuple[list[Gram], Crossed]:
+    def _crossed(self, beam: BeamNoise, count: int) -> tuple[list[Gram], OffsetProducts]:
         """Return the first columns' normal equations of each scan, and what single beams' offsets share with them."""
         beams = self.residual.shape[1]
         inner, common = np.zeros((beams, beams)), np.zeros((beams, count + 1))
@@ -278,11 +286,11 @@ class Assembly:
             own, shared, last = self._rows(k, np.arange(count), lasting=True)
             rows = whitened(np.hstack([own, shared, last]), beam.valid[k], beam.sd[k], beam.rho)
             grams.append(self._gram(k, rows, own.shape[1], shared.shape[1]))
-            products = crossed(rows, beam.valid[k], beam.sd[k], beam.rho, inner)
+            products = offset_products(rows, beam.valid[k], beam.sd[k], beam.rho, inner)
             lead = own.shape[1] + shared.shape[1]
             parts.append(products[:, :lead])
             common += products[:, lead:]
-        return grams, Crossed(tuple(parts), common, inner)
+        return grams, OffsetProducts(tuple(parts), common, inner)
 
     def grams(self, beam: BeamNoise, columns: IntArray | None = None, *, lasting: bool = False) -> list[Gram]:
         """Return the normal equations of each scan; columns: which of all, None for all.
@@ -307,14 +315,14 @@ class Assembly:
             matrix[-1, -1] += steady.left @ steady.left
         return Gram(matrix, own, shared)
 
-    def _motion(self) -> list[Steady]:
+    def _motion(self) -> list[MotionEvidence]:
         """Return what the chair's motion says of the errors of the poses under each scan."""
-        out: dict[int, Steady] = {}
+        out: dict[int, MotionEvidence] = {}
         for i, (track, first) in enumerate(zip(self.shots.tracks, self.tracks, strict=True)):
             own = np.flatnonzero((self.shots.run == i) & (self.layout.stand < 0)).tolist()
-            made = steady(track.times, first.poses, track.poses, [self.hats[k].rows for k in own])
+            made = motion_evidence(track.times, first.poses, track.poses, [self.hats[k].rows for k in own])
             out |= dict(zip(own, made, strict=True))
-        none = Steady(np.empty((0, 0)), np.empty(0))
+        none = MotionEvidence(np.empty((0, 0)), np.empty(0))
         return [out.get(k, none) for k in range(len(self.hats))]
 
     def leftover(self, beam: BeamNoise, columns: IntArray) -> FloatArray:
@@ -367,13 +375,13 @@ class Assembly:
         for axis in range(3):
             moved = [self.marks.base] if len(signs) == 1 else []
             for sign in signs:
-                seen = look(self.shots, (), 0, shift=sign * np.eye(3)[axis] * _MOVE, like=self.marks.seen)
+                seen = hits_of(self.shots, (), 0, shift=sign * np.eye(3)[axis] * _MOVE, like=self.marks.seen)
                 moved.append(predict(self.shots, (), seen, 0))
             out.append((moved[1] - moved[0]) / (len(signs) * _MOVE[axis]))
         return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
 
 
-def _sight(gram: Gram, rows: slice, width: float) -> Sight:
+def _pose_evidence(gram: Gram, rows: slice, width: float) -> PoseEvidence:
     """Return what a scan says of its poses, its common mode integrated out.
 
     rows: of the track, that it rests on; width: of what it leaves, in deviations.
@@ -382,7 +390,7 @@ def _sight(gram: Gram, rows: slice, width: float) -> Sight:
     matrix = gram.matrix / width**2
     beside = matrix[poses, common] / (matrix[common, common] + _BROAD.common_sd**-2)
     inner = matrix[np.ix_(poses, poses)] - np.outer(beside, matrix[common, poses])
-    return Sight(rows, inner, matrix[poses, -1] - beside * matrix[common, -1])
+    return PoseEvidence(rows, inner, matrix[poses, -1] - beside * matrix[common, -1])
 
 
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:

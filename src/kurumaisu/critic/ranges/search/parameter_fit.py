@@ -16,11 +16,11 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.search.block_evidence import Rival
-from kurumaisu.critic.ranges.search.normal_equations import Assembly, Normal
+from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.signals.effect_columns import Form
-from kurumaisu.critic.ranges.signals.form_error import OtherForm, of_beams
-from kurumaisu.critic.unknown.effect_likeness import FORM
+from kurumaisu.critic.ranges.signals.form_error import FormFamily, beam_family
+from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
@@ -28,7 +28,7 @@ from kurumaisu.types import FloatArray
 _STEPS = 2
 _ROUNDS = 4  # times that the scans are seen anew with what moves their beams
 _SETTLED = 0.5  # sds by which a parameter may still move between two of them
-LOUD = 1.0  # rms of what acts, in sds of single readings, from which scans are seen anew with it
+STRONG = 1.0  # rms of what acts, in sds of single readings, from which scans are seen anew with it
 _STEP = 0.05  # of a finite difference, in units of the larger of a parameter and its scale
 _SHAPE = 1.0  # prior sd of what only shapes an effect, in the same units
 _SIZE = 100.0  # and of its size
@@ -46,7 +46,7 @@ class _Free:
 
 
 @dataclass(frozen=True)
-class Pinned:
+class ParameterFit:
     """Settings of what acts on the mean, with the sds of what was fitted; where that was, and what it leaves.
 
     assembly: the scans as they are seen with these effects, where any of them moves beams; normal: the noise there, as
@@ -57,21 +57,21 @@ class Pinned:
 
     settings: tuple[tuple[EffectSetting, dict[str, float]], ...]
     assembly: Assembly
-    normal: Normal
+    normal: NormalEquations
     left: FloatArray
     missed: FloatArray
     slopes: FloatArray
 
 
-def pinned(
+def fit_parameters(
     assembly: Assembly,
-    normal: Normal,
+    normal: NormalEquations,
     forms: Sequence[Form],
     settings: Sequence[EffectSetting],
-    winner: Rival | None,
-    others: Mapping[str, OtherForm],
+    winner: SetWithBlock | None,
+    others: Mapping[str, FormFamily],
     truth: tuple[float, float] | None,
-) -> Pinned:
+) -> ParameterFit:
     """Return the forms, refitted together.
 
     winner: a block that acts beside them, whose coefficients are integrated out; others: what some of them may do
@@ -79,12 +79,12 @@ def pinned(
     """
     if not forms and winner is None:
         none = np.empty((*assembly.residual.shape, 0))
-        return Pinned((), assembly, normal, assembly.residual, none, none)
+        return ParameterFit((), assembly, normal, assembly.residual, none, none)
     at = [dict(setting.parameters) for setting in settings]
     curves = [others[form.id] for form in forms if form.id in others]
     block = _block(assembly, winner)
     # What is as large as a reading's own scatter has moved poses, and made outliers of readings, as much.
-    moving = _loud(assembly, normal, _settings(forms, at)) or any(
+    moving = _strong(assembly, normal, _settings(forms, at)) or any(
         not issubclass(effects.by_id(form.id), effects.ReadingEffect) for form in forms
     )
     free = [each for i, form in enumerate(forms) for each in _free(i, form, at[i])]
@@ -94,7 +94,7 @@ def pinned(
         if moving:
             # Where the chair was, which scans count and how they scatter: all of that was found without the effect.
             # What beams keep beyond an equation is no error of whole scans, of which each has other beams that count.
-            assembly = assembly.again(_settings(forms, at)).beside([*curves, of_beams(assembly.shots)])
+            assembly = assembly.again(_settings(forms, at)).with_families([*curves, beam_family(assembly.shots)])
             normal = normal if winner is not None else assembly.settle(truth)
         before = _values(free, at)
         for _ in range(_STEPS):
@@ -118,11 +118,11 @@ def pinned(
     out: list[dict[str, float]] = [{} for _ in forms]
     for each, sd in zip(free, sds.tolist(), strict=True):
         out[each.index][each.parameter.name] = sd
-    missed = FORM * np.nan_to_num(np.stack(signals, axis=-1)) if signals else np.empty((*left.shape, 0))
+    missed = FORM_ERROR * np.nan_to_num(np.stack(signals, axis=-1)) if signals else np.empty((*left.shape, 0))
     ways = np.empty((*left.shape, 0))
     if free:
         ways = np.stack([slope * each.prior for slope, each in zip(slopes, free, strict=True)], axis=-1)
-    return Pinned(tuple(zip(_settings(forms, at), out, strict=True)), assembly, normal, left, missed, ways)
+    return ParameterFit(tuple(zip(_settings(forms, at), out, strict=True)), assembly, normal, left, missed, ways)
 
 
 def _signals(
@@ -134,12 +134,12 @@ def _signals(
     return [whole - assembly.marks.together(other) for other in others]
 
 
-def _loud(assembly: Assembly, normal: Normal, settings: Sequence[EffectSetting]) -> bool:
+def _strong(assembly: Assembly, normal: NormalEquations, settings: Sequence[EffectSetting]) -> bool:
     """Tell whether effects move readings by more than they scatter anyway."""
-    return loudness(assembly, normal, assembly.marks.together(settings)) > LOUD
+    return strength(assembly, normal, assembly.marks.together(settings)) > STRONG
 
 
-def loudness(assembly: Assembly, normal: Normal, change: FloatArray) -> float:
+def strength(assembly: Assembly, normal: NormalEquations, change: FloatArray) -> float:
     """Return the rms of a change of the readings, in their sds; what no longer meets anything counts as nothing."""
     white = np.nan_to_num(change / assembly.first.sd)[normal.beam_noise.valid]
     return float(np.sqrt(np.mean(white**2))) if white.size else 0.0
@@ -151,7 +151,7 @@ def _values(free: Sequence[_Free], at: Sequence[dict[str, float]]) -> FloatArray
 
 def _step(
     assembly: Assembly,
-    normal: Normal,
+    normal: NormalEquations,
     free: Sequence[_Free],
     parts: tuple[Sequence[FloatArray], FloatArray],
     left: FloatArray,
@@ -169,7 +169,7 @@ def _step(
 
 def _doubt(
     assembly: Assembly,
-    normal: Normal,
+    normal: NormalEquations,
     free: Sequence[_Free],
     parts: tuple[Sequence[FloatArray], Sequence[int], Sequence[FloatArray]],
 ) -> FloatArray:
@@ -189,14 +189,14 @@ def _doubt(
     alike = (gram / np.outer(norms, norms))[:count, count:]
     own = np.array([[each.index == i for i in guessed] for each in free])
     share = np.where(own, alike**2 + (1 - alike**2) / _WAYS, alike**2 / _WAYS)
-    return np.asarray(FORM * np.sqrt(share @ norms[count:] ** 2))
+    return np.asarray(FORM_ERROR * np.sqrt(share @ norms[count:] ** 2))
 
 
 def _instead(
     assembly: Assembly,
-    normal: Normal,
+    normal: NormalEquations,
     fitted: tuple[Sequence[_Free], Sequence[FloatArray], FloatArray],
-    instead: tuple[Mapping[int, OtherForm], Mapping[int, FloatArray]],
+    instead: tuple[Mapping[int, FormFamily], Mapping[int, FloatArray]],
     left: FloatArray,
 ) -> FloatArray:
     """Return what of the rest (k, b) [m] effects would do by other curves than their equations.
@@ -254,10 +254,10 @@ def _slope(assembly: Assembly, forms: Sequence[Form], at: Sequence[dict[str, flo
     return np.asarray((high - low) / (ends[1] - ends[0]))
 
 
-def _block(assembly: Assembly, winner: Rival | None) -> FloatArray:
+def _block(assembly: Assembly, winner: SetWithBlock | None) -> FloatArray:
     """Return the columns (k, b, m) of a block, in units in which its coefficients have a prior sd of 1."""
     if winner is None:
         return np.empty((*assembly.residual.shape, 0))
-    values, vectors = np.linalg.eigh(winner.belief.prior)
+    values, vectors = np.linalg.eigh(winner.evidence.prior)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     return np.asarray(assembly.columns[:, :, winner.free.span] @ root)

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.noise.level_jumps import jumps, parted
-from kurumaisu.critic.ranges.poses.pose_corrections import stands
-from kurumaisu.critic.ranges.scans.beams import Look, Shots
+from kurumaisu.critic.ranges.noise.level_jumps import knots_parted, level_jumps
+from kurumaisu.critic.ranges.poses.pose_corrections import stands_of
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
 from kurumaisu.critic.ranges.scans.walls import Rays
-from kurumaisu.critic.ranges.signals.effect_columns import Marks
+from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns
 from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of
 from kurumaisu.effects import Echoes, Parameter
 from kurumaisu.types import FloatArray
@@ -35,7 +35,7 @@ _SAMPLES = 20000  # readings that say how often a covariate has which value
 
 
 @dataclass(frozen=True)
-class Free:
+class Block:
     """A block of columns whose coefficients are normal before the data, with covariances `priors`, to a factor.
 
     id: of the effect; parameter: the sd of the coefficients, in units of its scale, None of a curve; basis: of the
@@ -66,12 +66,14 @@ class _Spike(np.random.Generator):
         return out
 
 
-def blocks(shots: Shots, marks: Marks, start: int, ids: frozenset[str] | None) -> tuple[list[Free], FloatArray]:
+def blocks(
+    shots: Shots, marks: EffectColumns, start: int, ids: frozenset[str] | None
+) -> tuple[list[Block], FloatArray]:
     """Return all blocks, those first that change whole scans, and their columns (k, b, m).
 
     start: index of the first one in the whole matrix.
     """
-    found: list[Free] = []
+    found: list[Block] = []
     columns: list[NDArray[np.float32]] = []
     parts = [*_drawn(shots, marks, ids), *(_curves(shots, marks) if ids is None or effects.SMOOTH in ids else ())]
     for free, part in sorted(parts, key=lambda each: not each[0].whole):
@@ -81,7 +83,7 @@ def blocks(shots: Shots, marks: Marks, start: int, ids: frozenset[str] | None) -
     return found, np.concatenate([np.empty((*marks.base.shape, 0), dtype=np.float32), *columns], axis=2)
 
 
-def _drawn(shots: Shots, marks: Marks, ids: frozenset[str] | None) -> Iterator[tuple[Free, FloatArray]]:
+def _drawn(shots: Shots, marks: EffectColumns, ids: frozenset[str] | None) -> Iterator[tuple[Block, FloatArray]]:
     """Yield effects of the world whose walls are moved by normal numbers that are drawn once."""
     slope = _slope(shots, marks.seen.ranges)
     for effect in effects.WORLD:
@@ -102,10 +104,10 @@ def _drawn(shots: Shots, marks: Marks, ids: frozenset[str] | None) -> Iterator[t
                 change = _moved(shots, effect(values, rng).apply(shots.walls.segments), marks)
                 made.append((change * slope / _STEP / (np.sqrt(_DRAWS) if many else 1.0)).astype(np.float32))
             columns: Any = np.stack([one for one in made if np.abs(one).max() > 0], axis=-1)
-            yield Free(effect.id, p, None, (np.eye(columns.shape[2]),), slice(0)), columns
+            yield Block(effect.id, p, None, (np.eye(columns.shape[2]),), slice(0)), columns
 
 
-def _moved(shots: Shots, segments: FloatArray, marks: Marks) -> FloatArray:
+def _moved(shots: Shots, segments: FloatArray, marks: EffectColumns) -> FloatArray:
     """Return how much farther level beams (k, b) go [m] before other walls; 0 where they meet another one."""
     seen = marks.seen
     bearings = np.array([each.bearings for each in seen.beams])
@@ -123,11 +125,11 @@ def _slope(shots: Shots, ranges: FloatArray) -> FloatArray:
     return np.asarray((error.mean(safe + step) - error.mean(safe - step)) / (2 * step))
 
 
-def _curves(shots: Shots, marks: Marks) -> Iterator[tuple[Free, FloatArray]]:
+def _curves(shots: Shots, marks: EffectColumns) -> Iterator[tuple[Block, FloatArray]]:
     echoes = echoes_of(shots, marks.seen)
     known = np.isfinite(marks.base)
-    stand = stands(shots)
-    jumped = jumps(np.where(np.isfinite(shots.measured), shots.measured, np.nan) - marks.base, stand)
+    stand = stands_of(shots)
+    jumped = level_jumps(np.where(np.isfinite(shots.measured), shots.measured, np.nan) - marks.base, stand)
     for name, of in effects.RANGE_COVARIATES.items():
         at = np.asarray(of(echoes), dtype=float)
         values = at[known]
@@ -137,17 +139,17 @@ def _curves(shots: Shots, marks: Marks) -> Iterator[tuple[Free, FloatArray]]:
         knots = _knots(at[:, 0] if whole else values[:: max(len(values) // _SAMPLES, 1)])
         if len(knots) < 3:
             continue
-        knots, places = parted(knots, at[:, 0], stand, jumped) if whole else (knots, knots)
+        knots, places = knots_parted(knots, at[:, 0], stand, jumped) if whole else (knots, knots)
         few = values[:: max(len(values) // _SAMPLES, 1)]
         matrix = np.column_stack([np.interp(few, knots, row) for row in np.eye(len(knots))])
         low, high = np.quantile(few, [0.025, 0.975])
         priors = tuple(priors_of(places, matrix))
         basis = Basis(name, knots, {}, priors, float(low), float(high))
         columns = basis.matrix(at.ravel()).reshape(*at.shape, len(knots))
-        yield Free(effects.smooth_range_id(name), None, basis, priors, slice(0), whole), columns
+        yield Block(effects.smooth_range_id(name), None, basis, priors, slice(0), whole), columns
 
 
-def echoes_of(shots: Shots, seen: Look) -> Echoes:
+def echoes_of(shots: Shots, seen: BeamHits) -> Echoes:
     """Return what the beams (k, b) of all scans meet, for curves over it; of nothing, at a range of 0."""
     still = np.where(np.isfinite(seen.ranges), seen.ranges, 0.0)
     stamp: Any = shots.stamps[:, np.newaxis]

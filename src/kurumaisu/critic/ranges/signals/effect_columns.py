@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import Look, Shots, look, predict, shapes, thin
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, acts_on_readings, hits_of, predict, thin
 from kurumaisu.critic.ranges.signals.shape_grids import directions, geometric, grid_of
 from kurumaisu.effects import Mechanism, Parameter
 from kurumaisu.params import EffectSetting
@@ -60,26 +60,26 @@ class Form:
         return slice(self.start, self.start + len(self.columns))
 
 
-class Marks:
+class EffectColumns:
     """Finds the marks of effects on the mean of some shots."""
 
     def __init__(self, shots: Shots) -> None:
         self._shots = shots
-        self._seen = look(shots, (), 0)
+        self._seen = hits_of(shots, (), 0)
         self._own = {setting.id: setting.parameters for setting in shots.own}
         self.base = predict(shots, (), self._seen, 0)
         self._halves: dict[tuple[str, str], bool] = {}
-        self._probe = Marks(thin(shots, _PROBE)) if len(shots.stamps) > _PROBE else self
+        self._probe = EffectColumns(thin(shots, _PROBE)) if len(shots.stamps) > _PROBE else self
 
     @property
-    def seen(self) -> Look:
+    def seen(self) -> BeamHits:
         """What the beams meet by the model."""
         return self._seen
 
-    def thinned(self, rows: IntArray) -> Marks:
+    def thinned(self, rows: IntArray) -> EffectColumns:
         """Return some of the scans alone."""
         out, seen = copy(self), self._seen
-        out._seen = Look(
+        out._seen = BeamHits(
             seen.ranges[rows],
             seen.level[rows],
             seen.incidence[rows],
@@ -94,12 +94,12 @@ class Marks:
         """Return the change (k, b) [m] of the mean by an effect with values in place of the model's."""
         setting = EffectSetting(effect.id, {**self.null(effect), **values})
         moved = effect.id not in self._own and issubclass(effect, effects.ReadingEffect)
-        seen = self._seen if moved else look(self._shots, (setting,), seed, like=self._seen)
+        seen = self._seen if moved else hits_of(self._shots, (setting,), seed, like=self._seen)
         return np.asarray(predict(self._shots, (setting,), seen, seed) - self.base)
 
     def together(self, settings: Sequence[EffectSetting]) -> FloatArray:
         """Return the change (k, b) [m] of the mean by effects with these values in place of the model's."""
-        seen = look(self._shots, settings, 0, like=self._seen)
+        seen = hits_of(self._shots, settings, 0, like=self._seen)
         return np.asarray(predict(self._shots, settings, seen, 0) - self.base)
 
     def null(self, effect: type[Mechanism]) -> dict[str, float]:
@@ -117,7 +117,7 @@ class Marks:
         for effect in (*effects.LASER, *effects.WORLD):
             if ids is not None and effect.id not in ids:
                 continue
-            if issubclass(effect, effects.LaserEffect) and not shapes(effect.id):
+            if issubclass(effect, effects.LaserEffect) and not acts_on_readings(effect.id):
                 continue
             for at, marks, values in self._of(effect):
                 ends = {p.name: {p.lower, p.upper} for p in effect.parameters if p.lower > 0}

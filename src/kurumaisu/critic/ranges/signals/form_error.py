@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import Look, Shots
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
 from kurumaisu.critic.ranges.signals.coefficient_blocks import echoes_of
 from kurumaisu.critic.unknown.bases import Basis, priors_of
-from kurumaisu.critic.unknown.effect_likeness import FORM
+from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _FOLLOWED = ("time", "range", "incidence", "bearing")
@@ -29,7 +29,7 @@ _MOST = 12  # reflectances that a map may have, for a step each
 
 
 @dataclass(frozen=True)
-class OtherForm:
+class FormFamily:
     """Curves that an effect may follow instead of its equation.
 
     covariate: what they follow; knots: of straight lines, or values with a step each where there are but few; prior
@@ -40,7 +40,7 @@ class OtherForm:
     knots: FloatArray
     prior: FloatArray
 
-    def columns(self, shots: Shots, seen: Look) -> FloatArray:
+    def columns(self, shots: Shots, seen: BeamHits) -> FloatArray:
         """Return the curves (k, b, n) over the beams."""
         values = _values(self.covariate, shots, seen)
         if self.covariate == _RETURNS:
@@ -52,10 +52,10 @@ class OtherForm:
 
         power: squared norm, whitened as the gram is, of what the effect does.
         """
-        return self.prior * (FORM**2 * power / max(float(np.sum(self.prior * gram)), 1e-300))
+        return self.prior * (FORM_ERROR**2 * power / max(float(np.sum(self.prior * gram)), 1e-300))
 
 
-def other_form(change: FloatArray, shots: Shots, seen: Look, valid: BoolArray) -> OtherForm | None:
+def form_family(change: FloatArray, shots: Shots, seen: BeamHits, valid: BoolArray) -> FormFamily | None:
     """Return the curves over what an effect follows that does this (k, b) [m] to the mean; None if it follows nothing.
 
     Of two quantities that draw it, the one that leaves less; valid (k, b): of which readings it must.
@@ -78,13 +78,13 @@ def other_form(change: FloatArray, shots: Shots, seen: Look, valid: BoolArray) -
     return None if best is None else _over(best, _values(best, shots, seen)[known][::step], target)
 
 
-def of_beams(shots: Shots) -> OtherForm:
+def beam_family(shots: Shots) -> FormFamily:
     """Return curves over the bearing: what single beams keep, be it as smooth as it may."""
     ends = shots.laser.bearings[[0, -1]]
-    return OtherForm("bearing", np.linspace(ends.min(), ends.max(), _HATS), np.eye(_HATS))
+    return FormFamily("bearing", np.linspace(ends.min(), ends.max(), _HATS), np.eye(_HATS))
 
 
-def without(gram: FloatArray, columns: IntArray, prior: FloatArray) -> FloatArray:
+def integrated_out(gram: FloatArray, columns: IntArray, prior: FloatArray) -> FloatArray:
     """Return normal equations with some columns' coefficients integrated out, which are normal with a covariance."""
     values, vectors = np.linalg.eigh(prior)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -93,11 +93,11 @@ def without(gram: FloatArray, columns: IntArray, prior: FloatArray) -> FloatArra
     return np.asarray(gram - cross.T @ np.linalg.solve(inner, cross))
 
 
-def _over(name: str, values: FloatArray, change: FloatArray) -> OtherForm:
+def _over(name: str, values: FloatArray, change: FloatArray) -> FormFamily:
     """Return curves over a quantity; change [m]: what the effect does there. Other forms bend where it does, too."""
     if name == _RETURNS:
         steps = np.unique(values)
-        return OtherForm(name, steps, np.eye(len(steps)))
+        return FormFamily(name, steps, np.eye(len(steps)))
     fine = _knots(values, _FINE)
     drawn = _fitted(_hats(fine, values), change)
     ways = (fine, np.searchsorted(np.sort(values), fine), np.cumsum(np.abs(np.diff(drawn, prepend=drawn[:1]))))
@@ -105,10 +105,10 @@ def _over(name: str, values: FloatArray, change: FloatArray) -> OtherForm:
     knots = np.interp(np.linspace(0.0, along[-1], _HATS), along, fine)
     # Rough or smooth along these, with a level of its own or without: nobody knows.
     every = priors_of(np.arange(_HATS, dtype=float), _hats(knots, values))
-    return OtherForm(name, knots, np.mean(list(every), axis=0))
+    return FormFamily(name, knots, np.mean(list(every), axis=0))
 
 
-def _values(name: str, shots: Shots, seen: Look) -> FloatArray:
+def _values(name: str, shots: Shots, seen: BeamHits) -> FloatArray:
     """Return what curves follow (k, b), of every beam; of those that meet nothing, anything."""
     if name == _RETURNS:
         return seen.returns

@@ -9,26 +9,28 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import Shots, look, predict, thin
-from kurumaisu.critic.ranges.scans.valid_readings import uncut
+from kurumaisu.critic.ranges.scans.beams import Shots, hits_of, predict, thin
+from kurumaisu.critic.ranges.scans.valid_readings import without_cut_off
 from kurumaisu.effects import BeamEffect, LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
 
 _SCANS = 25  # that are looked at: each look takes a hundredth of a second
 _TOLERANCE = (0.1, 0.02)  # [m] and share of the range, within which a reading is where it belongs
 _FEW, _MOST = 0.9, 0.95  # share of them that do: more need no search; of fewer, something else is wrong as well
-_RIVAL = 0.5  # share of what it mends that another effect may mend: small changes must tell it from one that mends more
+_ALTERNATIVE = (
+    0.5  # share of what it mends that another effect may mend: small changes must tell it from one that mends more
+)
 _STEP = 2.0**0.5  # between sizes that are tried
 _LARGEST = 32.0  # times a usual size
 _FINER = 8  # sizes that are tried about the best
 
 
-def astray(shots: Shots, ids: frozenset[str] | None) -> EffectSetting | None:
+def large_effect(shots: Shots, ids: frozenset[str] | None) -> EffectSetting | None:
     """Return the one effect on beams that sends nearly all readings where they belong, which are elsewhere without it.
 
     ids: the effects that may be named; None for all.
     """
-    sought = _Sought(thin(shots, _SCANS))
+    sought = _SizeSearch(thin(shots, _SCANS))
     plain = sought.plain
     if plain > _FEW:
         return None
@@ -39,20 +41,20 @@ def astray(shots: Shots, ids: frozenset[str] | None) -> EffectSetting | None:
     if not ranked or ranked[0][0] < _MOST or not issubclass(effects.by_id(ranked[0][1].id), BeamEffect):
         return None
     rival = max((share for share, _ in ranked[1:]), default=plain)
-    return ranked[0][1] if rival - plain < _RIVAL * (ranked[0][0] - plain) else None
+    return ranked[0][1] if rival - plain < _ALTERNATIVE * (ranked[0][0] - plain) else None
 
 
-class _Sought:
+class _SizeSearch:
     """Which share of the readings of some scans are where they belong."""
 
     def __init__(self, shots: Shots) -> None:
-        self._shots, self._measured = shots, uncut(shots.measured)
+        self._shots, self._measured = shots, without_cut_off(shots.measured)
         self._seen = np.isfinite(self._measured)
         self.plain = self.share(())
 
     def share(self, settings: tuple[EffectSetting, ...]) -> float:
         """Return the share with effects at work."""
-        off = np.abs(self._measured - predict(self._shots, settings, look(self._shots, settings, 0), 0))
+        off = np.abs(self._measured - predict(self._shots, settings, hits_of(self._shots, settings, 0), 0))
         near = off[self._seen] < _TOLERANCE[0] + _TOLERANCE[1] * self._measured[self._seen]
         return float(near.mean()) if near.size else 1.0
 

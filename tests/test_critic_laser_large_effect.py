@@ -8,7 +8,7 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu.critic.ranges.scans.beams import gather
-from kurumaisu.critic.ranges.search.far_size import astray
+from kurumaisu.critic.ranges.search.large_effect import large_effect
 from kurumaisu.critic.sanity.examination import examine
 from kurumaisu.params import load_model, shipped
 
@@ -45,10 +45,10 @@ def test_a_clock_that_drifts_is_not_shifted(made):
 
 
 def test_a_clock_that_drifts_far_is_found_by_where_readings_belong(made):
-    found = astray(gather(stamped(made, lambda t: 1.0022 * t), MODEL), IDS)
+    found = large_effect(gather(stamped(made, lambda t: 1.0022 * t), MODEL), IDS)
     assert found.id == "laser.clock_skew"
     assert found.parameters["skew"] == pytest.approx(0.0022, rel=0.1)
-    assert astray(gather(made, MODEL), IDS) is None
+    assert large_effect(gather(made, MODEL), IDS) is None
 
 
 def test_what_several_effects_would_mend_is_left_to_small_changes(made):
@@ -56,4 +56,4 @@ def test_what_several_effects_would_mend_is_left_to_small_changes(made):
     one = replace(made, runs=made.runs[1:], train=("later",))
     shots = gather(stamped(one, lambda t: 1.0022 * t), MODEL)
     assert np.isfinite(shots.measured).any()
-    assert astray(shots, IDS) is None
+    assert large_effect(shots, IDS) is None

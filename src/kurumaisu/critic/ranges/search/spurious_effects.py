@@ -13,11 +13,11 @@ from scipy.linalg import block_diag
 
 from kurumaisu import effects
 from kurumaisu.critic.engine.search import NAMED
-from kurumaisu.critic.ranges.search.block_evidence import Rival
-from kurumaisu.critic.ranges.search.effect_sets import Fitted, Found
-from kurumaisu.critic.ranges.search.normal_equations import Assembly, Normal
-from kurumaisu.critic.ranges.signals.form_error import OtherForm, other_form, without
-from kurumaisu.critic.unknown.curves import belief
+from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
+from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
+from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
+from kurumaisu.critic.unknown.curves import curve_evidence
 from kurumaisu.critic.values.prior import occam, odds
 from kurumaisu.types import FloatArray, IntArray
 
@@ -25,36 +25,36 @@ _WEAK = 1e-4  # prior precision of a coefficient, in units of its parameter's sc
 _SURE = float(np.log(NAMED / (1 - NAMED)))  # [nat] from which an effect is named
 
 
-def forms_beside(assembly: Assembly, normal: Normal, fit: Fitted) -> dict[str, OtherForm]:
+def form_families(assembly: Assembly, normal: NormalEquations, fit: FittedForms) -> dict[str, FormFamily]:
     """Return, for each effect of a fit whose equation is the simplest of a family of curves, that family."""
     out, start = {}, 0
     for form in fit.forms:
         stop = start + len(form.columns)
         if effects.by_id(form.id).empirical:
             change = assembly.columns[:, :, form.span] @ fit.coefficients[start:stop]
-            found = other_form(change, assembly.shots, assembly.marks.seen, normal.beam_noise.valid)
+            found = form_family(change, assembly.shots, assembly.marks.seen, normal.beam_noise.valid)
             if found is not None:
                 out[form.id] = found
         start = stop
     return out
 
 
-def company(
+def without_spurious(
     assembly: Assembly,
-    normal: Normal,
-    found: Found,
-    acting: tuple[Fitted, Rival | None],
-    others: Mapping[str, OtherForm],
-) -> tuple[Fitted, Rival | None]:
+    normal: NormalEquations,
+    found: FormPosterior,
+    acting: tuple[FittedForms, SetWithBlock | None],
+    others: Mapping[str, FormFamily],
+) -> tuple[FittedForms, SetWithBlock | None]:
     """Return the effects that act, and the block beside them if any, without what other forms of the rest explain.
 
     acting: the effects and the block; others: the families of those that have one.
     """
     fit, winner = acting
     while others and len(fit.forms) + (winner is not None) > 1:
-        worth = _Beside(assembly, normal, fit, winner, others).worth(len(found.p))
-        weakest = min(worth, key=lambda name: worth[name])
-        if worth[weakest] >= _SURE:
+        log_odds = _JointGram(assembly, normal, fit, winner, others).log_odds(len(found.p))
+        weakest = min(log_odds, key=lambda name: log_odds[name])
+        if log_odds[weakest] >= _SURE:
             break
         if winner is not None and weakest == winner.free.id:
             winner = None
@@ -67,16 +67,16 @@ def company(
     return fit, winner
 
 
-class _Beside:
+class _JointGram:
     """Normal equations of effects, of a block, and of the families of curves that they belong to."""
 
     def __init__(
         self,
         assembly: Assembly,
-        normal: Normal,
-        fit: Fitted,
-        winner: Rival | None,
-        others: Mapping[str, OtherForm],
+        normal: NormalEquations,
+        fit: FittedForms,
+        winner: SetWithBlock | None,
+        others: Mapping[str, FormFamily],
     ) -> None:
         self._fit, self._winner = fit, winner
         self._others = {form.id: others[form.id] for form in fit.forms if form.id in others}
@@ -92,7 +92,7 @@ class _Beside:
         self._gram = assembly.products(normal, np.concatenate(columns, axis=2), assembly.residual)
         self._forms_of = {form.id: sum(each.id == form.id for each in assembly.forms) for form in fit.forms}
 
-    def worth(self, count: int) -> dict[str, float]:
+    def log_odds(self, count: int) -> dict[str, float]:
         """Return the log odds [nat] of each effect beside other forms of the rest; count: effects that might act."""
         out = {}
         for name in self._own:
@@ -100,12 +100,12 @@ class _Beside:
             drawn = [(self._free[other], self._prior(other)) for other in others]
             block = self._winner
             if block is not None and name != block.free.id:
-                drawn.append((self._own[block.free.id], block.belief.prior))
+                drawn.append((self._own[block.free.id], block.evidence.prior))
             gram = _without(self._gram, drawn)
             rest = self._columns([form.id for form in self._fit.forms if form.id != name])
             own, b = _left(gram, self._own[name], rest)
             if block is not None and name == block.free.id:
-                nats = belief(own, b, block.free.priors).nats
+                nats = curve_evidence(own, b, block.free.priors).nats
             else:
                 nats = 0.5 * float(b @ np.linalg.solve(own + _WEAK * np.eye(len(own)), b))
                 z = float(np.sqrt(max(2 * nats, 0.0)))
@@ -133,7 +133,7 @@ class _Beside:
 def _without(gram: FloatArray, drawn: Sequence[tuple[IntArray, FloatArray]]) -> FloatArray:
     if not drawn:
         return gram
-    return without(gram, np.concatenate([at for at, _ in drawn]), block_diag(*(prior for _, prior in drawn)))
+    return integrated_out(gram, np.concatenate([at for at, _ in drawn]), block_diag(*(prior for _, prior in drawn)))
 
 
 def _left(gram: FloatArray, own: IntArray, rest: IntArray) -> tuple[FloatArray, FloatArray]:
