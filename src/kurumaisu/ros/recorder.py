@@ -17,7 +17,7 @@ import rospy
 from kurumaisu.children import interrupt
 from kurumaisu.critic.data.bag_parts import numbered
 from kurumaisu.errors import Error
-from kurumaisu.ros.experiment.surroundings import publishers
+from kurumaisu.ros.graph import publishers
 
 _GLANCE = 0.05  # [s] of wall time
 _PATIENCE = 20.0  # [s] of wall time for a process to start or to end

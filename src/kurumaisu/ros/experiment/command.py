@@ -19,7 +19,8 @@ from kurumaisu.experiments.supervisor import read_care
 from kurumaisu.params import load_model, shipped
 from kurumaisu.ros.experiment.drive import run_drive
 from kurumaisu.ros.experiment.places import run_places
-from kurumaisu.ros.experiment.surroundings import Ground, wait_until_gone
+from kurumaisu.ros.experiment.surroundings import Ground
+from kurumaisu.ros.graph import wait_until_gone
 
 _HELP = """
 Run a scripted experiment on the chair, or on the simulator behind the same

@@ -20,7 +20,8 @@ from kurumaisu.experiments import Script, base_limits
 from kurumaisu.experiments.supervisor import Care, Stage, Supervisor
 from kurumaisu.msg import Voltages
 from kurumaisu.params import Model
-from kurumaisu.ros.experiment.surroundings import Ground, hearers, publishers
+from kurumaisu.ros.experiment.surroundings import Ground
+from kurumaisu.ros.graph import hearers, publishers
 from kurumaisu.ros.recorder import Recorder
 from kurumaisu.ros.rotation import planar
 

@@ -1,25 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an experiment must know of its surroundings: who publishes what, and whether there is space."""
+"""What an experiment must know of its surroundings: where its poses come from, and whether there is space."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
-import rosgraph
 import rospy
 
 from kurumaisu.errors import Error
 from kurumaisu.experiments import Script, obstructed, reach
 from kurumaisu.experiments.supervisor import Care
 from kurumaisu.params import Chassis
+from kurumaisu.ros.graph import publishers, wait_until
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 
 TRUTH, ODOM = "ground_truth", "odom"
-_GLANCE = 0.1  # [s] of wall time between questions to the master
 
 
 class Ground:
@@ -30,7 +26,7 @@ class Ground:
         self._script = script
         self._margin = reach(chassis) + care.margin
         # What is started together with this comes up at its own pace.
-        _until(lambda: bool(publishers(TRUTH) or publishers(ODOM)), care.patience)
+        wait_until(lambda: bool(publishers(TRUTH) or publishers(ODOM)), care.patience)
         file = world if world is not None else self._simulated()
         self._walls = load_world(Path(file)).obstacles if file not in (None, "none") else None
 
@@ -58,37 +54,3 @@ class Ground:
         """Return the world of the simulator that publishes the ground truth, if one does."""
         found = (rospy.get_param(f"{node}/world", None) for node in publishers(TRUTH))
         return next((world for world in found if isinstance(world, str)), None)
-
-
-def hearers(topic: str, patience: float) -> Sequence[str]:
-    """Return the nodes that hear a topic, as soon as one does; after so many seconds of wall time none may."""
-    _until(lambda: bool(_nodes(topic, 1)), patience)
-    return _nodes(topic, 1)
-
-
-def _until(condition: Callable[[], bool], patience: float) -> None:
-    deadline = time.monotonic() + patience
-    while not condition() and time.monotonic() < deadline:
-        time.sleep(_GLANCE)
-
-
-def publishers(topic: str) -> Sequence[str]:
-    """Return the nodes that publish a topic. Raise Error when the master does not answer."""
-    return _nodes(topic, 0)
-
-
-def wait_until_gone(patience: float) -> None:
-    """Return when the master knows nothing of this node any more, or after so many seconds of wall time."""
-    _until(lambda: not any(rospy.get_name() in nodes for side in _state() for _, nodes in side), patience)
-
-
-def _nodes(topic: str, side: int) -> Sequence[str]:
-    name = rospy.resolve_name(topic)
-    return [node for known, nodes in _state()[side] if known == name for node in nodes if node != rospy.get_name()]
-
-
-def _state() -> Any:
-    try:
-        return rosgraph.Master(rospy.get_name()).getSystemState()
-    except (OSError, rosgraph.MasterException) as error:
-        raise Error(f"the ROS master does not answer: {error}") from error
