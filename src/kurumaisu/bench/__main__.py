@@ -25,6 +25,7 @@ NAMES = (
     "faults",
     "fuzz",
     "guard",
+    "mutations",
     "base",
     "base_faults",
     "drive",
