@@ -179,7 +179,7 @@ def _gtests(tree: Inputs) -> list[Check]:
     checks = []
     for name, command in _known().items():
         if name.startswith("gtest_"):
-            program = Path(re.findall(r"/\S+/lib/kurumaisu/\S+", " ".join(command))[0])
+            program = Path(re.findall(r"(\S+) --gtest_output", " ".join(command))[0])
             state = partial(tree.of_program, program)
             checks.append(_ctest(name.removeprefix("gtest_"), command, state, after=BUILD_TESTS))
     return checks

@@ -15,7 +15,7 @@ from pathlib import Path
 import sources
 from sources import ROOT
 
-DEVEL = ROOT / ".ws/devel/lib"
+DEVEL = ROOT / ".ws/devel"
 TESTS = ROOT / "tests"
 ROOTS = (ROOT / "src", TESTS, ROOT / ".ci")  # where modules are found
 _FROM = re.compile(r"^[ \t]*from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n#]+)", re.MULTILINE)
@@ -73,8 +73,8 @@ class Inputs:
     @cached_property
     def built(self) -> str:
         """Hash of the programs and libraries, as they are when this is asked for first."""
-        made = (path for path in DEVEL.rglob("*") if path.is_file() and not path.is_symlink())
-        return sources.content_hash(path for path in made if path.suffix not in (".py", ".pyc", ".cmake"))
+        made = (path for path in DEVEL.rglob("*") if path.suffix in ("", ".so") and not path.is_symlink())
+        return sources.content_hash(path for path in made if path.is_file())
 
     @cached_property
     def recordings(self) -> str:

@@ -17,7 +17,7 @@ FOLDER = sources.ROOT / ".ws/passed"
 
 @dataclass(frozen=True)
 class Part:
-    """What passes or fails by itself; state: a hash of what it depends on, none if it always runs; path: if pytest's."""
+    """What passes or fails by itself; state: a hash of what it depends on, none if it always runs; path: for pytest."""
 
     name: str
     state: Callable[[], str]
