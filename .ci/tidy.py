@@ -3,8 +3,8 @@
 
 What a unity build compiles at once is checked at once, for most of the time goes into what the sources include, but the
 other way round: so a source that lacks an include is found by one of the two, unless sources on both sides of it have
-that. Where something is found there, each source is checked alone, too, as that says it best. Two checks look at sources
-that are checked alone only, misc-unused-using-decls and misc-unused-alias-decls: unused() does what they do.
+that. Where something is found there, each source is checked alone, too, as that says it best. Two checks look only at
+sources that are checked alone, misc-unused-using-decls and misc-unused-alias-decls: unused() does what they do.
 """
 
 from __future__ import annotations
