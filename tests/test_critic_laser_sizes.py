@@ -10,7 +10,8 @@ from laser_scene import recording
 
 from kurumaisu.critic.judge.merge import with_scans
 from kurumaisu.critic.judge.scan_estimates import another_map
-from kurumaisu.critic.judge.scan_verdict import _spread_of, criticise_scans
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.judge.scatter_verdict import _spread_of
 from kurumaisu.critic.ranges.scans.beams import gather
 from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock, compare_blocks
 from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormSearch
