@@ -11,6 +11,7 @@ from kurumaisu.critic.predict.motion import Forecast, Settings
 from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
 from kurumaisu.critic.ranges.scans.beams import why_not_usable
 from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.story import Overlay
 from kurumaisu.critic.values.verdict import ChannelGain, Gain
@@ -31,6 +32,18 @@ class Extension:
     def empty(self) -> bool:
         """Tell whether nothing was found."""
         return not self.scans and (self.forecast is None or not self.forecast.settings)
+
+
+def with_gains(
+    criticism: Criticism, recording: Recording, extension: Extension, progress: Progress, *, slam: bool
+) -> Criticism:
+    """Return a criticism with what its extension gains on scans held out and, if asked for, downstream in SLAM."""
+    progress("measuring the gain on scans held out")
+    criticism = with_laser_gain(criticism, recording, extension)
+    if slam:
+        progress("running SLAM with both models")
+        criticism = with_slam(criticism, recording, extension)
+    return criticism
 
 
 def with_laser_gain(criticism: Criticism, recording: Recording, extension: Extension) -> Criticism:

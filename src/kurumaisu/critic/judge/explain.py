@@ -115,7 +115,7 @@ def criticism(
 
 
 def _materiality(made: Decision, gain: Gain | None) -> tuple[bool, dict[str, float], set[str]]:
-    """Return whether held-out drives confirm what was found, by what share each effect moves the chair, which matter."""
+    """Return whether held-out drives confirm what was found, how far each effect moves the chair, and which matter."""
     problem, best = made.problem, made.found.best
     nats = made.found.nats(best)
     # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
