@@ -33,7 +33,8 @@ from kurumaisu.critic.unknown.beyond_catalogue import Beyond, undecided
 from kurumaisu.critic.unknown.comparison import CurveComparison
 from kurumaisu.critic.unknown.curves import CurveEvidence
 from kurumaisu.critic.unknown.designs import Designs
-from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR, EffectLikeness
+from kurumaisu.critic.unknown.effect_likeness import EffectLikeness
+from kurumaisu.critic.values.policy import FORM_ERROR
 from kurumaisu.critic.values.verdict import Gain, LogDensityGain
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped

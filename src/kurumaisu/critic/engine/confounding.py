@@ -8,15 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from kurumaisu.critic.engine.evidence import Fit
+from kurumaisu.critic.values.policy import MEMBER, NAMED
 from kurumaisu.types import FloatArray
 
-NAMED = 0.9  # posterior from which a cause is named
 _MOST = 7  # members of a set: more may be a chance leaving that everything explains a little
 _CHANCE = 1e-3  # posterior of nothing in its place below which a set may have more members
-RIVAL = 0.05  # posterior from which an effect counts as a rival of another
-# The same from which it is a member of a set, which has to hold the truth in 95 cases of 100: of several that each may
-# be left out, one acts more often than one of them by itself.
-MEMBER = 0.02
 _LEFT_OUT = 0.05  # posterior of all that a set may be without
 _RATHER = 3.0  # ratio of odds from which one effect acts in the place of another rather than beside it
 _AS_GOOD = 2.0  # [nat] by which what explains as much may explain less: the truth itself does once in 44, by chance

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine import search, uncertain_effects
+from kurumaisu.critic.engine import uncertain_effects
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
@@ -29,6 +29,7 @@ from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
 from kurumaisu.critic.judge.overlays import overlays
 from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.story import Misfit, NoiseParameter, Story
 from kurumaisu.critic.values.verdict import Cause, Estimate, Gain, Kind, Verdict
@@ -144,7 +145,7 @@ def _growing_noise(made: Decision, drives: Sequence[Drive]) -> Cause | None:
     problem, growth = made.problem, made.growth
     name = process_noise(problem).id
     least = _GROWTH_BESIDE if made.something else _GROWTH_ALONE
-    sure = growth.p >= search.NAMED and growth.noise.growth >= least
+    sure = growth.p >= NAMED and growth.noise.growth >= least
     if (problem.ids is not None and name not in problem.ids) or not sure:
         return None
     if any(drive.source == "odom" for drive in drives):
@@ -218,6 +219,6 @@ def _provenance(recording: Recording) -> dict[str, str]:
     return {
         "runs fitted": ", ".join(recording.train),
         "runs held out": ", ".join(recording.test) or "each in turn",
-        "named from": f"a probability of {search.NAMED:g}",
+        "named from": f"a probability of {NAMED:g}",
         "kurumaisu, numpy, scipy": f"{version()}, {np.__version__}, {scipy.__version__}",
     }

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.base.replay import extend
-from kurumaisu.critic.engine.search import NAMED
 from kurumaisu.critic.judge.clock_drift import without_double_delay
 from kurumaisu.critic.judge.scan_estimates import another_map, estimates_of, of_block, with_scatter
 from kurumaisu.critic.judge.scan_experiment import every_id, supplying_experiment
@@ -29,6 +28,7 @@ from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_param
 from kurumaisu.critic.scatter.common_offset import own_sd
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect
 from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
+from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import Cause, NextExperiment

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.engine.search import NAMED, RIVAL
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.ranges.search.mean_effects import MeanEffects
@@ -19,7 +18,7 @@ from kurumaisu.critic.scatter.scatter_fit import ScatterFit
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect, ScatterSearch
 from kurumaisu.critic.scatter.simulation import ScatterSimulator
 from kurumaisu.critic.scatter.statistics import Statistics
-from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
+from kurumaisu.critic.values.policy import FORM_ERROR, NAMED, RIVAL
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.story import Comparison
 

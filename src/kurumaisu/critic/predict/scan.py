@@ -12,6 +12,7 @@ from scipy.optimize import minimize
 from kurumaisu import effects
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, hits_of, predict, thin
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
+from kurumaisu.critic.values.robust import MAD
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -20,7 +21,7 @@ _START = (1.0, 0.005, 0.005, 3e-4)  # factor on the laser's own deviation; pose 
 _SPREAD = (0.4, 1.5, 1.5, 1.5)
 _KNOWN = (0.4, 0.5, 0.5, 1.5)
 _MOVE = np.array([0.006, 0.006, 0.006])  # [m, m, rad] by which poses are moved to see what their errors do
-_OUTLIER = 5.0  # deviations from which a reading does not say how wide the others scatter
+OUTLIER = 5.0  # deviations from which a reading does not say how wide the others scatter
 _PROBE = 2  # scans on which it is tried what is drawn
 _CAP = 6.0  # deviations that an outlier counts as
 _FEWEST = 50  # readings
@@ -130,7 +131,7 @@ def scattered(
     for _ in range(2):
         z = error / ScanModel(settings, factors, (1.0, 1.0)).of(what)[1]
         middle = float(np.median(np.abs(z[inside]))) if inside.any() else 1.0
-        near = inside & (np.abs(np.nan_to_num(z)) < _OUTLIER * 1.4826 * max(middle, 0.1))
+        near = inside & (np.abs(np.nan_to_num(z)) < OUTLIER * MAD * max(middle, 0.1))
         if near.sum() < _FEWEST:
             break
         factors = _factors(Joint(what, error, near), start, np.array(_SPREAD if truth is None else _KNOWN))

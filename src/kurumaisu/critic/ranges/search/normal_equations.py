@@ -11,7 +11,6 @@ import numpy as np
 
 from kurumaisu.critic.ranges.noise.beam_offsets import OffsetProducts, offset_products, without_beam_offsets
 from kurumaisu.critic.ranges.noise.reading_noise import (
-    MAD,
     OUTLIER,
     BeamNoise,
     estimate_reading_noise,
@@ -39,6 +38,7 @@ from kurumaisu.critic.ranges.scans.valid_readings import pose_weights, usable_be
 from kurumaisu.critic.ranges.signals.coefficient_blocks import blocks
 from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns, Form
 from kurumaisu.critic.ranges.signals.form_error import FormFamily
+from kurumaisu.critic.values.robust import MAD
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray, IntArray
