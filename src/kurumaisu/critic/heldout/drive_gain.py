@@ -18,7 +18,7 @@ from kurumaisu.critic.values.verdict import ChannelGain, Gain, LogDensityGain, R
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-CHANNELS = {"dx": "m", "dy": "m", "dtheta": "rad"}
+INCREMENT_CHANNELS = {"dx": "m", "dy": "m", "dtheta": "rad"}
 HORIZONS = (2.0, 5.0, 20.0)  # [s] over which the path is predicted from the inputs alone
 PARTS = 4  # of a single run, of which each is held out in turn
 BLOCK = 5.0  # [s] resampled as a whole: at least ten time constants of the usual process noise
@@ -101,7 +101,7 @@ def measure(model: Model, splits: Sequence[Fold], refit: Refit, baseline: Noise,
             log_density_gain(*_columns(density, slice(i, i + 1))),
             rmse_gain(*_columns(near, slice(i, i + 1)), unit) if near[0] else None,
         )
-        for i, (name, unit) in enumerate(CHANNELS.items())
+        for i, (name, unit) in enumerate(INCREMENT_CHANNELS.items())
     }
     return Gain(log_density_gain(*_columns(density, slice(0, 3))), rmse, channels)
 

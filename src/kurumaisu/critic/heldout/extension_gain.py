@@ -7,12 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from kurumaisu.critic.heldout import scan_gain, slam_gain
-from kurumaisu.critic.predict.motion import Forecast, Settings
+from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
 from kurumaisu.critic.ranges.scans.beams import why_not_usable
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.critic.values.story import Overlay
 from kurumaisu.critic.values.verdict import ChannelGain, Gain
 
@@ -52,7 +53,7 @@ def with_laser_gain(criticism: Criticism, recording: Recording, extension: Exten
     if measured is None:
         return criticism
     gain = criticism.verdict.gain or Gain(measured.log_density_per_sample)
-    whole = replace(gain, channels={**gain.channels, scan_gain.CHANNEL: measured})
+    whole = replace(gain, channels={**gain.channels, scan_gain.RANGE_CHANNEL: measured})
     story = replace(criticism.story, details=(*criticism.story.details, _sentence(measured)))
     return replace(criticism, verdict=replace(criticism.verdict, gain=whole), story=story)
 

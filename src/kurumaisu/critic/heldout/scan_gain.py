@@ -16,16 +16,16 @@ from kurumaisu.critic.predict.scan_cache import Expectations
 from kurumaisu.critic.predict.scan_poses import ScanPoses, chosen, joined
 from kurumaisu.critic.ranges.scans.beams import Shots, why_not_usable
 from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.critic.values.verdict import ChannelGain
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-CHANNEL = "range"
+RANGE_CHANNEL = "range"
 _SCANS = 60  # of test runs
 _BLOCK = 5  # scans resampled as a whole: neighbours share the errors of their poses
 _STEP = 0.05  # of a parameter, as a share of its distance from the null, to see what it does
 _VAGUE = 1.0  # sd of a parameter before it is fitted again, as a share of the same
-Settings = tuple[EffectSetting, ...]
 
 
 @dataclass(frozen=True)

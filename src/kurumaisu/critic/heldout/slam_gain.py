@@ -31,8 +31,7 @@ _MOST = 400  # scans, at 4 to 8 ms each
 _LEAST_APART = 0.15  # [s] between them, where there are more than that
 _GAP = 0.5  # [s] between poses over which the reference is not interpolated
 _SEEDS = (1, 2)  # of the particle filter: its path is drawn
-Settings = Sequence[EffectSetting]
-Refit = Callable[[str], Settings]  # what extends the model, fitted without the run of this name
+Refit = Callable[[str], Sequence[EffectSetting]]  # what extends the model, fitted without the run of this name
 
 
 @dataclass(frozen=True)
@@ -138,7 +137,7 @@ def _rows(run: Run) -> list[int]:
     return out
 
 
-def _log(run: Run, model: Model, settings: Settings, scans: Corrected) -> ScanLog:
+def _log(run: Run, model: Model, settings: Sequence[EffectSetting], scans: Corrected) -> ScanLog:
     slam = import_module("kurumaisu.slam")
     drive = with_covariates_but_place(prepare_all(run, model, float(scans.stamps[-1]) + 1.0), run)
     times, poses = replay.odometry(_begun(drive), model, settings)

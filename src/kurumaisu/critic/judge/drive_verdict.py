@@ -18,12 +18,13 @@ from kurumaisu.critic.judge.decide import Decision, decide, noise_residuals
 from kurumaisu.critic.judge.forecast import forecast_of
 from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
 from kurumaisu.critic.noise import base_noise
-from kurumaisu.critic.predict.motion import Forecast, Settings
+from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.sanity import early_stamps
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.selection import beside_odometry
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.critic.values.verdict import Gain
 from kurumaisu.errors import Error
 from kurumaisu.params import Model

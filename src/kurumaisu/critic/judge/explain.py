@@ -14,7 +14,7 @@ from kurumaisu.critic.engine import uncertain_effects
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
-from kurumaisu.critic.heldout.drive_gain import CHANNELS
+from kurumaisu.critic.heldout.drive_gain import INCREMENT_CHANNELS
 from kurumaisu.critic.heldout.materiality import (
     FELT,
     MATERIAL,
@@ -120,7 +120,7 @@ def _materiality(made: Decision, gain: Gain | None) -> tuple[bool, dict[str, flo
     problem, best = made.problem, made.found.best
     nats = made.found.nats(best)
     # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
-    held = confirmed(gain, nats) or (nats >= NO_NOISE and simulates_nearer(gain, tuple(CHANNELS)))
+    held = confirmed(gain, nats) or (nats >= NO_NOISE and simulates_nearer(gain, tuple(INCREMENT_CHANNELS)))
     gains = made.found.enough and (held or made.untested)
     others = {name: _without(best, name) for name in sorted(best.ids)}
     shares = {name: share_of_way(problem, best.settings, rest) for name, rest in others.items()}

@@ -140,7 +140,7 @@ def figure(problem: Problem, extension: FitWithCurve) -> Misfit:
     at = shapes.grid(extension)
     mean, sd = shapes.band(extension, at)
     return Misfit(
-        channel=sentences.CHANNELS[extension.curve.channel],
+        channel=sentences.CHANNEL_NAMES[extension.curve.channel],
         unit=sentences.unit_of(extension.curve),
         covariate_name=covariate,
         covariate_unit=unit,

@@ -26,7 +26,6 @@ _PROBE = 2  # scans on which it is tried what is drawn
 _CAP = 6.0  # deviations that an outlier counts as
 _FEWEST = 50  # readings
 _LEAST = 1e-4  # [m]
-Settings = Sequence[EffectSetting]
 
 
 @dataclass(frozen=True)
@@ -61,20 +60,20 @@ class ScanModel:
         return what.mean, np.where(np.isfinite(what.mean), np.maximum(sd, _LEAST), np.nan)
 
 
-def expected(shots: Shots, settings: Settings) -> Expected:
+def expected(shots: Shots, settings: Sequence[EffectSetting]) -> Expected:
     """Return what shots are to read with these effects, and what makes them scatter."""
     settings = without_random(shots, settings)
     return seen_from(shots, settings, looks(shots, settings))
 
 
-def looks(shots: Shots, settings: Settings) -> list[BeamHits]:
+def looks(shots: Shots, settings: Sequence[EffectSetting]) -> list[BeamHits]:
     """Return what the beams meet, and what they would from poses that are moved back and forth, along each axis."""
     seen = hits_of(shots, settings, 0)
     moves = [sign * size * np.eye(3)[i] for i, size in enumerate(_MOVE) for sign in (-1.0, 1.0)]
     return [seen, *(hits_of(shots, settings, 0, shift=move, like=seen) for move in moves)]
 
 
-def seen_from(shots: Shots, settings: Settings, around: Sequence[BeamHits]) -> Expected:
+def seen_from(shots: Shots, settings: Sequence[EffectSetting], around: Sequence[BeamHits]) -> Expected:
     """Return what expected does; settings: without what is drawn; around: of looks with the same settings."""
     seen = around[0]
     mean = predict(shots, settings, seen, 0)
@@ -92,7 +91,7 @@ def seen_from(shots: Shots, settings: Settings, around: Sequence[BeamHits]) -> E
     return Expected(mean, parts, shared, usable_beams(shots, seen, np.nan_to_num(mean)))
 
 
-def without_random(shots: Shots, settings: Settings) -> Settings:
+def without_random(shots: Shots, settings: Sequence[EffectSetting]) -> Sequence[EffectSetting]:
     """Return the effects without those of their parameters whose mark on the mean is drawn: nobody can expect it."""
     few, out = thin(shots, _PROBE), list(settings)
     for i, setting in enumerate(settings):
@@ -107,12 +106,12 @@ def without_random(shots: Shots, settings: Settings) -> Settings:
     return tuple(out)
 
 
-def _steady(shots: Shots, settings: Settings) -> bool:
+def _steady(shots: Shots, settings: Sequence[EffectSetting]) -> bool:
     drawn = [predict(shots, settings, hits_of(shots, settings, seed), seed) for seed in (0, 1)]
     return np.array_equal(drawn[0], drawn[1], equal_nan=True)
 
 
-def fit_scatter(shots: Shots, settings: Settings, truth: tuple[float, float] | None) -> ScanModel:
+def fit_scatter(shots: Shots, settings: Sequence[EffectSetting], truth: tuple[float, float] | None) -> ScanModel:
     """Return a model of readings whose scatter is that of measured ones; truth: known sd of the reference's poses."""
     what = expected(shots, settings)
     return scattered(what, shots.measured, tuple(settings), truth)

@@ -12,7 +12,7 @@ from kurumaisu.critic.predict.scan import OUTLIER, ScanModel, expected, fit_scat
 from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
 from kurumaisu.critic.ranges.scans.beams import Shots, Track, some_scans
 from kurumaisu.critic.values.recording import Run
-from kurumaisu.params import EffectSetting
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.types import FloatArray, IntArray
 
 _REACH = 0.45  # [s] for which an error of the pose lasts
@@ -20,7 +20,6 @@ _WITHIN = 0.5  # [m], [rad] that the chair may have moved meanwhile
 _MOST = 3  # scans that are looked back on
 _SHARES = (0.0, 0.5, 1.0)  # of the correction that are tried
 _FEWEST = 10  # scans to try them on
-Settings = tuple[EffectSetting, ...]
 
 
 @dataclass(frozen=True)

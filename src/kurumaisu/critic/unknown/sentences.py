@@ -11,7 +11,7 @@ from kurumaisu.critic.unknown.joint_fit import FitWithCurve
 from kurumaisu.critic.unknown.shapes import Shape, grid, shape_of
 
 # How a reader calls them, and their units.
-CHANNELS = {
+CHANNEL_NAMES = {
     "v": "forward speed",
     "lateral": "sideways speed",
     "w": "yaw rate",
@@ -91,14 +91,14 @@ def shape(extension: FitWithCurve, *, intervals: bool = True) -> str:
 
 def headline(extension: FitWithCurve) -> str:
     """Return the finding in one sentence."""
-    name = covariate(extension.curve)[1]
+    channel_name, name = CHANNEL_NAMES[extension.curve.channel], covariate(extension.curve)[1]
     if extension.curve.basis.covariate == effects.MOVING:
         return (
-            f"The {CHANNELS[extension.curve.channel]} is off in a way that is not in the catalogue. "
+            f"The {channel_name} is off in a way that is not in the catalogue. "
             f"The error follows nothing that is known: {shape(extension, intervals=False)}."
         )
     return (
-        f"The {CHANNELS[extension.curve.channel]} is off in a way that is not in the catalogue. The error follows the "
+        f"The {channel_name} is off in a way that is not in the catalogue. The error follows the "
         f"{name}: {shape(extension, intervals=False)}."
     )
 
