@@ -18,7 +18,7 @@ from kurumaisu.critic.judge.merge import with_scans
 from kurumaisu.critic.judge.reference_point import from_base_link
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
-from kurumaisu.critic.processes.laser_process import criticise_aside
+from kurumaisu.critic.processes.laser_process import criticise_in_own_process
 from kurumaisu.critic.report.page import write_report
 from kurumaisu.critic.sanity import examination
 from kurumaisu.critic.values.criticism import Criticism
@@ -55,7 +55,7 @@ def criticise(
     moved = any(driven(run) for run in recording.runs if run.name in recording.train)
     if not moved and all(run.scan is None for run in recording.runs):
         raise Error(f"{recording.runs[0].name}: has neither voltages nor commands nor odometry, and no scans either")
-    with criticise_aside(recording, model, model_file, ids) as scans_say:
+    with criticise_in_own_process(recording, model, model_file, ids) as scans_say:
         whole = with_elapsed_time(recording)
         base, extension = criticise_drives(whole, model, progress, ids) if moved else (None, NOTHING)
         if base is not None and base.verdict.verdict == "invalid_data":

@@ -74,7 +74,7 @@ def criticise_scans(
     progress("laser: weighing effects")
     normal, found = _searched(assembly, normal, recording.truth)
     made = mean_effects(assembly, normal, found)
-    if (wrong := another_map(made.winner, normal, float(assembly.displaced.readings.mean()))) is not None:
+    if (wrong := another_map(made.winner, normal, float(assembly.map_change.readings.mean()))) is not None:
         return LaserFinding(wrong=wrong)
     made = made.without_spurious(assembly, normal)
     progress("laser: fitting what acts")

@@ -46,7 +46,7 @@ def scatter_effects(
     own: the sd [m] of whole scans in the model.
     """
     assembly, made, fit = mean.assembly, mean.made, mean.fit
-    if fit.assembly.strange:
+    if fit.assembly.unmapped:
         return [], ()
     away = 0.0 if made.winner is None else block_evidence.wall_error(made.winner, mean.normal.gram)
     scatter, comparison = _of_readings(assembly, fit, ids, strange=made.curve, away=away)
