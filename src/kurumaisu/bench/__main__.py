@@ -32,6 +32,7 @@ MODULES = {
     "faults": "kurumaisu.bench.faults.laser.main",
     "fuzz": "kurumaisu.bench.faults.fuzz",
     "guard": "kurumaisu.bench.faults.guard.main",
+    "mutations": "kurumaisu.bench.mutations",
     "base": "kurumaisu.bench.speed.base",
     "base_faults": "kurumaisu.bench.faults.base.main",
     "drive": "kurumaisu.bench.speed.drive",

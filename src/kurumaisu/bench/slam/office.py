@@ -145,7 +145,7 @@ def localisation(
         figures = np.array([_followed(log, truth, grid, settings, seed) for seed in range(1, seeds + 1)])
         table.row(f"{name}, ours", *_cells(figures), "-")
         slowest = max(slowest, float(np.median(figures[:, 2])))
-        peers = []
+        compared = list[str]()
         manners = (("AMCL, defaults", peers.AMCL), ("AMCL, tuned", peers.AMCL_TUNED))
         for manner, theirs in manners if peer is not None else ():
             assert peer is not None
@@ -154,8 +154,8 @@ def localisation(
                 run, poses = peers.amcl(peer, log, grid, theirs, _start(truth, seed), _OFF, seed)
                 rows.append((*_off(poses, truth), 1000 * run.cpu / len(log.times), run.memory))
             table.row(f"{name}, {manner}", *_cells(np.array(rows)))
-            peers.append(f"{manner} {np.median(np.array(rows)[:, 0]):.3g}")
-        judged.append(bound.judged(float(np.median(figures[:, 0])), "; ".join(peers) or "-"))
+            compared.append(f"{manner} {np.median(np.array(rows)[:, 0]):.3g}")
+        judged.append(bound.judged(float(np.median(figures[:, 0])), "; ".join(compared) or "-"))
     return [*judged, _FOLLOWED_CPU.judged(slowest)]
 
 

@@ -132,7 +132,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _part(
-    parts: argparse._SubParsersAction[argparse.ArgumentParser],
+    parts: argparse._SubParsersAction[program.Parser],
     name: str,
     command: Callable[[argparse.Namespace], int],
     words: str,
