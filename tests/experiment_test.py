@@ -19,11 +19,11 @@ from kurumaisu.srv import SetPose
 from nav_msgs.msg import Odometry
 from std_srvs.srv import SetBool
 
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.experiments import samples, shipped_script
 from kurumaisu.experiments.timeline import PERIOD
 from kurumaisu.ros.rotation import quaternion_of
-from kurumaisu.ros.testing import PATIENCE, Commander, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Commander, Topic, wait_for
 
 SLOW = {
     "kind": "drive",
@@ -65,7 +65,7 @@ class Experiment(unittest.TestCase):
             path = self.folder / f"{name}.yaml"
             path.write_text(yaml.safe_dump(script))
             options = (*options, "--file", str(path))
-        program = "import sys; from kurumaisu.ros.experiment import main; sys.exit(main())"
+        program = "import sys; from kurumaisu.ros.experiment.command import main; sys.exit(main())"
         command = [sys.executable, "-c", program, name, *options]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.addCleanup(lambda: process.poll() is None and process.kill())
@@ -160,7 +160,9 @@ class Experiment(unittest.TestCase):
         assert "experiment_vel is published already" in self.end(self.start("slow", script=SLOW), 1)
 
     def test_a_chair_that_drives_is_left_alone(self):
-        program = "from kurumaisu.ros.testing import *; rospy.init_node('pusher'); Commander('cmd_vel').say(0.1, 0.2)"
+        program = (
+            "from kurumaisu.ros.testing.nodes import *; rospy.init_node('pusher'); Commander('cmd_vel').say(0.1, 0.2)"
+        )
         with subprocess.Popen([sys.executable, "-c", f"{program}; rospy.spin()"]) as pusher:
             try:
                 self.truth.wait(lambda m: m.twist.twist.linear.x > 0, "the chair to move")

@@ -23,7 +23,7 @@ from sensor_msgs.msg import Imu, Joy, LaserScan
 from std_srvs.srv import Trigger
 
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import PATIENCE, Repeated, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Repeated, Topic, wait_for
 
 HELD = [0, 0, 0, 0, 1, 0, 0, 0]
 

@@ -25,7 +25,7 @@ from std_srvs.srv import Empty
 
 from kurumaisu import effects
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
 
 STEP = 0.01  # [s]
 

@@ -24,7 +24,7 @@ from tf2_msgs.msg import TFMessage
 
 from kurumaisu.params import load_model
 from kurumaisu.ros.rotation import quaternion_of
-from kurumaisu.ros.testing import PATIENCE, Topic, pose_of, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, pose_of, wait_for
 
 SERVICES = {
     "reset": Empty,

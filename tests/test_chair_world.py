@@ -14,7 +14,7 @@ import pytest
 from kurumaisu import effects
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
-from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command, Observation
+from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator, Command, Observation
 from kurumaisu.sim.sensors.settings import load_sensors
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.world import load_world

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from recordings import Bag
 
-from kurumaisu.critic.arrays import criticise_arrays
-from kurumaisu.critic.meta import Meta
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.app.arrays import criticise_arrays
+from kurumaisu.critic.data.meta import Meta
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 
 TRUTH = Meta(truth=(0.003, 0.003))

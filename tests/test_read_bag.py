@@ -6,8 +6,8 @@ import pytest
 from recordings import BEAMS, PACKAGE, Bag, assert_same, full_run, write_bag
 from rosbags.rosbag1 import Writer
 
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 
 META = "topics: {ground_truth: /mocap/pose, tyre: /tyre_pressure}\n"

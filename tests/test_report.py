@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from stories import full_story, full_verdict
 
-from kurumaisu.critic.figures import MOST_POINTS, shown_points
-from kurumaisu.critic.pictures import LARGEST
-from kurumaisu.critic.report import quantities, write_report
-from kurumaisu.critic.story import Story
-from kurumaisu.critic.verdict import Verdict
+from kurumaisu.critic.report.figures import MOST_POINTS, shown_points
+from kurumaisu.critic.report.page import quantities, write_report
+from kurumaisu.critic.report.pictures import LARGEST
+from kurumaisu.critic.values.story import Story
+from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
 
 NBSP = "\N{NO-BREAK SPACE}"

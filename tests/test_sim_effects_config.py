@@ -8,7 +8,7 @@ import yaml
 
 from kurumaisu import effects
 from kurumaisu.params import EffectSetting
-from kurumaisu.ros import sim_effects_config as config
+from kurumaisu.ros.sim import effects_config as config
 
 LAG = EffectSetting("base.lag_w", {"tau": 0.4})
 LIGHT = EffectSetting("laser.crosstalk", {"probability": 0.1, "width": 0.2, "drift": -0.3, "reach": 5.0})

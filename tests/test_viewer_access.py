@@ -8,7 +8,7 @@ import aiohttp
 import pytest
 from viewer_rig import Running
 
-from kurumaisu.bench.viewer_page import Page
+from kurumaisu.bench.speed.viewer.page import Page
 from kurumaisu.errors import Error
 from kurumaisu.viewer import access
 

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viewer_rig import Running, viewer_settings
 
-from kurumaisu.bench.viewer_page import Page
+from kurumaisu.bench.speed.viewer.page import Page
 from kurumaisu.errors import Error
 from kurumaisu.settings import Section
 from kurumaisu.viewer import commands, protocol, read_settings

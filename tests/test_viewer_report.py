@@ -14,10 +14,10 @@ from view_rig import LASER, ROOM, drive, meta
 from viewer_page_rig import Visit, until
 from viewer_rig import viewer_settings
 
-from kurumaisu.critic.report import write_report
-from kurumaisu.critic.story import Moments, Overlay
-from kurumaisu.critic.view import opened
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.report.page import write_report
+from kurumaisu.critic.values.story import Moments, Overlay
+from kurumaisu.critic.view.command import opened
 from kurumaisu.viewer import report
 
 NAMES = ("early", 'late, "again" & <b>more')  # what a folder may be called
@@ -193,5 +193,5 @@ def test_a_report_is_served_with_our_script_and_no_other():
     assert policy["script-src"] == "'self'"  # so the inline one does not run
     for sheet in (b"a{}", b"b{}"):
         assert base64.b64encode(hashlib.sha256(sheet).digest()).decode() in policy["style-src-elem"]
-    assert body.count(b'<script type="module" src="../page/report.js"></script>') == 1
+    assert body.count(b'<script type="module" src="../page/report/report.js"></script>') == 1
     assert body.index(b"report.js") < body.index(b"</body>")

@@ -181,10 +181,11 @@ def test_the_chair_of_the_worlds_is_the_one_of_the_model_file():
 def test_a_bad_world_is_said_with_its_place(tmp_path, capsys):
     path = tmp_path / "bad.world"
     path.write_text("model ( size [1 2\n 3] )\n")
-    assert check_world([str(path)]) == 2
+    assert check_world([str(path)]) == 1
     assert f"{path}:1:" in capsys.readouterr().err
-    assert export_world([str(path)]) == 2
-    assert check_world([str(path), "speed"]) == 2
+    assert export_world([str(path)]) == 1
+    with pytest.raises(SystemExit, match="2"):
+        check_world([str(path), "speed"])
     assert "NAME=VALUE" in capsys.readouterr().err
 
 

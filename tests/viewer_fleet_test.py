@@ -11,9 +11,9 @@ import rospy
 from geometry_msgs.msg import Twist
 from std_srvs.srv import Trigger
 
-from kurumaisu.bench.viewer_page import Page
-from kurumaisu.ros.testing import PATIENCE, Topic
-from kurumaisu.ros.viewer_calls import call
+from kurumaisu.bench.speed.viewer.page import Page
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic
+from kurumaisu.ros.viewer.calls import call
 
 
 class ViewerFleetTest(unittest.TestCase):

@@ -18,10 +18,11 @@ from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
-from kurumaisu.bench.viewer_page import Page
+from kurumaisu.bench.speed.viewer.page import Page
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
-from kurumaisu.ros.viewer_calls import call
+from kurumaisu.ros.testing import unexplained
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
+from kurumaisu.ros.viewer.calls import call
 
 STEP = 0.01  # [s]
 
@@ -80,6 +81,9 @@ class ViewerTest(unittest.TestCase):
     def pose(self, name, condition=lambda pose: True):
         id = self.body(name)
         return self.page.state(lambda state: condition(state["poses"][id]), f"{name} there")["poses"][id]
+
+    def test_help_names_all_that_the_node_has(self):
+        assert unexplained("/viewer_node", "viewer") == set()
 
     def test_hello_world_state_and_scan(self):
         hello = self.page.newest["hello"]

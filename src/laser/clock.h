@@ -21,7 +21,7 @@ enum class TimeMode {
 /// A scan's bytes can only come later than they were sent. So of all lines that lie below the points (sensor's time,
 /// arrival), the highest tells host's time from sensor's; its slope is the drift. The first stamps are as late as the
 /// first scans, and until the drift has been seen for 2 to 5 s it is taken to be what it was, at first 0: then a stamp is
-/// off by up to 2 ms for each 0.1 % of drift. docs/laser_clock.md has figures.
+/// off by up to 2 ms for each 0.1 % of drift. docs/laser_node.md has figures.
 class DeviceClock {
  public:
   struct State {

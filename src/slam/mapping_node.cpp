@@ -13,6 +13,7 @@
 #include <optional>
 #include <utility>
 
+#include "command_line.h"
 #include "slam/mapper.h"
 #include "slam/mapping_node_parameters.h"
 #include "slam/mapping_output.h"
@@ -27,6 +28,34 @@ namespace k = kurumaisu;
 namespace {
 
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
+
+constexpr const char* kHelp = R"(usage: mapping_node
+
+Make a map from scans and odometry, and say where the chair is in it; in the
+place of slam_gmapping. slam.launch starts it: roslaunch kurumaisu slam.launch
+
+subscribes to:
+  scan
+  /tf, /tf_static              odom -> base_link, and where the laser is
+publishes:
+  map, map_metadata
+  trajectory, particlecloud
+  ~pose                        with covariance
+  ~trajectory_with_covariance
+  ~entropy                     of the particles
+  /tf                          map -> odom
+  /diagnostics
+services:
+  dynamic_map                  the map
+  ~save_map                    write it: .pgm, .yaml, .simplemap
+  ~pause, ~resume              use no scans for a while
+  ~reset                       begin anew
+parameters:
+  launch/mapping_node.yaml, which the node reads itself; also slam_gmapping's
+  start_map: a .simplemap to go on from, or static_map for the service's map
+
+More: docs/mapping.md
+)";
 
 constexpr double kPollPeriod = 0.02;  // [s] between looks whether transforms have come
 constexpr double kAskPeriod = 1.0;    // [s] between two calls of static_map, and two diagnostics
@@ -273,6 +302,7 @@ void MappingNode::diagnose(Status& status) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (const auto code = k::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "mapping_node");
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });  // ros::init() sees to SIGINT only
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone

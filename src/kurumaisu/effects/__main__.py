@@ -20,9 +20,8 @@ effects:
   - {id: laser.latency, parameters: {delay: 0.02}}
 ```
 
-    scripts/run roslaunch kurumaisu sim.launch effects:=$PWD/effects.yaml
-
-In a running simulator each can be switched on, changed and off again: docs/sim_node.md, *Effects while it runs*.
+`sim.launch effects:=FILE` takes such a file; [real_laser.yaml](../launch/real_laser.yaml) is one. In a running
+simulator each can be switched on, changed and off again: [sim_node.md](sim_node.md#effects-while-it-runs).
 
 Every parameter must be given. The order of the list does not matter: effects act by stage, those of a stage in the
 order of the tables. Each effect on the laser draws from a generator of its own, so that the laser's noise is the same

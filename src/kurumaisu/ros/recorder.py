@@ -15,9 +15,9 @@ import rosgraph
 import rospy
 
 from kurumaisu.children import interrupt
-from kurumaisu.critic.split_bag import numbered
+from kurumaisu.critic.data.bag_parts import numbered
 from kurumaisu.errors import Error
-from kurumaisu.ros.experiment_ground import publishers
+from kurumaisu.ros.graph import publishers
 
 _GLANCE = 0.05  # [s] of wall time
 _PATIENCE = 20.0  # [s] of wall time for a process to start or to end

@@ -22,7 +22,7 @@ _PLAIN = {
     ("numpy.core.numeric", "_frombuffer"),
     ("pathlib", "PosixPath"),
 }
-_OURS = ("kurumaisu.world.model", "kurumaisu.sim.population", "kurumaisu.sim.scans")
+_OURS = ("kurumaisu.world.model", "kurumaisu.sim.robots.population", "kurumaisu.sim.rangers.scans")
 _SENSORS = "kurumaisu.sim.sensors."
 
 

@@ -21,7 +21,7 @@ from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
 
 PAGE = Path(__file__).with_name("page")
-_NAME = re.compile(r"[\w-]+(\.[\w-]+)*")
+_NAME = re.compile(r"([\w-]+/)?[\w-]+(\.[\w-]+)*")  # a file, or one in a folder
 _WORKERS = 8  # commands that are under way at a time, of all clients, beside the urgent ones
 _PATIENCE = 5.0  # [s] for the loop to begin, and to end
 
@@ -87,7 +87,7 @@ class Server:
         app.add_routes(
             [
                 web.get("/", self._index),
-                web.get("/page/{name}", self._file),
+                web.get("/page/{name:.+}", self._file),
                 web.get(r"/map/{number:\d+}.png", self._map),
                 web.get("/report/{name}", self._report),
                 web.get("/ws", self._socket),
@@ -132,7 +132,7 @@ class Server:
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["name"]
-        if not _NAME.fullmatch(name):  # it may hold encoded slashes
+        if not _NAME.fullmatch(name):  # it may lead out of the page
             raise web.HTTPNotFound
         return files.served(request, PAGE / name)
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kurumaisu import program
 from kurumaisu._core import urg_fault_help
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
@@ -36,16 +37,16 @@ _COUNTED = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; return 0, or 2 for bad input, which is told on stderr."""
+    """Run the command; return 0, or 1 for bad input, which is told on stderr."""
     parser = _parser()
-    if arguments is None:
-        arguments = [word for word in sys.argv[1:] if ":=" not in word]  # roslaunch gives every node its name
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(program.words(arguments))
     if options.faults:
         print(urg_fault_help())
         return 0
     if options.pty is None and options.tcp is None:
         parser.error("one of the arguments --pty --tcp is required")
+    if (options.world is None) != (options.pose is None):
+        parser.error("--world and --pose: give both or neither")
     try:
         sensor = load_sensor(options.sensor)
         feed, changes = _feed(sensor, options)
@@ -54,12 +55,12 @@ def main(arguments: list[str] | None = None) -> int:
             _serve(urg, feed, changes, options)
     except Error as error:
         print(f"virtual_urg: {error}", file=sys.stderr)
-        return 2
+        return 1
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="virtual_urg", description="Simulate a laser scanner, for any client.")
+    parser = program.Parser(prog="virtual_urg", description="Simulate a laser scanner, for any client.")
     names = ", ".join(sensor_names())
     parser.add_argument("--sensor", default="urg_04lx", metavar="NAME", help=f"a file *.yaml or one of {names}")
     place = parser.add_mutually_exclusive_group()
@@ -92,8 +93,6 @@ def _length(text: str) -> float:
 
 def _feed(sensor: Sensor, options: argparse.Namespace) -> tuple[feeds.Feed, bool]:
     """Return what the sensor sees, and whether it changes from turn to turn."""
-    if (options.world is None) != (options.pose is None):
-        raise Error("--world and --pose: give both or neither")
     if options.world is not None:
         return feeds.world(sensor, options.world, np.array(options.pose), options.seed), True
     if options.wall is not None:
