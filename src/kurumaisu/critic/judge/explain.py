@@ -219,6 +219,6 @@ def _provenance(recording: Recording) -> dict[str, str]:
     return {
         "runs fitted": ", ".join(recording.train),
         "runs held out": ", ".join(recording.test) or "each in turn",
-        "an effect is named": f"from a probability of {NAMED:g} on",
+        "least probability of a named cause": f"{NAMED:g}",
         "kurumaisu, numpy, scipy": f"{version()}, {np.__version__}, {scipy.__version__}",
     }
