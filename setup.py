@@ -8,8 +8,8 @@ setup(
         package_dir={"": "src"},
         package_data={
             "kurumaisu.bench": ["drivers/*.cpp", "drivers/*.h"],
-            "kurumaisu.critic": ["*.json", "*.html"],
-            "kurumaisu.viewer": ["page/*"],
+            "kurumaisu.critic": ["report/*.html", "values/*.json"],
+            "kurumaisu.viewer": ["page/*", "page/*/*"],
             "kurumaisu": ["py.typed"],
         },
     )

@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
-# Builds with catkin-tools, devel and install space, in a workspace of its own: as usual as catkin_make.
-# Each source alone, unlike scripts/setup's build: so it must include all that it needs.
-# Debug: takes half the time, and sees what only an unoptimised build sees (assertions, missing definitions). No -g:
-# nobody looks for symbols here, and to write them is an eighth of the time.
+# Builds with catkin-tools, devel and install space, in a workspace of its own: as usual as catkin_make. It proves the
+# packaging, so it compiles as scripts/setup does: folders lie as in .ws, and ccache has nearly all of it.
 set -eu
 source "$(dirname "$0")/../scripts/environment.bash"   # without it, .ws would be extended
-workspace=$root/.ws/tools
+workspace=$root/.ws-tools   # as deep as .ws: ccache compares paths that are relative
 rm -rf "$workspace"
+trap 'rm -rf "$workspace"' EXIT
 mkdir -p "$workspace/src"
-ln -s "$root/.ws/src/kurumaisu" "$workspace/src/kurumaisu"
-catkin config --workspace "$workspace" --init --no-extend --install \
-  --cmake-args "-DPYTHON_EXECUTABLE=$root/.venv/bin/python" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0 \
-  -DCATKIN_ENABLE_TESTING=OFF
+cp -a "$root/.ws/src/kurumaisu" "$workspace/src/kurumaisu"   # links into the tree
+mapfile -t arguments < <(grep -o -- '-D.*' "$root/.ws/stamp" | sed 's/ -D/\n-D/g')
+catkin config --workspace "$workspace" --init --no-extend --install --merge-devel \
+  --cmake-args "${arguments[@]}" -DCATKIN_ENABLE_TESTING=OFF
 catkin build --workspace "$workspace" --no-status --no-notify --force-cmake --jobs "$(jobs)"
 for space in devel install; do
   (set +u; source "$workspace/$space/setup.bash"; rospack find kurumaisu; "$root/.venv/bin/python" -c 'import kurumaisu._core')
 done
+ccache --show-stats

@@ -54,13 +54,23 @@ def failures(paths: list[Path]) -> list[str]:
     return lines
 
 
-def classes(path: Path) -> set[str]:
-    """Return the last part of the class (or module) names of the cases in a file, empty if unreadable."""
+def of(paths: list[Path], name: str) -> Counts | None:
+    """Return what the files say of the module (or class) of a name, None if they have no case of it."""
+    cases = _cases(paths, name)
+    return sum((_verdict(case) for case in cases), Counts()) if cases else None
+
+
+def seconds(paths: list[Path], name: str) -> float:
+    """Return how long the cases of a module took."""
+    return sum(float(case.get("time", 0.0)) for case in _cases(paths, name))
+
+
+def _cases(paths: list[Path], name: str) -> list[ElementTree.Element]:
     try:
-        cases = list(ElementTree.parse(path).iter("testcase"))
+        cases = [case for path in paths for case in ElementTree.parse(path).iter("testcase")]
     except (ElementTree.ParseError, OSError):
-        return set()
-    return {part for case in cases for part in case.get("classname", "").split(".")}
+        return []
+    return [case for case in cases if name in case.get("classname", "").split(".")]
 
 
 def _verdict(case: ElementTree.Element) -> Counts:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """clang-tidy on all that the build compiles and that, or whose headers, changed since it was last found clean.
 
-What a unity build compiles at once is checked at once, for most of the time goes into what the sources include; so are
-test programs that are compiled alike, each in a namespace of its own there, as their names may be the same. Where
-something is found there, each source is checked alone, too, as that says it best. Two of clang-tidy's checks look at
-sources that are checked alone only, misc-unused-using-decls and misc-unused-alias-decls: unused() does what they do.
+What a unity build compiles at once is checked at once, for most of the time goes into what the sources include, but the
+other way round: so a source that lacks an include is found by one of the two, unless sources on both sides of it have
+that. Where something is found there, each source is checked alone, too, as that says it best. Two checks look only at
+sources that are checked alone, misc-unused-using-decls and misc-unused-alias-decls: unused() does what they do.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,23 +28,19 @@ CLEAN = sources.ROOT / ".ws/tidy"  # one empty file per clean state of a unit
 WHOLE = CLEAN / "whole"  # what is checked at once, in a tree of folders as src/ and tests/ are, with their settings
 
 
-TESTS = 8  # test programs that are checked at once
-
-
 @dataclass(frozen=True)
 class Unit:
-    """What calls of the compiler with the same flags made of sources, all of one folder or nearly so."""
+    """What a call of the compiler made of sources, all of one folder or nearly so."""
 
     flags: list[str]  # of the compiler, but for what it reads and writes
-    made: tuple[Path, ...]  # the objects
+    made: Path  # the object
     directory: Path
     sources: tuple[Path, ...]  # as the build sees them: links into the workspace
-    apart: bool = False  # each in a namespace of its own
 
     @property
     def name(self) -> str:
         """Return a name that no other unit has."""
-        return "_".join(self.made[0].relative_to(BUILD / "kurumaisu").parts)
+        return "_".join(self.made.relative_to(BUILD / "kurumaisu").parts)
 
 
 def main() -> int:
@@ -83,21 +78,8 @@ def _units() -> list[Unit]:
         seen.update(ours)
         if ours:
             made = Path(entry["directory"]) / words[here + 1]
-            units.append(Unit(words[first:here], (made,), Path(entry["directory"]), ours))
-    return sorted(_together(units), key=lambda unit: -len(unit.sources))
-
-
-def _together(units: list[Unit]) -> list[Unit]:
-    """Return the units, of test programs several in one."""
-    others, alike = list[Unit](), defaultdict[tuple[str, ...], list[Unit]](list)
-    for unit in units:
-        test = len(unit.sources) == 1 and unit.sources[0].match("tests/test_*.cpp")
-        (alike[*unit.flags] if test else others).append(unit)
-    for tests in alike.values():
-        for some in (tests[i : i + TESTS] for i in range(0, len(tests), TESTS)):
-            made, files = (tuple(unit.made[0] for unit in some), tuple(unit.sources[0] for unit in some))
-            others.append(Unit(some[0].flags, made, some[0].directory, files, apart=True))
-    return others
+            units.append(Unit(words[first:here], made, Path(entry["directory"]), ours))
+    return sorted(units, key=lambda unit: -len(unit.sources))
 
 
 def _check(unit: Unit, configs: list[Path], version: str) -> str:
@@ -130,11 +112,7 @@ def _whole(unit: Unit) -> Path:
     # by UnifiedSource in its name the analyzer knows that what this includes is no header
     path = WHOLE / unit.sources[0].parent.relative_to(LINKS) / f"UnifiedSource_{unit.name}.cpp"
     path.parent.mkdir(parents=True, exist_ok=True)
-    lines = [f'#include "{source}"  // NOLINT(bugprone-suspicious-include)' for source in unit.sources]
-    if unit.apart:
-        texts = (source.read_text() for source in unit.sources)
-        headers = dict.fromkeys(line for text in texts for line in re.findall(r"^#include .*$", text, re.MULTILINE))
-        lines = [*headers, *(f"namespace test_{i} {{\n{line}\n}}" for i, line in enumerate(lines))]
+    lines = [f'#include "{source}"  // NOLINT(bugprone-suspicious-include)' for source in reversed(unit.sources)]
     path.write_text("\n".join([*lines, ""]))
     return path
 
@@ -142,8 +120,7 @@ def _whole(unit: Unit) -> Path:
 def _tidy(unit: Unit, path: Path) -> str:
     """Return what clang-tidy finds in a file, compiled as the unit is, empty if there is nothing."""
     # Links into the workspace are kept: HeaderFilterRegex and clang then see the same paths as gcc does.
-    here = [f"-I{unit.sources[0].parent}"] if unit.apart else []  # where a test itself looks first
-    command = ["clang-tidy", "--quiet", str(path), "--", *unit.flags, *here]
+    command = ["clang-tidy", "--quiet", str(path), "--", *unit.flags, "-Wno-unknown-warning-option"]
     run = subprocess.run(command, check=False, capture_output=True, text=True, cwd=unit.directory)
     if run.returncode == 0:
         return ""
@@ -153,10 +130,9 @@ def _tidy(unit: Unit, path: Path) -> str:
 
 def _dependencies(unit: Unit) -> set[Path]:
     """Return the sources and the headers of this tree that they include, as gcc noted; else all headers."""
-    depfiles = [Path(f"{made}.d") for made in unit.made]
-    if all(path.exists() for path in depfiles):
-        names = [name for path in depfiles for name in path.read_text().replace("\\\n", " ").split()[1:]]
-        headers = {Path(name).resolve() for name in names}
+    depfile = Path(f"{unit.made}.d")
+    if depfile.exists():
+        headers = {Path(name).resolve() for name in depfile.read_text().replace("\\\n", " ").split()[1:]}
     else:
         headers = set(sources.files(".h"))
     mine = {p for p in headers if p.is_relative_to(sources.ROOT) and p.exists()}

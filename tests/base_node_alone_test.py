@@ -18,7 +18,7 @@ import rostest
 from kurumaisu.msg import Voltages
 from nav_msgs.msg import Odometry
 
-from kurumaisu.ros.testing import PATIENCE, Commander, SimulatedClock, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Commander, SimulatedClock, Topic, wait_for
 
 PERIOD = 0.02  # [s] of base_node.yaml
 FACTOR = 5.0  # simulated seconds per second

@@ -25,7 +25,8 @@ from std_srvs.srv import Trigger
 
 from kurumaisu import _core
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import Commander, Topic, wait_for
+from kurumaisu.ros.testing import unexplained
+from kurumaisu.ros.testing.nodes import Commander, Topic, wait_for
 
 
 def is_neutral(message: Voltages) -> bool:
@@ -68,6 +69,9 @@ class BaseNode(unittest.TestCase):
 
     def count(self, key: str) -> int:
         return int(self.value("commands", key))
+
+    def test_help_names_all_that_the_node_has(self) -> None:
+        assert unexplained("/base_node", "base_node") == set()
 
     def test_command_becomes_voltages(self) -> None:
         self.commander.say(0.5, 0.3)
@@ -238,7 +242,7 @@ class BaseNode(unittest.TestCase):
         assert before.v == 0.5  # at once, without a ramp
         assert "still pressed" in reset().message
         stop.publish(False)
-        wait_for(lambda: "let go first" in reset().message, "the cause is gone, the command is not")
+        wait_for(lambda: "release the input first" in reset().message, "the cause is gone, the command is not")
         assert is_neutral(self.voltages.last)
         self.commander.say(0.0, 0.0)
         wait_for(lambda: reset().success, "a reset")

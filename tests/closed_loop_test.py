@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from kurumaisu import geometry
-from kurumaisu.ros.testing import Commander, Topic, pose_of, wait_for
+from kurumaisu.ros.testing.nodes import Commander, Topic, pose_of, wait_for
 
 
 def at(topic, stamp):

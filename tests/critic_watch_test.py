@@ -11,7 +11,7 @@ import unittest
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from kurumaisu.ros.testing import Commander, Topic, wait_for
+from kurumaisu.ros.testing.nodes import Commander, Topic, wait_for
 
 # v [m/s], w [rad/s]: spins and arcs at several rates, and back again, so that the chair stays where there is room.
 MOVES = [(0.0, 1.2), (0.3, 0.0), (0.0, -0.6), (0.0, -1.2), (0.3, 0.0), (0.0, 0.6), (0.2, 0.9), (0.2, -0.9)]

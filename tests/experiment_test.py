@@ -19,11 +19,11 @@ from kurumaisu.srv import SetPose
 from nav_msgs.msg import Odometry
 from std_srvs.srv import SetBool
 
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.experiments import samples, shipped_script
 from kurumaisu.experiments.timeline import PERIOD
 from kurumaisu.ros.rotation import quaternion_of
-from kurumaisu.ros.testing import PATIENCE, Commander, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Commander, Topic, wait_for
 
 SLOW = {
     "kind": "drive",
@@ -65,7 +65,7 @@ class Experiment(unittest.TestCase):
             path = self.folder / f"{name}.yaml"
             path.write_text(yaml.safe_dump(script))
             options = (*options, "--file", str(path))
-        program = "import sys; from kurumaisu.ros.experiment import main; sys.exit(main())"
+        program = "import sys; from kurumaisu.ros.experiment.command import main; sys.exit(main())"
         command = [sys.executable, "-c", program, name, *options]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.addCleanup(lambda: process.poll() is None and process.kill())
@@ -155,16 +155,18 @@ class Experiment(unittest.TestCase):
         other = Commander("experiment_vel")
         self.addCleanup(other.close)
         other.say(0.0, 0.0)
-        assert "commands the chair, too" in self.end(process, 1)
+        assert "also commands the chair" in self.end(process, 1)
         other.silence()
         assert "experiment_vel is published already" in self.end(self.start("slow", script=SLOW), 1)
 
     def test_a_chair_that_drives_is_left_alone(self):
-        program = "from kurumaisu.ros.testing import *; rospy.init_node('pusher'); Commander('cmd_vel').say(0.1, 0.2)"
+        program = (
+            "from kurumaisu.ros.testing.nodes import *; rospy.init_node('pusher'); Commander('cmd_vel').say(0.1, 0.2)"
+        )
         with subprocess.Popen([sys.executable, "-c", f"{program}; rospy.spin()"]) as pusher:
             try:
                 self.truth.wait(lambda m: m.twist.twist.linear.x > 0, "the chair to move")
-                assert "navigation commands the chair, too" in self.end(self.start("slow", script=SLOW), 1)
+                assert "navigation also commands the chair" in self.end(self.start("slow", script=SLOW), 1)
             finally:
                 pusher.terminate()  # a killed one would stay on the books of the master
 
@@ -174,7 +176,7 @@ class Experiment(unittest.TestCase):
         hand = Commander("joy_vel")
         self.addCleanup(hand.close)
         hand.say(0.0, 0.1)
-        assert "joystick commands the chair, too" in self.end(process, 1)
+        assert "joystick also commands the chair" in self.end(process, 1)
         hand.silence()
         self.stopped_properly()
 

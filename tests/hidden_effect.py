@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.recording import Recording, Run, Series
-from kurumaisu.sim.joystick import joystick
+from kurumaisu.critic.values.recording import Recording, Run, Series
+from kurumaisu.sim.chair.joystick import joystick
 from kurumaisu.types import FloatArray
 
 # id: from, to, of either sign

@@ -25,7 +25,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
 
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
+from kurumaisu.ros.testing import unexplained
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
 from kurumaisu.virtual_urg import Pty, Tcp, VirtualUrg, load_sensor
 
 SENSOR = load_sensor("urg_04lx")
@@ -144,6 +145,7 @@ class LaserNode(unittest.TestCase):
             assert 0.06 < min(ages) < 0.5  # it takes 71 ms to measure; the test itself may look late
             assert scan.header.frame_id == "front"
             np.testing.assert_allclose(scan.scan_time, 0.1, rtol=1e-6)
+            assert unexplained("/plain/laser_node", "laser_node") == set()
             self.check_fan(scan, 0, SENSOR.steps - 1)
             self.check_status("plain", diagnostics)
             self.check_reconfigure(scans)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
+from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 
 BEAMS, FIRST, INCREMENT, BEAM_TIME = 682, -2.086214, 0.006135923, 9.765625e-5
 # name, middle, size [m], degrees, ranger_return

@@ -20,8 +20,9 @@ from nav_msgs.srv import SetMap
 from std_srvs.srv import Empty
 
 from kurumaisu.geometry import wrap
-from kurumaisu.ros.testing import Topic, deviation, pose_of, wait_for
-from kurumaisu.ros.testing_room import BEAMS, STEP, WALLS, Room, ranges_at, transform, truth
+from kurumaisu.ros.testing import unexplained
+from kurumaisu.ros.testing.nodes import Topic, deviation, pose_of, wait_for
+from kurumaisu.ros.testing.room import BEAMS, STEP, WALLS, Room, ranges_at, transform, truth
 
 DEADLINE = 40.0  # [s] of the wall clock
 EDGE, MARGIN = 0.05, 0.525  # [m] the walls lie in the middle of their cells
@@ -88,6 +89,9 @@ class LocalizationNode(unittest.TestCase):
         error = pose_of(message) - truth(self.room.time_of(message))
         assert np.hypot(*error[:2]) < distance, error
         assert abs(wrap(error[2])) < turn, error
+
+    def test_help_names_all_that_the_node_has(self):
+        assert unexplained("/localization_node", "localization_node") == set()
 
     def test_1_without_a_map_it_says_so(self):
         self.wait_for_status(2, "LOCALIZATION_NO_MAP")

@@ -16,7 +16,7 @@ from nav_msgs.msg import Odometry
 from kurumaisu import geometry
 from kurumaisu.driving import Driver, load_route
 from kurumaisu.params import shipped
-from kurumaisu.ros.testing import Commander, Topic, deviation, pose_of, wait_for
+from kurumaisu.ros.testing.nodes import Commander, Topic, deviation, pose_of, wait_for
 
 WAY = 12.0  # [m]
 PATIENCE = 90.0  # [s] of wall time

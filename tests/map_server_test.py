@@ -19,7 +19,7 @@ from PIL import Image
 from kurumaisu.map_file import MapFile, write_map
 from kurumaisu.params import shipped
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import Topic, wait_for
+from kurumaisu.ros.testing.nodes import Topic, wait_for
 
 DEADLINE = 60.0  # [s]
 BUILDING = shipped("worlds/maps/building.yaml")

@@ -14,7 +14,7 @@ from kurumaisu import geometry, slam_score
 from kurumaisu.maps import Grid
 from kurumaisu.params import shipped
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import PATIENCE, Commander, Topic, pose_of, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Commander, Topic, pose_of, wait_for
 from kurumaisu.world import load_world
 
 WAY = 5.0  # [m]

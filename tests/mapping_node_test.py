@@ -30,10 +30,11 @@ from std_srvs.srv import Trigger
 
 from kurumaisu.geometry import between, compose, wrap
 from kurumaisu.map_file import read_map
-from kurumaisu.ros.map_messages import map_of
+from kurumaisu.ros.maps.messages import map_of
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import Topic, wait_for
-from kurumaisu.ros.testing_room import BEAMS, SPEED_ERROR, STEP, WALLS, Room, ranges_at, truth
+from kurumaisu.ros.testing import unexplained
+from kurumaisu.ros.testing.nodes import Topic, wait_for
+from kurumaisu.ros.testing.room import BEAMS, SPEED_ERROR, STEP, WALLS, Room, ranges_at, truth
 from kurumaisu.slam_score import distance_to_walls
 
 DEADLINE = 40.0  # [s] of the wall clock, for any one thing to happen
@@ -148,6 +149,9 @@ class MappingNode(unittest.TestCase):
             process.send_signal(signal.SIGTERM)
             assert process.wait(DEADLINE) == 0
             rospy.delete_param("/second")
+
+    def test_help_names_all_that_the_node_has(self):
+        assert unexplained("/mapping_node", "mapping_node") == set()
 
     def test_1_map_and_pose(self):
         last = self.room.drive(20.0)
@@ -269,9 +273,12 @@ class MappingNode(unittest.TestCase):
 
     def test_4_a_laser_that_nobody_has_placed_is_said(self):
         self.room.step_until(
-            lambda: self.says("nobody says"), "a laser without a place said", DEADLINE, frame="nowhere"
+            lambda: self.says("the mounting of the laser is unknown"),
+            "a laser without a place said",
+            DEADLINE,
+            frame="nowhere",
         )
-        self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but nobody says where the laser is")
+        self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but the mounting of the laser is unknown")
 
     def test_5_scans_without_transforms_do_not_stop_the_others(self):
         self.room.step(0.0, with_tf=False)

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu.params import shipped
-from kurumaisu.sim.physical import PhysicalMotion
-from kurumaisu.sim.rigid import Ground, Part, Rigid, rigid
+from kurumaisu.sim.motion.physical import PhysicalMotion
+from kurumaisu.sim.motion.rigid import Ground, Part, Rigid, rigid
 from kurumaisu.sim.settings import Dynamics, load_dynamics
 from kurumaisu.types import FloatArray
 

@@ -8,7 +8,7 @@ import numpy as np
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from kurumaisu.critic.recording import Run, Series
+from kurumaisu.critic.values.recording import Run, Series
 
 BEAMS = 7
 PACKAGE = Path(__file__).resolve().parents[1]

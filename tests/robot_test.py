@@ -23,7 +23,7 @@ from sensor_msgs.msg import Imu, Joy, LaserScan
 from std_srvs.srv import Trigger
 
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import PATIENCE, Repeated, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Repeated, Topic, wait_for
 
 HELD = [0, 0, 0, 0, 1, 0, 0, 0]
 
@@ -107,7 +107,7 @@ class Robot(unittest.TestCase):
         self.odom.wait(lambda m: abs(m.twist.twist.angular.z - 0.3) < 0.02, "the gyro's rate in odometry")
         self.imu.say(None)
         self.odom.wait(lambda m: m.twist.twist.angular.z == 0, "open loop without the gyro")
-        wait_for(lambda: self.status(name) == "the gyro fell silent", "a warning")
+        wait_for(lambda: self.status(name) == "the gyro stopped sending", "a warning")
         self.aggregated.close()
 
     def after(self, service: Callable[[], Any]) -> tuple[Odometry, float]:

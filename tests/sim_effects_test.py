@@ -25,7 +25,7 @@ from std_srvs.srv import Empty
 
 from kurumaisu import effects
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
 
 STEP = 0.01  # [s]
 
@@ -157,14 +157,14 @@ class SimEffectsTest(unittest.TestCase):
         ask = rospy.ServiceProxy("/sim_node/live/set_parameters", Reconfigure)
         ask(Config(doubles=[DoubleParameter("base_lag_w_tau", math.nan), DoubleParameter("base_lag_q_tau", 1.0)]))
         self.said("SIM_EFFECTS_BOUNDED base.lag_w: tau must be 0 to 3 s: nan; it stays as it is")
-        self.said("SIM_EFFECTS_BOUNDED base_lag_q_tau: is no parameter of an effect")
+        self.said("SIM_EFFECTS_BOUNDED base_lag_q_tau: is not a parameter of an effect")
         assert ask(Config()).config.doubles[0].value == ask(Config()).config.doubles[0].value
 
     def test_walls_that_would_stand_in_the_chair_are_refused(self):
         near = Pose(position=Point(4.6, 2.0, 0.0), orientation=Quaternion(0.0, 0.0, 0.0, 1.0))
         assert rospy.ServiceProxy("set_pose", SetPose)("chair", near).success
         assert self.switch("world.map_error", scale=-0.2) == {"enabled": False, "scale": 0.0}  # the east wall at 4.8 m
-        self.said("SIM_EFFECTS_REFUSED effects: a wall would stand in the chair")
+        self.said("SIM_EFFECTS_REFUSED effects: a wall would be inside the chair")
         assert self.switch("world.map_error", scale=0.1) == {"enabled": True, "scale": 0.1}
 
     def test_all_of_them_one_after_another_and_off_again(self):

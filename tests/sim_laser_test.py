@@ -17,7 +17,7 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, SetBool, Trigger
 
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
 
 SERVICES = {
     "reset": Empty,

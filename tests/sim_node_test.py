@@ -19,7 +19,8 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, SetBool
 
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import PATIENCE, Topic, pose_of, wait_for
+from kurumaisu.ros.testing import unexplained
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, pose_of, wait_for
 
 STEP = rospy.Duration(0, 10_000_000)
 
@@ -37,7 +38,7 @@ class BadConfiguration:
         name = f"bad_{self.id().rsplit('.', 1)[-1]}"
         rospy.set_param(f"/{name}", values)
         # Not rosrun: in a workspace it finds scripts several times and asks which.
-        node = [sys.executable, "-c", "from kurumaisu.ros.sim_node import main; main()"]
+        node = [sys.executable, "-c", "from kurumaisu.ros.sim.node import main; main()"]
         command = [*node, f"__name:={name}", "/clock:=/bad_clock", "scan:=bad_scan"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
         return done.returncode, done.stdout + done.stderr
@@ -102,6 +103,9 @@ class SimNodeTest(BadConfiguration, unittest.TestCase):
         rospy.ServiceProxy("reset", Empty)()
         said = rospy.ServiceProxy("pause", SetBool)(False).message  # at 12.340 s
         return rospy.Time.from_sec(float(said.split()[1]))
+
+    def test_help_names_all_that_the_node_has(self):
+        assert unexplained("/sim_node", "sim_node") == set()
 
     def test_clock_advances_step_by_step(self):
         first = self.clock.wait(lambda _: True, "the clock")

@@ -24,7 +24,7 @@ from tf2_msgs.msg import TFMessage
 
 from kurumaisu.params import load_model
 from kurumaisu.ros.rotation import quaternion_of
-from kurumaisu.ros.testing import PATIENCE, Topic, pose_of, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, pose_of, wait_for
 
 SERVICES = {
     "reset": Empty,
@@ -103,7 +103,7 @@ class SimWorldTest(unittest.TestCase):
     def test_a_pause_holds_the_clock_and_steps_are_single(self):
         answer = self.call["step"]()
         assert not answer.success
-        assert "nothing is paused" in answer.message
+        assert "only while paused" in answer.message
         at = [float(self.done("pause", True).split()[1])]
         for _ in range(3):
             at.append(float(self.done("step").split()[1]))

@@ -16,13 +16,17 @@ from stageros_services import Services
 from std_srvs.srv import SetBool, Trigger
 
 from kurumaisu.params import shipped
-from kurumaisu.ros.testing import Topic, wait_for
+from kurumaisu.ros.testing import unexplained
+from kurumaisu.ros.testing.nodes import Topic, wait_for
 from kurumaisu.sim import Simulator, load_options
 from kurumaisu.world import load_world
 
 
 class OneRobot(Services):
     """With the services: one start of stageros for both."""
+
+    def test_help_names_all_that_the_node_has(self):
+        assert unexplained("/stageros", "stageros") == set()
 
     def test_names_types_and_services(self):
         publishers, subscribers, services = rosgraph.Master("/test").getSystemState()

@@ -24,7 +24,7 @@ from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
 
 from kurumaisu.ros.rotation import quaternion_of, yaw_of
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
 
 STEP = 0.1  # [s]
 # A room of 10 x 8 m; the beams' plane is 0.3 + 0.05 + 0.01 m high

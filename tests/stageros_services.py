@@ -14,7 +14,7 @@ from stageros_rig import ONE, STEP, Case, place
 from std_srvs.srv import Empty, SetBool, Trigger
 
 from kurumaisu.ros.rotation import quaternion_of
-from kurumaisu.ros.testing import Topic, wait_for
+from kurumaisu.ros.testing.nodes import Topic, wait_for
 
 
 class Services(Case):

@@ -14,7 +14,7 @@ import rosmaster.master
 from sensor_msgs.msg import LaserScan
 from stageros_rig import ONE, Stageros
 
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
 
 
 class RealTime(unittest.TestCase):
@@ -60,7 +60,7 @@ class BadStarts(unittest.TestCase):
 
     def test_rate_of_no_sensor(self):
         self.refused(
-            "there is no sensor of this name; there are: base_scan", ONE, "_rates:={sensors: {base_scam: 5.0}}"
+            "there is no sensor of this name; did you mean base_scan?", ONE, "_rates:={sensors: {base_scam: 5.0}}"
         )
 
     def test_no_world(self):

@@ -14,7 +14,7 @@ from stageros_rig import MODELS, STEP, Case, place, since
 from std_msgs.msg import Bool, UInt8MultiArray
 from std_srvs.srv import Empty, Trigger
 
-from kurumaisu.ros.testing import Topic, wait_for
+from kurumaisu.ros.testing.nodes import Topic, wait_for
 
 TWO = (
     MODELS

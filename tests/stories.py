@@ -3,8 +3,8 @@
 
 import numpy as np
 
-from kurumaisu.critic.story import Bins, Misfit, Moments, Noise, Overlay, Rival, Story
-from kurumaisu.critic.verdict import (
+from kurumaisu.critic.values.story import Alternative, Bins, Misfit, Moments, NoiseParameter, Overlay, Story
+from kurumaisu.critic.values.verdict import (
     Cause,
     Estimate,
     Gain,
@@ -56,8 +56,11 @@ def full_story():
         misfits=(
             Misfit("yaw rate", "rad/s", "change of w", "rad/s", x, y, bins, "base.lag_w", curve, None, None, moments),
         ),
-        rivals=(Rival("base.delay", -6.1, "fits worse by 6.1 nats"),),
-        noise=(Noise("heading", 0.0049, 0.0041, 0.0057, "rad"), Noise("tau", 0.3, float("nan"), float("nan"), "s")),
+        rivals=(Alternative("base.delay", -6.1, "fits worse by 6.1 nats"),),
+        noise=(
+            NoiseParameter("heading", 0.0049, 0.0041, 0.0057, "rad"),
+            NoiseParameter("tau", 0.3, float("nan"), float("nan"), "s"),
+        ),
         unexplained=("Nothing that these drives show.",),
         next_drive="Spin both ways.",
     )

@@ -21,7 +21,7 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool
 
 from kurumaisu.bench.processes import program
-from kurumaisu.ros.testing import PATIENCE, Repeated, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Repeated, Topic, wait_for
 
 HELD = [0, 0, 0, 0, 1, 0, 0, 0]
 

@@ -132,7 +132,7 @@ TEST(EStop, IsReleasedByNothingButAReset) {
   stop.hear(false, 3);
   stop.tick(4);
   EXPECT_TRUE(stop.latched());
-  EXPECT_EQ(stop.reset(true), "somebody commands motion: let go first");
+  EXPECT_EQ(stop.reset(true), "motion is commanded: release the input first");
   EXPECT_EQ(stop.reset(false), "");
   stop.tick(1000);
   EXPECT_FALSE(stop.stopped());  // without a timeout silence means nothing
@@ -152,7 +152,7 @@ TEST(EStop, WithATimeoutSomebodyMustSayThatAllIsWell) {
   EXPECT_FALSE(stop.stopped());
   stop.tick(1.51);
   EXPECT_TRUE(stop.latched());
-  EXPECT_EQ(stop.reset(false), "nobody says that the emergency stop is not pressed");
+  EXPECT_EQ(stop.reset(false), "no message says that the emergency stop is not pressed");
   stop.hear(false, 1.6);
   stop.tick(1.6);
   EXPECT_EQ(stop.reset(false), "");

@@ -10,7 +10,7 @@ from itertools import pairwise
 import pytest
 import yaml
 
-from kurumaisu.bench.base_faults_peer import Graph, Peer, until
+from kurumaisu.bench.faults.base.peers import Graph, Peer, until
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.params import shipped
 

@@ -104,7 +104,7 @@ TEST(Drive, AnEmergencyStopThatFallsSilentIsALatchedStop) {
   chair.say(0.5, 0.0);
   chair.run(kPeriod);
   EXPECT_TRUE(chair.neutral());  // not one word yet
-  EXPECT_EQ(k::stateOf(chair.drive), "waiting for the emergency stop's first word");
+  EXPECT_EQ(k::stateOf(chair.drive), "waiting for the emergency stop's first message");
   chair.run(2 * kPeriod);
   EXPECT_TRUE(chair.neutral());
   EXPECT_EQ(k::stateOf(chair.drive), "emergency stop");

@@ -6,17 +6,38 @@ import math
 import numpy as np
 import pytest
 
-from kurumaisu.bench import __main__, agreement_beams, base, chair, peers, rays, robots, sim, ways
+from kurumaisu.bench import __main__, peers
+from kurumaisu.bench.accuracy.stage import beams
+from kurumaisu.bench.speed import base, chair, rays, robots, sim, ways
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.world import load_world
 
 
-@pytest.mark.parametrize("arguments", [[], ["nothing"], ["table"]])
-def test_a_name_that_is_none(arguments, capsys):
-    assert __main__.main(arguments) == 2
-    assert "there are: " in capsys.readouterr().err
+def test_without_a_name_each_is_listed_with_a_line_of_what_it_measures(capsys):
+    assert __main__.main([]) == 0
+    lines = capsys.readouterr().out.splitlines()[2:]
+    assert [line.split()[0] for line in lines] == list(__main__.MODULES)
+    assert all(len(line.split(maxsplit=1)[1]) > 30 for line in lines)
+
+
+@pytest.mark.parametrize(("name", "words"), [("simm", "the nearest: sim"), ("table", "without a name lists them")])
+def test_a_name_that_is_none(name, words, capsys):
+    assert __main__.main([name]) == 2
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", __main__.MODULES)
+def test_help_says_what_it_measures_and_how_to_write_it_into_a_page(name, capsys):
+    with pytest.raises(SystemExit) as stop:
+        __main__.main([name, "--help"])
+    assert stop.value.code == 0
+    usage, *others = capsys.readouterr().out.split("\n\n")
+    assert usage.startswith(f"usage: scripts/bench {name} ")
+    assert len(others[0]) > 30
+    assert not others[0].startswith("options")
+    assert "--write PAGE" in others[-1]
 
 
 def test_base(capsys):
@@ -104,4 +125,4 @@ def test_a_peer_that_is_not_there(tmp_path):
 def test_agreement_leaves_out_jumps_but_no_slopes():
     slope = [np.array([value, value]) for value in (5.0, 4.8, 4.9, 5.1, 5.2)]  # here, right2, right, left, left2
     slope[3][1] = 7.0
-    assert agreement_beams._edges(slope, 0.02).tolist() == [False, True]
+    assert beams._edges(slope, 0.02).tolist() == [False, True]

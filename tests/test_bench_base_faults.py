@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kurumaisu.bench import base_faults, base_faults_path
-from kurumaisu.bench.base_faults_seen import Case, Seen
-from kurumaisu.bench.guard_rig import Change, changed
+from kurumaisu.bench.faults.base import main, path
+from kurumaisu.bench.faults.base.cases import Case, Seen
+from kurumaisu.bench.rigs.guard import Change, changed
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 
@@ -19,7 +19,7 @@ NUMBERS = {str(number) for number in range(1, 18)}
 
 @pytest.mark.parametrize("fault", ["3 base_node dies, SIGKILL", "5 wire: blocked", "8 wall clock set, -"])
 def test_a_fault_for_real(fault, capsys):
-    status = base_faults.main(["--only", fault, "--times", "1"])
+    status = main.main(["--only", fault, "--times", "1"])
     rows = [line.split(" | ") for line in capsys.readouterr().out.splitlines() if line.startswith("| ")]
     (row,) = rows[2:]
     seen, verdict = row[-2], row[-1]
@@ -30,14 +30,14 @@ def test_a_fault_for_real(fault, capsys):
 
 
 def test_all_of_the_list_are_there():
-    cases = base_faults.cases()
+    cases = main.cases()
     assert {case.number for case in cases} >= NUMBERS
     assert len({case.name for case in cases}) == len(cases)
 
 
 def test_a_text_that_no_fault_has():
     with pytest.raises(SystemExit):
-        base_faults.main(["--only", "no such fault"])
+        main.main(["--only", "no such fault"])
 
 
 @pytest.mark.parametrize(
@@ -56,9 +56,9 @@ def test_what_is_not_as_expected_is_told(monkeypatch, capsys, play, verdict, sta
 
     peer = SimpleNamespace(heard=lambda _what, _since: [])
     stage = SimpleNamespace(mark=lambda: None, fail=fail, peer=peer, begun=0.0)
-    monkeypatch.setattr(base_faults, "stage", lambda _folder, _setup: contextlib.nullcontext(stage))
-    monkeypatch.setattr(base_faults, "cases", lambda: [Case("1", "a", "b", "c", play, clamped=False)])
-    assert base_faults.main(["--times", "1"]) == status
+    monkeypatch.setattr(main, "stage", lambda _folder, _setup: contextlib.nullcontext(stage))
+    monkeypatch.setattr(main, "cases", lambda: [Case("1", "a", "b", "c", play, clamped=False)])
+    assert main.main(["--times", "1"]) == status
     assert f"| {verdict} |" in capsys.readouterr().out
 
 
@@ -73,12 +73,12 @@ def test_a_play_that_its_commander_spoils_does_not_count(monkeypatch, capsys):
     def stages(_folder, _setup):
         return contextlib.nullcontext(stage)
 
-    monkeypatch.setattr(base_faults, "stage", stages)
-    monkeypatch.setattr(base_faults, "cases", lambda: [Case("1", "a", "b", "c", play, clamped=False)])
-    assert base_faults.main([]) == 1  # it never keeps time
+    monkeypatch.setattr(main, "stage", stages)
+    monkeypatch.setattr(main, "cases", lambda: [Case("1", "a", "b", "c", play, clamped=False)])
+    assert main.main([]) == 1  # it never keeps time
     stage.peer.heard = lambda _what, _since: late.pop(0)
     late.insert(0, ["late"])
-    assert base_faults.main([]) == 0
+    assert main.main([]) == 0
     assert "| done | ok |" in capsys.readouterr().out
 
 
@@ -113,12 +113,12 @@ def test_slopes_jerks_and_distances_of_a_known_path():
     times = np.arange(0.0, 2.0, 0.02)
     speeds = 0.5 * 3.0 * np.minimum(times, 0.4) ** 2 + 1.2 * np.maximum(times - 0.4, 0.0)  # jerk 3, then 1.2 m/s^2
     samples = list(zip(times, law.volts(speeds), strict=True))
-    t, v = base_faults_path.rates(law, samples)
+    t, v = path.rates(law, samples)
     assert v == pytest.approx(speeds, abs=1e-9)
-    assert base_faults_path.steepest(t, v, 0.1) == pytest.approx(1.2)
-    assert base_faults_path.sharpest(t, v, 0.1) == pytest.approx(3.0)
+    assert path.steepest(t, v, 0.1) == pytest.approx(1.2)
+    assert path.sharpest(t, v, 0.1) == pytest.approx(3.0)
     changes = [Change(time, False, (volts, 0.0, 2.5)) for time, volts in samples]
-    assert base_faults_path.distance(law, changes, 2.0) == pytest.approx(0.02 * float(np.sum(speeds)))
+    assert path.distance(law, changes, 2.0) == pytest.approx(0.02 * float(np.sum(speeds)))
 
 
 def test_changes_of_a_tree():

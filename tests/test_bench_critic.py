@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 from scipy.stats import binomtest
 
-from kurumaisu.bench import critic, critic_floors, critic_table
+from kurumaisu.bench.critic import by_effect, floors, main
 from kurumaisu.bench.hidden.baselines import BASELINES
-from kurumaisu.bench.hidden.case import Truth
+from kurumaisu.bench.hidden.generator.case import Truth
 from kurumaisu.bench.hidden.score import score, scored_names
-from kurumaisu.critic.verdict import Cause, Verdict
+from kurumaisu.critic.values.verdict import Cause, Verdict
 
 OPTIONS = argparse.Namespace(draws=2, seed=0, jobs=1, log=None)
 
@@ -29,8 +29,8 @@ def rows(capsys, monkeypatch, truth_of, named_by_critic):
             out.append({"critic": critic, **others})
         return out
 
-    monkeypatch.setattr(critic_floors, "all_answers", answers)
-    assert critic_floors.run(OPTIONS) == 0
+    monkeypatch.setattr(floors, "all_answers", answers)
+    assert floors.run(OPTIONS) == 0
     lines = capsys.readouterr().out.splitlines()
     return {line[:31].strip(): line[31:] for line in lines if line[:1] not in ("", "-")}
 
@@ -53,7 +53,7 @@ def test_names_said_for_sure_count_against_it_where_nothing_is_hidden_that_has_a
     truth = Truth("unknown", ("threshold_slip",), channel="v", covariates=("v",))
     misnamed = replace(scored_names(truth, frozenset(["base.gain_v"]), 1.0), stated=((0.97, False),))
     doubted = replace(misnamed, stated=((0.6, False),))
-    figure = next(f for f in critic_floors.FIGURES if f.label == "unknown: misnamed, p >= .9, base")
+    figure = next(f for f in floors.FIGURES if f.label == "unknown: misnamed, p >= .9, base")
     assert figure.count([misnamed, doubted]).startswith("0.50")
 
 
@@ -78,7 +78,7 @@ def test_where_nothing_does_the_same_the_name_is_right_too():
     assert not score(replace(alone, accepted=(("a",), ("b",))), Verdict("named", causes=(cause,)), 0.0).right
 
 
-@pytest.mark.parametrize("figure", critic_floors.FIGURES, ids=lambda figure: figure.label)
+@pytest.mark.parametrize("figure", floors.FIGURES, ids=lambda figure: figure.label)
 def test_a_figure_of_nothing_is_a_dash(figure):
     assert figure.count([]).startswith(("-", "nan"))
 
@@ -89,9 +89,9 @@ def test_a_figure_of_nothing_is_a_dash(figure):
     ids=" ".join,
 )
 def test_an_option_of_one_kinds_table_is_refused_without_the_kind(given, capsys, monkeypatch):
-    monkeypatch.setattr(critic_floors, "run", lambda options: pytest.fail("it ran as if nothing were said"))
+    monkeypatch.setattr(floors, "run", lambda options: pytest.fail("it ran as if nothing were said"))
     with pytest.raises(SystemExit) as stop:
-        critic.main(given)
+        main.main(given)
     assert stop.value.code == 2
     assert f"error: {given[0]}: only with --kind" in capsys.readouterr().err
 
@@ -105,12 +105,12 @@ def test_one_kinds_table_has_what_was_asked(given, form, monkeypatch):
         truths = [Truth(job.ask.kind, job.ask.ids, z=7.0) for job in jobs]
         return [{"critic": replace(scored_names(t, frozenset(t.ids), 1.0), gain_share=None)} for t in truths]
 
-    monkeypatch.setattr(critic_table, "all_answers", answers)
+    monkeypatch.setattr(by_effect, "all_answers", answers)
     options = ["--kind", "base", "--effects", "base.delay", "--z", "7", "--draws", "2", "--baselines", *given]
-    assert critic.main(options) == 0
+    assert main.main(options) == 0
     assert {(j.ask.ids, j.ask.z, j.ask.form, j.baselines) for j in asked} == {(("base.delay",), 7.0, form, True)}
 
 
 def test_the_table_of_all_kinds_takes_what_concerns_all(monkeypatch):
-    monkeypatch.setattr(critic_floors, "run", lambda options: options.draws)
-    assert critic.main(["--draws", "3", "--seed", "5", "--jobs", "2", "--log", "a.jsonl"]) == 3
+    monkeypatch.setattr(floors, "run", lambda options: options.draws)
+    assert main.main(["--draws", "3", "--seed", "5", "--jobs", "2", "--log", "a.jsonl"]) == 3

@@ -5,14 +5,14 @@ import math
 
 import pytest
 
-from kurumaisu.bench import guard
+from kurumaisu.bench.faults.guard import main
 
 
 @pytest.mark.parametrize("device", ["serial", "iio"])
 def test_every_end_leads_to_neutral(capsys, device):
-    status = guard.main(["--times", "1", "--load", "idle", "--device", device])
+    status = main.main(["--times", "1", "--load", "idle", "--device", device])
     printed = capsys.readouterr().out
-    for case in guard.CASES:
+    for case in main.CASES:
         cells = next(line[len(case.name) :].split() for line in printed.splitlines() if line.startswith(case.name))
         times, low, *_, never = cells[:6]
         assert (times, never) == ("1", "0"), case.name
@@ -32,16 +32,16 @@ def test_every_end_leads_to_neutral(capsys, device):
     ],
 )
 def test_a_bound_is_judged_by_the_worst(times, bound, verdict):
-    assert guard.judge(times, bound, max) == verdict
+    assert main.judge(times, bound, max) == verdict
 
 
 def test_of_busy_cores_the_99th_percentile_counts(monkeypatch):
     bounds = []
-    monkeypatch.setattr(guard, "_table", lambda _device, _options, worst, loops: bounds.append((worst, loops)) or 0)
-    assert guard.main(["--device", "iio"]) == 0
+    monkeypatch.setattr(main, "_table", lambda _device, _options, worst, loops: bounds.append((worst, loops)) or [])
+    assert main.main(["--device", "iio"]) == 0
     (idle, none), (busy, loops) = bounds
     times = [0.001] * 199 + [1.0]
     assert none == 0
     assert loops > 0
-    assert guard.judge(times, 0.010, idle) == "BROKEN"
-    assert guard.judge(times, 0.010, busy) == "kept"
+    assert main.judge(times, 0.010, idle) == "BROKEN"
+    assert main.judge(times, 0.010, busy) == "kept"

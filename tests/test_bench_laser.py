@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import pytest
 
-from kurumaisu.bench.faults_cases import CASES, Case
-from kurumaisu.bench.faults_run import Result, noted, run, verdict
-from kurumaisu.bench.laser_heard import Status, read_scan, read_status
-from kurumaisu.bench.laser_rig import Driver, fed, ours, sensor_at, stock
+from kurumaisu.bench.faults.laser.cases import CASES, Case
+from kurumaisu.bench.faults.laser.run import Result, noted, run, verdict
 from kurumaisu.bench.processes import master
+from kurumaisu.bench.rigs.heard_scans import Status, read_scan, read_status
+from kurumaisu.bench.rigs.laser import Driver, fed, ours, sensor_at, stock
 
 CASE = Case(1, ("corrupt@20",), (1, 1), 0.26, proof="Bad Sums", level=1)
 STATUS = Status(1, "bad sums: 1", {"Bad Sums": "1", "Lost Scans": "1", "Reconnects": "0", "Last Error": "LASER_X: y"})

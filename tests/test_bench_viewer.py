@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from kurumaisu.bench.viewer import interval
+from kurumaisu.bench.speed.viewer.main import interval
 
 
 @pytest.mark.parametrize("count", [5, 7, 8, 20, 101])

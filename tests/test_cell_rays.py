@@ -215,7 +215,7 @@ def test_bad_bodies_and_fans() -> None:
 
 
 def test_cells_too_fine_name_the_option(tmp_path: Path) -> None:
-    with pytest.raises(Error, match=r"ray_casting: cells of 1e-05 m: .*; ray_casting: exact does without"):
+    with pytest.raises(Error, match=r"ray_casting: cells of 1e-05 m: .*; ray_casting: exact needs none"):
         simulator(
             tmp_path,
             "resolution 0.00001\nmodel ( size [600 600 1] )\n" + robot(LASER),

@@ -14,7 +14,7 @@ import pytest
 from kurumaisu import effects
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
-from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command, Observation
+from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator, Command, Observation
 from kurumaisu.sim.sensors.settings import load_sensors
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.world import load_world
@@ -305,7 +305,7 @@ def test_a_saved_state_goes_on_bit_for_bit(tmp_path, things):
     assert loaded.time == pytest.approx(1.23)
     assert bytes_of(drive(other, 0.5, -0.2, 1.0)) == bytes_of(went_on)
     assert other.state_hash() == simulator.state_hash()
-    with pytest.raises(Error, match="of another world"):
+    with pytest.raises(Error, match="belongs to another world"):
         among(tmp_path, things).load(saved)
     with pytest.raises(Error, match="state: "):
         simulator.load(saved[:-50])

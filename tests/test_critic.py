@@ -10,11 +10,14 @@ from hidden_effect import recording, recording_of
 from scipy.integrate import trapezoid
 
 from kurumaisu import geometry
-from kurumaisu.critic import drive, explain, pipeline, prior, replay
-from kurumaisu.critic.material import nearer
-from kurumaisu.critic.recording import Series
-from kurumaisu.critic.reference import with_reference
-from kurumaisu.critic.verdict import read_verdict
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.base import drive, replay
+from kurumaisu.critic.data.reference import with_reference
+from kurumaisu.critic.heldout.materiality import simulates_nearer
+from kurumaisu.critic.judge import explain
+from kurumaisu.critic.values import prior
+from kurumaisu.critic.values.recording import Series
+from kurumaisu.critic.values.verdict import read_verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 
@@ -197,7 +200,7 @@ def test_without_poses_and_scans_the_odometry_is_what_commands_are_compared_with
 def test_what_cannot_be_noise_is_named_where_it_simulates_nearer(monkeypatch, near, verdict):
     """Though the density of what is held out gains nothing, as where it differs from drive to drive."""
     monkeypatch.setattr(explain, "confirmed", lambda worth, nats: False)
-    monkeypatch.setattr(explain, "nearer", lambda worth, channels: near and nearer(worth, channels))
+    monkeypatch.setattr(explain, "simulates_nearer", lambda worth, channels: near and simulates_nearer(worth, channels))
     assert criticise(recording("base.gain_w", 0.1, 70, 40.0)).verdict.verdict == verdict
 
 
@@ -206,7 +209,7 @@ def test_a_recording_too_short_to_hold_anything_back_names_nothing():
     criticism = criticise(replace(data, runs=data.runs[:1], train=data.train[:1]))
     assert criticism.verdict.verdict == "none"
     assert criticism.verdict.gain is None
-    assert criticism.story.headline.startswith("Nothing can be named")
+    assert criticism.story.headline.startswith("No effect can be named")
 
 
 @pytest.mark.parametrize(

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from hidden_effect import recording
 
-from kurumaisu.critic.arrays import criticise_arrays, recording_of
-from kurumaisu.critic.clean import Faults
-from kurumaisu.critic.meta import Meta
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.recording import Fan
-from kurumaisu.critic.rolling import Rolled, Rolling
-from kurumaisu.critic.window import Heard, Window
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.app.arrays import criticise_arrays, recording_of
+from kurumaisu.critic.app.watch import ContinuousCritic, WatchedCriticism
+from kurumaisu.critic.app.window import Heard, Window
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.meta import Meta
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.values.recording import Fan
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 
@@ -108,7 +108,7 @@ def test_a_window_stays_within_its_memory_and_begins_anew_when_the_clock_is_set_
 
 
 def test_a_rolling_verdict_outlives_its_process():
-    rolling = Rolling(shipped("launch/md100.yaml"), frozenset({"base.gain_v"}))
+    rolling = ContinuousCritic(shipped("launch/md100.yaml"), frozenset({"base.gain_v"}))
     data = recording(None, 0.0, 3, 10.0)
 
     def answer():
@@ -121,11 +121,11 @@ def test_a_rolling_verdict_outlives_its_process():
         return said
 
     rolling._worker._process.kill()
-    assert answer() == Rolled(None, "no verdict: its process was ended by SIGKILL (out of memory?)")
+    assert answer() == WatchedCriticism(None, "no verdict: its process was ended by SIGKILL (out of memory?)")
     assert answer().verdict.verdict == "none"
     rolling.start(data, 0.0)
     assert rolling.answer(299.0) is None
-    assert rolling.answer(301.0) == Rolled(None, "no verdict: given up after 300 s")
+    assert rolling.answer(301.0) == WatchedCriticism(None, "no verdict: given up after 300 s")
     rolling.close()
 
 

@@ -13,16 +13,21 @@ from pathlib import Path
 import pytest
 from hidden_effect import recording
 
-from kurumaisu.critic import batch
-from kurumaisu.critic.cli import main
-from kurumaisu.critic.display import Display, Plain, Terminal
-from kurumaisu.critic.job import Job, Outcome
-from kurumaisu.critic.worker import Progress, Worker
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.app import batch
+from kurumaisu.critic.app.cli import main
+from kurumaisu.critic.app.display import Display, Plain, Terminal
+from kurumaisu.critic.app.job import Job, Outcome
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.processes.worker import ProgressMessage, Worker
 from kurumaisu.errors import Error
 
 QUICK = ["--only", "base.gain_v", "--quiet"]
-CRITIC = [sys.executable, "-P", "-c", "import sys; from kurumaisu.ros.critic_command import main; sys.exit(main())"]
+CRITIC = [
+    sys.executable,
+    "-P",
+    "-c",
+    "import sys; from kurumaisu.ros.tools.critic_command import main; sys.exit(main())",
+]
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +87,7 @@ def die(progress):
 def test_what_kills_a_worker_is_told(seen_by_workers):
     worker = Worker()
     worker.send(die)
-    assert worker.receive() == Progress("dying")
+    assert worker.receive() == ProgressMessage("dying")
     with pytest.raises(EOFError):
         worker.receive()
     assert "SIGKILL" in worker.died_of()

@@ -9,11 +9,13 @@ import pytest
 from hidden_effect import recording, recording_of
 from scipy import optimize
 
-from kurumaisu.critic import explain, pipeline, solve
-from kurumaisu.critic.catalogue import Term
-from kurumaisu.critic.drive import prepare
-from kurumaisu.critic.evidence import Problem
-from kurumaisu.critic.noise import Noise
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.engine import least_squares
+from kurumaisu.critic.engine.catalogue import Term
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.judge import explain
+from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.effects import Parameter
 from kurumaisu.params import load_model, shipped
 
@@ -58,7 +60,7 @@ def test_a_lever_to_the_side_is_exactly_a_leak_of_turns_and_said_as_a_set():
 
 
 def test_a_set_of_which_nothing_matters_is_not_told(monkeypatch):
-    for share in ("moved_share", "felt_share"):
+    for share in ("share_of_way", "share_of_noise"):
         monkeypatch.setattr(explain, share, lambda problem, settings, without: 0.0)
     verdict = pipeline.criticise(with_lever(recording(None, 0.0, 71, 40.0), 0.0, 0.05), MD100, lambda _: None).verdict
     assert (verdict.verdict, verdict.confounded) == ("none", ())
@@ -99,7 +101,7 @@ def test_least_squares_against_scipy(most):
         Term("one", Parameter("a", "1", null=0.0, scale=1.0, lower=0.0, upper=most), 0.0),
         Term("two", Parameter("b", "1", null=0.0, scale=0.5, lower=0.1, upper=9.0), 0.0),
     ]
-    ours = solve.least_squares(problem, terms, np.array([0.5, 0.5]))
+    ours = least_squares.least_squares(problem, terms, np.array([0.5, 0.5]))
     theirs = optimize.least_squares(lambda x: problem.residual(terms, x), [0.5, 0.5], bounds=([0, 0.1], [most, 9.0]))
     np.testing.assert_allclose(ours.values, theirs.x, atol=1e-3)
     assert ours.cost == pytest.approx(theirs.cost, abs=0.02)

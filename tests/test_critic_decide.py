@@ -8,19 +8,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import Ask, base_case, make
-from kurumaisu.bench.hidden.noise import Colour, Regime
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.generator.noise import Colour, Regime
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic import decide, naming, stuck
-from kurumaisu.critic.catalogue import Term
-from kurumaisu.critic.decide import Decision
-from kurumaisu.critic.drive import prepare
-from kurumaisu.critic.evidence import Problem
-from kurumaisu.critic.naming import Naming
-from kurumaisu.critic.noise import START, Growth
+from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.engine import refit, search
+from kurumaisu.critic.engine.catalogue import Term
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.engine.search import SearchResult
+from kurumaisu.critic.judge import decide
+from kurumaisu.critic.judge.decide import Decision
+from kurumaisu.critic.noise.base_noise import START, NoiseGrowth
 from kurumaisu.critic.pipeline import criticise
-from kurumaisu.critic.smooth_judge import Beyond
-from kurumaisu.critic.smooth_search import Rivalry
+from kurumaisu.critic.unknown.beyond_catalogue import Beyond
+from kurumaisu.critic.unknown.comparison import CurveComparison
 from kurumaisu.effects import Parameter
 from kurumaisu.params import load_model, shipped
 
@@ -30,7 +32,7 @@ def fit_of(names):
 
 
 def found_of(*sets, confounded=()):
-    return Naming((*map(fit_of, sets), fit_of("")), defaultdict(lambda: 1.0), confounded, 0.0)
+    return SearchResult((*map(fit_of, sets), fit_of("")), defaultdict(lambda: 1.0), confounded, 0.0)
 
 
 def undriven():
@@ -41,15 +43,15 @@ def undriven():
 
 
 def decision(found, better=None):
-    beyond = Beyond(Rivalry((), -np.inf, {}, {}, 0.0), None, 1.0, better)
-    return Decision(undriven(), found, Growth(0.0, 0.0, START), beyond)
+    beyond = Beyond(CurveComparison((), -np.inf, {}, {}, 0.0), None, 1.0, better)
+    return Decision(undriven(), found, NoiseGrowth(0.0, 0.0, START), beyond)
 
 
 def test_what_is_named_is_in_no_set():
     """A curve that draws b speaks for it: it is named then, and not one of two that cannot be told apart."""
     found = found_of("a b", confounded=(("b", "c"), ("d", "e")))
     p = {"a": 1.0, "b": 0.95, "c": 0.05, "d": 0.6, "e": 0.4}
-    again = decide.weighed_anew(found, p)
+    again = decide.with_curve_odds(found, p)
     assert again.confounded == (("d", "e"),)
     assert again.named == ("a", "b")
 
@@ -63,8 +65,8 @@ def judged(monkeypatch):
         asked.append(" ".join(sorted(found.best.ids)))
         return answers[asked[-1]]
 
-    monkeypatch.setattr(naming, "search", lambda *_: found_of("wrong"))
-    monkeypatch.setattr(decide.smooth_judge, "hinted", lambda *_: None)
+    monkeypatch.setattr(search, "search", lambda *_: found_of("wrong"))
+    monkeypatch.setattr(decide.beyond_catalogue, "hinted_curve", lambda *_: None)
     monkeypatch.setattr(decide, "_judged", judge)
     return asked, answers
 
@@ -114,16 +116,16 @@ def test_a_fit_that_first_values_beat_is_stuck(start, better):
     terms, own = (Term("a", parameter, 0.0), Term("b", parameter, 0.0)), (0.5, 0.2)
     at = {term.key: value for term, value in zip(terms, own, strict=True)}
     fit = SimpleNamespace(terms=terms, start=at, log_likelihood=-2.0)
-    assert stuck.begins_better(problem, fit, {(name, "offset"): value for name, value in start.items()}) is better
-    assert not stuck.begins_better(problem, SimpleNamespace(terms=()), {("a", "offset"): 0.9})
+    assert refit.start_is_better(problem, fit, {(name, "offset"): value for name, value in start.items()}) is better
+    assert not refit.start_is_better(problem, SimpleNamespace(terms=()), {("a", "offset"): 0.9})
 
 
 @pytest.mark.parametrize(("by_noise", "least", "curved"), [(0.0, 3.0, True), (3.5, 3.0, False), (3.5, 1.0, True)])
 def test_a_curve_has_to_beat_the_noise_that_would_take_it_up(judged, monkeypatch, by_noise, least, curved):
     curve = SimpleNamespace()
     won = decision(found_of("a"))
-    won = replace(won, beyond=Beyond(Rivalry((curve,), 5.0, {}, {}, 0.0, least), curve, 0.0))
-    monkeypatch.setattr(decide.smooth_judge, "hinted", lambda *_: curve)
+    won = replace(won, beyond=Beyond(CurveComparison((curve,), 5.0, {}, {}, 0.0, least), curve, 0.0))
+    monkeypatch.setattr(decide.beyond_catalogue, "hinted_curve", lambda *_: curve)
     monkeypatch.setattr(decide, "_by_noise", lambda *_: by_noise)
     plain = decision(found_of("a"))
     monkeypatch.setattr(decide, "_judged", lambda _first, _found, hint, *_: plain if hint is None else won)
@@ -141,7 +143,7 @@ def test_noise_about_nothing_hides_no_weak_turn_by_the_heading():
 
 def test_slow_noise_is_heard_where_noise_about_a_curve_lacks_it():
     regime = Regime((Colour((0.01, 0.002, 0.01), 0.2), Colour((0.01, 0.001, 0.03), 3.0)), 0.002, 0.002)
-    data = base_case.recording("null", base_case.draw_drives("rich", regime, np.random.default_rng(1), rate=5.0), ())
+    data = recordings.recording("null", recordings.draw_drives("rich", regime, np.random.default_rng(1), rate=5.0), ())
     model, own = load_model(shipped("launch/md100.yaml")), noise_of(regime)
     problem = Problem([prepare(run, model) for run in data.runs], model, own, ids=frozenset({"base.gain_v"}))
     nothing = problem.fit_candidates((), {})

@@ -10,12 +10,12 @@ import pytest
 from laser_scene import neighbours, recording
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, marginal, whitened
-from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.search import Search, confusion
-from kurumaisu.critic.laser.shots import gather
-from kurumaisu.critic.laser.still import repeatability
-from kurumaisu.critic.laser.verdicts import criticise
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.ranges.noise.scan_noise import Gram, Layout, ScanNoise, marginal, whitened
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.repeatability import repeatability
+from kurumaisu.critic.ranges.search.effect_sets import FormSearch, confusion
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 from kurumaisu.world import load_world
@@ -31,25 +31,28 @@ def say(_):
 
 def test_what_is_missing_is_said(tmp_path):
     good = recording(tmp_path, None, 0.0, 1, scans=6)
-    mapless = criticise(replace(good, world=None), MODEL, say)
+    mapless = criticise_scans(replace(good, world=None), MODEL, say)
     assert "map" in mapless.refused
     assert mapless.next_experiment is None, "no drive makes a map of measured walls"
     blind = replace(good, runs=(replace(good.runs[0], pose=None),))
-    assert "reference pose" in criticise(blind, MODEL, say).refused
+    assert "reference pose" in criticise_scans(blind, MODEL, say).refused
     mapped = replace(good, runs=(replace(good.runs[0], pose_source="particle filter over 6 scans"),))
-    assert "these very scans" in criticise(mapped, MODEL, say).refused
+    assert "computed from these scans" in criticise_scans(mapped, MODEL, say).refused
     none = replace(good, runs=(replace(good.runs[0], scan=None),))
-    scanless = criticise(none, MODEL, say)
+    scanless = criticise_scans(none, MODEL, say)
     assert "scans" in scanless.refused
     assert scanless.next_experiment.id == "room_poses"
     assert {"laser.offset", "laser.scale", "laser.mount_yaw"} <= set(scanless.next_experiment.separates)
     assert not {"laser.latency", "laser.sweep"} & set(scanless.next_experiment.separates), "they show on the way only"
     late = replace(good.runs[0].scan, t=good.runs[0].scan.t + 1000)
-    assert "within the time" in criticise(replace(good, runs=(replace(good.runs[0], scan=late),)), MODEL, say).refused
+    assert (
+        "within the time"
+        in criticise_scans(replace(good, runs=(replace(good.runs[0], scan=late),)), MODEL, say).refused
+    )
 
 
 def test_without_an_effect_the_verdict_is_none(tmp_path):
-    finding = criticise(recording(tmp_path, None, 0.0, 2, scans=30), MODEL, say)
+    finding = criticise_scans(recording(tmp_path, None, 0.0, 2, scans=30), MODEL, say)
     assert finding.causes == ()
     assert finding.confounded == ()
 
@@ -62,20 +65,20 @@ def test_dependent_noise_does_not_pass_for_an_effect_on_the_mean(tmp_path, seed)
     )
     assembly = Assembly(shots)
     normal = assembly.settle(None)
-    found = Search(assembly.forms, normal.gram).run()
+    found = FormSearch(assembly.forms, normal.gram).run()
     assert found.named == ()
     assert normal.beam_noise.rho == pytest.approx(0.5, abs=0.05)
     assert normal.scan_noise.position_sd == pytest.approx(0.005, rel=0.4)
     assert normal.scan_noise.heading_sd == pytest.approx(0.005, rel=0.4)
     naive = [gram.matrix[gram.own + gram.shared :, gram.own + gram.shared :] for gram in assembly.grams(assembly.first)]
-    assert Search(assembly.forms, np.sum(naive, axis=0)).run().named
+    assert FormSearch(assembly.forms, np.sum(naive, axis=0)).run().named
 
 
 @pytest.mark.parametrize(
     ("effect", "size", "parameter"), [("laser.scale", 0.006, "scale"), ("laser.mount_yaw", -0.02, "yaw")]
 )
 def test_a_hidden_effect_is_named_and_measured(tmp_path, effect, size, parameter):
-    finding = criticise(recording(tmp_path, effect, size, 5, scans=30), MODEL, say)
+    finding = criticise_scans(recording(tmp_path, effect, size, 5, scans=30), MODEL, say)
     assert [cause.id for cause in finding.causes] == [effect]
     estimate = finding.causes[0].parameters[parameter]
     error = (estimate.hi90 - estimate.lo90) / (2 * 1.645)
@@ -84,7 +87,7 @@ def test_a_hidden_effect_is_named_and_measured(tmp_path, effect, size, parameter
 
 
 def test_an_effect_on_the_scatter_is_named_and_measured(tmp_path):
-    finding = criticise(recording(tmp_path, "laser.dropout", 0.04, 6, scans=20), MODEL, say)
+    finding = criticise_scans(recording(tmp_path, "laser.dropout", 0.04, 6, scans=20), MODEL, say)
     assert [cause.id for cause in finding.causes] == ["laser.dropout"]
     assert finding.causes[0].parameters["probability"].estimate == pytest.approx(0.04, rel=0.25)
 

@@ -8,14 +8,21 @@ import pytest
 
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.critic.laser.free import _curves
-from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, _Likelihood, wary_of, whitened
-from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.scan_fit import fluctuating
-from kurumaisu.critic.laser.shots import gather
-from kurumaisu.critic.laser.statistics import Statistics
-from kurumaisu.critic.laser.trust import piles
-from kurumaisu.critic.laser.verdicts import criticise
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.ranges.noise.scan_noise import (
+    Gram,
+    Layout,
+    ScanNoise,
+    _Likelihood,
+    whitened,
+    with_lasting_common_mode,
+)
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.ranges.signals.coefficient_blocks import _curves
+from kurumaisu.critic.scatter.scan_fit import fluctuating
+from kurumaisu.critic.scatter.statistics import Statistics
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -30,7 +37,7 @@ def say(_):
 def stands(tmp_path_factory):
     """Scans of stands in a room, 7 of each, without anything hidden."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 84)
+        patch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 84)
         case = make(Ask("null", regime="clean", design="room", family="laser"), 7, tmp_path_factory.mktemp("room"))
         return Assembly(gather(case.recording, MODEL), frozenset())
 
@@ -77,7 +84,7 @@ def test_how_far_readings_scatter_is_what_no_beam_keeps(stands, kept, told):
     by_incidence = [moved[name] - plain[name] for name in plain if name.startswith("spread, incidence")]
     assert (min(by_incidence) > 0.4) == told
     assert (max(by_incidence) > 0.1) == told
-    name = "spread of the beams' means"
+    name = "spread of the means per beam"
     assert (moved[name] - plain[name] > 0.8) == kept  # what scatters spreads them by no more than it does by chance
     assert abs(moved[name] - plain[name]) < 0.3 or kept
 
@@ -119,7 +126,7 @@ def test_what_is_cut_off_says_nothing_of_the_scatter(stands, louder, least, most
     error = louder * noise(stands, 6) + statistics.pose_errors(np.random.default_rng(8))
     cut = float(np.quantile(stands.marks.base[stands.geometry], 0.6))
     found = numbers(stands, error, np.minimum(stands.marks.base + error, cut))
-    assert found["greatest value at which readings pile up"] == pytest.approx(cut / 0.05, abs=0.02)
+    assert found["upper cut-off of the readings"] == pytest.approx(cut / 0.05, abs=0.02)
     spread = [found[f"spread, {name} {i} of 4"] for name in ("range", "incidence") for i in (1, 2)]
     assert least < min(spread) <= max(spread) < most
     gone = numbers(stands, error, np.minimum(stands.marks.base + error, 0.2))
@@ -131,7 +138,7 @@ def test_a_pile_lies_where_it_lies_on_its_grid():
     rng = np.random.default_rng(3)
     for end in np.round(np.arange(2.5, 2.6, 0.001), 3):
         walls = np.round(rng.uniform(1.0, 4.0, 4000), 3)
-        assert piles(np.minimum(walls, end))[1] == pytest.approx(end, abs=1e-9)
+        assert cut_off_ends(np.minimum(walls, end))[1] == pytest.approx(end, abs=1e-9)
 
 
 def test_columns_that_others_draw_as_well_speak_for_no_noise():
@@ -167,7 +174,7 @@ def test_a_common_mode_may_last_as_long_as_stands_that_are_shorter_cannot_deny(t
         rows = whitened(columns, np.ones(beams, dtype=bool), np.full(beams, 0.001), 0.0)
         grams.append(Gram(rows.T @ rows, 0, 1))
     likeliest = ScanNoise(0.002, 0.001, 4.5e-4 if there else 2e-5, 1.0)
-    wary = wary_of(grams, layout, np.arange(count), likeliest)
+    wary = with_lasting_common_mode(grams, layout, np.arange(count), likeliest)
     if not there:
         assert wary == likeliest, "there is none"
         return
@@ -176,11 +183,11 @@ def test_a_common_mode_may_last_as_long_as_stands_that_are_shorter_cannot_deny(t
 
 
 def test_what_comes_and_goes_with_the_time_is_no_common_mode(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 72)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 72)
     case = make(Ask("unknown", ("pulse_bias",), regime="clean", family="laser"), 29464, tmp_path)
     ids = frozenset({"laser.common_mode", "laser.offset", "laser.warmup", effects.SMOOTH})
-    finding = criticise(case.recording, MODEL, say, ids)
+    finding = criticise_scans(case.recording, MODEL, say, ids)
     assert finding.causes == ()
     assert any(unknown.covariate == "time" for unknown in finding.unknown[:3])
-    null = criticise(case.null, MODEL, say, ids)
+    null = criticise_scans(case.null, MODEL, say, ids)
     assert (null.causes, null.unknown, null.confounded) == ((), (), ())

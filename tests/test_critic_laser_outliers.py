@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.laser.verdicts import criticise
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -32,7 +32,7 @@ def in_bursts(rng, scan):
 def test_outliers_anywhere_are_tails_and_bursts_are_crosstalk(tmp_path, spoil, name):
     told, rng = recording(tmp_path, None, 0.0, 6, scans=30), np.random.default_rng(12)
     runs = tuple(replace(run, scan=replace(run.scan, values=np.round(spoil(rng, run.scan), 3))) for run in told.runs)
-    finding = criticise(replace(told, runs=runs), MODEL, lambda _: None, IDS)
+    finding = criticise_scans(replace(told, runs=runs), MODEL, lambda _: None, IDS)
     assert [cause.id for cause in finding.causes] == [name]
     assert not finding.confounded
 
@@ -50,7 +50,7 @@ def test_a_burst_is_not_bent_to_do_what_beams_lose(tmp_path):
         )
         for run in told.runs
     )
-    finding = criticise(replace(told, runs=runs), MODEL, lambda _: None, IDS | {"laser.dropout"})
+    finding = criticise_scans(replace(told, runs=runs), MODEL, lambda _: None, IDS | {"laser.dropout"})
     causes = {cause.id: cause.parameters for cause in finding.causes}
     assert set(causes) == {"laser.crosstalk", "laser.dropout"}
     assert causes["laser.dropout"]["probability"].estimate == pytest.approx(0.04, rel=0.3)

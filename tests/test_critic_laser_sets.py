@@ -6,17 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kurumaisu.critic.laser.columns import Column, Form
-from kurumaisu.critic.laser.finding import LaserFinding
-from kurumaisu.critic.laser.free import Free
-from kurumaisu.critic.laser.grids import grid_of
-from kurumaisu.critic.laser.one_clock import one_clock
-from kurumaisu.critic.laser.reframed import from_base_link
-from kurumaisu.critic.laser.search import Search
-from kurumaisu.critic.laser.trust import trusted_place
-from kurumaisu.critic.laser.twins import twins
-from kurumaisu.critic.recording import Recording, Run, Series
-from kurumaisu.critic.verdict import Cause, Estimate
+from kurumaisu.critic.judge.clock_drift import without_double_delay
+from kurumaisu.critic.judge.reference_point import from_base_link
+from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
+from kurumaisu.critic.ranges.search.confounding import confounded
+from kurumaisu.critic.ranges.search.effect_sets import FormSearch
+from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
+from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
+from kurumaisu.critic.ranges.signals.shape_grids import grid_of
+from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.recording import Recording, Run, Series
+from kurumaisu.critic.values.verdict import Cause, Estimate
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -35,11 +35,11 @@ def test_many_walls_do_not_imitate_an_effect_by_chance(walls, a_set):
     y = 2.0 * effect + rng.standard_normal(readings)
     rows = np.column_stack([effect, block, y])
     form = Form("an.effect", {}, (Column(SIZE, squared=False, beside={}),), 0)
-    free = Free("a.map", SIZE, None, (np.eye(walls),), slice(1, 1 + walls))
+    free = Block("a.map", SIZE, None, (np.eye(walls),), slice(1, 1 + walls))
     gram = rows.T @ rows
-    found = Search([form], gram).run()
+    found = FormSearch([form], gram).run()
     assert found.best.ids == {"an.effect"}
-    groups = twins(found, None, [free], gram, ["an.effect"])
+    groups = confounded(found, None, [free], gram, ["an.effect"])
     assert groups == ((("a.map", "an.effect"),) if a_set else ())
 
 
@@ -59,7 +59,7 @@ def test_beams_along_a_wall_do_not_speak():
     level = 1 / np.cos(np.linspace(-0.1, 0.1, beams))  # of a straight wall
     seen = SimpleNamespace(incidence=incidence, level=np.repeat(level[np.newaxis], 5, axis=0))
     laser = SimpleNamespace(range_min=0.06, range_max=4.0, angle_increment=0.2 / (beams - 1))
-    place = trusted_place(SimpleNamespace(laser=laser), seen, np.full_like(incidence, 2.0))
+    place = usable_beams(SimpleNamespace(laser=laser), seen, np.full_like(incidence, 2.0))
     assert place[:, beams // 2].tolist() == [True, True, True, False, False]
 
 
@@ -114,8 +114,8 @@ def test_clocks_that_agree_at_the_first_scan_are_no_delay(first, delay, named):
     late = Cause("laser.latency", 1.0, {"delay": Estimate(delay, delay - 4e-4, delay + 4e-4, "s")}, 50.0)
     drift = Cause("laser.clock_skew", 1.0, {"skew": Estimate(4e-4, 3.9e-4, 4.1e-4, "1")}, 50.0)
     settings = (EffectSetting("laser.latency", {"delay": delay}), EffectSetting("laser.clock_skew", {"skew": 4e-4}))
-    told = one_clock(LaserFinding(causes=(late, drift), settings=settings), first + np.arange(9.0))
+    told = without_double_delay(LaserFinding(causes=(late, drift), settings=settings), first + np.arange(9.0))
     assert [cause.id for cause in told.causes] == ["laser.latency", "laser.clock_skew"][1 - named :]
     assert told.settings == settings
     assert bool(told.details) != named
-    assert one_clock(LaserFinding(causes=(late,)), first + np.arange(9.0)).causes == (late,)
+    assert without_double_delay(LaserFinding(causes=(late,)), first + np.arange(9.0)).causes == (late,)

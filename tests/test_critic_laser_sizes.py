@@ -8,37 +8,37 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.explain import Criticism
-from kurumaisu.critic.laser.acting import gain_of
-from kurumaisu.critic.laser.columns import Column, Form
-from kurumaisu.critic.laser.estimates import another_map
-from kurumaisu.critic.laser.finding import LaserFinding
-from kurumaisu.critic.laser.free import Free
-from kurumaisu.critic.laser.merge import with_laser
-from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.pictures import Part
-from kurumaisu.critic.laser.pinned import pinned
-from kurumaisu.critic.laser.rivals import Rival, weigh
-from kurumaisu.critic.laser.search import Fitted, Search
-from kurumaisu.critic.laser.shots import gather
-from kurumaisu.critic.laser.verdicts import _spread_of, criticise
-from kurumaisu.critic.smooth import Belief
-from kurumaisu.critic.smooth_alike import FORM
-from kurumaisu.critic.story import Story
-from kurumaisu.critic.verdict import Verdict
+from kurumaisu.critic.judge.merge import with_scans
+from kurumaisu.critic.judge.scan_estimates import another_map
+from kurumaisu.critic.judge.scan_verdict import _spread_of, criticise_scans
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock, compare_blocks
+from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormSearch
+from kurumaisu.critic.ranges.search.mean_effects import gain_of
+from kurumaisu.critic.ranges.search.misfits import Part
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.ranges.search.parameter_fit import fit_parameters
+from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
+from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
+from kurumaisu.critic.unknown.curves import CurveEvidence
+from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
+from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.story import Story
+from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
-NONE = Fitted((), np.empty(0), np.empty(0), 0.0, 0.0)
-NAMED = Fitted((Form("laser.warmup", {}, (), 0),), np.empty(0), np.empty(0), 700.0, 690.0)
-CURVE = Free("smooth.range.time", None, SimpleNamespace(), (), slice(1, 9))
+NONE = FittedForms((), np.empty(0), np.empty(0), 0.0, 0.0)
+NAMED = FittedForms((Form("laser.warmup", {}, (), 0),), np.empty(0), np.empty(0), 700.0, 690.0)
+CURVE = Block("smooth.range.time", None, SimpleNamespace(), (), slice(1, 9))
 
 
 @pytest.mark.parametrize(("leads", "gain"), [(False, 690.0), (True, -30.0)])
 def test_a_curve_out_of_the_running_does_not_make_a_named_cause_worth_less_than_nothing(leads, gain):
     """A curve follows a slightly other form than the equation's by more than the equation, and stands for it."""
-    rival = Rival(NONE, CURVE, Belief(720.0, np.eye(8)), 720.0)
+    rival = SetWithBlock(NONE, CURVE, CurveEvidence(720.0, np.eye(8)), 720.0)
     found = SimpleNamespace(fits=(NAMED, NONE))
     made = SimpleNamespace(
         found=found,
@@ -61,8 +61,8 @@ def test_beside_walls_that_are_where_they_like_an_effect_needs_evidence_only(siz
     gram = columns.T @ columns
     own = Column(Parameter("quadratic", "1/m", null=0.0, scale=1.0, lower=-9.0, upper=9.0), False, {})
     quadratic = Form("laser.quadratic", {}, (own,), 0)
-    free = Free("world.map_error", own.parameter, None, (np.eye(12),), slice(1, 13))
-    winner = weigh(Search([quadratic], gram).run(), [free], gram).winner
+    free = Block("world.map_error", own.parameter, None, (np.eye(12),), slice(1, 13))
+    winner = compare_blocks(FormSearch([quadratic], gram).run(), [free], gram).winner
     assert winner is not None
     assert winner.free is free
     assert winner.fit.ids == found
@@ -74,15 +74,17 @@ def test_beside_walls_that_are_where_they_like_an_effect_needs_evidence_only(siz
 def test_walls_that_are_farther_off_than_an_error_of_the_map_are_of_another_one(off, lacking, told):
     """Such walls are not named, and nothing else is, be the rest as it may; what the map lacks speaks for it, too."""
     sd = Parameter("sd", "m", null=0.0, scale=0.005, lower=0.0, upper=0.2)
-    free = Free("world.map_error", sd, None, (np.eye(12),), slice(0, 12))
+    free = Block("world.map_error", sd, None, (np.eye(12),), slice(0, 12))
     walls = off / sd.scale * np.random.default_rng(1).standard_normal(12)
     gram = np.vstack([np.column_stack([np.eye(12), walls]), np.append(walls, walls @ walls)])
-    words = another_map(Rival(NONE, free, Belief(100.0, np.eye(12)), 100.0), SimpleNamespace(gram=gram), lacking)
+    words = another_map(
+        SetWithBlock(NONE, free, CurveEvidence(100.0, np.eye(12)), 100.0), SimpleNamespace(gram=gram), lacking
+    )
     assert (words is not None) == told
     assert another_map(None, SimpleNamespace(gram=gram), lacking) is None
     if words is not None:
         story = Story("", "", "", (), "", {})
-        found = with_laser(
+        found = with_scans(
             Criticism(Verdict("none", problems=("a note",)), story, MODEL, ()), LaserFinding(wrong=words)
         )
         assert (found.verdict.verdict, found.verdict.causes) == ("invalid_data", ())
@@ -100,15 +102,15 @@ def test_a_size_is_no_surer_than_the_form_that_it_belongs_to(tmp_path):
         told = [EffectSetting(name, values)]
         assembly = Assembly(replace(shots, measured=marks.base + marks.together(told)))
         forms = [form for form in assembly.forms if form.id == name]
-        fit = pinned(assembly, assembly.settle(None), forms, told, None, {}, None)
+        fit = fit_parameters(assembly, assembly.settle(None), forms, told, None, {}, None)
         ((setting, known),) = fit.settings
         assert setting.parameters[name.removeprefix("laser.")] == pytest.approx(next(iter(values.values())), rel=1e-3)
         missed[name] = fit.missed
         sds |= {p: sd / setting.parameters[p] for p, sd in known.items()}
     assert sds["offset"] < 0.05
-    assert 0.99 * FORM < sds["quadratic"] < 1.2 * FORM
+    assert 0.99 * FORM_ERROR < sds["quadratic"] < 1.2 * FORM_ERROR
     assert missed["laser.offset"].shape[2] == 0
-    what = FORM * marks.together([EffectSetting("laser.quadratic", sizes["laser.quadratic"])])
+    what = FORM_ERROR * marks.together([EffectSetting("laser.quadratic", sizes["laser.quadratic"])])
     off = np.abs(missed["laser.quadratic"][:, :, 0] - np.nan_to_num(what))
     assert np.mean(off < 1e-3) > 0.99  # but for beams beside an edge, which the sought poses move
 
@@ -116,7 +118,7 @@ def test_a_size_is_no_surer_than_the_form_that_it_belongs_to(tmp_path):
 @pytest.mark.parametrize(("name", "size"), [("laser.scale", 0.05), ("laser.cyclic", 0.03), ("laser.quadratic", 0.02)])
 def test_a_cause_far_out_of_the_noise_leaves_no_scatter(tmp_path, name, size):
     """It has moved poses and made outliers of readings until it was known."""
-    seen = criticise(recording(tmp_path, name, size, 2), MODEL, lambda _: None)
+    seen = criticise_scans(recording(tmp_path, name, size, 2), MODEL, lambda _: None)
     assert [cause.id for cause in seen.causes] == [name]
     (told,) = (cause.parameters for cause in seen.causes)
     first = next(iter(told.values()))
@@ -130,7 +132,7 @@ def test_where_readings_are_cut_off_is_known_to_a_step_of_them(tmp_path, end):
     run = data.runs[0]
     cut = np.minimum(run.scan.values, end)
     data = replace(data, runs=(replace(run, scan=replace(run.scan, values=cut)),))
-    seen = criticise(data, MODEL, lambda _: None, frozenset({"laser.saturation", "laser.crosstalk"}))
+    seen = criticise_scans(data, MODEL, lambda _: None, frozenset({"laser.saturation", "laser.crosstalk"}))
     (cause,) = seen.causes
     told = cause.parameters["inverse_far"]
     assert told.lo90 < 1 / end < told.hi90

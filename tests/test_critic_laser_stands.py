@@ -9,16 +9,16 @@ from laser_scene import recording
 
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.critic.laser.columns import Column, Form, Marks
-from kurumaisu.critic.laser.likeness import Kinds
-from kurumaisu.critic.laser.search import Search
-from kurumaisu.critic.laser.shots import gather
-from kurumaisu.critic.laser.spread import ScatterSearch
-from kurumaisu.critic.laser.spread_fit import ScatterFit
-from kurumaisu.critic.laser.standing import held, steadied
-from kurumaisu.critic.laser.trust import hats
-from kurumaisu.critic.laser.verdicts import criticise
-from kurumaisu.critic.recording import Series
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.standstill import stands_averaged, with_pause_rows
+from kurumaisu.critic.ranges.scans.valid_readings import pose_weights
+from kurumaisu.critic.ranges.search.effect_sets import FormSearch
+from kurumaisu.critic.ranges.signals.effect_columns import Column, EffectColumns, Form
+from kurumaisu.critic.scatter.likelihood import StatisticKinds
+from kurumaisu.critic.scatter.scatter_fit import ScatterFit
+from kurumaisu.critic.scatter.scatter_search import ScatterSearch
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -31,11 +31,11 @@ def say(_):
 def test_a_carried_chair_stands_until_it_is_carried():
     times = np.array([0.0, 0.1, 0.2, 60.0, 60.1, 60.2])
     places = np.repeat([[0.0, 0.0, 0.0], [3.0, 2.0, 1.0]], 3, axis=0)
-    t, poses = held(times, places)
+    t, poses = with_pause_rows(times, places)
     for when, x in ((0.2, 0.0), (1.2, 0.0), (29.0, 0.0), (31.0, 3.0), (59.5, 3.0), (60.2, 3.0)):
         assert np.interp(when, t, poses[:, 0]) == x
     driven = places + np.arange(6)[:, np.newaxis]
-    np.testing.assert_array_equal(held(times, driven)[0], times)
+    np.testing.assert_array_equal(with_pause_rows(times, driven)[0], times)
 
 
 def test_stands_are_found_whatever_their_jitter_happens_to_be():
@@ -43,7 +43,7 @@ def test_stands_are_found_whatever_their_jitter_happens_to_be():
     for seed in range(40):
         rng = np.random.default_rng(seed)
         places = np.repeat(rng.uniform(-1, 1, (4, 3)), 20, axis=0)
-        still = steadied(times, places + 3e-4 * rng.standard_normal(places.shape))
+        still = stands_averaged(times, places + 3e-4 * rng.standard_normal(places.shape))
         assert len(np.unique(still, axis=0)) == 4, seed
 
 
@@ -53,7 +53,7 @@ def test_a_stand_begins_when_the_chair_has_rolled_out():
     way = np.interp(times, [0.0, 1.0, 1.24, 5.83, 6.0, 7.0], [-0.5, -0.02, 0.0, 0.0, 0.013, 0.6])
     for seed in range(40):
         poses = np.column_stack([way, 0 * way, 0 * way]) + 1.3e-3 * np.random.default_rng(seed).standard_normal((70, 3))
-        same = (np.diff(steadied(times, poses), axis=0) == 0).all(axis=1)
+        same = (np.diff(stands_averaged(times, poses), axis=0) == 0).all(axis=1)
         rows = np.flatnonzero(np.r_[False, same] | np.r_[same, False])
         assert 13 <= rows[0] <= 15, seed
         assert 55 <= rows[-1] <= 58, seed
@@ -64,7 +64,7 @@ def test_a_scan_rests_on_the_poses_of_when_its_beams_leave(tmp_path):
     for delay in (0.0, 0.3):
         late = replace(shots, own=(EffectSetting("laser.latency", {"delay": delay}),))
         for scan in (3, 8):
-            hat = hats(late, scan)
+            hat = pose_weights(late, scan)
             times = shots.stamps[scan] - delay + shots.said
             knots = shots.tracks[shots.run[scan]].times[hat.rows]
             assert knots[0] <= times[0]
@@ -81,10 +81,10 @@ def test_the_temperature_at_which_a_laser_reads_right_is_free_within_bounds(tmp_
     warmth = 21.5 + 4 * np.sin(run.scan.t)[:, np.newaxis]
     known = {"temperature": Series(run.scan.t, warmth, ("temperature",))}
     shots = gather(replace(data, runs=(replace(run, covariates=known),)), MODEL)
-    forms, columns = Marks(shots).forms(frozenset({"laser.temperature", "laser.offset"}))
+    forms, columns = EffectColumns(shots).forms(frozenset({"laser.temperature", "laser.offset"}))
     error = coefficient * (warmth - 22.3) + offset + np.zeros_like(shots.measured)
     flat = np.concatenate([columns, error[:, :, np.newaxis]], axis=2)[np.isfinite(columns).all(axis=2)] / 0.01
-    assert Search(forms, flat.T.astype(float) @ flat).run().best.ids == {named}
+    assert FormSearch(forms, flat.T.astype(float) @ flat).run().best.ids == {named}
 
 
 def _two(z, other):
@@ -95,7 +95,7 @@ def _two(z, other):
     ]
     gram = np.diag([1e4, 1e4, 0.0])
     gram[:2, 2] = gram[2, :2] = 100 * np.array([z, other])
-    return Search(forms, gram).run()
+    return FormSearch(forms, gram).run()
 
 
 def test_what_a_form_leaves_is_not_one_more_effect():
@@ -104,9 +104,9 @@ def test_what_a_form_leaves_is_not_one_more_effect():
 
 
 def test_a_delay_is_measured_where_it_acts(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 120)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 120)
     case = make(Ask("single", ("laser.latency",), None, family="laser"), 121, tmp_path)
-    finding = criticise(case.recording, MODEL, say)
+    finding = criticise_scans(case.recording, MODEL, say)
     assert [cause.id for cause in finding.causes] == ["laser.latency"]
     truth = case.truth.parameters["laser.latency"]["delay"]
     assert finding.causes[0].parameters["delay"].estimate == pytest.approx(truth, rel=0.12)
@@ -117,7 +117,7 @@ class _Three:
 
     def kinds(self):
         none = np.zeros(3, dtype=bool)
-        return Kinds(none, none)
+        return StatisticKinds(none, none)
 
     def null(self, effect):
         return {p.name: p.null for p in effect.parameters}

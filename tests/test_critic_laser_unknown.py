@@ -10,13 +10,14 @@ from laser_scene import recording
 
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.critic import pipeline, sanity_jumps
-from kurumaisu.critic.laser.beams import Crossed, crossed, without_beams
-from kurumaisu.critic.laser.noise import Gram, Layout, ScanNoise, whitened
-from kurumaisu.critic.laser.path import Sight, likeliest, steady
-from kurumaisu.critic.laser.standing import steadied
-from kurumaisu.critic.laser.verdicts import criticise
-from kurumaisu.critic.recording import Series
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.ranges.noise.beam_offsets import OffsetProducts, offset_products, without_beam_offsets
+from kurumaisu.critic.ranges.noise.scan_noise import Gram, Layout, ScanNoise, whitened
+from kurumaisu.critic.ranges.poses.likeliest_path import PoseEvidence, likeliest_path, motion_evidence
+from kurumaisu.critic.ranges.scans.standstill import stands_averaged
+from kurumaisu.critic.sanity import pose_jumps
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.effects import Echoes
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -58,7 +59,7 @@ def test_beside_what_is_in_no_catalogue_nothing_is_told_of_scatter_but_what_is_l
     run = data.runs[0]
     stripe = 0.03 * (np.abs(np.arange(run.scan.values.shape[1]) - 450) < 30)
     data = replace(data, runs=(replace(run, scan=replace(run.scan, values=np.round(run.scan.values - stripe, 3))),))
-    finding = criticise(data, MODEL, say)
+    finding = criticise_scans(data, MODEL, say)
     assert finding.unknown[0].covariate == "bearing"
     assert {cause.id for cause in finding.causes} == {"laser.dropout"}
 
@@ -94,9 +95,9 @@ def test_the_temperature_that_was_recorded_is_followed():
 
 
 def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 80)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 80)
     case = make(Ask("single", ("laser.tilt",), 40.0, regime="clean", design="room"), 1002, tmp_path)
-    finding = criticise(case.recording, MODEL, say)
+    finding = criticise_scans(case.recording, MODEL, say)
     assert [cause.id for cause in finding.causes] == ["laser.tilt"]
     (setting,) = [setting for setting in finding.settings if setting.id == "laser.tilt"]
     for name, truth in case.truth.parameters["laser.tilt"].items():
@@ -105,15 +106,15 @@ def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypa
 
 
 def test_one_wall_does_not_tell_the_mounting_from_the_map(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.laser.shots.MOST_SCANS", 60)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 60)
     case = make(Ask("confounded", ("laser.mount_x",), 16.0, regime="clean"), 301, tmp_path)
-    finding = criticise(case.recording, MODEL, say)
+    finding = criticise_scans(case.recording, MODEL, say)
     assert finding.confounded == (("laser.mount_x", "world.map_error"),)
     assert finding.causes == ()
     assert any("only one wall" in line and "room_poses" in line for line in finding.details)
     assert finding.next_experiment.id == "room_poses"
     assert finding.next_experiment.separates == ("laser.mount_x", "world.map_error")
-    null = criticise(case.null, MODEL, say)
+    null = criticise_scans(case.null, MODEL, say)
     assert (null.confounded, null.causes, null.unknown) == ((), (), ())
 
 
@@ -132,11 +133,11 @@ def test_beams_that_keep_an_offset_are_integrated_out():
     for k in range(scans):
         rows = whitened(np.hstack([poses[k], np.ones((beams, 1)), columns[k]]), valid, sd, rho)
         grams.append(Gram(rows.T @ rows, own, 1))
-        products = crossed(rows, valid, sd, rho, inner)
+        products = offset_products(rows, valid, sd, rho, inner)
         parts.append(products[:, : own + 1])
         total += products[:, own + 1 :]
     layout = Layout(times, run, np.full(scans, -1))
-    gram = without_beams(grams, Crossed(tuple(parts), total, inner), layout, noise, sd_own)
+    gram = without_beam_offsets(grams, OffsetProducts(tuple(parts), total, inner), layout, noise, sd_own)
     modes = noise.common_sd**2 * np.exp(-np.abs(times[:, None] - times) / noise.common_tau)
     dense = np.kron(modes * (run[:, None] == run), np.ones((n, n)))
     dense += np.kron(np.ones((scans, scans)), sd_own**2 * np.eye(n))
@@ -152,11 +153,11 @@ def test_poses_of_a_stand_are_one_and_those_of_a_drive_are_not():
     rng = np.random.default_rng(3)
     times = np.concatenate([0.1 * np.arange(30), 100 + 0.1 * np.arange(30)])
     places = np.repeat([[0.0, 0.0, 0.0], [1.0, 0.5, 2.0]], 30, axis=0)
-    still = steadied(times, places + 0.001 * rng.standard_normal(places.shape))
+    still = stands_averaged(times, places + 0.001 * rng.standard_normal(places.shape))
     assert len(np.unique(still, axis=0)) == 2
     np.testing.assert_allclose(still, places, atol=0.001)
     driven = np.column_stack([0.3 * times, 0.0 * times, 0.0 * times]) + 0.001 * rng.standard_normal(places.shape)
-    np.testing.assert_array_equal(steadied(times, driven), driven)
+    np.testing.assert_array_equal(stands_averaged(times, driven), driven)
 
 
 def seen(times, truth, reference, sd, every):
@@ -165,7 +166,7 @@ def seen(times, truth, reference, sd, every):
     inner = np.kron(np.eye(3), np.diag([sd**-2.0] * 3))
     rows = [slice(i, i + 3) for i in range(0, len(times) - 3, every)]
     errors = [(truth[r] - reference[r] + sd * rng.standard_normal((3, 3))).ravel() for r in rows]
-    return [Sight(r, inner, inner @ error) for r, error in zip(rows, errors, strict=True)]
+    return [PoseEvidence(r, inner, inner @ error) for r, error in zip(rows, errors, strict=True)]
 
 
 @pytest.mark.parametrize("step", [0.05, 0.02])
@@ -177,7 +178,7 @@ def test_a_path_has_the_rates_of_the_truth_and_shows_where_they_jump(step):
     truth = np.column_stack([x, 0.0 * x, 2 * x])
     reference = truth + np.array([0.01, 0.01, 0.005]) * rng.standard_normal(truth.shape)
     known = seen(times, truth, reference, 0.001, round(0.2 / step))
-    path, jumps = likeliest(times, reference, known, np.zeros(len(times), dtype=bool), np.zeros_like(truth))
+    path, jumps = likeliest_path(times, reference, known, np.zeros(len(times), dtype=bool), np.zeros_like(truth))
     under = np.concatenate([np.arange(sight.rows.start, sight.rows.stop - 1) for sight in known])
     under = under[~(jumps[under] | jumps[under + 1]) & (under > 5) & (under < len(times) - 6)]
     found, right = (np.diff(poses, axis=0)[under] / step for poses in (path, truth))
@@ -198,7 +199,7 @@ def test_motion_tells_errors_that_differ_from_pose_to_pose_unless_the_rates_jump
     truth = np.cumsum(np.outer(rates, [0.05, 0.0, 0.1]), axis=0)
     reference = truth + np.array([0.01, 0.01, 0.005]) * rng.standard_normal(truth.shape)
     scans = [slice(i, i + 3) for i in (10, 30, 48, 70)]
-    made = steady(times, reference, truth, scans)
+    made = motion_evidence(times, reference, truth, scans)
     for known, rows in zip(made, scans, strict=True):
         errors = (truth - reference)[rows].ravel()
         off = known.rows @ errors - known.left
@@ -207,7 +208,7 @@ def test_motion_tells_errors_that_differ_from_pose_to_pose_unless_the_rates_jump
         else:
             np.testing.assert_allclose(off, 0, atol=1e-9)
             assert np.abs(known.left).max() > 3  # of the reference's errors much is told
-    fewer = steady(times, reference, truth, [slice(10, 12)])
+    fewer = motion_evidence(times, reference, truth, [slice(10, 12)])
     assert fewer[0].rows.shape == (0, 6)
 
 
@@ -215,7 +216,7 @@ def test_a_pose_that_is_known_stays_and_pauses_say_nothing_of_rates():
     times = np.r_[0.1 * np.arange(20), 60 + 0.1 * np.arange(20)]
     places = np.repeat([[0.0, 0.0, 0.0], [1.5, 0.5, 1.0]], 20, axis=0)
     errors = np.repeat([[0.003, 0.0, 0.001], [0.0, -0.002, 0.0]], 20, axis=0)
-    path, jumps = likeliest(times, places, [], np.ones(40, dtype=bool), errors)
+    path, jumps = likeliest_path(times, places, [], np.ones(40, dtype=bool), errors)
     np.testing.assert_allclose(path, places + errors, atol=1e-6)
     assert not jumps.any()
 
@@ -226,4 +227,4 @@ def test_a_chair_that_was_carried_has_not_jumped(pause, jumps):
     times = 0.1 * np.arange(40)
     times[20:] += pause
     places = np.repeat([[0.0, 0.0, 0.0], [1.5, 0.5, 1.0]], 20, axis=0) + 0.0005 * rng.standard_normal((40, 3))
-    assert bool(sanity_jumps.words(Series(times, places, ("x", "y", "theta")))) == jumps
+    assert bool(pose_jumps.problems(Series(times, places, ("x", "y", "theta")))) == jumps

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.laser.normal import Assembly
-from kurumaisu.critic.laser.shots import gather
-from kurumaisu.critic.laser.verdicts import criticise
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -40,5 +40,5 @@ def test_how_much_of_the_references_errors_lasts_is_seen(tmp_path, share, low, h
 @pytest.mark.parametrize("seed", [11, 13, 14])
 def test_a_reference_that_wanders_is_no_mounting(tmp_path, seed):
     data = wandering(recording(tmp_path, None, 0.0, seed, scans=150), 0.6, 4.0, seed)
-    finding = criticise(data, MODEL, lambda _: None)
+    finding = criticise_scans(data, MODEL, lambda _: None)
     assert (finding.causes, finding.confounded, finding.unknown) == ((), (), ())

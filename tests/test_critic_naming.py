@@ -11,27 +11,30 @@ from hidden_effect import recording_of
 from scipy.special import logit
 
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.bench.hidden.base_case import run_of
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.motion import STEP, Setting
-from kurumaisu.bench.hidden.motion import drive as hidden_drive
-from kurumaisu.bench.hidden.noise import USUAL, draw_rates, draw_reference
-from kurumaisu.critic import explain, naming, neighbours, replay, sanity, stuck
-from kurumaisu.critic.catalogue import Candidate, Term
-from kurumaisu.critic.decide import Decision
-from kurumaisu.critic.drive import GRID, Drive, prepare
-from kurumaisu.critic.evidence import Problem
-from kurumaisu.critic.naming import Naming
-from kurumaisu.critic.noise import Growth, Noise, Scatter, whitener
-from kurumaisu.critic.pruned import in_turn, pruned, unmet
-from kurumaisu.critic.scan import Screen
-from kurumaisu.critic.smooth import Belief
-from kurumaisu.critic.smooth_alike import FORM, Likeness
-from kurumaisu.critic.smooth_designs import Designs
-from kurumaisu.critic.smooth_judge import Beyond, undecided
-from kurumaisu.critic.smooth_search import Rivalry
-from kurumaisu.critic.stand_ins import Posterior, confounded
-from kurumaisu.critic.verdict import Gain, LogDensityGain
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.base.recordings import run_of
+from kurumaisu.bench.hidden.generator.motion import STEP, Setting
+from kurumaisu.bench.hidden.generator.motion import drive as hidden_drive
+from kurumaisu.bench.hidden.generator.noise import USUAL, draw_rates, draw_reference
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, Drive, prepare
+from kurumaisu.critic.engine import neighbouring_sets, refit, search
+from kurumaisu.critic.engine.catalogue import Candidate, Term
+from kurumaisu.critic.engine.confounding import SetPosterior, confounded
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.engine.linear_screening import Screen
+from kurumaisu.critic.engine.search import SearchResult
+from kurumaisu.critic.judge import explain
+from kurumaisu.critic.judge.decide import Decision
+from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
+from kurumaisu.critic.noise.base_noise import Noise, NoiseGrowth, NoiseResiduals, whitener
+from kurumaisu.critic.sanity import examination
+from kurumaisu.critic.unknown.beyond_catalogue import Beyond, undecided
+from kurumaisu.critic.unknown.comparison import CurveComparison
+from kurumaisu.critic.unknown.curves import CurveEvidence
+from kurumaisu.critic.unknown.designs import Designs
+from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR, EffectLikeness
+from kurumaisu.critic.values.verdict import Gain, LogDensityGain
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -47,7 +50,7 @@ def posterior(*sets, explains=()):
         SimpleNamespace(ids=frozenset(names.split()), log_likelihood=nats, sizes=1, terms=())
         for (_, names), nats in zip(sets, explained, strict=True)
     ]
-    return Posterior(ranked, np.array([weight for weight, _ in sets]))
+    return SetPosterior(ranked, np.array([weight for weight, _ in sets]))
 
 
 def test_one_for_one_stand_ins_make_a_set():
@@ -160,7 +163,7 @@ def noise_of_a_drive(growth, seed):
     size = 3 * (len(made.times) - 1)
     inverse = whitener(made, truth).whiten(np.eye(size))
     left = np.linalg.solve(inverse, np.random.default_rng(seed).standard_normal(size)).reshape(-1, 3)
-    scatter = Scatter([made], [left], [np.empty((size, 0))], (NOISE.position_sd, NOISE.heading_sd))
+    scatter = NoiseResiduals([made], [left], [np.empty((size, 0))], (NOISE.position_sd, NOISE.heading_sd))
     return scatter.growth(scatter.estimate(NOISE), 0.02)
 
 
@@ -189,8 +192,8 @@ def test_a_curve_speaks_for_the_effect_that_it_draws(understeering, channel, cov
     problem, best, nothing = understeering
     designs = Designs(problem, nothing)
     (curve,) = (c for c in designs.about(nothing).curves if (c.channel, c.basis.covariate) == (channel, covariate))
-    belief = Belief(0.0, 0.04 * np.eye(curve.basis.size))
-    found = Likeness(problem, best, designs).drawn(nothing, curve, belief)
+    belief = CurveEvidence(0.0, 0.04 * np.eye(curve.basis.size))
+    found = EffectLikeness(problem, best, designs).drawn(nothing, curve, belief)
     assert set(found) == ({"base.understeer"} if drawn else set())
     if drawn:  # the larger the effect, the more its equation may be off
         assert 3.0 < found["base.understeer"] < 0.05 * best.log_likelihood - 0.05 * nothing.log_likelihood
@@ -204,12 +207,12 @@ def test_a_curve_beside_an_effect_may_be_what_its_equation_lacks(understeering, 
     problem, best, nothing = understeering
     designs = Designs(problem, best)
     (curve,) = (c for c in designs.about(best).curves if (c.channel, c.basis.covariate) == (channel, covariate))
-    found = Likeness(problem, best, designs).mended(best, curve)
+    found = EffectLikeness(problem, best, designs).mended(best, curve)
     assert set(found) == ({"base.understeer"} if mends else set())
-    assert Likeness(problem, best, designs).mended(nothing, curve) == {}
+    assert EffectLikeness(problem, best, designs).mended(nothing, curve) == {}
     if mends:
         signal = 2 * (best.log_likelihood - nothing.log_likelihood)
-        assert found["base.understeer"] == pytest.approx(0.5 * FORM**2 * signal, rel=0.05)
+        assert found["base.understeer"] == pytest.approx(0.5 * FORM_ERROR**2 * signal, rel=0.05)
 
 
 def fit_of(names, score):
@@ -218,7 +221,7 @@ def fit_of(names, score):
 
 
 def found_of(p, *fits):
-    return Naming((*fits, fit_of("", 0.0)), p, (), 0.0)
+    return SearchResult((*fits, fit_of("", 0.0)), p, (), 0.0)
 
 
 @pytest.mark.parametrize(
@@ -227,7 +230,7 @@ def found_of(p, *fits):
 )
 def test_an_effect_or_a_curve_for_sure_is_not_nothing(p_effect, p_curve, p_nothing, said):
     found = found_of({"a": p_effect}, fit_of("a", 40.0))
-    rivalry = Rivalry((SimpleNamespace(),), 0.0, {"smooth.w.v": p_curve}, {"a": logit(p_effect)}, p_nothing)
+    rivalry = CurveComparison((SimpleNamespace(),), 0.0, {"smooth.w.v": p_curve}, {"a": logit(p_effect)}, p_nothing)
     assert undecided(found, rivalry) is said
 
 
@@ -237,22 +240,22 @@ def gain(value):
 
 
 def decision(p, *fits):
-    nothing = Beyond(Rivalry((), -np.inf, {}, {}, 0.0), None, 1.0)
-    return Decision(SimpleNamespace(), found_of(p, *fits), Growth(0.0, 0.0, NOISE), nothing)
+    nothing = Beyond(CurveComparison((), -np.inf, {}, {}, 0.0), None, 1.0)
+    return Decision(SimpleNamespace(), found_of(p, *fits), NoiseGrowth(0.0, 0.0, NOISE), nothing)
 
 
 def test_an_uncertain_effect_that_held_out_data_refuse_is_left_out():
     made = decision({"a": 1.0, "b": 0.7}, fit_of("a b", 50.0), fit_of("a c", 49.5), fit_of("a", 49.0))
-    other, worth = pruned(made, gain(-0.1), lambda one: gain(0.2 if one.found.best.ids == {"a"} else -0.1))
+    other, worth = confirmed_part(made, gain(-0.1), lambda one: gain(0.2 if one.found.best.ids == {"a"} else -0.1))
     assert other.found.best.ids == {"a"}
     assert worth == gain(0.2)
 
 
 def test_what_is_certain_or_confirmed_is_kept():
     certain = decision({"a": 1.0, "b": 0.95}, fit_of("a b", 50.0), fit_of("a", 45.0))
-    assert pruned(certain, gain(-0.1), lambda _: gain(0.2)) == (certain, gain(-0.1))
+    assert confirmed_part(certain, gain(-0.1), lambda _: gain(0.2)) == (certain, gain(-0.1))
     confirmed = decision({"a": 1.0, "b": 0.7}, fit_of("a b", 50.0), fit_of("a", 49.0))
-    assert pruned(confirmed, gain(0.2), lambda _: gain(0.3)) == (confirmed, gain(0.2))
+    assert confirmed_part(confirmed, gain(0.2), lambda _: gain(0.3)) == (confirmed, gain(0.2))
 
 
 @pytest.mark.parametrize(
@@ -261,7 +264,7 @@ def test_what_is_certain_or_confirmed_is_kept():
 )
 def test_where_drives_held_out_decide_nothing_each_is_left_out_in_turn(held, nats, turned, kept):
     made = decision({"a": 1.0}, fit_of("a", nats))
-    assert in_turn(made, gain(held), lambda: gain(turned)) == gain(kept)
+    assert leave_one_out(made, gain(held), lambda: gain(turned)) == gain(kept)
 
 
 @pytest.mark.parametrize(
@@ -270,22 +273,22 @@ def test_where_drives_held_out_decide_nothing_each_is_left_out_in_turn(held, nat
 )
 def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatch, held, nats, seen, silent):
     """Whatever they gain, if it is no loss beyond chance."""
-    monkeypatch.setattr("kurumaisu.critic.pruned.expected_nats", lambda *_: seen)
+    monkeypatch.setattr("kurumaisu.critic.judge.held_out_pruning.expected_nats", lambda *_: seen)
     made = decision({"a": 1.0}, fit_of("a", nats))
-    assert unmet(made, gain(held), ()) is silent
-    assert not unmet(made, None, ())
+    assert untested(made, gain(held), ()) is silent
+    assert not untested(made, None, ())
 
 
 @pytest.mark.parametrize(("told", "without", "best"), [(True, 0.2, ""), (False, 0.2, "a"), (False, -0.1, "")])
 def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, without, best):
     """It took all their probability; where nobody would be told of it, they are weighed by themselves."""
-    monkeypatch.setattr("kurumaisu.critic.smooth_explain.told", lambda *_: told)
+    monkeypatch.setattr("kurumaisu.critic.judge.explain_unknown.is_reported", lambda *_: told)
     twins = [SimpleNamespace(**vars(fit_of(name, 40.0)), log_likelihood=44.0, sizes=1, terms=()) for name in "ab"]
     nothing = SimpleNamespace(**vars(fit_of("", 0.0)), log_likelihood=0.0, sizes=0, terms=())
-    found = Naming((*twins, nothing), {"a": 0.0, "b": 0.0}, (), 0.0)
-    curved = Beyond(Rivalry((), 5.0, {}, {}, 0.0), SimpleNamespace(), 0.0)
-    made = Decision(SimpleNamespace(), found, Growth(0.0, 0.0, NOISE), curved)
-    other, worth = pruned(made, gain(-0.1), lambda one: gain(without if one.beyond.extension is None else -0.1))
+    found = SearchResult((*twins, nothing), {"a": 0.0, "b": 0.0}, (), 0.0)
+    curved = Beyond(CurveComparison((), 5.0, {}, {}, 0.0), SimpleNamespace(), 0.0)
+    made = Decision(SimpleNamespace(), found, NoiseGrowth(0.0, 0.0, NOISE), curved)
+    other, worth = confirmed_part(made, gain(-0.1), lambda one: gain(without if one.beyond.extension is None else -0.1))
     assert (other is made) is (best == "")
     assert worth == gain(0.2 if best else -0.1)
     if best:
@@ -297,7 +300,7 @@ def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, 
 def test_another_steering_law_is_neither_a_unit_nor_a_sign(seed):
     """By the other law of V_s the chair hardly turns, and more like the volts' steps than like the rates asked for."""
     case = make(Ask("single", ("base.steering_law",), form="other", family="base"), seed)
-    assert sanity.examine(case.recording, MODEL).invalid == []
+    assert examination.examine(case.recording, MODEL).invalid == []
 
 
 def test_another_form_is_tried_without_what_stood_in_for_it():
@@ -313,7 +316,7 @@ def test_another_form_is_tried_without_what_stood_in_for_it():
         chosen = frozenset({zero, *needless})
         start = {("zero", "offset"): 0.4}
         fit = SimpleNamespace(candidates=chosen, ids=frozenset(one.id for one in chosen), start=start)
-        sets = list(neighbours.neighbours(problem, screen, screen, fit))
+        sets = list(neighbouring_sets.neighbouring_sets(problem, screen, screen, fit))
         # From its own size, and from that of the wrong form.
         assert {len(begin) for chosen, begin in sets if chosen == {other}} in (set(), {0, 1})
         return {chosen for chosen, _ in sets}
@@ -338,7 +341,9 @@ def test_a_comb_is_fitted_once_from_each_tooth_it_may_be_on(rough, start, again)
     terms = Term("a", OFFSET, 0.0, rough=rough), Term("b", OFFSET, 0.0)
     fit = SimpleNamespace(candidates=frozenset("a"), terms=terms, values=[0.0184, 0.1])
     begun = set()
-    told = [stuck.other_tooth(fit, {(name, "offset"): size for name, size in start.items()}, begun) for _ in range(2)]
+    told = [
+        refit.other_step_size(fit, {(name, "offset"): size for name, size in start.items()}, begun) for _ in range(2)
+    ]
     assert told == [again, False]
 
 
@@ -354,7 +359,7 @@ def test_what_clips_does_not_hide_what_else_it_may_be():
     ids = frozenset({"base.saturation", "base.dead_zone_v", "base.gain_v"})
     problem = Problem([prepare(run, MODEL)], MODEL, NOISE, ids=ids)
     top = problem.fit(["base.saturation"], {})
-    found = naming.search(problem, lambda _: None, top)
+    found = search.search(problem, lambda _: None, top)
     best = {next(iter(fit.ids)): fit for fit in reversed(found.fits) if len(fit.ids) == 1}
     assert {"base.dead_zone_v", "base.gain_v"} <= set(found.confounded[0])
     # That the top speed lies just below the one that was driven would be chance.

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden.base_case import draw_drives, recording
-from kurumaisu.bench.hidden.motion import drive
-from kurumaisu.bench.hidden.noise import REGIMES
+from kurumaisu.bench.hidden.base.recordings import draw_drives, recording
+from kurumaisu.bench.hidden.generator.motion import drive
+from kurumaisu.bench.hidden.generator.noise import REGIMES
 from kurumaisu.bench.hidden.oracle import errors
-from kurumaisu.critic.drive import prepare
-from kurumaisu.critic.noise import Scatter
+from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.noise.base_noise import NoiseResiduals
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -26,7 +26,7 @@ def estimated(regime, seed, truth=None):
         for one, setting in zip(made, drawn.settings, strict=True)
     ]
     nothing = [np.empty((rest.size, 0)) for rest in left]
-    return Scatter(made, left, nothing, truth).estimate().noise
+    return NoiseResiduals(made, left, nothing, truth).estimate().noise
 
 
 @pytest.mark.parametrize("known", [False, True])

@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 
 from kurumaisu import geometry
-from kurumaisu.bench.hidden.base_case import draw_drives, recording
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.noise import REGIMES
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.base.recordings import draw_drives, recording
+from kurumaisu.bench.hidden.generator.noise import REGIMES
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic import pipeline, predict
-from kurumaisu.critic.arrays import recording_of
-from kurumaisu.critic.meta import Meta
-from kurumaisu.critic.predict_motion import Forecast
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.recording import Recording, Series
-from kurumaisu.critic.reference import with_reference
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.app.arrays import recording_of
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.meta import Meta
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.data.reference import with_reference
+from kurumaisu.critic.predict import predictions
+from kurumaisu.critic.predict.motion import Forecast
+from kurumaisu.critic.values.recording import Recording, Series
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -53,7 +54,7 @@ def withheld(run, rng, horizons):
 
 
 def z_of(run, truth, forecast):
-    made = predict.motions_of(run, forecast, run.queries)
+    made = predictions.motions_of(run, forecast, run.queries)
     sds = np.array([one.sds for one in made])
     left = truth - np.array([one.means for one in made])
     left[:, 2] = geometry.wrap(left[:, 2])
@@ -118,18 +119,18 @@ def test_nothing_after_t0_is_used_but_the_inputs_up_to_t1(settings):
     run = drives_of("usual", 5)[0]
     forecast = Forecast(MODEL, settings, noise_of(REGIMES["usual"]))
     query = np.array([[20.0, 22.0]])
-    (first,) = predict.motions_of(run, forecast, query)
+    (first,) = predictions.motions_of(run, forecast, query)
     values = run.pose.values.copy()
     values[run.pose.t > 20.0] += [3.0, -2.0, 1.0]
     later = replace(run, pose=replace(run.pose, values=values))
     volts = run.voltage.values.copy()
     volts[run.voltage.t > 22.05] *= 0.3
     later = replace(later, voltage=replace(run.voltage, values=volts))
-    (again,) = predict.motions_of(later, forecast, query)
+    (again,) = predictions.motions_of(later, forecast, query)
     np.testing.assert_allclose(again.means, first.means, rtol=0, atol=1e-9)
     np.testing.assert_allclose(again.sds, first.sds, rtol=1e-6)
     volts[(run.voltage.t > 20.0) & (run.voltage.t < 22.0)] *= 0.3
-    (other,) = predict.motions_of(replace(later, voltage=replace(run.voltage, values=volts)), forecast, query)
+    (other,) = predictions.motions_of(replace(later, voltage=replace(run.voltage, values=volts)), forecast, query)
     assert np.abs(other.means - first.means).max() > 0.01
 
 
@@ -139,7 +140,7 @@ def test_an_uncertain_model_predicts_wider():
     doubtful = replace(sure, others=((EffectSetting("base.gain_v", {"gain": 0.1}),),))
     queries = np.array([[3.0, 8.0]])  # soon after the start, when the drive itself has told little yet
     few = replace(run, pose=rows(run.pose, run.pose.t < 0.15))
-    (one,), (other,) = (predict.motions_of(few, forecast, queries) for forecast in (sure, doubtful))
+    (one,), (other,) = (predictions.motions_of(few, forecast, queries) for forecast in (sure, doubtful))
     way = abs(one.means[0])
     assert other.sds[0] == pytest.approx(np.hypot(one.sds[0], 0.1 * way), rel=0.1)
     assert other.sds[2] == pytest.approx(one.sds[2], rel=0.05)
@@ -149,9 +150,9 @@ def test_few_poses_or_none_are_enough():
     run = drives_of("usual", 7)[0]
     forecast = Forecast(MODEL, (), noise_of(REGIMES["usual"]))
     queries = np.array([[10.0, 11.0], [10.0, 30.0]])
-    whole = predict.motions_of(run, forecast, queries)
+    whole = predictions.motions_of(run, forecast, queries)
     for pose in (rows(run.pose, slice(0, 1)), rows(run.pose, slice(0, 2)), None):
-        made = predict.motions_of(replace(run, pose=pose), forecast, queries)
+        made = predictions.motions_of(replace(run, pose=pose), forecast, queries)
         for one, full in zip(made, whole, strict=True):
             assert np.isfinite(one.means).all()
             assert (one.sds > 0.99 * full.sds).all()
@@ -162,7 +163,7 @@ def test_few_poses_or_none_are_enough():
 def test_a_run_that_nothing_drove_is_not_predicted():
     run = replace(drives_of("usual", 8)[0], command=None, voltage=None, queries=np.array([[1.0, 2.0]]))
     made = Recording("r", (run,), train=(), test=(run.name,))
-    (one,) = predict.predictions(made, MODEL, Forecast(MODEL, (), noise_of(REGIMES["usual"])), ())
+    (one,) = predictions.predictions(made, MODEL, Forecast(MODEL, (), noise_of(REGIMES["usual"])), ())
     assert np.isnan(one.means).all()
 
 

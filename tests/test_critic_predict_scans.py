@@ -8,8 +8,8 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.critic import predict
-from kurumaisu.critic.recording import Recording, Series
+from kurumaisu.critic.predict import predictions
+from kurumaisu.critic.values.recording import Recording, Series
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -31,7 +31,7 @@ def withheld(data, every=4):
 
 
 def predicted(data, settings=()):
-    made = list(predict.predictions(data, MODEL, None, settings))
+    made = list(predictions.predictions(data, MODEL, None, settings))
     assert all(one.is_scan for one in made)
     return np.array([one.means for one in made]), np.array([one.sds for one in made])
 
@@ -79,10 +79,10 @@ def test_rows_are_in_the_order_of_the_queries(tmp_path):
     run = data.runs[1]
     mixed = np.array([run.queries[1], [1.0, 2.0], run.queries[0]])
     asked = Recording(**{**vars(data), "runs": (data.runs[0], replace(run, queries=mixed))})
-    made = list(predict.predictions(asked, MODEL, None, ()))
+    made = list(predictions.predictions(asked, MODEL, None, ()))
     assert [(one.t0, one.t1) for one in made] == [tuple(row) for row in mixed.tolist()]
     assert [len(one.means) for one in made] == [682, 3, 682]
-    predict.write_predictions(tmp_path / "prediction.csv", made)
+    predictions.write_predictions(tmp_path / "prediction.csv", made)
     lines = (tmp_path / "prediction.csv").read_text().splitlines()
     assert len(lines) == 1 + 682 + 3 + 682
     assert lines[1].split(",")[:2] == ["test", "range"]

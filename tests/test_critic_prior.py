@@ -5,13 +5,15 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from kurumaisu.bench.hidden import Ask, base_case, make
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.noise import USUAL
-from kurumaisu.critic import naming, prior
-from kurumaisu.critic.drive import prepare
-from kurumaisu.critic.evidence import Problem
-from kurumaisu.critic.noise import Noise
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.generator.noise import USUAL
+from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.engine import search
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.noise.base_noise import Noise
+from kurumaisu.critic.values import prior
 from kurumaisu.params import load_model, shipped
 
 GRAM = np.array([[900.0, 300.0], [300.0, 2500.0]])  # of columns per usual size
@@ -57,8 +59,8 @@ def problem_of(runs, noise, ids):
 
 def cost_of(name, sizes):
     """Return what a hidden effect costs when it is fitted, and the norm of its signal."""
-    drives = base_case.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
-    runs = base_case.recording("one", drives, [BASE[name].fault(sizes, "plain")]).runs
+    drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(5), seconds=40.0, rate=10.0)
+    runs = recordings.recording("one", drives, [BASE[name].fault(sizes, "plain")]).runs
     problem = problem_of(runs, NOISE, frozenset([name]))
     fit = problem.fit([name], {})
     signal = np.linalg.norm(problem.residual((), np.empty(0)) - problem.residual(fit.terms, fit.values))
@@ -94,6 +96,6 @@ def test_one_effect_that_does_what_two_do_is_fitted_though_lines_tell_little_of_
     more = ("payload", "delay", "curvature_v", "gain_v", "dead_zone_v", "understeer", "battery_sag", "lag_v")
     ids = frozenset(f"base.{name}" for name in more)
     problem = problem_of(case.recording.runs, quiet, ids)
-    monkeypatch.setattr(naming, "_REFITS", 1)
-    found = naming.search(problem, lambda _: None, problem.fit(["base.delay", "base.curvature_v"], {}))
+    monkeypatch.setattr(search, "_REFITS", 1)
+    found = search.search(problem, lambda _: None, problem.fit(["base.delay", "base.curvature_v"], {}))
     assert found.best.ids == {"base.payload"}

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 from stories import full_story, full_verdict
 
-from kurumaisu.critic.digits import odds, quantities, with_interval
-from kurumaisu.critic.display import cells, cut, printable
-from kurumaisu.critic.figures import misfit_svg, shown_points
-from kurumaisu.critic.job import Job, Outcome
-from kurumaisu.critic.misfit import explained
-from kurumaisu.critic.pictures import comparison_picture, misfit_picture, overlay_picture, thinned
-from kurumaisu.critic.report import write_report
-from kurumaisu.critic.results import summary, table
-from kurumaisu.critic.story import Bins, Comparison, Moments, Overlay
-from kurumaisu.critic.verdict import Cause, Estimate, Verdict, grouped
-from kurumaisu.critic.words import named, wrong
+from kurumaisu.critic.app.display import cells, cut, printable
+from kurumaisu.critic.app.job import Job, Outcome
+from kurumaisu.critic.app.results import summary, table
+from kurumaisu.critic.judge.sentences import named_causes, wrong_data
+from kurumaisu.critic.report.figures import misfit_svg, shown_points
+from kurumaisu.critic.report.page import write_report
+from kurumaisu.critic.report.pictures import comparison_picture, misfit_picture, overlay_picture, thinned
+from kurumaisu.critic.values.binned_means import explained
+from kurumaisu.critic.values.digits import odds, quantities, with_interval
+from kurumaisu.critic.values.story import Bins, Comparison, Moments, Overlay
+from kurumaisu.critic.values.verdict import Cause, Estimate, Verdict, grouped
 
 NOWHERE = ["", "", "", ""]  # a mean is of no single moment
 NBSP = "\N{NO-BREAK SPACE}"
@@ -61,7 +61,7 @@ def test_runs_beyond_a_dozen_are_counted_not_drawn(tmp_path):
     write_report(tmp_path / "report.html", full_verdict(), replace(story, overlays=story.overlays * 3))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.count('role="img"') == 12 + len(story.misfits)
-    assert "6 more runs are not drawn" in page
+    assert "6 more runs are not shown" in page
     text = re.sub(r'href="data:[^"]*"|<svg.*?</svg>', "", page, flags=re.DOTALL)
     assert not re.search(r"\bnan\b", text)  # an interval that nobody knows is left out
 
@@ -91,7 +91,7 @@ def test_the_pieces_of_a_path_are_told_apart_in_its_data():
         ["baseline", "1", "1", "0.5", "", ""],
         ["baseline", "2", "2", "1.5", "", ""],
     ]
-    assert picture.caption.replace(NBSP, " ") == "After 10 s off by 0.250 m with the model as it was (rms)."
+    assert picture.caption.replace(NBSP, " ") == "Error after 10 s: 0.250 m with the original model (rms)."
 
 
 def test_a_misfits_data_hold_the_means_before_and_after():
@@ -156,11 +156,11 @@ def test_sizes_have_one_unit_and_no_negative_zero():
 
 def test_causes_are_named_with_sizes_and_beyond_four_by_id():
     cause = Cause("base.lag_w", 0.98, {"tau": Estimate(0.0435, 0.04, 0.047, "s")}, 41.0)
-    said = named([cause])
+    said = named_causes([cause])
     assert said.replace(NBSP, " ").endswith("(base.lag_w: tau 43.5 ms).")
     assert said[0].isupper()
     others = [replace(cause, id=name) for name in ("base.gain_v", "base.delay", "base.veer", "base.slope", "base.sign")]
-    assert named([cause, *others]).endswith("; and base.slope, base.sign.")
+    assert named_causes([cause, *others]).endswith("; and base.slope, base.sign.")
 
 
 def test_problems_that_differ_in_their_run_only_are_one():
@@ -170,7 +170,7 @@ def test_problems_that_differ_in_their_run_only_are_one():
         ("no map", ["run_1: no map"]),
         ("odd", ["odd"]),
     ]
-    assert wrong(problems) == "The data are wrong, so nothing was fitted: clock jumps; no map; and 1 more."
+    assert wrong_data(problems) == "The data are wrong, so nothing was fitted: clock jumps; no map; and 1 more."
 
 
 def outcome(name="corridor", **changes):

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic import misfit
-from kurumaisu.critic.drive import GRID, Drive
-from kurumaisu.critic.evidence import Problem
-from kurumaisu.critic.explain import overlays
-from kurumaisu.critic.laser.verdicts import criticise
-from kurumaisu.critic.noise import START
-from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.base.drive import GRID, Drive
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.judge import misfit
+from kurumaisu.critic.judge.explain import overlays
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.noise.base_noise import START
+from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import EffectSetting, follow_commands, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -52,7 +52,7 @@ def test_a_sideways_effect_is_drawn_sideways_over_the_product_of_the_rates():
 
 def test_a_gain_is_drawn_forward_over_the_speed_asked_for():
     figure = picture_of("base.gain_v", {"gain": 0.1}, gain=0.1)
-    assert (figure.channel, figure.covariate_name) == ("forward speed", "forward speed asked for")
+    assert (figure.channel, figure.covariate_name) == ("forward speed", "commanded forward speed")
     np.testing.assert_allclose(figure.bins.mean, 0.1 * figure.bins.centre, atol=0.01)
     assert np.abs(figure.after.mean).max() < 0.015
 
@@ -81,7 +81,7 @@ def test_a_path_begins_again_at_the_measured_pose(gain):
 @pytest.mark.parametrize(("effect", "size"), [("laser.scale", 0.006), (None, 0.0)])
 def test_readings_are_drawn_over_the_range_that_a_wrong_scale_follows(tmp_path, effect, size):
     told = recording(tmp_path, effect, size, 5, scans=30)
-    finding = criticise(told, MODEL, lambda _: None, frozenset({"laser.scale", "laser.incidence_bias"}))
+    finding = criticise_scans(told, MODEL, lambda _: None, frozenset({"laser.scale", "laser.incidence_bias"}))
     assert [each.explained_by for each in finding.pictures.misfits] == ([effect] if effect else [])
     assert [row.name for row in finding.pictures.noise]
     for figure in finding.pictures.misfits:
@@ -93,7 +93,7 @@ def test_readings_are_drawn_over_the_range_that_a_wrong_scale_follows(tmp_path, 
 
 def test_scatter_is_compared_before_and_after(tmp_path):
     told = recording(tmp_path, "laser.range_noise", 0.5, 6, scans=30)
-    finding = criticise(told, MODEL, lambda _: None, frozenset({"laser.range_noise"}))
+    finding = criticise_scans(told, MODEL, lambda _: None, frozenset({"laser.range_noise"}))
     (comparison,) = finding.pictures.comparisons
     assert len(comparison.names) == len(comparison.measured)
     before = np.abs(comparison.measured - comparison.baseline) / comparison.sd

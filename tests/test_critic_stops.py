@@ -3,12 +3,12 @@
 
 import numpy as np
 
-from kurumaisu.bench.hidden import base_case
-from kurumaisu.bench.hidden.noise import Colour, Regime
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.generator.noise import Colour, Regime
 from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic import replay
-from kurumaisu.critic.drive import GRID, Drive, prepare
-from kurumaisu.critic.noise import whitener
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, Drive, prepare
+from kurumaisu.critic.noise.base_noise import whitener
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -18,7 +18,7 @@ SLOW = Regime((Colour((0.01, 0.0045, 0.053), 1.33),), 0.012, 0.0011)
 
 def turned_too_far(seed):
     """Return, per drive, by how many sds the known noise seems to turn the chair while it moves."""
-    data = base_case.recording("", base_case.draw_drives(None, SLOW, np.random.default_rng(seed), rate=10.0), ())
+    data = recordings.recording("", recordings.draw_drives(None, SLOW, np.random.default_rng(seed), rate=10.0), ())
     for run in data.runs:
         drive = prepare(run, MODEL)
         turn = np.zeros_like(drive.measured)

@@ -8,9 +8,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.recording import Run, Series
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
 
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)

@@ -187,7 +187,7 @@ TEST(DacFaults, UnpluggedAndBackUnderANewTerminal) {
   rig.board.inject("unplug=0.1");
   const std::string fault = faultOf(*converter, d::kMoving);
   EXPECT_TRUE(has(fault, "DAC_CLOSED")) << fault;
-  EXPECT_TRUE(has(faultOf(*converter, d::kNeutral), "opened anew"));
+  EXPECT_TRUE(has(faultOf(*converter, d::kNeutral), "opened again"));
   EXPECT_TRUE(has(complaint<d::Fault>([&] { converter->reopen(); }), "DAC_NO_PORT"));
   ASSERT_TRUE(rig.board.wait([&] { return std::filesystem::exists(rig.folder / "port"); }, d::kLong));
   converter->reopen();

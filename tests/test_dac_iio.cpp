@@ -68,7 +68,7 @@ TEST(DacIio, AVanishedDeviceIsAFaultUntilItIsBack) {
   const std::string fault = faultOf(*converter, d::kNeutral);
   EXPECT_TRUE(has(fault, "DAC_CLOSED") && has(fault, "out_voltage2_raw")) << fault;
   EXPECT_TRUE(has(complaint<d::Fault>([&] { converter->reopen(); }), "DAC_NO_PORT"));
-  EXPECT_TRUE(has(faultOf(*converter, d::kNeutral), "opened anew"));
+  EXPECT_TRUE(has(faultOf(*converter, d::kNeutral), "opened again"));
   tree.chip("iio:device1", "mcp4728");
   converter->reopen();
   converter->put(d::kNeutral);

@@ -206,7 +206,7 @@ TEST(DacSettings, RefusesWhatIsWrongInASerialDevice) {
       {{{"volt: {min: -1.8, max: 2.2}", "volt: {min: -1.8, max: .nan}"}},
        "translation/volt/max: must be finite"},
       {{{"ch: A", "ch: C"}}, "channels: two signals share a channel"},
-      {{{"ch: A", "ch: A*"}}, "translation/ch: must not have"},
+      {{{"ch: A", "ch: A*"}}, "translation/ch: must not contain"},
       {{{"  steering:", "  streeing:"}}, "channels/steering: is missing"},
       {{{"ch: C", "ch: C\n    add_reference: true"}}, "reference/add_reference: is not a known key"}};
   for (const auto& [edits, part] : cases) {

@@ -172,7 +172,7 @@ def test_a_chip_comes_back_with_the_codes_it_had(start, tmp_path):
     [
         ([], "DEVICE.yaml PLACE"),
         ([str(EXAMPLE.with_name("mcp4728.yaml")), "no/such/folder"], "no/such/folder"),
-        ([str(EXAMPLE.with_name("mcp4728.yaml")), "."], "is there already"),
+        ([str(EXAMPLE.with_name("mcp4728.yaml")), "."], "exists already"),
         ([str(EXAMPLE.with_name("mcp4728.yaml")), "chip", "deaf"], "can only be unplugged"),
         ([str(EXAMPLE.with_name("dacs_82ada_unverified.yaml")), "dac"], "manual"),
         ([str(EXAMPLE), "dac", "sulk"], "no such fault"),

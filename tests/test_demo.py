@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from kurumaisu import effects
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.demo import __main__, hidden, processes
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting

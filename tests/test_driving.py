@@ -8,7 +8,7 @@ from kurumaisu._core import integrate
 from kurumaisu.driving import Driver, Route, load_route
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
-from kurumaisu.sim.joystick import joystick
+from kurumaisu.sim.chair.joystick import joystick
 
 ROUTE = Route(np.array([[2.0, 0.0], [2.0, 2.0], [-1.0, 2.0]]), 0.5, 0.8, 1.5, 0.2, 1.0, 60.0)
 

@@ -6,12 +6,12 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from kurumaisu.bench.hidden import base_case
-from kurumaisu.bench.hidden.noise import REGIMES
-from kurumaisu.critic import noise
-from kurumaisu.critic.catalogue import settings_of
-from kurumaisu.critic.drive import prepare
-from kurumaisu.critic.evidence import Problem
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.generator.noise import REGIMES
+from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.engine.catalogue import settings_of
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.noise import base_noise
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -22,9 +22,9 @@ SHARE = 0.08  # of what the usual size does that a little of it may do: laws hav
 @pytest.fixture(scope="module")
 def problem():
     """Return a drive with turns on the spot, stops and reversals, and what it can show."""
-    drives = base_case.draw_drives("rich", next(iter(REGIMES.values())), np.random.default_rng(5), seconds=40.0)
-    run = base_case.recording("", drives, ()).runs[0]
-    return Problem([prepare(run, MODEL)], MODEL, noise.START)
+    drives = recordings.draw_drives("rich", next(iter(REGIMES.values())), np.random.default_rng(5), seconds=40.0)
+    run = recordings.recording("", drives, ()).runs[0]
+    return Problem([prepare(run, MODEL)], MODEL, base_noise.START)
 
 
 def sizes(candidate, share):

@@ -10,7 +10,7 @@ from oracle_rays import Arc, Laser, Room, ray
 
 from kurumaisu import effects
 from kurumaisu.params import EffectSetting, load_model, shipped
-from kurumaisu.sim.chair import ChairSimulator, Command
+from kurumaisu.sim.chair.simulator import ChairSimulator, Command
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.world import load_world
 

@@ -8,7 +8,7 @@ import pytest
 
 from kurumaisu import effects
 from kurumaisu.params import load_model, shipped
-from kurumaisu.sim.chair import ChairSimulator, Command
+from kurumaisu.sim.chair.simulator import ChairSimulator, Command
 from kurumaisu.sim.settings import load_dynamics, with_effects
 from kurumaisu.world import load_world
 

@@ -27,9 +27,9 @@ def test_wanderers_get_somewhere_and_a_seed_is_a_run(capsys: pytest.CaptureFixtu
 def test_wander_says_what_it_needs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "bare.world"
     path.write_text("position ( )")
-    assert wander.main([str(path)]) == 2
+    assert wander.main([str(path)]) == 1
     assert capsys.readouterr().err.rstrip().endswith("bare.world: this example wants robots with one laser each")
-    assert wander.main([str(tmp_path / "none.world")]) == 2
+    assert wander.main([str(tmp_path / "none.world")]) == 1
 
 
 def test_the_environment_passes_gymnasiums_checker() -> None:
@@ -67,7 +67,7 @@ def test_without_gymnasium_the_example_says_so(
 ) -> None:
     monkeypatch.delitem(sys.modules, "kurumaisu.examples.gym_env", raising=False)
     monkeypatch.setitem(sys.modules, "gymnasium", None)
-    assert reach.main([]) == 2
+    assert reach.main([]) == 1
     assert "pip install gymnasium" in capsys.readouterr().err
 
 

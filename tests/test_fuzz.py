@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from kurumaisu.bench import fuzz
-from kurumaisu.bench.fuzz_seeds import seeds
+from kurumaisu.bench.faults import fuzz
+from kurumaisu.bench.faults.fuzz_seeds import seeds
 from kurumaisu.errors import Error
 
 RUNS = 1500

@@ -101,7 +101,8 @@ TEST(GuardReport, SaysWhatIsWrong) {
   EXPECT_TRUE(k::reportGuard(status, before, 10).warning);
   status.state = g::State::kTripped;
   status.reason = g::Reason::kStep;
-  EXPECT_EQ(k::reportGuard(status, status, 10).summary, "tripped: step too large: let go, to arm anew");
+  EXPECT_EQ(k::reportGuard(status, status, 10).summary,
+            "tripped: step too large: release the input to arm again");
   EXPECT_TRUE(k::reportGuard(status, status, 10).warning);
 }
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from kurumaisu.bench.hidden import Ask, make, names_of
-from kurumaisu.bench.hidden.base_case import Scale, draw_drives, gates
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.drives import rich
-from kurumaisu.bench.hidden.motion import STEP, Setting, drive, integrate
-from kurumaisu.bench.hidden.noise import REGIMES, Colour, Regime, draw_rates, draw_reference
-from kurumaisu.bench.hidden.sizing import left_beside, size_for
-from kurumaisu.bench.hidden.unknown import STRANGE_BASE
-from kurumaisu.bench.hidden.whitening import Path, Whitener, deviation
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.base.recordings import Scale, draw_drives, gates
+from kurumaisu.bench.hidden.base.sizing import left_beside, size_for
+from kurumaisu.bench.hidden.base.whitening import Path, Whitener, deviation
+from kurumaisu.bench.hidden.generator.drives import rich
+from kurumaisu.bench.hidden.generator.motion import STEP, Setting, drive, integrate
+from kurumaisu.bench.hidden.generator.noise import REGIMES, Colour, Regime, draw_rates, draw_reference
+from kurumaisu.bench.hidden.unknown.forms import STRANGE_BASE
 from kurumaisu.errors import Error
 
 WITHOUT = ("base.sign", "base.steering_law", "base.process_noise")  # a size to choose, or a mean

@@ -7,17 +7,18 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point, Polygon
 
-from kurumaisu.bench.hidden import Ask, laws, make, names_of
-from kurumaisu.bench.hidden.backdrop import CLEAN, Backdrop
-from kurumaisu.bench.hidden.laser_catalogue import LASER
-from kurumaisu.bench.hidden.laser_worth import LaserScale
-from kurumaisu.bench.hidden.noise import USUAL
-from kurumaisu.bench.hidden.rays import cast
-from kurumaisu.bench.hidden.rooms import corners, draw_room, edges, world_text
-from kurumaisu.bench.hidden.scanning import expected
-from kurumaisu.bench.hidden.tours import draw_tour
-from kurumaisu.bench.hidden.write import TABLES, write_case
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.bench.hidden import Ask, make, names_of
+from kurumaisu.bench.hidden.generator import laws
+from kurumaisu.bench.hidden.generator.noise import USUAL
+from kurumaisu.bench.hidden.generator.rays import cast
+from kurumaisu.bench.hidden.generator.rooms import corners, draw_room, edges, world_text
+from kurumaisu.bench.hidden.generator.scanning import expected
+from kurumaisu.bench.hidden.generator.tours import draw_tour
+from kurumaisu.bench.hidden.laser.catalogue import LASER
+from kurumaisu.bench.hidden.laser.signal import LaserScale
+from kurumaisu.bench.hidden.laser.usual_effects import CLEAN, Backdrop
+from kurumaisu.bench.hidden.tables import TABLES, write_case
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.world import load_world
 
 

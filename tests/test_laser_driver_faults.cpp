@@ -127,8 +127,8 @@ TEST(Driver, TellsWhySensorsRefuse) {
   const std::map<std::string, Refusal> refusals{
       {"bm01", {State::kRefused, "LASER_NO_LIGHT: BM is answered by status 01"}},
       {"md0e", {State::kRefused, "LASER_REFUSED: MD0044072501000 is answered by status 0E"}},
-      {"pp-ares0", {State::kRefused, "LASER_BAD_PP: the sensor says what cannot be: PP: ARES"}},
-      {"pp-crossed", {State::kRefused, "LASER_BAD_PP: the sensor says what cannot be: PP: AMIN 725"}},
+      {"pp-ares0", {State::kRefused, "LASER_BAD_PP: the sensor sends impossible values: PP: ARES"}},
+      {"pp-crossed", {State::kRefused, "LASER_BAD_PP: the sensor sends impossible values: PP: AMIN 725"}},
       {"blackhole", {State::kConnecting, "LASER_NO_PORT"}},
       {"close-on-accept", {State::kConnecting, "LASER_CLOSED"}},
       {"rst-after-cmd", {State::kConnecting, "LASER_CLOSED"}}};

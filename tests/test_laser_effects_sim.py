@@ -11,7 +11,7 @@ import yaml
 from kurumaisu import effects
 from kurumaisu.errors import Error
 from kurumaisu.params import Model, load_model, shipped
-from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
+from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator, Command
 from kurumaisu.sim.settings import load_dynamics, with_effects
 from kurumaisu.world import load_world
 

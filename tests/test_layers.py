@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Dependencies point one way: scripts -> ros, critic -> sim -> effects, world -> model. ROS stays in its rooms."""
+"""Dependencies point one way: scripts -> ros, critic -> sim -> effects, world -> model. ROS stays in its folders.
+
+A folder of src/ holds few files, and no two folders import each other.
+"""
 
 import ast
 import os
@@ -23,8 +26,14 @@ ROS_CPP = r"<(ros\w*|tf2?|tf2_\w+|xmlrpcpp|actionlib|nodelet|diagnostic_updater|
 ABSTRACT = {"base", "mechanism", "laser"}
 MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - ABSTRACT | {r"laser\.\w+"}
 CONCRETE = rf"kurumaisu\.effects\.({'|'.join([*MODULES, *(effect.__name__ for effect in effects.ALL)])})(\.|$)"
-SHARED = r"file_descriptor\.h|steady\.h"  # C++ that rests on nothing
+SHARED = r"command_line\.h|file_descriptor\.h|steady\.h"  # C++ that rests on nothing
 IDS = {effect.id for effect in effects.ALL}
+LARGEST = 25  # files in a folder of src/; a C++ header and its source are one
+ONE_PER_EFFECT = "kurumaisu/effects"  # as many files as there are effects
+GATHERS = (
+    "__init__.py",
+    "bindings.cpp",
+)  # may import what is in folders below their own, though these import the others there
 
 
 @dataclass(frozen=True)
@@ -45,9 +54,8 @@ PYTHON_RULES = [
         "MRPT is reached through kurumaisu.slam",
     ),
     Rule(r"kurumaisu/(?!ros/|bench/|demo/)", r"kurumaisu\.ros(\.|$)", "only entry points come before kurumaisu/ros"),
-    # map_command is an entry point, too: it reads recordings as the critic does
     Rule(
-        r"kurumaisu/(?!critic/|ros/|bench/|demo/|paper/|real/|riddles/|map_command)",
+        r"kurumaisu/(?!critic/|ros/|bench/|demo/|paper/|real/|riddles/)",
         r"kurumaisu\.critic(\.|$)",
         "nothing rests on the critic",
     ),
@@ -80,7 +88,11 @@ CPP_RULES = [
     Rule(
         r"virtual_urg/", rf'"(?!scip/|virtual_urg/|bindings\.h|{SHARED})', "the virtual sensor shares the protocol only"
     ),
-    Rule(r"laser/", r'"(?!scip/|serial/|laser/|params\.h)', "the driver rests on the protocol and the port only"),
+    Rule(
+        r"laser/",
+        r'"(?!scip/|serial/|laser/|params\.h|command_line\.h)',
+        "the driver rests on the protocol and the port only",
+    ),
     Rule(r"serial/", rf'"(?!serial/|{SHARED})', "a port rests on nothing"),
     # a virtual board is plugged in and out as a virtual sensor is
     Rule(r"dac/(?!virtual_)", rf'"(?!dac/|serial/|yaml\.h|{SHARED})', "what moves the chair rests on the port only"),
@@ -121,6 +133,17 @@ def _includes(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _imports(path: Path, source: Path) -> Iterator[tuple[int, str]]:
+    """Yield line and full name of every import, and of what else gives an effect away."""
+    yield from _imported(path, source)
+    for node in ast.walk(ast.parse(path.read_text(), str(path))):
+        if isinstance(node, ast.Attribute):
+            # from kurumaisu import effects; effects.GainV
+            yield node.lineno, f"kurumaisu.{ast.unparse(node)}"
+        elif isinstance(node, ast.Constant) and node.value in IDS:
+            yield node.lineno, f"effect id {node.value}"
+
+
+def _imported(path: Path, source: Path) -> Iterator[tuple[int, str]]:
     """Yield line and full name of every import: at the top, in functions, relative, or by import_module."""
     package = path.relative_to(source).parent.parts
     for node in ast.walk(ast.parse(path.read_text(), str(path))):
@@ -132,15 +155,91 @@ def _imports(path: Path, source: Path) -> Iterator[tuple[int, str]]:
             yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
         elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("import_module", "__import__")):
             yield node.lineno, str(getattr(node.args[0], "value", "a name that is not written out"))
-        elif isinstance(node, ast.Attribute):
-            # from kurumaisu import effects; effects.GainV
-            yield node.lineno, f"kurumaisu.{ast.unparse(node)}"
-        elif isinstance(node, ast.Constant) and node.value in IDS:
-            yield node.lineno, f"effect id {node.value}"
+
+
+def crowded(root: Path) -> list[str]:
+    """Return a line for each folder of src/ that holds too many files."""
+    found = []
+    source = root / "src"
+    for folder in sorted(path for path in [source, *source.rglob("*")] if path.is_dir()):
+        place = folder.relative_to(source).as_posix()
+        if folder.name == "__pycache__" or f"{place}/".startswith(f"{ONE_PER_EFFECT}/"):
+            continue
+        files = [path for path in folder.iterdir() if path.is_file()]
+        units = {path.stem if path.suffix in (".cpp", ".h") else path.name for path in files}
+        if len(units) > LARGEST:
+            found.append(f"{folder}: {len(units)} files, at most {LARGEST}: what belongs together gets a folder")
+    return found
+
+
+def mutual(root: Path) -> list[str]:
+    """Return a line for each two folders of src/ that import each other.
+
+    Compared are, in each folder, those in it, each with all below it, and the files that are not in any of them.
+    """
+    source = root / "src"
+    by_pair: dict[tuple[Path, Path], str] = {}
+    for path, line, used in _uses(source):
+        here, there = _apart(path, used)
+        if here != there and not (path.name in GATHERS and here == path.parent):
+            by_pair.setdefault((here, there), f"{path}:{line}")
+    return [
+        f"{here} and {there} import each other: {by_pair[here, there]}, {by_pair[there, here]}"
+        for here, there in sorted(by_pair)
+        if here < there and (there, here) in by_pair
+    ]
+
+
+def _apart(path: Path, used: Path) -> tuple[Path, Path]:
+    """Return the folders of two files below the innermost that holds both; it itself for a file that is in no other."""
+    common = Path(os.path.commonpath([path.parent, used.parent]))
+
+    def below(file: Path) -> Path:
+        parts = file.relative_to(common).parts
+        return common / parts[0] if len(parts) > 1 else common
+
+    return below(path), below(used)
+
+
+def _uses(source: Path) -> Iterator[tuple[Path, int, Path]]:
+    """Yield a file, a line of it, and the file in src/ that is imported or included there."""
+    for path in sorted(source.rglob("*.[ch]*")):
+        if path.suffix in (".cpp", ".h"):
+            for line, name in _includes(path):
+                used = source / name.strip('"<> ')
+                if used.is_file():
+                    yield path, line, used
+    for path in sorted((source / "kurumaisu").rglob("*.py*")):
+        if path.suffix in (".py", ".pyi"):
+            for line, name in _imported(path, source):
+                if name.startswith("kurumaisu."):
+                    yield path, line, _module(source, name)
+
+
+def _module(source: Path, name: str) -> Path:
+    """Return the file of a module, or of the module that a name is in."""
+    path = source.joinpath(*name.split("."))
+    while path != source:
+        if path.is_dir():
+            return path / "__init__.py"
+        if path.with_suffix(".py").is_file():
+            return path.with_suffix(".py")
+        path = path.parent
+    return source / "kurumaisu/__init__.py"
 
 
 def test_the_tree_keeps_the_rules():
     found = violations(ROOT)
+    assert not found, "\n".join(found)
+
+
+def test_no_folder_is_crowded():
+    found = crowded(ROOT)
+    assert not found, "\n".join(found)
+
+
+def test_no_two_folders_import_each_other():
+    found = mutual(ROOT)
     assert not found, "\n".join(found)
 
 
@@ -203,6 +302,96 @@ def test_lets_pass_what_is_allowed(tmp_path, name):
     (tmp_path / name).parent.mkdir(parents=True)
     (tmp_path / name).write_text(ALLOWED[name] + "\n")
     assert violations(tmp_path) == []
+
+
+def plant(root: Path, files: dict[str, str]) -> None:
+    """Write files, by their paths."""
+    for name, text in files.items():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text + "\n")
+
+
+@pytest.mark.parametrize("folder", ["src/kurumaisu/sim", "src/kurumaisu/critic/report", "src/slam", "src/slam/filters"])
+def test_finds_a_crowded_folder(tmp_path, folder):
+    plant(tmp_path, {f"{folder}/f{i}.{end}": "" for i in range(LARGEST) for end in ("h", "cpp")})
+    assert crowded(tmp_path) == []
+    plant(tmp_path, {f"{folder}/more.py": ""})
+    found = crowded(tmp_path)
+    assert len(found) == 1
+    assert str(tmp_path / folder) in found[0]
+
+
+def test_effects_may_be_many(tmp_path):
+    plant(
+        tmp_path, {f"src/kurumaisu/effects/{place}f{i}.py": "" for i in range(2 * LARGEST) for place in ("", "laser/")}
+    )
+    assert crowded(tmp_path) == []
+
+
+MUTUAL = {
+    "siblings": {
+        "src/kurumaisu/ros/viewer/node.py": "from kurumaisu.ros.sim import effects",
+        "src/kurumaisu/ros/sim/effects.py": "from kurumaisu.ros.viewer.maps import Maps",
+        "src/kurumaisu/ros/viewer/maps.py": "",
+    },
+    "at different depths": {
+        "src/kurumaisu/sim/motion/bodies.py": "def f():\n    from ...virtual_urg import models",
+        "src/kurumaisu/virtual_urg/feeds.py": "import importlib\nimportlib.import_module('kurumaisu.sim.chair')",
+        "src/kurumaisu/sim/chair.py": "",
+        "src/kurumaisu/virtual_urg/models.py": "",
+    },
+    "a folder and one in it": {
+        "src/kurumaisu/bench/peers.py": "from kurumaisu.bench.slam import drive",
+        "src/kurumaisu/bench/slam/office/bags.py": "from kurumaisu.bench import peers",
+        "src/kurumaisu/bench/slam/drive.py": "",
+    },
+    "C++": {
+        "src/slam/mapper.cpp": '#include "raycast/arena.h"',
+        "src/raycast/arena.h": '#include "slam/filters/grid.h"',
+        "src/slam/filters/grid.h": "",
+    },
+    "C++, a folder and one in it": {
+        "src/slam/grid.h": '#  include "slam/filters/filter.h"',
+        "src/slam/filters/filter.h": '#include "slam/grid.h"',
+    },
+}
+
+
+@pytest.mark.parametrize("case", MUTUAL)
+def test_finds_folders_that_import_each_other(tmp_path, case):
+    plant(tmp_path, MUTUAL[case])
+    assert len(mutual(tmp_path)) == 1
+
+
+ONE_WAY = {
+    "a chain": {
+        "src/kurumaisu/ros/viewer/node.py": "from kurumaisu.ros.sim import effects",
+        "src/kurumaisu/ros/sim/effects.py": "from kurumaisu.ros import rotation\nfrom kurumaisu.sim import plant",
+        "src/kurumaisu/ros/rotation.py": "from kurumaisu.errors import Error",
+        "src/kurumaisu/errors.py": "",
+        "src/kurumaisu/sim/plant.py": "",
+    },
+    "a package that gathers what is public": {
+        "src/kurumaisu/sim/__init__.py": "from kurumaisu.sim.robots.simulator import Simulator",
+        "src/kurumaisu/sim/robots/simulator.py": "from kurumaisu.sim.options import Options",
+        "src/kurumaisu/sim/options.py": "",
+    },
+    "bindings": {
+        "src/bindings.cpp": '#include "contact/bindings.h"',
+        "src/contact/bindings.h": '#include "bindings.h"',
+        "src/bindings.h": "",
+    },
+    "a variable of a folder's name": {
+        "src/kurumaisu/sim/plant.py": "def f(world):\n    return world.walls",
+        "src/kurumaisu/world/walls.py": "from kurumaisu.sim import plant",
+    },
+}
+
+
+@pytest.mark.parametrize("case", ONE_WAY)
+def test_lets_pass_imports_one_way(tmp_path, case):
+    plant(tmp_path, ONE_WAY[case])
+    assert mutual(tmp_path) == []
 
 
 def machine_paths(root: Path) -> list[str]:

@@ -209,7 +209,7 @@ TEST(MappingReport, SaysTheWorstFirst) {
        "MAPPING_NO_TRANSFORM: scans come, but no odom"},
       {[](State& s) { s.full = true; }, 2, "MAPPING_TOO_LARGE"},
       {[](State& s) { s.blind = true; }, 1, "MAPPING_BLIND"},
-      {[](State& s) { s.jumps = 2; }, 1, "MAPPING_ODOMETRY_JUMP: jumps not believed: 2"},
+      {[](State& s) { s.jumps = 2; }, 1, "MAPPING_ODOMETRY_JUMP: jumps rejected: 2"},
       {[](State& s) { s.skipped = 7; }, 1, "MAPPING_TOO_SLOW: scans skipped: 7"},
       {[](State& s) { s.dropped = 1, s.reason = "tilted"; }, 1,
        "MAPPING_DROPPED: scans dropped: 1, the last: tilted"}};

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from kurumaisu.bench.odometry import NOISES, bounds, ends, main, measured, nees, white
+from kurumaisu.bench.accuracy.odometry import NOISES, bounds, ends, main, measured, nees, white
 
 DRIVES = 400
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from recordings import Bag
 
-from kurumaisu import map_command
-from kurumaisu.bench import paper_scans
-from kurumaisu.critic import cli
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.paper import drive
+from kurumaisu.bench.paper import scans
+from kurumaisu.critic.app import cli
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.paper.chair import drive
 from kurumaisu.paper.options import load_options
-from kurumaisu.ros import calibrate_command, paper_command
+from kurumaisu.ros.paper import command
+from kurumaisu.ros.tools import calibrate_command, map_command
 
 AS_ITS_MODEL = (1.0, 1.0)
 # start of the clock [s]; how late messages are received; how often a Twist; topics' first letter; who measures the pose
@@ -26,7 +26,7 @@ def write(path, run, how):
     rng = np.random.default_rng(3)
     bag = Bag(path, None)
     rows = []
-    fan = paper_scans.load_model(paper_scans.shipped("launch/md100.yaml")).laser
+    fan = scans.load_model(scans.shipped("launch/md100.yaml")).laser
 
     def add(topic, t, make, values):
         for at, row in zip(t + how["start"], values, strict=True):
@@ -67,7 +67,7 @@ def bags(tmp_path_factory):
     """The same drives as bags of the simulator and of the robot: to fit, and held out."""
     folder = tmp_path_factory.mktemp("bags")
     for name, file in (("train", drive.IDENTIFICATION), ("test", drive.HELD_OUT)):
-        (run,) = paper_scans.recorded(AS_ITS_MODEL, 11, file).runs
+        (run,) = scans.recorded(AS_ITS_MODEL, 11, file).runs
         run = replace(run, name=name)
         for kind, how in (("simulator", SIMULATOR), ("robot", ROBOT)):
             (folder / kind).mkdir(exist_ok=True)
@@ -88,7 +88,7 @@ def test_nothing_is_wrong_with_it_and_it_has_its_fan(bags, kind):
 @pytest.mark.parametrize("kind", ["simulator", "robot"])
 def test_paper_and_calibrate_take_it(bags, kind, tmp_path, capsys):
     train, test = bags / kind / "train.bag", bags / kind / "test.bag"
-    assert paper_command.main(["drive", str(train), "--out", str(tmp_path / "paper")]) == 0
+    assert command.main(["drive", str(train), "--out", str(tmp_path / "paper")]) == 0
     told = capsys.readouterr().out
     source = "reference pose: measured" if kind == "simulator" else "reference pose: particle filter over"
     assert source in told
@@ -120,9 +120,9 @@ def test_the_critic_takes_it_and_finds_nothing_wrong_with_the_data(bags, kind, t
 def test_without_a_reference_the_chairs_law_is_found_and_not_the_models():
     """The odometry believes the model; a filter drawn to it would find the model's slopes."""
     other = (0.85, 1.10)
-    recording = paper_scans.blind(paper_scans.recorded(other, 5))
+    recording = scans.blind(scans.recorded(other, 5))
     options = load_options()
-    own, models = (paper_scans.judge(recording, factors, options) for factors in (other, AS_ITS_MODEL))
+    own, models = (scans.judge(recording, factors, options) for factors in (other, AS_ITS_MODEL))
     assert own.refused == 0
     assert sum(own.held) >= 5  # of eight, each in 9 of 10; fewer than five once in 200
     assert not any(models.held[0::2])  # slopes

@@ -8,16 +8,16 @@ import pytest
 import yaml
 from test_paper_wall import DISTANCES, FOUR, recorded, scans
 
-from kurumaisu.bench import paper as bench
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.rehearse import write
+from kurumaisu.bench.paper import drive as bench
+from kurumaisu.critic.experiment.rehearse import write
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.errors import Error
 from kurumaisu.experiments import load_script
-from kurumaisu.paper import advice, drive, held_out
+from kurumaisu.paper.chair import advice, drive, held_out
+from kurumaisu.paper.chair.samples import samples_of
 from kurumaisu.paper.options import load_options
-from kurumaisu.paper.samples import samples_of
 from kurumaisu.params import load_model, shipped
-from kurumaisu.ros.calibrate_command import main
+from kurumaisu.ros.tools.calibrate_command import main
 
 OPTIONS = load_options()
 MODEL = shipped("launch/md100.yaml")

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from kurumaisu.bench import paper as bench
-from kurumaisu.paper import colour, law
+from kurumaisu.bench.paper import drive as bench
+from kurumaisu.paper.chair import coloured_noise, law
+from kurumaisu.paper.chair.samples import samples_of
 from kurumaisu.paper.options import load_options
-from kurumaisu.paper.samples import samples_of
 
 OPTIONS = load_options()
 SLOW = next(case for case in bench.CASES if case.tau == 6.0)
@@ -24,7 +24,7 @@ def residuals(tau, seed, n=120):
     true = np.exp(-apart / tau) if tau > 0 else np.eye(n)
     rate = np.linalg.cholesky(true + 1e-9 * np.eye(n)) @ rng.standard_normal(n)
     block = np.arange(n) // 2
-    return colour.Residuals(t, np.zeros(n, dtype=int), block, rate, np.ones((n, 1))), true
+    return coloured_noise.Residuals(t, np.zeros(n, dtype=int), block, rate, np.ones((n, 1))), true
 
 
 @pytest.mark.parametrize("tau", [0.0, 1.0, 5.0, 20.0])
@@ -34,7 +34,7 @@ def test_it_is_what_the_noise_that_made_the_data_does_to_a_mean(tau):
     _, true = residuals(tau, 0)
     within = np.where(found[0].block[:, None] == found[0].block, true, 0.0)
     exact = true.sum() / within.sum()
-    got = np.mean([colour.widening(one, np.full((1, n), 1 / n))[0] for one in found])
+    got = np.mean([coloured_noise.widening(one, np.full((1, n), 1 / n))[0] for one in found])
     assert 0.9 * exact < got < 1.4 * exact  # what cannot be excluded counts: on the safe side
 
 
@@ -42,13 +42,13 @@ def test_runs_are_apart_however_near_their_times_are():
     one, _ = residuals(20.0, 3)
     two = replace(one, run=np.arange(120) // 60)
     alike = np.full((1, 120), 1 / 120)
-    assert colour.widening(two, alike)[0] < 0.95 * colour.widening(one, alike)[0]
+    assert coloured_noise.widening(two, alike)[0] < 0.95 * coloured_noise.widening(one, alike)[0]
 
 
 def test_two_thousand_samples_are_looked_at_in_pieces():
     """Half an hour. The more there is, the less is believed of a slow share that is not there."""
     one, _ = residuals(0.0, 1, n=2000)
-    assert colour.widening(one, np.full((1, 2000), 1 / 2000))[0] < 1.2
+    assert coloured_noise.widening(one, np.full((1, 2000), 1 / 2000))[0] < 1.2
 
 
 def test_slow_samples_are_not_left_out_for_being_slow():

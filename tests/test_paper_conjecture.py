@@ -3,14 +3,14 @@
 
 import pytest
 
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.rehearse import write
+from kurumaisu.critic.experiment.rehearse import write
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.errors import Error
-from kurumaisu.paper import conjecture
+from kurumaisu.paper.laser import conjecture
 from kurumaisu.paper.options import load_options
 from kurumaisu.params import shipped
 from kurumaisu.riddles import lab
-from kurumaisu.ros.paper_command import main
+from kurumaisu.ros.paper.command import main
 
 STEP = 0.001
 OPTIONS = load_options()
@@ -34,9 +34,9 @@ def test_the_board_names_what_made_its_data(truth, named):
 def test_a_recording_is_asked_by_the_command(tmp_path, capsys):
     recording = board("incidence")
     bench = tmp_path / "bench.yaml"
-    from kurumaisu.paper import bench_wall
+    from kurumaisu.paper.laser import wall_experiment
 
-    bench_wall.write_model(shipped("launch/md100.yaml"), OPTIONS.wall, bench)
+    wall_experiment.write_model(shipped("launch/md100.yaml"), OPTIONS.wall, bench)
     write(tmp_path / "board", recording)
     meta = tmp_path / "board/meta.yaml"
     meta.write_text(meta.read_text() + "world: board.world\n")

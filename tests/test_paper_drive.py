@@ -8,16 +8,16 @@ import pytest
 import yaml
 from scipy import odr, stats
 
-from kurumaisu.bench import paper as bench
-from kurumaisu.critic.read_csv import read_csv_run
-from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.bench.paper import drive as bench
+from kurumaisu.critic.data.csv_reader import read_csv_run
+from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.experiments import load_script, nominal_path
-from kurumaisu.paper import drive, identify, law, law_file, lines
+from kurumaisu.paper.chair import drive, identify, law, law_file, lines
+from kurumaisu.paper.chair.samples import samples_of
 from kurumaisu.paper.options import load_options
-from kurumaisu.paper.samples import samples_of
 from kurumaisu.params import load_model, shipped
-from kurumaisu.ros.paper_command import main
+from kurumaisu.ros.paper.command import main
 
 OPTIONS = load_options()
 MODEL = shipped("launch/md100.yaml")
@@ -299,7 +299,7 @@ def test_drives_excite_both_rates_and_not_together(name):
 
 def test_paper_drive_writes_figures_data_and_a_law_twice_the_same(tmp_path, capsys):
     """On the package's own simulator; the second time from the recording's own files."""
-    from kurumaisu.critic.rehearse import write
+    from kurumaisu.critic.experiment.rehearse import write
 
     first = drive.recorded(drive.uneven(load_model(MODEL)), drive.HELD_OUT, 1)
     write(tmp_path / "drive", first)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from kurumaisu._core import AxisLaw, Branch
-from kurumaisu.critic.recording import Series
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.errors import Error
-from kurumaisu.paper import dac_line
-from kurumaisu.paper.reckon import Reckoner, compare, heading, seconds
+from kurumaisu.paper.chair import dac_line
+from kurumaisu.paper.chair.dead_reckoning import Reckoner, compare, heading, seconds
 
 TICK = 20_000_000  # [ns]
 BEGIN = 1_700_000_000_123_456_789  # as of a clock on the wall

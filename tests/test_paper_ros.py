@@ -15,12 +15,13 @@ import pytest
 import rosbag
 
 from kurumaisu.bench.processes import master, program, running
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
-from kurumaisu.paper import drive
+from kurumaisu.paper.chair import drive
 from kurumaisu.params import shipped
-from kurumaisu.ros import paper_parts, paper_run, recorder
-from kurumaisu.ros.paper_command import main
+from kurumaisu.ros import recorder
+from kurumaisu.ros.paper import figures, launches
+from kurumaisu.ros.paper.command import main
 
 SPEEDS = (0.3, 0.9, -0.4)
 PATIENCE = 90.0  # [s] of wall time: this computer may be busy
@@ -58,9 +59,7 @@ def test_the_wall_through_driver_and_virtual_sensor_agrees_with_equation_4(tmp_p
 
 def test_a_launch_that_fails_shows_the_end_of_its_log(tmp_path):
     with pytest.raises(Error, match=r"figure_12\.launch .*the end of"):
-        paper_run.launch(
-            ["figure_12.launch", "bag:=b", "file:=none.yaml", "model:=none.yaml"], tmp_path / "l.log", 60.0
-        )
+        launches.launch(["figure_12.launch", "bag:=b", "file:=none.yaml", "model:=none.yaml"], tmp_path / "l.log", 60.0)
 
 
 def test_a_drive_is_watched_while_it_is_recorded(tmp_path):
@@ -150,7 +149,7 @@ def test_a_full_disk_is_told_before_and_while_it_is_recorded(tmp_path, monkeypat
         assert watched.bags == [tmp_path / "a.bag"]
         with pytest.raises(Error, match="GiB are free"):
             recorder.Recorder(tmp_path / "b.bag", ["voltages"])
-    with pytest.raises(Error, match=r"a\.bag: is there already"):
+    with pytest.raises(Error, match=r"a\.bag: exists already"):
         recorder.Recorder(tmp_path / "a.bag", ["voltages"])
 
 
@@ -170,11 +169,11 @@ def test_all_figures_are_repeated_and_one_that_fails_is_not_forgotten(monkeypatc
 
         return run
 
-    monkeypatch.setattr(paper_parts, "drive", part("3-6", 1))
-    monkeypatch.setattr(paper_parts.commands_wall, "figures_wall_of", part("7-9", 0))
-    monkeypatch.setattr(paper_parts.commands_wall, "asked", part("conjecture", 0))
-    monkeypatch.setattr(paper_parts, "dac", part("10", 0))
-    monkeypatch.setattr(paper_parts, "simulated_wall", part("11-12", 0))
+    monkeypatch.setattr(figures, "drive", part("3-6", 1))
+    monkeypatch.setattr(figures.commands_wall, "figures_wall_of", part("7-9", 0))
+    monkeypatch.setattr(figures.commands_wall, "asked", part("conjecture", 0))
+    monkeypatch.setattr(figures, "dac", part("10", 0))
+    monkeypatch.setattr(figures, "simulated_wall", part("11-12", 0))
     assert main(["all", "--out", str(tmp_path)]) == 1
     assert done == ["3-6", "7-9", "conjecture", "10", "11-12"]
 

@@ -8,15 +8,16 @@ import pytest
 import yaml
 from scipy.stats import binom
 
-from kurumaisu.critic.recording import LaserMount, Recording, Run, Series
+from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.experiments import load_script
-from kurumaisu.paper import bench_wall, laser_file, laser_law
-from kurumaisu.paper.commands_wall import figure_12
+from kurumaisu.paper.commands.wall import figure_12
+from kurumaisu.paper.laser import law as laser_law
+from kurumaisu.paper.laser import law_file, wall_experiment
+from kurumaisu.paper.laser.wall import ahead_of, on_wall, places_of
 from kurumaisu.paper.options import load_options
-from kurumaisu.paper.wall import ahead_of, on_wall, places_of
 from kurumaisu.params import load_model, shipped
-from kurumaisu.ros.paper_command import main
+from kurumaisu.ros.paper.command import main
 
 OPTIONS = load_options()
 MODEL = shipped("launch/md100.yaml")
@@ -177,13 +178,13 @@ def test_a_sigma_below_zero_is_not_written(tmp_path):
     law = laser_law.fit(ahead(1), 0.001, 0.0, replace(OPTIONS.bootstrap, resamples=3))
     down = replace(law, sigma=(law.sigma[0], replace(law.sigma[1], value=-0.01), law.sigma[2]))
     with pytest.raises(Error, match="sigma is not above 0 at"):
-        laser_file.write_laser(MODEL, down, [], tmp_path / "laser.yaml")
+        law_file.write_laser(MODEL, down, [], tmp_path / "laser.yaml")
     assert not (tmp_path / "laser.yaml").exists()
 
 
 def test_the_written_model_differs_in_the_law_alone(tmp_path):
     law = laser_law.fit(ahead(1), 0.001, 0.0, replace(OPTIONS.bootstrap, resamples=3))
-    laser_file.write_laser(MODEL, law, ["from a test"], tmp_path / "laser.yaml")
+    law_file.write_laser(MODEL, law, ["from a test"], tmp_path / "laser.yaml")
     new, old = (yaml.safe_load(path.read_text()) for path in (tmp_path / "laser.yaml", MODEL))
     assert new["laser"]["error"].pop("scale") == pytest.approx(law.scale.value, abs=1e-6)
     assert new["laser"]["error"].pop("sigma") == pytest.approx([c.value for c in law.sigma], abs=1e-6)
@@ -194,11 +195,11 @@ def test_the_written_model_differs_in_the_law_alone(tmp_path):
 
 
 def test_the_bench_is_the_models_laser_with_the_sensors_gate(tmp_path):
-    bench_wall.write_model(MODEL, OPTIONS.wall, tmp_path / "bench.yaml")
+    wall_experiment.write_model(MODEL, OPTIONS.wall, tmp_path / "bench.yaml")
     bench = load_model(tmp_path / "bench.yaml")
     assert (bench.laser.range_max, bench.laser.mount.x, bench.chassis.length) == (5.6, 0.0, 0.06)
     assert bench.laser.error.mean(1.0) == LASER.error.mean(1.0)
-    bench_wall.write_script(OPTIONS.wall, tmp_path / "wall.yaml")
+    wall_experiment.write_script(OPTIONS.wall, tmp_path / "wall.yaml")
     script = load_script(tmp_path / "wall.yaml")
     assert [round(1.3 - place.pose[0], 9) for place in script.places] == list(DISTANCES)
 
@@ -223,9 +224,9 @@ def test_paper_wall_on_the_simulator_agrees_with_equation_4_twice_the_same(tmp_p
 
 def test_figure_12_fails_where_the_wall_is_not_that_of_equation_4(tmp_path, capsys):
     """Scans of a recording whose noise is another one."""
-    from kurumaisu.critic.rehearse import write
+    from kurumaisu.critic.experiment.rehearse import write
 
-    bench_wall.write_model(MODEL, OPTIONS.wall, tmp_path / "bench.yaml")
+    wall_experiment.write_model(MODEL, OPTIONS.wall, tmp_path / "bench.yaml")
     rng = np.random.default_rng(3)
     results = []
     for name, sd in (("right", 1.0), ("wrong", 1.3)):

@@ -11,7 +11,7 @@ from physics_scene import DT, DYNAMICS, SKIN, SMOOTH, box, motion, room, run, th
 
 from kurumaisu._core import integrate
 from kurumaisu.errors import Error
-from kurumaisu.sim.rigid import GRAVITY, Ground, convex
+from kurumaisu.sim.motion.rigid import GRAVITY, Ground, convex
 
 EMPTY = walls()
 rates = st.floats(-3, 3)

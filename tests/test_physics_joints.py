@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from physics_scene import DT, DYNAMICS, box, motion, run, walls
 
-from kurumaisu.sim.bodies import assemble, ground, movable
-from kurumaisu.sim.partition import build_arena, sort
-from kurumaisu.sim.physical import PhysicalMotion
-from kurumaisu.sim.rigid import GRAVITY
+from kurumaisu.sim.motion.bodies import assemble, ground, movable
+from kurumaisu.sim.motion.partition import build_arena, sort
+from kurumaisu.sim.motion.physical import PhysicalMotion
+from kurumaisu.sim.motion.rigid import GRAVITY
+from kurumaisu.sim.motion.slip import hold
 from kurumaisu.sim.settings import Dynamics
-from kurumaisu.sim.slip import hold
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 

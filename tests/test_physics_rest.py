@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from physics_scene import DT, DYNAMICS, box, room, thing, walls
 
-from kurumaisu.sim import island
-from kurumaisu.sim.physical import PhysicalMotion
+from kurumaisu.sim.motion import island
+from kurumaisu.sim.motion.physical import PhysicalMotion
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.3, -0.01])

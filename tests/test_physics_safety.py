@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from physics_scene import DT, DYNAMICS, SKIN, box, motion, room, run, thing, walls
 
-from kurumaisu.sim.physical import PhysicalMotion
-from kurumaisu.sim.rigid import Rigid
+from kurumaisu.sim.motion.physical import PhysicalMotion
+from kurumaisu.sim.motion.rigid import Rigid
 from kurumaisu.types import FloatArray
 
 

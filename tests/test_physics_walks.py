@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sim_worlds import LASER, drive, robot, simulator
 
 from kurumaisu.errors import Error
-from kurumaisu.sim import social_force
+from kurumaisu.sim.robots import social_force
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 

@@ -11,7 +11,7 @@ from shapely import geometry as shapely
 
 from kurumaisu.params import load_model, shipped
 from kurumaisu.sim import Simulator, load_options
-from kurumaisu.sim.chair import ChairSimulator, Command
+from kurumaisu.sim.chair.simulator import ChairSimulator, Command
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World, load_world

@@ -6,8 +6,8 @@ import pytest
 from recordings import BEAMS, PACKAGE, Bag, assert_same, full_run, write_bag
 from rosbags.rosbag1 import Writer
 
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 
 META = "topics: {ground_truth: /mocap/pose, tyre: /tyre_pressure}\n"
@@ -49,7 +49,7 @@ def test_twists_received_in_one_tick_are_no_copies_and_the_last_of_them_holds(tm
     recording = read_recording(tmp_path / "drive.bag")
     assert recording.invalid == ()
     (told,) = (words for words in recording.problems if "cmd_vel" in words)
-    assert "6 messages were received in one tick of the clock with a later one: the last of each tick holds" in told
+    assert "6 messages were dropped: a later one has the same time of receipt" in told
     command = recording.runs[0].command
     np.testing.assert_allclose(command.t, [1.0, 1.1, 1.2])
     np.testing.assert_array_equal(command.values, [asked[2], asked[5], asked[8]])

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kurumaisu.critic.clean import Faults
-from kurumaisu.critic.read_rawlog import to_run
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.rawlog_reader import to_run
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 
 DATASETS = Path("/usr/share/mrpt/datasets")

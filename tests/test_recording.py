@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from recordings import BEAMS, PACKAGE, assert_same, full_run, series
 
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.recording import Run
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.values.recording import Run
 from kurumaisu.errors import Error
 
 
@@ -77,7 +77,7 @@ def test_columns_may_come_in_any_order_quoted_and_with_covariates_among_them(fol
     assert run.command.columns == ("v", "w")
     assert run.command.values.tolist() == [[0.5, 0.1], [0.6, 0.2]]
     assert run.covariates["load"].values.tolist() == [[70]]
-    assert recording.problems == ("run_1/command.csv: column 'note' is not read: it holds no numbers",)
+    assert recording.problems == ("run_1/command.csv: column 'note' is not read: it has no numbers",)
 
 
 def test_repeated_rows_are_dropped_and_told(folder):
@@ -204,7 +204,7 @@ def test_meta_is_read_strictly(folder):
         ("truth:", "thruth:", "thruth: is not a known key"),
         ("heading_sd", "heading", r"truth.heading_sd: is missing"),
         ("room.world", "hall.world", r"world: is not a file: .*hall.world"),
-        ("[run_2]", "[run_3]", "train: there is no run 'run_3'; there are: run_1, run_2"),
+        ("[run_2]", "[run_3]", "train: there is no run 'run_3'; did you mean run_2 or run_1"),
         ("[run_2]", "[run_1]", "test: 'run_1' is in train too"),
         ("beams: 7", "beams: 682", "scans have 7 beams, but meta.yaml says laser.beams: 682"),
         ("[run_2]", "run_2", "train: must be a list of names"),
@@ -216,4 +216,4 @@ def test_meta_is_read_strictly(folder):
 
 def test_a_table_with_an_unknown_name_is_told(folder):
     shutil.copy(folder / "run_1" / "pose.csv", folder / "run_1" / "poses.csv")
-    assert read_recording(folder).problems[0].startswith("run_1/poses.csv: not read: it is none of command.csv")
+    assert read_recording(folder).problems[0].startswith("run_1/poses.csv: not read: its name is none of command.csv")

@@ -14,7 +14,7 @@ import pytest
 import rosbag
 
 from kurumaisu.bench.processes import master, running
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 
 PATIENCE = 180.0  # [s] of wall time for a process to end
 TICK = 0.02  # [s] of base_node

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from stories import full_story, full_verdict
 
-from kurumaisu.critic.figures import MOST_POINTS, shown_points
-from kurumaisu.critic.pictures import LARGEST
-from kurumaisu.critic.report import quantities, write_report
-from kurumaisu.critic.story import Story
-from kurumaisu.critic.verdict import Verdict
+from kurumaisu.critic.report.figures import MOST_POINTS, shown_points
+from kurumaisu.critic.report.page import quantities, write_report
+from kurumaisu.critic.report.pictures import LARGEST
+from kurumaisu.critic.values.story import Story
+from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
 
 NBSP = "\N{NO-BREAK SPACE}"
@@ -73,7 +73,7 @@ def test_the_page_says_what_verdict_and_story_hold(tmp_path):
         "\N{MINUS SIGN}6.1 nats",
         "fits worse by 6.1 nats",
         "400 times",
-        "After 10 s off by 0.424 m with the model as it was, 0.004 m extended (rms).",
+        "Error after 10 s: 0.424 m with the original model, 0.004 m with the extended one (rms).",
         "Drive next: Spin both ways.",
         "4.10 to 5.70 mrad",
         "Nothing that these drives show.",
@@ -83,7 +83,7 @@ def test_the_page_says_what_verdict_and_story_hold(tmp_path):
         "2 more",
     ):
         assert words in said, words
-    order = ["The chair turns late.", "+0.370", "Spin both ways.", "Causes", "weighed"]
+    order = ["The chair turns late.", "+0.370", "Spin both ways.", "Causes", "Other explanations"]
     assert [said.index(words) for words in order] == sorted(said.index(words) for words in order)
 
 

@@ -13,8 +13,8 @@ from sim_worlds import OPTIONS, simulator
 
 from kurumaisu.geometry import relative
 from kurumaisu.sim import Simulator
-from kurumaisu.sim.machinery import Machinery
-from kurumaisu.sim.population import Population
+from kurumaisu.sim.robots.machinery import Machinery
+from kurumaisu.sim.robots.population import Population
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 

@@ -7,9 +7,9 @@ import sys
 import pytest
 import yaml
 
-from kurumaisu.bench.guard_rig import Rig
 from kurumaisu.bench.processes import master, program, running
-from kurumaisu.ros.testing import wait_for
+from kurumaisu.bench.rigs.guard import Rig
+from kurumaisu.ros.testing.nodes import wait_for
 
 PATIENCE = 60.0  # [s] of wall time for anything to come about
 

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kurumaisu.bench import drives, sanity, wrong_data, wrong_scans
+from kurumaisu.bench.critic import drives, sanity, wrong_data, wrong_scans
 from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.critic import sanity_fit, sanity_input, sanity_rates, sanity_rows, sanity_stamps
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.recording import Series
-from kurumaisu.critic.sanity import examine
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.sanity import input_match, map_placement, pose_stamps, rates
+from kurumaisu.critic.sanity import rows as sanity_rows
+from kurumaisu.critic.sanity.examination import examine
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.params import load_model, shipped
 from kurumaisu.real import warthog
 
@@ -46,11 +47,11 @@ def test_nothing_is_wrong_with_a_good_drive_of_any_style(style):
 def test_channels_are_swapped_only_if_neither_follows_its_own(turns, crossed, swapped):
     """Of a chair that veers much the yaw rate follows the forward channel, but so does the speed."""
     rng = np.random.default_rng(6)
-    t = np.arange(0.0, 120.0, sanity_rates.STEP)
+    t = np.arange(0.0, 120.0, rates.STEP)
     v, w = 0.5 * (t % 10 < 5), turns * (t % 14 < 7)
     driven = np.column_stack([v + rng.normal(0, 0.25, len(t)), w + 0.4 * v + rng.normal(0, 0.06, len(t))])
     asked = np.column_stack([w, v] if crossed else [v, w])
-    match = sanity_input.compare(sanity_rates.Rates(t, asked), sanity_rates.Rates(t, driven), "command")
+    match = input_match.compare(rates.Rates(t, asked), rates.Rates(t, driven), "command")
     assert match.swapped == swapped
 
 
@@ -69,7 +70,7 @@ def test_the_warthogs_poses_wait_and_the_rest_of_them_do_not():
     told = {}
     for name, poses in (("all", log.all_poses), ("kept", log.pose)):
         rows = warthog.between(poses, 134.0, 218.0)
-        told[name] = sanity_stamps.words(Series(rows[:, 0], rows[:, 1:], ("x", "y", "theta")))
+        told[name] = pose_stamps.problem(Series(rows[:, 0], rows[:, 1:], ("x", "y", "theta")))
     assert told["kept"] is None
     assert "times of arrival" in told["all"]
 
@@ -130,7 +131,7 @@ def test_poses_that_are_held_while_it_moves_are_said_beside_rests():
 def test_the_lag_of_white_noise_behind_itself_is_found():
     rng = np.random.default_rng(1)
     a = rng.normal(size=2000)
-    found = sanity_rates.likeness(np.roll(a, 7), a, (0.01, 0.01), 5.0)
+    found = rates.shift_correlation(np.roll(a, 7), a, (0.01, 0.01), 5.0)
     at = int(np.argmax(found.nats))
     assert found.lags[at] == pytest.approx(0.7)
     assert found.correlation[at] == pytest.approx(1.0, abs=0.01)
@@ -150,7 +151,7 @@ def test_a_map_is_moved_back_to_where_the_points_are():
     points = np.concatenate([a + rng.random((20, 1)) * (b - a) for a, b in ends.reshape(-1, 2, 2)])
     c, s = np.cos(0.7), np.sin(0.7)
     moved = (ends @ np.array([[c, s], [-s, c]]) + [3.0, -1.0]).reshape(-1, 4)
-    fitted = next(sanity_fit.nearest_maps(points, moved))
+    fitted = next(map_placement.nearest_maps(points, moved))
     assert np.abs(fitted.segments - walls).max() < 0.05
 
 

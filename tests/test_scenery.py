@@ -7,8 +7,8 @@ import pytest
 from kurumaisu import settings
 from kurumaisu.params import shipped
 from kurumaisu.sim.options import read_options
-from kurumaisu.sim.scenery import bounds, scenery
-from kurumaisu.sim.simulator import Simulator
+from kurumaisu.sim.robots.scenery import bounds, scenery
+from kurumaisu.sim.robots.simulator import Simulator
 from kurumaisu.world import load_world
 
 WORLD = """

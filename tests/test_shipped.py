@@ -24,10 +24,10 @@ SOURCE_TREE_TOOLS = {"bench", "demo", "real", "run", "setup", "test"}  # they bu
 
 # The strict readers of private parameters, by node type. Nodes in C++ read theirs when they start: rostests.
 READERS = {
-    "sim_node": "kurumaisu.ros.sim_settings:read_settings",
-    "map_server": "kurumaisu.ros.map_server:read_settings",
-    "stageros": "kurumaisu.ros.stageros_settings:read_settings",
-    "viewer": "kurumaisu.ros.viewer_settings:read_settings",
+    "sim_node": "kurumaisu.ros.sim.settings:read_settings",
+    "map_server": "kurumaisu.ros.maps.server:read_settings",
+    "stageros": "kurumaisu.ros.stageros.settings:read_settings",
+    "viewer": "kurumaisu.ros.viewer.settings:read_settings",
 }
 
 

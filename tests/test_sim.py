@@ -14,8 +14,8 @@ import pytest
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose, wrap
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
-from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command, Observation
-from kurumaisu.sim.holder import VoltageHolder
+from kurumaisu.sim.chair.holder import VoltageHolder
+from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator, Command, Observation
 from kurumaisu.sim.settings import Dynamics, load_dynamics, with_effects
 from kurumaisu.types import FloatArray
 from kurumaisu.urdf import robot_description

@@ -8,7 +8,7 @@ import yaml
 
 from kurumaisu import effects
 from kurumaisu.params import EffectSetting
-from kurumaisu.ros import sim_effects_config as config
+from kurumaisu.ros.sim import effects_config as config
 
 LAG = EffectSetting("base.lag_w", {"tau": 0.4})
 LIGHT = EffectSetting("laser.crosstalk", {"probability": 0.1, "width": 0.2, "drift": -0.3, "reach": 5.0})
@@ -59,7 +59,7 @@ def test_defaults_lie_within_their_bounds():
         ({"base_lag_w_tau": math.inf}, {"base_lag_w_tau": 3.0}, "tau must be 0 to 3 s: inf; 3 is taken"),
         ({"base_lag_w_tau": math.nan}, {}, "nan; it stays as it is"),
         ({"base_lag_w_enabled": 1}, {"base_lag_w_enabled": True}, None),
-        ({"tau": 0.3}, {}, "tau: is no parameter of an effect"),
+        ({"tau": 0.3}, {}, "tau: is not a parameter of an effect"),
     ],
 )
 def test_a_request_is_sifted(request_, changes, complaint):

@@ -9,8 +9,8 @@ import yaml
 
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
-from kurumaisu.ros.sim_settings import SimSettings, read_settings
-from kurumaisu.sim.chair import NEUTRAL, ChairSimulator
+from kurumaisu.ros.sim.settings import SimSettings, read_settings
+from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator
 
 CHOSEN = {"seed": 1, "speed": 1.0, "effects": "none", "sensors": "none", "image_extents": False}
 LASER = {"laser": "direct", "laser_port": "urg", "laser_faults": "none"}

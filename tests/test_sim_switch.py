@@ -10,7 +10,7 @@ from kurumaisu import effects
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
 from kurumaisu.sim import state
-from kurumaisu.sim.chair import ChairSimulator, Command
+from kurumaisu.sim.chair.simulator import ChairSimulator, Command
 from kurumaisu.sim.sensors.settings import load_sensors
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.world import load_world
@@ -175,7 +175,7 @@ def test_changed_effects_are_saved_and_others_are_refused(world):
     drive(it, BACK, 15)
     saved = it.save()
     after = drive(it, BEND, 30)
-    with pytest.raises(Error, match="of another world, chassis, list of effects"):
+    with pytest.raises(Error, match="belongs to another world, chassis, list of effects"):
         other.load(saved)
     other.switch((TYPICAL["base.lag_w"], TYPICAL["laser.warmup"], TYPICAL["world.map_error"]))
     other.load(saved)
@@ -239,7 +239,7 @@ def test_walls_in_the_chair_are_refused_and_nothing_has_changed(world):
     it, other = start(world, "base.gain_v"), start(world, "base.gain_v")
     for one in (it, other):
         one.set_pose("chair", [4.6, 0.0, 0.0, 0.0])
-    with pytest.raises(Error, match="a wall would stand in the chair: drive away"):
+    with pytest.raises(Error, match="a wall would be inside the chair: drive away"):
         it.switch((TYPICAL["base.lag_v"], EffectSetting("world.map_error", {"scale": -0.2, "sd": 0.0})))
     assert it.state_hash() == other.state_hash()
     same(drive(it, BACK, 30), drive(other, BACK, 30))

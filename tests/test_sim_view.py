@@ -12,11 +12,11 @@ import rospy
 from kurumaisu.msg import View
 
 from kurumaisu.params import shipped
-from kurumaisu.ros.sim_fans import FleetFans
-from kurumaisu.ros.sim_view import ViewTopics
+from kurumaisu.ros.view.fans import FleetFans
+from kurumaisu.ros.view.topics import ViewTopics
 from kurumaisu.settings import load
 from kurumaisu.sim.options import read_options
-from kurumaisu.sim.simulator import Simulator
+from kurumaisu.sim.robots.simulator import Simulator
 from kurumaisu.world import load_world
 
 NS = 1_000_000_000

@@ -187,7 +187,7 @@ def test_commands_of_another_shape_are_refused(tmp_path: Path) -> None:
 def test_a_robot_that_begins_in_a_wall_is_named(tmp_path: Path) -> None:
     sim = simulator(tmp_path, ROOM + robot("", "4.9 0 0 0") + robot('name "b"', "0 0 0 0"))
     assert [w for w in sim.warnings if "touches" in w] == [
-        f"{tmp_path / 't.world'}:4:1: position touches something where it begins; it stalls until it is free"
+        f"{tmp_path / 't.world'}:4:1: position touches something at its start; it stalls until it is free"
     ]
     assert drive(sim, (0.01, 0, 0), 1)[-1].stalled.tolist() == [True, False]
 

@@ -85,7 +85,7 @@ def test_a_saved_state_continues_bit_for_bit(tmp_path: Path) -> None:
 def test_states_of_another_world_are_refused(tmp_path: Path) -> None:
     saved = crowd(tmp_path).save()
     for other in (simulator(tmp_path, ROOM + robot()), crowd(tmp_path, timing="consistent")):
-        with pytest.raises(Error, match=r"is of another world than .*t\.world, or of other options"):
+        with pytest.raises(Error, match=r"belongs to another world than .*t\.world, or to other options"):
             other.load(saved)
 
 
@@ -111,9 +111,9 @@ class Evil:
 
 
 def test_a_state_runs_no_code() -> None:
-    with pytest.raises(Error, match="system is no part of a state"):
+    with pytest.raises(Error, match="system is not part of a state"):
         state.unpack(state.pack({"a": Evil()}))
-    with pytest.raises(Error, match="is no part of a state"):
+    with pytest.raises(Error, match="is not part of a state"):
         state.unpack(b"kurumaisu state 1\n" + pickle.dumps(eval))
 
 

@@ -13,7 +13,7 @@ from sim_worlds import LASER, OPTIONS, ROOM, robot, simulator
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.sim import SimulatorPool
-from kurumaisu.sim.run import run
+from kurumaisu.sim.robots.run import run
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 

@@ -12,11 +12,12 @@ import pytest
 import yaml
 from recordings import full_run, write_bag
 
-from kurumaisu import _slam, map_command, maps, slam
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu import _slam, maps, slam
+from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose
 from kurumaisu.params import shipped
+from kurumaisu.ros.tools import map_command
 
 DATASETS = Path("/usr/share/mrpt/datasets")
 SENA = DATASETS / "2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog"
@@ -131,7 +132,7 @@ def test_a_scan_that_makes_no_sense_is_named(sena: slam.ScanLog) -> None:
     [
         (None, 0, "cannot be read"),
         ("RO-SLAM_demo.rawlog", None, "has no laser scan"),
-        ("README_directory.txt", None, "is no rawlog"),
+        ("README_directory.txt", None, "is not a rawlog"),
         (SENA.name, 100_000, "cut off"),
         (SENA.name, 0, "is empty"),
     ],
@@ -234,8 +235,8 @@ def test_command_goes_on_from_a_map(tmp_path: Path, capsys: pytest.CaptureFixtur
     second = np.loadtxt(tmp_path / "b" / "trajectory.csv", delimiter=",", skiprows=1)
     assert np.hypot(*(second - first)[:, 1:3].T).max() < 0.15
     capsys.readouterr()
-    assert map_command.main([log, "-o", str(tmp_path / "c"), *start[:2], "--at", "500", "0", "0"]) == 2
-    assert "scan 0: the map to go on from explains 0 %" in capsys.readouterr().err
+    assert map_command.main([log, "-o", str(tmp_path / "c"), *start[:2], "--at", "500", "0", "0"]) == 1
+    assert "scan 0: the map to continue explains 0 %" in capsys.readouterr().err
 
 
 def test_command_refuses_bad_input(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -246,14 +247,16 @@ def test_command_refuses_bad_input(tmp_path: Path, capfd: pytest.CaptureFixture[
     for arguments, message in (
         ([str(tmp_path / "a.rawlog")], "a.rawlog: has no laser scan"),
         ([str(tmp_path / "none")], "none: cannot be read"),
-        ([demo, "--seed", "-1"], "--seed: must be"),
         ([demo, "--settings", str(tmp_path / "none.yaml")], "none.yaml: No such file"),
         ([demo, "-o", str(blocked / "folder")], "folder: Not a directory"),
         ([demo, "--start", str(tmp_path / "none.simplemap")], "none.simplemap: cannot be read"),
-        ([demo, "--start", str(blocked)], "is no simplemap to go on from"),
+        ([demo, "--start", str(blocked)], "is not a simplemap to continue"),
     ):
-        assert map_command.main(arguments) == 2
+        assert map_command.main(arguments) == 1
         out, err = capfd.readouterr()
         assert out == ""
         assert err.count("\n") == 1  # nothing of MRPT's own
         assert message in err
+    with pytest.raises(SystemExit, match="2"):
+        map_command.main([demo, "--seed", "-1"])
+    assert "--seed: must be" in capfd.readouterr().err

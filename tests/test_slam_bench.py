@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from kurumaisu import slam
-from kurumaisu.bench import slam_peers
-from kurumaisu.bench.slam_office import Bound
-from kurumaisu.bench.slam_ours import ours
-from kurumaisu.bench.slam_roam import Ways, roam
-from kurumaisu.bench.slam_sharp import sharpness
+from kurumaisu.bench.slam import peers
+from kurumaisu.bench.slam.office import Bound
+from kurumaisu.bench.slam.ours import ours
+from kurumaisu.bench.slam.random_drives import Ways, roam
+from kurumaisu.bench.slam.sharpness import sharpness
 from kurumaisu.errors import Error
 from kurumaisu.geometry import between, compose, wrap
 from kurumaisu.localization import load_localizer_settings, make_localizer
@@ -66,16 +66,16 @@ def test_between_a_peers_poses_odometry_goes_on_and_its_error_is_spread():
     odom = np.column_stack([np.linspace(0, 1, 11), np.zeros(11), np.zeros(11)])
     nodes = np.full((11, 3), np.nan)
     nodes[0], nodes[10] = (5, 5, np.pi), (3.9, 5, -np.pi)
-    filled = slam_peers._between_nodes(nodes, odom)
+    filled = peers._between_nodes(nodes, odom)
     np.testing.assert_allclose(filled[:, 0], np.linspace(5, 3.9, 11), atol=1e-9)
     np.testing.assert_allclose(wrap(filled[:, 2] - np.pi), 0, atol=1e-9)
     with pytest.raises(Error, match="no pose"):
-        slam_peers._between_nodes(np.full((3, 3), np.nan), odom[:3])
+        peers._between_nodes(np.full((3, 3), np.nan), odom[:3])
 
 
 def test_a_driver_reads_the_log_that_is_written(drive, tmp_path):
     log = replace(drive[0], times=drive[0].times[:5], ranges=drive[0].ranges[:5], odom=drive[0].odom[:5])
-    slam_peers.write_log(log, tmp_path / "log")
+    peers.write_log(log, tmp_path / "log")
     (tmp_path / "echo.cpp").write_text(
         '#include <cassert>\n#include "slam_log.h"\nint main(int n, char** words) {\n'
         '  Arguments from(n, words);\n  const Log log(from.text("log"));\n'
@@ -86,9 +86,9 @@ def test_a_driver_reads_the_log_that_is_written(drive, tmp_path):
         "  writeDoubles(to, out);\n  printCosts(0.5, log);\n}\n"
     )
     program = tmp_path / "echo"
-    drivers = slam_peers._DRIVERS
+    drivers = peers._DRIVERS
     subprocess.run(["g++", "-std=c++17", f"-I{drivers}", str(tmp_path / "echo.cpp"), "-o", str(program)], check=True)
-    peer = slam_peers.Peer(program, tmp_path)
+    peer = peers.Peer(program, tmp_path)
     run, poses = peer.run(log, {})
     assert run.cpu == 0.5
     assert 0 < run.memory < 50
@@ -123,7 +123,7 @@ def test_thick_and_double_walls_are_told_from_thin_ones():
 
 def test_bounds_say_which_is_broken():
     bound = Bound("x", 2.0, 1.0)
-    assert [bound.told(value).split(":")[0] for value in (1.0, 1.5, 2.5)] == ["reached", "kept", "BROKEN"]
+    assert [bound.judged(value).state for value in (1.0, 1.5, 2.5)] == ["reached", "kept", "BROKEN"]
 
 
 def test_the_covariance_of_a_pose_has_the_maps_own(drive):

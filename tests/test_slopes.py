@@ -14,10 +14,10 @@ from sim_worlds import drive, robot, simulator
 from kurumaisu import effects
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
-from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
+from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator, Command
+from kurumaisu.sim.motion.slopes import Slopes
 from kurumaisu.sim.plant import Plant
 from kurumaisu.sim.settings import load_dynamics
-from kurumaisu.sim.slopes import Slopes
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 from kurumaisu.world.check import findings

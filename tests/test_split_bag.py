@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from recordings import full_run, write_bag
 
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.recording import Series
-from kurumaisu.critic.split_bag import numbered, parts_of
+from kurumaisu.critic.data.bag_parts import numbered, parts_of
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.errors import Error
 
 PARTS = 12  # the eleventh, NAME_10.bag, sorts before the third by name

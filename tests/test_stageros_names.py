@@ -10,10 +10,10 @@ import yaml
 
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
-from kurumaisu.ros.stageros import parse
-from kurumaisu.ros.stageros_names import names_of
-from kurumaisu.ros.stageros_plan import plan_world
-from kurumaisu.ros.stageros_settings import read_settings
+from kurumaisu.ros.stageros.names import names_of
+from kurumaisu.ros.stageros.node import parse
+from kurumaisu.ros.stageros.plan import plan_world
+from kurumaisu.ros.stageros.settings import read_settings
 from kurumaisu.world.model import Camera, Fan, Model, Place, Position, Ranger, Shape
 
 PLACE = Place(Path("a.world"), 1, 1)

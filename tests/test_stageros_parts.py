@@ -9,12 +9,12 @@ from sim_worlds import ROOM, drive, robot, simulator
 
 from kurumaisu.effects import Reference
 from kurumaisu.errors import Error
-from kurumaisu.ros.stageros_names import Names
-from kurumaisu.ros.stageros_newcomers import renumbered
-from kurumaisu.ros.stageros_rates import Pace
-from kurumaisu.ros.stageros_saved import packed_names, unpacked_names
-from kurumaisu.ros.stageros_settings import read_settings
-from kurumaisu.ros.stageros_truth import Truth
+from kurumaisu.ros.stageros.added_models import renumbered
+from kurumaisu.ros.stageros.names import Names
+from kurumaisu.ros.stageros.rates import Pace
+from kurumaisu.ros.stageros.saved_names import packed_names, unpacked_names
+from kurumaisu.ros.stageros.settings import read_settings
+from kurumaisu.ros.stageros.truth import Truth
 from kurumaisu.world.layout import family
 
 
@@ -45,7 +45,7 @@ def test_bad_rates_are_named(rates, message):
 def test_a_rate_of_no_sensor_is_named():
     one = pace(sensors={"base_scan_1": 5.0})
     one.check(["/robot_0/base_scan_0", "/robot_0/base_scan_1"])
-    with pytest.raises(Error, match="base_scan_1: there is no sensor of this name; there are: base_scan"):
+    with pytest.raises(Error, match="base_scan_1: there is no sensor of this name; did you mean base_scan"):
         one.check(["base_scan"])
 
 

@@ -12,13 +12,14 @@ import rosbag
 import rospy
 from sensor_msgs.msg import LaserScan
 
-from kurumaisu import map_command, slam
-from kurumaisu.bench.slam_models import without_mean_error
-from kurumaisu.bench.slam_roam import roam
+from kurumaisu import slam
+from kurumaisu.bench.slam.models import without_mean_error
+from kurumaisu.bench.slam.random_drives import roam
 from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap
 from kurumaisu.map_file import read_map
 from kurumaisu.params import load_model, shipped
+from kurumaisu.ros.tools import map_command
 
 CONFIGS = Path("/usr/share/mrpt/config_files")
 PATIENCE = 120.0  # [s] of wall time

@@ -190,7 +190,7 @@ def test_a_terminal_gives_single_keys_and_is_restored():
 
 
 def test_a_file_is_no_terminal(tmp_path):
-    with (tmp_path / "keys").open("w") as file, pytest.raises(Error, match="no terminal"):
+    with (tmp_path / "keys").open("w") as file, pytest.raises(Error, match="not a terminal"):
         Terminal(file.fileno())
 
 
@@ -260,7 +260,7 @@ def test_a_device_that_is_gone_or_none_is_an_error(tmp_path):
         reader.poll()
     device = FakeDevice()
     device.capabilities = lambda: {1: [30]}  # a keyboard
-    with pytest.raises(Error, match="no joystick"):
+    with pytest.raises(Error, match="not a joystick"):
         Reader(device, 0.0)
     with pytest.raises(Error, match="missing"):
         open_device(tmp_path / "missing")

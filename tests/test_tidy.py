@@ -16,8 +16,7 @@ int moved(std::unique_ptr<int> p) { auto q = std::move(p); return *p + *q; }
 """
 
 
-@pytest.mark.parametrize("apart", [False, True])
-def test_at_once_as_much_is_found_as_alone(tmp_path, monkeypatch, apart):
+def test_at_once_as_much_is_found_as_alone(tmp_path, monkeypatch):
     """The analyzer, too, which leaves out what it takes for a header."""
     monkeypatch.setattr(tidy, "BUILD", tmp_path / "build")
     monkeypatch.setattr(tidy, "LINKS", tmp_path)
@@ -28,8 +27,8 @@ def test_at_once_as_much_is_found_as_alone(tmp_path, monkeypatch, apart):
         shutil.copy(sources.ROOT / ".clang-tidy", folder)
     both = tuple(tmp_path / f"src/base/{name}.cpp" for name in ("one", "two"))
     for path in both:
-        path.write_text(DEFECTS % ("same" if apart else path.stem))
-    unit = tidy.Unit(["-std=c++17"], (tmp_path / "build/kurumaisu/x.o",), tmp_path, both, apart)
+        path.write_text(DEFECTS % path.stem)
+    unit = tidy.Unit(["-std=c++17"], tmp_path / "build/kurumaisu/x.o", tmp_path, both)
 
     def found(text):
         return set(re.findall(r"(\w+\.cpp:\d+):\d+: error: .*\[(.*)\]", text))
@@ -37,6 +36,19 @@ def test_at_once_as_much_is_found_as_alone(tmp_path, monkeypatch, apart):
     alone = set.union(*(found(tidy._tidy(unit, path)) for path in both))
     assert {check.split(",")[0] for _, check in alone} >= {"clang-analyzer-core.DivideZero", "bugprone-use-after-move"}
     assert found(tidy._tidy(unit, tidy._whole(unit))) == alone
+
+
+def test_a_source_that_lacks_an_include_is_found_behind_another_that_has_it(tmp_path, monkeypatch):
+    """The build reads them in order, clang-tidy the other way round."""
+    monkeypatch.setattr(tidy, "BUILD", tmp_path / "build")
+    monkeypatch.setattr(tidy, "LINKS", tmp_path)
+    monkeypatch.setattr(tidy, "WHOLE", tmp_path / "whole")
+    (tmp_path / "src").mkdir()
+    has, lacks = tmp_path / "src/has.cpp", tmp_path / "src/lacks.cpp"
+    has.write_text("#include <vector>\nstd::vector<int> one();\n")
+    lacks.write_text("std::vector<int> other();\n")
+    unit = tidy.Unit(["-std=c++17"], tmp_path / "build/kurumaisu/x.o", tmp_path, (has, lacks))
+    assert "lacks.cpp" in tidy._tidy(unit, tidy._whole(unit))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from kurumaisu import urdf
 from kurumaisu.params import load_model, shipped
-from kurumaisu.sim.chair_body import outline
+from kurumaisu.sim.chair.body import outline
 
 MODEL = load_model(shipped("launch/md100.yaml"))
 IMU = ("imu_link", urdf.Pose((0.1, -0.2, 0.3), (math.pi, 0.0, 0.5)))

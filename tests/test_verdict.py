@@ -10,7 +10,7 @@ import pytest
 from recordings import PACKAGE
 from stories import full_verdict
 
-from kurumaisu.critic.verdict import Cause, Verdict, read_verdict, to_json, write_verdict
+from kurumaisu.critic.values.verdict import Cause, Verdict, read_verdict, to_json, write_verdict
 from kurumaisu.errors import Error
 
 
@@ -21,7 +21,7 @@ def test_a_verdict_reads_back_as_it_was_written(tmp_path):
 
 
 def test_the_schema_is_a_schema_and_the_file_has_the_contracts_fields(tmp_path):
-    schema = json.loads((PACKAGE / "src/kurumaisu/critic/verdict.schema.json").read_text(encoding="utf-8"))
+    schema = json.loads((PACKAGE / "src/kurumaisu/critic/values/verdict.schema.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator.check_schema(schema)
     write_verdict(tmp_path / "verdict.json", full_verdict())
     content = json.loads((tmp_path / "verdict.json").read_text(encoding="utf-8"))

@@ -9,8 +9,8 @@ import pytest
 import rospy
 from kurumaisu.msg import View
 
-from kurumaisu.ros.sim_fans import Looks
-from kurumaisu.ros.view_wire import Shape, ViewWire
+from kurumaisu.ros.view.fans import Looks
+from kurumaisu.ros.view.wire import Shape, ViewWire
 
 NS = 1_000_000_000
 

@@ -8,7 +8,7 @@ import aiohttp
 import pytest
 from viewer_rig import Running
 
-from kurumaisu.bench.viewer_page import Page
+from kurumaisu.bench.speed.viewer.page import Page
 from kurumaisu.errors import Error
 from kurumaisu.viewer import access
 
@@ -43,13 +43,13 @@ def test_guessing_tokens_ends_the_connection(page):
 
 def test_without_control_no_token_is_good_and_nobody_commands():
     with Running(control=False, mode="robot") as robot:
-        with pytest.raises(Error, match="only shows"):
+        with pytest.raises(Error, match="is read-only"):
             robot.server.new_address()
         page = Page(robot.server.address)
         page.wait(lambda: "hello" in page.newest, "hello")
         assert page.newest["hello"]["abilities"] == []
         for name, arguments in (("drive", {"v": 0.1, "w": 0.0}), ("estop", {"on": False}), ("reset", {})):
-            assert "only shows" in page.ask(name, **arguments)["message"]
+            assert "is read-only" in page.ask(name, **arguments)["message"]
         assert robot.rig.commands == []
         page.close()
 

@@ -161,7 +161,7 @@ def test_a_body_is_placed_by_numbers(visit, shown):
         page.locator(f"#place-{name}").fill(value)
     page.locator("#place-yaw").press("Enter")
     until(lambda: shown.rig.poses["2"] == pytest.approx((0.5, -1.25, math.pi / 2)), "placed")
-    expect(page.locator("#toast")).to_have_text("<b>box</b> was put there.")
+    expect(page.locator("#toast")).to_have_text("<b>box</b> was moved there.")
 
 
 def test_recording_and_estimate(visit, shown):

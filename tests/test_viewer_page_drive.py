@@ -73,7 +73,7 @@ def test_the_stick_is_taken_away_when_nobody_may_be_there(visit, shown):
         page.keyboard.down("w")
         until(lambda: drives(shown) and drives(shown)[-1][0] > 0, "it drives")
         page.evaluate(fright)
-        expect(page.locator("#alarm")).to_contain_text("The stick was taken away")
+        expect(page.locator("#alarm")).to_contain_text("Driving was ended")
         stopped(shown, visit)
         expect(page.locator("#stick-box")).to_be_hidden()
         count = len(drives(shown))
@@ -118,7 +118,7 @@ def test_a_lost_connection_lets_go_and_the_page_comes_back(browser, shown):
         page.keyboard.down("w")
         until(lambda: len(drives(shown)) >= 2, "it drives")
         shown.server.close()
-        expect(page.locator("#connection")).to_have_text("No connection: trying again")
+        expect(page.locator("#connection")).to_have_text("No connection: retrying")
         expect(page.locator("#stick-box")).to_be_hidden()
         expect(page.locator("#estop")).to_be_disabled()
         count = len(drives(shown))
@@ -150,7 +150,7 @@ def test_nobody_drives_by_a_line_that_is_too_slow(visit, shown):
     shown.rig.do_drive = late
     take_stick(visit)
     visit.page.keyboard.down("w")
-    expect(visit.page.locator("#alarm")).to_contain_text("too slow to drive by")
+    expect(visit.page.locator("#alarm")).to_contain_text("too slow for driving")
     assert len(drives(shown)) <= 11
     jam.set()
     stopped(shown, visit)

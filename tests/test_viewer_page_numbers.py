@@ -88,7 +88,7 @@ def test_binary_messages_are_read_as_they_were_written(browser, shown):
     with Visit(browser, shown.server.address) as visit:
         scan, nobody, cloud = visit.page.evaluate(
             """async (texts) => {
-              const {decode} = await import('/page/decode.js');
+              const {decode} = await import('/page/server/decode.js');
               const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
               const plain = (value) => value instanceof Float32Array ? [...value].map(String) : value;
               const entries = (text) => Object.entries(decode(bytes(text)));
@@ -121,7 +121,7 @@ def test_a_slider_reaches_both_bounds_and_is_fine_near_zero(browser, shown):
     with Visit(browser, shown.server.address) as visit:
         found = visit.page.evaluate(
             """async (all) => {
-              const {law} = await import('/page/slider.js');
+              const {law} = await import('/page/panels/slider.js');
               const places = Array.from({length: 101}, (_, i) => 10 * i);
               return all.map(([low, high]) => {
                 const one = law(low, high);

@@ -12,11 +12,11 @@ from rosbags.typesys import Stores, get_typestore
 from stories import full_story, full_verdict
 from view_rig import Look, drive, meta, on_circle, room_ranges, stamp_of
 
-from kurumaisu.critic import explain
-from kurumaisu.critic.recording import Recording
-from kurumaisu.critic.report import write_report
-from kurumaisu.critic.view_tape import laid
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.judge import explain
+from kurumaisu.critic.report.page import write_report
+from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.view.tape import laid
 from kurumaisu.errors import Error
 from kurumaisu.params import follow_commands, load_model, shipped
 from kurumaisu.viewer.playback import CHAIR

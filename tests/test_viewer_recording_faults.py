@@ -13,9 +13,9 @@ import pytest
 from recordings import Bag, full_run, write_bag
 from view_rig import LASER, Look, drive, meta
 
-from kurumaisu.critic.recording import Run
-from kurumaisu.critic.view import main
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.values.recording import Run
+from kurumaisu.critic.view.command import main
 from kurumaisu.viewer.playback import CHAIR
 
 
@@ -118,7 +118,7 @@ def test_a_world_that_is_not_there_is_named(two_runs, capsys):
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_the_command_says_where_to_look_and_ends_when_asked(two_runs, how):
-    command = [sys.executable, "-c", "import sys; from kurumaisu.critic.view import main; sys.exit(main())"]
+    command = [sys.executable, "-c", "import sys; from kurumaisu.critic.view.command import main; sys.exit(main())"]
     process = subprocess.Popen([*command, str(two_runs), "--port", "0"], stdout=subprocess.PIPE, text=True)
     try:
         told = [process.stdout.readline(), process.stdout.readline()]

@@ -9,8 +9,8 @@ import pytest
 from recordings import Bag
 from view_rig import Look
 
-from kurumaisu.critic.view_album import read_album
-from kurumaisu.critic.view_spool import Spool
+from kurumaisu.critic.view.album import read_album
+from kurumaisu.critic.view.spool import Spool
 
 
 def bag_of_scans(path, scans=1200, beams=682, intensities=lambda i: ()):

@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from kurumaisu.bench.processes import free_port, master, running
-from kurumaisu.bench.viewer_page import Page
+from kurumaisu.bench.speed.viewer.page import Page
 from kurumaisu.params import load_model, shipped
 
 PATIENCE = 60.0  # [s] of wall time for nodes to come up

@@ -14,10 +14,10 @@ from view_rig import LASER, ROOM, drive, meta
 from viewer_page_rig import Visit, until
 from viewer_rig import viewer_settings
 
-from kurumaisu.critic.report import write_report
-from kurumaisu.critic.story import Moments, Overlay
-from kurumaisu.critic.view import opened
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.report.page import write_report
+from kurumaisu.critic.values.story import Moments, Overlay
+from kurumaisu.critic.view.command import opened
 from kurumaisu.viewer import report
 
 NAMES = ("early", 'late, "again" & <b>more')  # what a folder may be called
@@ -72,7 +72,7 @@ def test_a_point_of_the_report_leads_to_its_moment_and_place(browser, served):
         page.reload()
         link = page.locator("figure a", has_text="t = 5010.00 s")
         expect(page.locator(".unserved")).to_be_hidden()
-        page.get_by_text("furthest off, in the viewer").click()
+        page.get_by_text("largest misfits, in the viewer").click()
         expect(link).to_be_visible()
         assert NAMES[1] in link.text_content()
         svg = page.locator("svg[data-at]").first
@@ -99,7 +99,7 @@ def test_a_report_in_a_tab_of_its_own_leads_to_the_viewers_tab(browser, served):
         expect(visit.page.locator("#scrubber")).to_be_enabled()
         page = visit.context.new_page()
         page.goto(f"{served.server.address}report/report.html")
-        page.get_by_text("furthest off, in the viewer").click()
+        page.get_by_text("largest misfits, in the viewer").click()
         page.locator("figure a", has_text="t = 5010.00 s").click()
         expect(page.get_by_role("status")).to_contain_text("t = 5010.00 s")
         expect(page.get_by_role("status")).to_contain_text("shown in the viewer's tab")
@@ -111,7 +111,7 @@ def test_a_report_says_why_the_viewers_tab_does_not_go_there(browser, served):
     with Visit(browser, served.server.address) as visit:  # without a token
         page = visit.context.new_page()
         page.goto(f"{served.server.address}report/report.html")
-        page.get_by_text("furthest off, in the viewer").click()
+        page.get_by_text("largest misfits, in the viewer").click()
         page.locator("figure a", has_text="t = 5010.00 s").click()
         expect(page.get_by_role("status")).to_contain_text("the link that the viewer printed")
         assert playback(served).run == NAMES[0]
@@ -193,5 +193,5 @@ def test_a_report_is_served_with_our_script_and_no_other():
     assert policy["script-src"] == "'self'"  # so the inline one does not run
     for sheet in (b"a{}", b"b{}"):
         assert base64.b64encode(hashlib.sha256(sheet).digest()).decode() in policy["style-src-elem"]
-    assert body.count(b'<script type="module" src="../page/report.js"></script>') == 1
+    assert body.count(b'<script type="module" src="../page/report/report.js"></script>') == 1
     assert body.index(b"report.js") < body.index(b"</body>")

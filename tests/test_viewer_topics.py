@@ -18,9 +18,9 @@ from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
 
 from kurumaisu.params import load_model, shipped
-from kurumaisu.ros.viewer_maps import Maps
-from kurumaisu.ros.viewer_robot import Robot
-from kurumaisu.ros.viewer_topics import Transforms
+from kurumaisu.ros.viewer.maps import Maps
+from kurumaisu.ros.viewer.robot import Robot
+from kurumaisu.ros.viewer.topics import Transforms
 from kurumaisu.viewer import Hub
 
 

@@ -16,11 +16,11 @@ from kurumaisu import effects
 from kurumaisu._core import LaserError
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
-from kurumaisu.sim.chair import ChairSimulator, Command
-from kurumaisu.sim.scanner import Scan
+from kurumaisu.sim.chair.scanner import Scan
+from kurumaisu.sim.chair.simulator import ChairSimulator, Command
 from kurumaisu.sim.settings import load_dynamics
-from kurumaisu.sim.virtual_laser import VirtualLaser, check_fan, remainder, turn_start
 from kurumaisu.virtual_urg import Sensor, load_sensor
+from kurumaisu.virtual_urg.chair_laser import VirtualLaser, check_fan, remainder, turn_start
 from kurumaisu.world import load_world
 
 FILE = shipped("launch/md100.yaml")

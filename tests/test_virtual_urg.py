@@ -282,17 +282,20 @@ def test_command(tmp_path, feed):
 
 
 def test_command_refuses_nonsense(tmp_path, capsys):
-    def told(*arguments):
-        with pytest.raises(SystemExit, match="2"):  # argparse's way, and what the script does
+    def told(*arguments, code=1):
+        with pytest.raises(SystemExit, match=str(code)):  # argparse's way, and what the script does
             sys.exit(main(list(arguments)))
         return capsys.readouterr().err
 
-    assert "--pty --tcp is required" in told()
-    assert "urg_04lx_ug01, utm_30lx: 'sick'" in told("--sensor", "sick", "--tcp", "0")
+    assert "--pty --tcp is required" in told(code=2)
+    assert "'sick' is neither a file *.yaml nor a known one; there are: urg_04lx, urg_04lx_ug01, utm_30lx" in told(
+        "--sensor", "sick", "--tcp", "0"
+    )
+    assert "did you mean urg_04lx or urg_04lx_ug01" in told("--sensor", "urg_04xl", "--tcp", "0")
     assert "corupt@5: no such name" in told("--tcp", "0", "--fault", "corupt@5")
-    assert "--world and --pose" in told("--tcp", "0", "--world", "a.world")
+    assert "--world and --pose" in told("--tcp", "0", "--world", "a.world", code=2)
     assert f"{tmp_path}/no.world" in told("--tcp", "0", "--world", f"{tmp_path}/no.world", "--pose", "0", "0", "0")
     assert "70000" in told("--tcp", "70000")
     assert "1.2.3.4" in told("--tcp", "0", "--host", "1.2.3.4")
-    assert "--range" in told("--tcp", "0", "--range", "-1")
+    assert "--range" in told("--tcp", "0", "--range", "-1", code=2)
     assert list(tmp_path.iterdir()) == []

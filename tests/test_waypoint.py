@@ -8,7 +8,7 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from kurumaisu.driving import Route
-from kurumaisu.ros.waypoint_node import WaypointNode
+from kurumaisu.ros.tools.waypoint_node import WaypointNode
 
 
 def test_whoever_comes_to_listen_hears_rest_first(monkeypatch):

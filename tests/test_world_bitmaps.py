@@ -78,7 +78,7 @@ def test_trim_and_stretch(tmp_path: Path) -> None:
     np.testing.assert_allclose(box(np.array(hole)), [-1, 0.8, -0.6, 1.0])  # 5 from the left, 4 from below
     np.testing.assert_allclose(world.models[0].shape.heights, [[0, 3]] * 8)
     (warning,) = world.warnings
-    assert "t.world:1:9: map.png: its walls without its margins" in warning
+    assert "t.world:1:9: map.png: trimmed to its walls" in warning
     assert "2.000 times as wide and 2.000 times as high" in warning
     whole = read(tmp_path, text, image_extents=True)
     np.testing.assert_allclose(box(whole.segments), [-1, 0.5, 3, 1.5])

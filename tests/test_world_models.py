@@ -189,7 +189,7 @@ def test_colours_of_models(tmp_path: Path) -> None:
     assert colours[:3] == [(0, 0, 1, 1), (0.1, 0.2, 0.3, 1), (1, 0, 0, 1)]
     assert colours[3] != colours[4]
     assert colours == [model.color for model in read(tmp_path, text).models]
-    assert world.warnings == (f"{tmp_path}/t.world:1:90: there is no color 'mud': red is taken, as in Stage",)
+    assert world.warnings == (f"{tmp_path}/t.world:1:90: unknown color 'mud': red is used, as in Stage",)
 
 
 def test_what_is_warned_of(tmp_path: Path) -> None:
@@ -205,15 +205,15 @@ def test_what_is_warned_of(tmp_path: Path) -> None:
         [
             "1:1: threads is accepted and has no effect here",
             "6:42: sensor1 is not a property of the world: ignored, as Stage does",
-            "2:13: laser_return has no effect: Stage 4 heeds ranger_return instead",
+            "2:13: laser_return has no effect: Stage 4 uses ranger_return instead",
             "2:39: colour is not a property of a model: ignored, as Stage does",
             "2:48: ctrl is accepted and has no effect here",
             "2:62: driver is not a property of a model: ignored, as Stage does",
-            "4:57: odom has no effect: Stage 4 heeds localization_origin instead",
+            "4:57: odom has no effect: Stage 4 uses localization_origin instead",
             "5:80: range_max is not a property of a ranger: ignored, as Stage does",
-            "5:23: range_max has no effect: Stage 4 heeds range [MIN MAX] instead",
-            "5:36: range_min has no effect: Stage 4 heeds range [MIN MAX] instead",
-            "5:48: update_interval has no effect: Stage 4 heeds that of the ranger",
+            "5:23: range_max has no effect: Stage 4 uses range [MIN MAX] instead",
+            "5:36: range_min has no effect: Stage 4 uses range [MIN MAX] instead",
+            "5:48: update_interval has no effect: Stage 4 uses that of the ranger",
             "6:5: blobfinder: has only a body here",
             "4:25: drive must be one of diff, omni, car, not 'tank': diff is taken",
         ]

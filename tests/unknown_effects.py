@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from kurumaisu.critic.drive import prepare
-from kurumaisu.critic.noise import Noise, whitened
-from kurumaisu.critic.recording import Recording, Run, Series
+from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.noise.base_noise import Noise, whitened
+from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import follow_commands, load_model, shipped
 
 STEP = 0.005  # [s]

@@ -7,8 +7,8 @@ import numpy as np
 from recordings import series
 from viewer_rig import viewer_settings
 
-from kurumaisu.critic.recording import Run
-from kurumaisu.critic.view import opened
+from kurumaisu.critic.values.recording import Run
+from kurumaisu.critic.view.command import opened
 
 ROOM = """\
 name "room"

@@ -11,9 +11,9 @@ import rospy
 from geometry_msgs.msg import Twist
 from std_srvs.srv import Trigger
 
-from kurumaisu.bench.viewer_page import Page
-from kurumaisu.ros.testing import PATIENCE, Topic
-from kurumaisu.ros.viewer_calls import call
+from kurumaisu.bench.speed.viewer.page import Page
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic
+from kurumaisu.ros.viewer.calls import call
 
 
 class ViewerFleetTest(unittest.TestCase):
@@ -60,7 +60,7 @@ class ViewerFleetTest(unittest.TestCase):
         for body in (wall, "moon"):
             reply = self.page.ask("drive", v=0.1, w=0.0, body=body)
             assert not reply["ok"]
-            assert "nothing that can be driven" in reply["message"]
+            assert "cannot be driven" in reply["message"]
 
     def test_all_rangers_are_seen(self):
         self.page.wait(lambda: len(self.page.scans) == 2, "both rangers")

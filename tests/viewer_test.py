@@ -18,10 +18,11 @@ from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
-from kurumaisu.bench.viewer_page import Page
+from kurumaisu.bench.speed.viewer.page import Page
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
-from kurumaisu.ros.viewer_calls import call
+from kurumaisu.ros.testing import unexplained
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
+from kurumaisu.ros.viewer.calls import call
 
 STEP = 0.01  # [s]
 
@@ -81,6 +82,9 @@ class ViewerTest(unittest.TestCase):
         id = self.body(name)
         return self.page.state(lambda state: condition(state["poses"][id]), f"{name} there")["poses"][id]
 
+    def test_help_names_all_that_the_node_has(self):
+        assert unexplained("/viewer_node", "viewer") == set()
+
     def test_hello_world_state_and_scan(self):
         hello = self.page.newest["hello"]
         assert (hello["version"], hello["mode"], hello["control"]) == (1, "sim", True)
@@ -112,7 +116,7 @@ class ViewerTest(unittest.TestCase):
         after = self.page.state(lambda state: state["t"] > before, "a step")["t"]
         assert after - before == pytest.approx(STEP, abs=1e-6)
         self.do("pause", on=False)
-        assert "nothing is paused" in self.refused("step")
+        assert "only while paused" in self.refused("step")
 
     def test_speed(self):
         self.do("speed", value=0.3)
@@ -254,7 +258,7 @@ class ViewerTest(unittest.TestCase):
         assert len(lines) == 3
         for line in lines[:-1]:
             assert int(line.split(" frames")[0].split()[-1]) > 0
-        assert lines[-1] == "cut off so far, as they took nothing: 0"
+        assert lines[-1] == "disconnected so far because they did not read: 0"
         other.close()
         wait_for(lambda: len(call("viewer_node/clients", Trigger).message.splitlines()) == 2, "it to be gone")
 
@@ -271,12 +275,12 @@ class ViewerTest(unittest.TestCase):
         assert watching.newest["hello"]["mode"] == "robot"
         assert watching.newest["hello"]["abilities"] == []
         for name, arguments in (("drive", {"v": 0.1, "w": 0.0}), ("estop", {"on": True}), ("record", {"on": True})):
-            assert "only shows" in watching.ask(name, **arguments)["message"]
+            assert "is read-only" in watching.ask(name, **arguments)["message"]
         t = watching.state(lambda state: state["t"] > 0, "the time of the simulation")["t"]
         assert t < 1e6  # not this computer's
         watching.say(type="token", token="x")
         watching.wait(lambda: None in watching.replies, "an answer")
-        assert "only shows" in watching.replies[None]["message"]
+        assert "is read-only" in watching.replies[None]["message"]
         watching.close()
 
 

@@ -11,7 +11,7 @@ import rosnode
 import rospy
 from nav_msgs.msg import Odometry
 
-from kurumaisu.ros.testing import PATIENCE, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
 
 END = np.array([1.0, 1.5])
 
@@ -41,7 +41,7 @@ class WaypointNode(unittest.TestCase):
                 node = [
                     sys.executable,
                     "-c",
-                    "import sys; from kurumaisu.ros.waypoint_node import main; sys.exit(main())",
+                    "import sys; from kurumaisu.ros.tools.waypoint_node import main; sys.exit(main())",
                 ]
                 done = subprocess.run(
                     [*node, "__name:=bad_driver"], capture_output=True, text=True, timeout=PATIENCE, check=False

@@ -22,12 +22,44 @@
 #include "base/settings.h"
 #include "base/stop_request.h"
 #include "base/topic_dac.h"
+#include "command_line.h"
 #include "guard/crash.h"
 #include "guard/realtime.h"
 
 namespace k = kurumaisu;
 
 namespace {
+
+constexpr const char* kHelp = R"(usage: base_node
+
+The base controller: follows the commands of one input at a time, within limits;
+puts out voltages and computes odometry from them.
+base.launch starts it: roslaunch kurumaisu base.launch
+
+subscribes to:
+  joy_vel, key_vel, viewer_vel, experiment_vel, cmd_vel
+                    commands, those of the highest priority first
+  hold, passenger_holds
+                    locks: while one is engaged, lower inputs do not drive
+  e_stop            the emergency stop
+  speed_cap         [m/s] at most
+  imu               if odometry/imu/use is true
+publishes:
+  voltages          what is put out
+  cmd_vel_out       the command that is left of what was asked for
+  odom, /tf
+  active_input      who drives
+  /diagnostics
+services:
+  ~e_stop, ~reset   stop, and release the stop
+  ~reset_odometry, ~set_odometry
+parameters:
+  launch/base_node.yaml: also inputs, locks and their topics
+  model: launch/md100.yaml. guard: launch/guard.yaml
+  limits, while it runs: dynamic_reconfigure at ~limits/NAME
+
+More: docs/base.md
+)";
 
 constexpr double kGlance = 0.02;     // [s] longest wait for anything
 constexpr int kLastSamples = 5;      // of neutral at the end, with
@@ -130,7 +162,7 @@ void BaseNode::run() {
   finish();
   if (isForgotten()) {
     throw std::runtime_error(
-        "BASE_MASTER_FORGOT: another ROS master has taken the place of the one that knew this node");
+        "BASE_MASTER_FORGOT: a new ROS master is running, which does not know this node");
   }
 }
 
@@ -177,7 +209,7 @@ void BaseNode::onTick() {
   drive_.cutOff(master_.lost() || master_.forgotten());
   const k::Drive::Tick tick = drive_.tick(t);
   if (tick == k::Drive::Tick::kReset) {
-    warn("BASE_TIME_RESET: time ran backwards: neutral, odometry starts afresh");
+    warn("BASE_TIME_RESET: time ran backwards: neutral, odometry restarts");
   }
   odom_input_.check();
   if (tick != k::Drive::Tick::kRepeated) publish();
@@ -222,6 +254,7 @@ void BaseNode::tell() {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (const auto code = k::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "base_node", ros::init_options::NoSigintHandler);
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
   k::catchStopRequests();

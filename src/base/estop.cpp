@@ -22,8 +22,8 @@ void EStop::tick(double t) {
 
 std::string EStop::reset(bool moving) {
   if (cause_) return "the emergency stop is still pressed";
-  if (silent_ || waiting()) return "nobody says that the emergency stop is not pressed";
-  if (moving) return "somebody commands motion: let go first";
+  if (silent_ || waiting()) return "no message says that the emergency stop is not pressed";
+  if (moving) return "motion is commanded: release the input first";
   latched_ = false;
   return "";
 }

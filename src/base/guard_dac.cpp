@@ -12,10 +12,10 @@ double heldRate(const AxisLaw& law, double held, double asked, double rate) {
 
 std::string summaryOf(const guard::Status& status) {
   if (!status.connected && status.reason == guard::Reason::kBusy) return "neutral: " + nameOf(status.reason);
-  if (!status.connected) return "no guard: nobody knows what the converter holds";
-  if (!status.has_device) return "the D/A converter is lost: nobody knows what it holds";
+  if (!status.connected) return "no guard: the output of the converter is unknown";
+  if (!status.has_device) return "the D/A converter is lost: its output is unknown";
   if (status.state == guard::State::kTripped)
-    return "tripped: " + nameOf(status.reason) + ": let go, to arm anew";
+    return "tripped: " + nameOf(status.reason) + ": release the input to arm again";
   return nameOf(status.state);
 }
 

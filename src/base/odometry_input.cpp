@@ -68,7 +68,7 @@ void OdometryInput::check() {
   const Gyro* gyro = drive_.reckoning().gyro();
   if (!gyro || gyro->counts().fallbacks == fallbacks_) return;
   fallbacks_ = gyro->counts().fallbacks;
-  ROS_WARN_THROTTLE(kGyroWarningPeriod, "BASE_GYRO_LOST: imu: nothing for %g s: odometry is open loop",
+  ROS_WARN_THROTTLE(kGyroWarningPeriod, "BASE_GYRO_LOST: imu: no sample for %g s: odometry is open loop",
                     gyro->settings().timeout);
 }
 
@@ -83,7 +83,7 @@ bool OdometryInput::onSet(SetOdometry::Request& request, SetOdometry::Response& 
   const Eigen::Matrix3d covariance = planar(request.pose.covariance);
   response.success = isPose(pose) && isCovariance(covariance);
   if (!response.success) {
-    response.message = isPose(pose) ? "the covariance of x, y, yaw is none"
+    response.message = isPose(pose) ? "the covariance of x, y, yaw is invalid"
                                     : "the pose must be finite, its quaternion of length 1 and about z";
     return true;
   }

@@ -12,7 +12,7 @@ void addGyro(const Gyro& gyro, const GyroCounts& before, Report& report) {
   const bool refused = now.refused > before.refused;
   if (lost || refused) {
     report.warning = true;
-    report.summary = lost ? "the gyro fell silent" : "samples of the gyro refused";
+    report.summary = lost ? "the gyro stopped sending" : "samples of the gyro refused";
   } else {
     const char* why =
         gyro.bias() ? "open loop: the gyro is silent" : "open loop: the gyro's bias is not known yet";
@@ -31,7 +31,7 @@ void addGyro(const Gyro& gyro, const GyroCounts& before, Report& report) {
 std::string unfollowedWarning(const std::vector<std::string>& unfollowed) {
   if (unfollowed.empty()) return "";
   return "BASE_EFFECTS_NOT_FOLLOWED: the model has " + joined(unfollowed) +
-         ", odometry has not: its covariance keeps the assumed growth";
+         ", odometry does not: its covariance keeps the assumed growth";
 }
 
 Report reportOdometry(const Reckoning& reckoning, const std::vector<std::string>& unfollowed, bool measured,

@@ -72,7 +72,7 @@ Report reportCommands(const Drive& drive, const Tally& before) {
   warn(now.arbiter.refused > before.arbiter.refused, "command refused");
   warn(now.drive.clamped > before.drive.clamped, "command beyond a limit");
   warn(now.drive.ignored > before.drive.ignored, "command with components that are not obeyed");
-  warn(now.arbiter.timeouts > before.arbiter.timeouts, "command ran out");
+  warn(now.arbiter.timeouts > before.arbiter.timeouts, "command timed out");
   warn(now.cap.refused > before.cap.refused, "speed cap refused");
   warn(now.cut > before.cut, "voltage cut by its band");
   warn(now.drive.late_ticks > before.drive.late_ticks, "late");
@@ -101,7 +101,7 @@ Report reportCommands(const Drive& drive, const Tally& before) {
 
 std::string stateOf(const Drive& drive) {
   if (drive.eStop().latched()) return "emergency stop";
-  if (drive.eStop().stopped()) return "waiting for the emergency stop's first word";
+  if (drive.eStop().stopped()) return "waiting for the emergency stop's first message";
   if (drive.isCutOff()) return "cut off: the ROS master is gone";
   const Choice& choice = drive.arbiter().last();
   switch (choice.reason) {
@@ -127,7 +127,7 @@ std::string activeInput(const Drive& drive) {
 std::string warningOf(const Drive& drive, const Tally& before, const std::string& state) {
   const Arbiter& arbiter = drive.arbiter();
   if (arbiter.counts().timeouts > before.arbiter.timeouts)
-    return "BASE_COMMAND_TIMEOUT: nothing more: brakes";
+    return "BASE_COMMAND_TIMEOUT: no more commands: brakes";
   if (stateOf(drive) == state) return "";
   if (drive.eStop().stopped()) return "BASE_EMERGENCY_STOP: neutral at once, until ~reset is called";
   if (drive.isCutOff()) return "BASE_MASTER_LOST: the ROS master does not answer: brakes";
@@ -140,7 +140,7 @@ std::string warningOf(const Drive& drive, const Tally& before, const std::string
       return "BASE_SEVERAL_PUBLISHERS: " + nameOf(drive) + ": " + joined(arbiter.publishers(*choice.input)) +
              ": brakes until only one is left";
     case Reason::kUnreleased:
-      return "BASE_NOT_RELEASED: " + nameOf(drive) + " must say zero, or let go, before it is obeyed";
+      return "BASE_NOT_RELEASED: " + nameOf(drive) + " must send zero, or be released, before it is obeyed";
     default:
       return "";
   }

@@ -89,7 +89,7 @@ void Dialogue::discard() {
   int lines = 0;
   while (const std::optional<std::string> line = next(0)) {
     settled(*line);
-    if (++lines > kLinesMost) throw Fault("DAC_WRONG_REPLY: it does not stop talking");
+    if (++lines > kLinesMost) throw Fault("DAC_WRONG_REPLY: the reply does not end");
   }
   input_.clear();
   const double now = steadyTime();
@@ -146,7 +146,7 @@ std::string Dialogue::ask(const std::string& command, const std::string& expect)
     }
     owe(expect, sent);
   }
-  const std::string what = "to " + readable(command) + ", where " + readable(expect) + " must come";
+  const std::string what = "to " + readable(command) + ", expected: " + readable(expect);
   if (wrong.empty()) throw Fault("DAC_NO_REPLY: no reply " + what);
   throw Fault("DAC_WRONG_REPLY: " + wrong + " is the reply " + what);
 }

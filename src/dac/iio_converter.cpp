@@ -67,9 +67,10 @@ double IioConverter::number(Signal signal, const std::string& suffix, std::optio
   if (!text) text = attributes_->readIfThere("out_voltage" + suffix);
   if (!text && otherwise) return *otherwise;
   const std::string name = attributes_->folder() + "/" + attribute(signal, suffix);
-  if (!text) throw Fault("DAC_NO_PORT: " + name + " is not there: " + kSignalNames[signal] + " is no output");
+  if (!text)
+    throw Fault("DAC_NO_PORT: " + name + " is missing: " + kSignalNames[signal] + " is not an output");
   if (const std::optional<double> value = numberOf(*text)) return *value;
-  throw Fault("DAC_REFUSED: " + name + " is no number: " + *text);
+  throw Fault("DAC_REFUSED: " + name + " is not a number: " + *text);
 }
 
 void IioConverter::open() {
@@ -95,7 +96,7 @@ void IioConverter::reopen() {
     attributes_.reset();
     throw;
   } catch (const std::invalid_argument& error) {
-    throw Fault(std::string("DAC_REFUSED: not the range that it had: ") + error.what());
+    throw Fault(std::string("DAC_REFUSED: the range has changed: ") + error.what());
   }
 }
 
@@ -111,7 +112,7 @@ void IioConverter::write(Signal signal, int code) const {
 
 Volts IioConverter::put(const Volts& volts) {
   const Levels levels = levelsOf(volts, channels_, codings_);
-  if (!attributes_) throw Fault("DAC_CLOSED: " + settings_.device + " must be opened anew");
+  if (!attributes_) throw Fault("DAC_CLOSED: " + settings_.device + " must be opened again");
   std::optional<Fault> fault;
   for (const Signal signal :
        kWriteOrder) {  // all of them: the one that fails may not be the one that stops the chair

@@ -123,7 +123,7 @@ bool SerialConverter::putAtOnce(const Frames& frames) {
 
 Volts SerialConverter::put(const Volts& volts) {
   const Levels levels = levelsOf(volts, channels_, settings_.codings);
-  if (!dialogue_) throw Fault("DAC_CLOSED: " + settings_.port + " must be opened anew");
+  if (!dialogue_) throw Fault("DAC_CLOSED: " + settings_.port + " must be opened again");
   const Frames frames = framesOf(levels);
   try {
     if (!settings_.burst || !putAtOnce(frames)) converse(frames.begin(), frames.end());

@@ -4,6 +4,7 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <csignal>
@@ -13,18 +14,24 @@
 #include <string>
 #include <vector>
 
+#include "command_line.h"
 #include "dac/open.h"
 
 namespace {
 
 namespace dac = kurumaisu::dac;
 
-constexpr const char* kUsage =
-    "set_voltages DEVICE.yaml V_F V_S V_REF\n\n"
-    "Puts out three voltages [V], V_F and V_S as they are counted from the reference, tells what the device "
-    "holds, waits\n"
-    "for a line, the end of its input or Ctrl-C, and puts out neutral. For a bench: nothing watches over it. "
-    "No chair!\n";
+constexpr const char* kHelp = R"(usage: set_voltages DEVICE.yaml V_F V_S V_REF
+
+Puts out three voltages until Enter or Ctrl-C, then neutral: to try a D/A
+converter with a voltmeter. It has no guard: never connect a chair!
+
+  DEVICE.yaml    the D/A converter: launch/dac holds examples
+  V_F V_S V_REF  [V]; V_F and V_S count from the reference V_REF
+
+Prints what the device holds. Exit code: 1 a failure, 2 wrong usage.
+More: docs/dac.md
+)";
 
 double numberOf(const std::string& text) {
   double value = 0;
@@ -48,10 +55,9 @@ int holdSignals() {
   return signalfd(-1, &ends, SFD_CLOEXEC);
 }
 
-void run(const std::vector<std::string>& arguments) {
-  const dac::Volts volts{numberOf(arguments[1]), numberOf(arguments[2]), numberOf(arguments[3])};
+void run(const std::string& device, const dac::Volts& volts) {
   std::array<pollfd, 2> ends{{{holdSignals(), POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}}};
-  const auto converter = dac::open(dac::readDevice(arguments[0]));
+  const auto converter = dac::open(dac::readDevice(device));
   std::fprintf(stderr, "%s\n", converter->name().c_str());
   put(*converter, {0, 0, volts.reference});
   put(*converter, volts);
@@ -62,13 +68,21 @@ void run(const std::vector<std::string>& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::vector<std::string> arguments(argv + 1, argv + argc);
-  if (arguments.size() != 4) {
-    std::fputs(kUsage, stderr);
-    return 2;
+  const std::vector<std::string> arguments = kurumaisu::wordsOf(argc, argv);
+  if (std::any_of(arguments.begin(), arguments.end(), kurumaisu::isHelp)) {
+    std::fputs(kHelp, stdout);
+    return 0;
+  }
+  if (arguments.size() != 4)
+    return kurumaisu::misused("set_voltages: a file and three voltages are needed", kHelp);
+  dac::Volts volts{};
+  try {
+    volts = {numberOf(arguments[1]), numberOf(arguments[2]), numberOf(arguments[3])};
+  } catch (const std::invalid_argument& error) {
+    return kurumaisu::misused(std::string("set_voltages: ") + error.what(), kHelp);
   }
   try {
-    run(arguments);
+    run(arguments[0], volts);
     return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "set_voltages: %s\n", error.what());

@@ -68,7 +68,7 @@ void readStart(Section& top, SerialSettings& serial) {
 void checkWrite(const Section& section, const SerialSettings& serial) {
   const Template& send = serial.write.send;
   if (!serial.one_frame) {
-    if (!send.tells(Template::kThis)) throw section.error("send", "says neither {code} nor {volt}");
+    if (!send.tells(Template::kThis)) throw section.error("send", "has neither {code} nor {volt}");
     if (!send.names()) throw section.error("send", "does not say which channel: {ch}");
   }
   for (const Signal signal : kWriteOrder) {
@@ -127,8 +127,8 @@ SerialSettings readSerial(Section& top, Channels& channels) {
   channels = readChannels(top.section("channels"), [&serial, bits](Section& channel, Signal signal) {
     serial.ch[signal] = channel.text("ch");
     if (serial.ch[signal].find_first_of("*?[") != std::string::npos) {
-      throw channel.error(
-          "ch", "must not have *, ? or [ in it, which mean something in expect: " + serial.ch[signal]);
+      throw channel.error("ch",
+                          "must not contain *, ? or [, which are patterns in expect: " + serial.ch[signal]);
     }
     serial.codings[signal] = readCoding(channel.section("code"), bits);
   });

@@ -28,7 +28,7 @@ constexpr double kMillivoltsOfVolt = 1000;  // [1/V]
 const IioSettings& iioOf(const Device& device) {
   const auto* iio = std::get_if<IioSettings>(&device.back_end);
   if (iio == nullptr)
-    throw std::invalid_argument(device.file + ": kind must be iio: a virtual chip is nothing else");
+    throw std::invalid_argument(device.file + ": kind must be iio: a virtual chip has no other kind");
   if (iio->device.front() != '/') return *iio;
   throw std::invalid_argument(device.file +
                               ": device: a virtual chip must be called by its name: " + iio->device);
@@ -57,7 +57,7 @@ VirtualChip::VirtualChip(const Device& device, const std::string& root, const st
       folder_(root_ / "iio:device0"),
       outputs_(device.channels, codingsOf(settings_), log) {
   if (!fs::create_directory(root_))
-    throw std::invalid_argument(root + ": is there already");  // it goes in the end
+    throw std::invalid_argument(root + ": exists already");  // it goes in the end
   plug();
   thread_ = std::thread(&VirtualChip::run, this);
 }

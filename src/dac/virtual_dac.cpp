@@ -11,9 +11,11 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "command_line.h"
 #include "dac/virtual_board.h"
 #include "dac/virtual_chip.h"
 
@@ -23,43 +25,54 @@ using kurumaisu::dac::Device;
 using kurumaisu::dac::VirtualBoard;
 using kurumaisu::dac::VirtualChip;
 
-constexpr const char* kUsage =
-    "virtual_dac DEVICE.yaml PLACE [--log FILE] [--realtime] [FAULT]...\n\n"
-    "A D/A converter that is none, as the file describes it, until Ctrl-C or the end of its standard input, "
-    "unless "
-    "that is\n"
-    "/dev/null. kind serial: a board at a terminal to which PLACE leads (the file's `port` is not read); "
-    "kind iio: a "
-    "chip in a\n"
-    "tree of files, which is made at PLACE (give it as the file's `root`) and can only be unplugged. It "
-    "reads faults "
-    "from its\n"
-    "input, one per line, and `volts`.\n\n"
-    "  --log FILE   every change of voltage: TIME volts V_f V_s V_ref, TIME in ns of CLOCK_MONOTONIC\n"
-    "  --realtime   before all others, where the system allows it\n"
-    "  FAULT        NAME[/SIGNAL][@COMMAND][xCOUNT][=SECONDS]; without COMMAND it begins at once\n\n";
+constexpr const char* kHelp = R"(usage: virtual_dac DEVICE.yaml PLACE [--log FILE] [--realtime] [FAULT]...
+
+Simulates a D/A converter until Ctrl-C or the end of its standard input, unless
+that is /dev/null.
+
+  DEVICE.yaml  the D/A converter: launch/dac holds examples
+  PLACE        kind serial: link to make to a terminal, in the place of `port`
+               kind iio: folder to make, the file's `root`; its one fault is
+               to be unplugged
+  --log FILE   every change: TIME volts V_f V_s V_ref; TIME [ns] is
+               CLOCK_MONOTONIC
+  --realtime   with real-time priority, where the system allows it
+  FAULT        NAME[/SIGNAL][@COMMAND][xCOUNT][=SECONDS]; without COMMAND: at
+               once
+
+On its standard input it takes a FAULT on each line, and `volts`: print them.
+Exit code: 1 a failure, 2 wrong usage. More: docs/dac.md
+
+)";
 
 struct Options {
   std::vector<std::string> places;  // device, place
   std::vector<std::string> faults;
   std::string log;
   bool realtime = false;
+  bool help = false;
 };
 
+/// Throws std::invalid_argument for a wrong command line.
 Options optionsOf(const std::vector<std::string>& arguments) {
   Options options;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
-    if (arguments[i].find(":=") != std::string::npos) continue;  // roslaunch names every node
-    if (arguments[i] == "--realtime") {
+    if (kurumaisu::isHelp(arguments[i])) {
+      options.help = true;
+    } else if (arguments[i] == "--realtime") {
       options.realtime = true;
     } else if (arguments[i] == "--log" && i + 1 < arguments.size()) {
       options.log = arguments[++i];
+    } else if (arguments[i].rfind("--", 0) == 0) {
+      throw std::invalid_argument("unknown option, or one without its value: " + arguments[i]);
     } else if (options.places.size() < 2) {
       options.places.push_back(arguments[i]);
     } else {
       options.faults.push_back(arguments[i]);
     }
   }
+  if (!options.help && options.places.size() != 2)
+    throw std::invalid_argument("a file and a place are needed");
   return options;
 }
 
@@ -154,10 +167,16 @@ int run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const Options options = optionsOf({argv + 1, argv + argc});
-  if (options.places.size() != 2) {
-    std::fputs((kUsage + kurumaisu::dac::boardFaults()).c_str(), stderr);
-    return 2;
+  const std::string help = kHelp + kurumaisu::dac::boardFaults();
+  Options options;
+  try {
+    options = optionsOf(kurumaisu::wordsOf(argc, argv));
+  } catch (const std::invalid_argument& error) {
+    return kurumaisu::misused(std::string("virtual_dac: ") + error.what(), help);
+  }
+  if (options.help) {
+    std::fputs(help.c_str(), stdout);
+    return 0;
   }
   try {
     return run(options);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "command_line.h"
 #include "dac/open.h"
 #include "guard/log.h"
 #include "guard/realtime.h"
@@ -17,12 +18,18 @@ namespace {
 
 namespace k = kurumaisu;
 
-constexpr const char* kUsage =
-    "guard [--neutral] DEVICE.yaml GUARD.yaml\n"
-    "Keeps the D/A converter of DEVICE.yaml neutral unless a client, over the socket of GUARD.yaml, may "
-    "drive.\n"
-    "--neutral: only writes neutral and ends; for systemd's ExecStopPost.\n"
-    "Exit status: 0 ended by a signal, neutral; 1 a failure; 2 wrong usage.\n";
+constexpr const char* kHelp = R"(usage: guard [--neutral] DEVICE.yaml GUARD.yaml
+
+Keeps the D/A converter neutral unless its client, base_node, may drive. It
+needs no ROS.
+
+  DEVICE.yaml  the D/A converter: launch/dac holds examples
+  GUARD.yaml   socket, time-outs: launch/guard.yaml
+  --neutral    only put out neutral and end; for ExecStopPost of systemd
+
+Exit code: 0 ended by a signal, neutral; 1 a failure; 2 wrong usage.
+More: docs/guard.md
+)";
 
 int run(const std::string& device_file, const std::string& guard_file, bool only_neutral) {
   const k::dac::Device device = k::dac::readDevice(device_file);
@@ -36,19 +43,17 @@ int run(const std::string& device_file, const std::string& guard_file, bool only
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::vector<std::string> words(argv + 1, argv + argc);
-  const auto given = [](const std::string& word) { return word.find(":=") != std::string::npos; };
-  words.erase(std::remove_if(words.begin(), words.end(), given), words.end());  // roslaunch names every node
-  if (words.size() == 1 && (words[0] == "--help" || words[0] == "-h")) {
-    std::cout << kUsage;
+  std::vector<std::string> words = kurumaisu::wordsOf(argc, argv);
+  if (std::any_of(words.begin(), words.end(), kurumaisu::isHelp)) {
+    std::cout << kHelp;
     return 0;
   }
   const bool only_neutral = !words.empty() && words[0] == "--neutral";
   if (only_neutral) words.erase(words.begin());
-  if (words.size() != 2 || words[0].rfind("--", 0) == 0) {
-    std::cerr << kUsage;
-    return 2;
+  for (const std::string& word : words) {
+    if (word.rfind('-', 0) == 0) return kurumaisu::misused("guard: unknown option: " + word, kHelp);
   }
+  if (words.size() != 2) return kurumaisu::misused("guard: two files are needed", kHelp);
   try {
     return run(words[0], words[1], only_neutral);
   } catch (const std::exception& error) {

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
-from kurumaisu.errors import Error, one_line
+from kurumaisu import program
+from kurumaisu.errors import Error, failed
 from kurumaisu.params import Model, load_model
 
 # A picture, with which nothing computes: height of the seat, radius and width of a drive wheel [m].
@@ -76,20 +78,34 @@ def _text(values: tuple[float, float, float]) -> str:
 
 
 def main() -> None:
-    """Print the URDF of a model file, for roslaunch: urdf MODEL BASE_FRAME [IMU_FRAME 'X Y Z ROLL PITCH YAW']."""
+    """Print the URDF of a model file, for roslaunch; exit with 1 where there is none."""
+    parser = _parser()
+    options = parser.parse_args()
+    if (options.imu_frame is None) != (options.imu_pose is None):
+        parser.error("IMU_FRAME goes with a pose: 'X Y Z ROLL PITCH YAW'")
+    imu = None if options.imu_frame is None else (options.imu_frame, options.imu_pose)
     try:
-        if len(sys.argv) not in (3, 5):
-            raise Error("usage: urdf MODEL BASE_FRAME [IMU_FRAME 'X Y Z ROLL PITCH YAW']")
-        imu = (sys.argv[3], _pose(sys.argv[4])) if len(sys.argv) == 5 else None
-        print(robot_description(load_model(Path(sys.argv[1])), sys.argv[2], imu))
+        print(robot_description(load_model(options.model), options.base_frame, imu))
     except Error as error:
-        print(f"urdf: {one_line(error)}", file=sys.stderr)
-        sys.exit(1)
+        sys.exit(failed("urdf", error))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = program.Parser(
+        prog="urdf",
+        usage="urdf MODEL.yaml BASE_FRAME [IMU_FRAME 'X Y Z ROLL PITCH YAW']",
+        description="Print the URDF of the chair, for the parameter robot_description.",
+    )
+    parser.add_argument("model", type=Path, metavar="MODEL.yaml", help="what the chair is, as launch/md100.yaml")
+    parser.add_argument("base_frame", metavar="BASE_FRAME", help="frame of the chair, as base_link")
+    parser.add_argument("imu_frame", nargs="?", metavar="IMU_FRAME", help="frame of an inertial sensor")
+    parser.add_argument("imu_pose", nargs="?", type=_pose, metavar="POSE", help="where it is on the chair [m, rad]")
+    return parser
 
 
 def _pose(text: str) -> Pose:
     try:
         x, y, z, roll, pitch, yaw = map(float, text.split())
     except ValueError as error:
-        raise Error(f"a pose is 'X Y Z ROLL PITCH YAW' [m, rad], not {text!r}") from error
+        raise argparse.ArgumentTypeError(f"a pose is 'X Y Z ROLL PITCH YAW' [m, rad], not {text!r}") from error
     return Pose((x, y, z), (roll, pitch, yaw))

@@ -36,9 +36,9 @@ void checkPlace(const DriverSettings& settings) {
   require(is_tty != settings.serial_port.empty(), "either serial_port or ip_address must be given: " +
                                                       settings.serial_port + ", " + settings.ip_address);
   require(is_tty || (settings.ip_port > 0 && settings.ip_port <= kLastPort),
-          "ip_port is none: " + std::to_string(settings.ip_port));
+          "ip_port is not a port: " + std::to_string(settings.ip_port));
   require(!is_tty || std::find(kBauds.begin(), kBauds.end(), settings.serial_baud) != kBauds.end(),
-          "serial_baud is no rate of SCIP 2.0: " + std::to_string(settings.serial_baud));
+          "serial_baud is not a rate of SCIP 2.0: " + std::to_string(settings.serial_baud));
 }
 
 DriverSettings checked(DriverSettings settings) {

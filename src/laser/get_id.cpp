@@ -14,6 +14,7 @@
 #include <system_error>
 #include <vector>
 
+#include "command_line.h"
 #include "laser/handshake.h"
 #include "laser/link.h"
 #include "laser/tcp.h"
@@ -28,12 +29,17 @@ constexpr double kPatience = 3.0;       // [s] for a port, all in all: udev wait
 constexpr double kAnswerTimeout = 0.3;  // [s]
 constexpr int kBaud = 115200;           // [baud] on RS-232, where urg_node, too, leaves sensors
 constexpr const char* kHokuyo = "15d1";
-constexpr const char* kUsage =
-    "getID [--quiet] [PORT]...\n"
-    "Prints the serial number of the sensor at each PORT: a tty, or ADDRESS:PORT, the address in numbers.\n"
-    "Without a PORT: of all Hokuyo sensors on USB. --quiet, or -- after the PORT as with urg_node: the "
-    "number only.\n"
-    "Exit status: 0 all answered, 1 one did not, 2 wrong usage.\n";
+constexpr const char* kHelp = R"(usage: getID [--quiet] [PORT]...
+
+Prints the serial number of the laser scanner at each PORT; without a PORT, of
+all Hokuyo sensors on USB. Needs no ROS, for udev.
+
+  PORT         a tty, or ADDRESS:PORT with the address in numbers
+  -q, --quiet  the number only; so does -- after the PORT, as with urg_node
+
+Exit code: 0 all answered, 1 one did not, 2 wrong usage.
+More: docs/laser_node.md
+)";
 
 struct Arguments {
   bool quiet = false;
@@ -47,7 +53,7 @@ Arguments parse(int argc, char** argv) {
     const std::string word = argv[i];
     if (word == "--quiet" || word == "-q" || word == "--") {
       arguments.quiet = true;
-    } else if (word == "--help" || word == "-h") {
+    } else if (kurumaisu::isHelp(word)) {
       arguments.help = true;
     } else if (word.empty() || word[0] == '-') {
       throw std::invalid_argument("unknown option: " + word);
@@ -87,7 +93,7 @@ std::unique_ptr<k::Port> open(const std::string& name, const k::Link::Interrupte
   int port = 0;
   const char* const end = name.data() + name.size();
   const auto [stop, error] = std::from_chars(name.data() + colon + 1, end, port);
-  if (error != std::errc() || stop != end) throw std::invalid_argument("its port is no number");
+  if (error != std::errc() || stop != end) throw std::invalid_argument("its port is not a number");
   return std::make_unique<k::Tcp>(name.substr(0, colon), port, kPatience, interrupted);
 }
 
@@ -100,7 +106,7 @@ std::string serialNumber(const std::string& name) {
                    [](k::Report::Level, const std::string& text) { std::cerr << text << "\n"; });
   const auto version = kurumaisu::scip::keyed(sensor.version);
   const auto found = version.find("SERI");
-  if (found == version.end() || found->second.empty()) throw std::runtime_error("VV holds no SERI");
+  if (found == version.end() || found->second.empty()) throw std::runtime_error("VV has no SERI");
   return found->second;
 }
 
@@ -120,7 +126,7 @@ bool report(const std::string& port, bool quiet) {
 int main(int argc, char** argv) try {
   Arguments arguments = parse(argc, argv);
   if (arguments.help) {
-    std::cout << kUsage;
+    std::cout << kHelp;
     return 0;
   }
   if (arguments.ports.empty()) arguments.ports = hokuyoPorts();
@@ -132,6 +138,5 @@ int main(int argc, char** argv) try {
   for (const std::string& port : arguments.ports) all = report(port, arguments.quiet) && all;
   return all ? 0 : 1;
 } catch (const std::exception& problem) {
-  std::cerr << "getID: " << problem.what() << "\n" << kUsage;
-  return 2;
+  return kurumaisu::misused(std::string("getID: ") + problem.what(), kHelp);
 }

@@ -103,11 +103,11 @@ scip::Message describe(Link& link, const std::string& command, double timeout, c
     reply = std::move(again);
     if (!alike || reply.bad_sums == 0) continue;
     tell(Report::Level::kWarning, "LASER_BAD_SUM: " + command + " always comes with " +
-                                      std::to_string(reply.bad_sums) + " wrong sums: taken as it is");
+                                      std::to_string(reply.bad_sums) + " wrong sums: accepted as it is");
     return reply;
   }
   if (reply.bad_sums == 0) return reply;
-  throw LinkLost("LASER_BAD_SUM: " + command + " comes with a wrong sum each time, never alike");
+  throw LinkLost("LASER_BAD_SUM: " + command + " has a wrong sum each time, and never the same content");
 }
 
 std::optional<Told> timeIn(const std::map<std::string, std::string>& state, double host) {
@@ -127,7 +127,7 @@ scip::Parameters askParameters(Link& link, double timeout, const Tell& tell) {
   try {
     return scip::parameters(reply);
   } catch (const scip::BadFrame& problem) {
-    throw Refused(std::string("LASER_BAD_PP: the sensor says what cannot be: ") + problem.what());
+    throw Refused(std::string("LASER_BAD_PP: the sensor sends impossible values: ") + problem.what());
   }
 }
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "command_line.h"
 #include "laser/diagnosis.h"
 #include "laser/driver.h"
 #include "laser/messages.h"
@@ -26,6 +27,28 @@ namespace k = kurumaisu::laser;
 using diagnostic_msgs::DiagnosticStatus;
 using kurumaisu::LaserConfig;
 using std_srvs::Trigger;
+
+constexpr const char* kHelp = R"(usage: laser_node
+
+The driver of a Hokuyo URG or UTM laser scanner, in the place of urg_node.
+laser.launch starts it:
+roslaunch kurumaisu laser.launch serial_port:=/dev/ttyACM0
+
+publishes:
+  scan                    sensor_msgs/LaserScan
+  laser_status            the state of the sensor, when it changes
+  /diagnostics
+services:
+  update_laser_status     publish laser_status again
+  ~restart                open the port anew
+  ~self_test              likewise, and wait for three good scans
+parameters:
+  launch/laser_node.yaml, which the node reads itself. The sensor is at
+  ip_address and ip_port, or at serial_port
+  angle_min, angle_max, skip and more, while it runs: dynamic_reconfigure
+
+More: docs/laser_node.md
+)";
 
 constexpr double kLongestWait = 0.02;   // [s] for a callback, so that a stop is soon noticed
 constexpr double kWarningPeriod = 1.0;  // [s] between two equal warnings
@@ -155,7 +178,7 @@ void LaserNode::publish(const k::Scan& scan) {
     rhythm_.add(now());
   }
   if (stamp < 0) {  // at the start of simulated time; ROS has no such time
-    ROS_WARN_THROTTLE(kWarningPeriod, "LASER_STAMP: a scan of %g s, before time began, is dropped", stamp);
+    ROS_WARN_THROTTLE(kWarningPeriod, "LASER_STAMP: a scan with a stamp before 0, %g s, is dropped", stamp);
     return;
   }
   message.header.stamp = ros::Time(stamp);
@@ -228,7 +251,7 @@ void LaserNode::updateStatus(Answer& answer) {
 void LaserNode::restart(Answer& answer) {
   driver_.restart();
   answer.success = true;
-  answer.message = "the port is opened anew";
+  answer.message = "the port is opened again";
 }
 
 /// Holds up other callbacks meanwhile.
@@ -249,6 +272,7 @@ k::NodeSettings read(const XmlRpc::XmlRpcValue& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (const auto code = kurumaisu::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "laser_node");
   ros::NodeHandle nh;  // here, because ROS's log is mute once the last one is gone
   try {

@@ -33,9 +33,9 @@ const char* name(State state) {
 
 std::string meaning(const std::string& status) {
   if (status == "10") return "its laser is off";
-  if (status == "98") return "it has resumed after it checked itself";
-  if (status >= "21" && status <= "49") return "it has stopped to check itself";
-  if (status >= "50" && status <= "97") return "its hardware is in trouble";
+  if (status == "98") return "it has resumed after a self-check";
+  if (status >= "21" && status <= "49") return "it has stopped for a self-check";
+  if (status >= "50" && status <= "97") return "its hardware has a fault";
   return "unexpected while it streams";
 }
 

@@ -105,7 +105,7 @@ std::unique_ptr<Urg> Session::startForm(std::shared_ptr<ScipStream>& stream, con
 bool Session::streamUntilQuiet(Urg& urg, ScipStream& stream) {
   Watch watch{with_.now(), steadyTime()};
   while (!with_.control.changed()) {
-    if (with_.control.takeRestart()) throw LinkLost("LASER_RESTART: told to begin anew");
+    if (with_.control.takeRestart()) throw LinkLost("LASER_RESTART: told to restart");
     const std::optional<Arrival> arrival = stream.await(kSlice);
     updateCounts();
     if (arrival) handle(*arrival, urg, watch);
@@ -120,7 +120,7 @@ void Session::handle(const Arrival& arrival, Urg& urg, Watch& watch) {
   if (arrival.kind == Arrival::Kind::kScan) {
     const std::optional<scip::Rotation> scan = urg.take();
     if (!scan || !(*scan == arrival.rotation))
-      throw LinkLost("LASER_MRPT: MRPT does not read a good scan as it was sent");
+      throw LinkLost("LASER_MRPT: MRPT decodes a good scan differently");
     publish(*scan, arrival.first_byte);
     watch = {with_.now(), steadyTime()};
     return;
@@ -195,7 +195,7 @@ void Session::updateCounts() {
   const scip::Assembler::Counts& counts = link_.counts();
   const std::uint64_t unreadable = counts.unreadable + counts.cut;
   if (unreadable > unreadable_)
-    tell_(Report::Level::kWarning, "LASER_UNREADABLE: what came is no reply, or was cut short");
+    tell_(Report::Level::kWarning, "LASER_UNREADABLE: the bytes are not a reply, or were cut short");
   unreadable_ = unreadable;
   with_.monitor.update([&](Status& status) {
     status.counts.bad_sums = before_.bad_sums + counts.bad_sums;

@@ -68,12 +68,12 @@ void readPlace(Section& node, bool port_given, DriverSettings& driver) {
   driver.serial_port = node.textOrNone("serial_port");
   driver.serial_baud = node.integer("serial_baud", 1);
   if (driver.ip_address.empty() && driver.serial_port.empty()) {
-    throw node.error("serial_port", "is empty, and so is ip_address: one of them says where the sensor is");
+    throw node.error("serial_port", "is empty, and so is ip_address: give one of them");
   }
   if (driver.ip_address.empty()) return;
   if (port_given) {
     throw node.error("serial_port", "contradicts ip_address: " + driver.serial_port + ", " +
-                                        driver.ip_address + ": the sensor is at one of them");
+                                        driver.ip_address + ": give only one of them");
   }
   driver.serial_port.clear();
 }
@@ -125,7 +125,7 @@ std::string readFrame(Section& node, std::vector<std::string>& warnings) {
   try {
     std::string result = frame(given);
     if (result != given) {
-      warnings.push_back("LASER_FRAME_SLASH: frame_id: tf2 knows no leading slash: " + given);
+      warnings.push_back("LASER_FRAME_SLASH: frame_id: tf2 allows no leading slash: " + given);
     }
     return result;
   } catch (const std::invalid_argument& problem) {

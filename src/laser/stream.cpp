@@ -92,7 +92,7 @@ void ScipStream::start(const std::string& command) {
   const std::string status = link_.ask(asked, answer_timeout_).status;
   if (request_.form == scip::Form::kIntensity && status[0] == '0' && status != "00") {
     throw NoIntensity("LASER_NO_INTENSITY: " + asked + " is answered by status " + status +
-                      "; scans come without");
+                      "; scans have none");
   }
   if (status != "00") throw Refused("LASER_REFUSED: " + asked + " is answered by status " + status);
   started_ = command;

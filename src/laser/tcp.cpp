@@ -25,7 +25,7 @@ Address addressOf(const std::string& address, int port) {
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
   if (getaddrinfo(address.c_str(), std::to_string(port).c_str(), &hints, &found) != 0) {
-    throw LinkLost("LASER_NO_PORT: ip_address " + address + " is none in numbers");
+    throw LinkLost("LASER_NO_PORT: ip_address " + address + " is not a numeric address");
   }
   return {found, &freeaddrinfo};
 }

@@ -33,7 +33,7 @@ void requireLength(const A& array, py::ssize_t n, const char* name) {
 inline int asInt(std::int64_t value, const char* name) {
   if (value >= std::numeric_limits<int>::min() && value <= std::numeric_limits<int>::max())
     return static_cast<int>(value);
-  throw std::invalid_argument(std::string(name) + ": " + std::to_string(value) + " is no number of anything");
+  throw std::invalid_argument(std::string(name) + ": " + std::to_string(value) + " is not a valid number");
 }
 
 /// Integers (n,); an array of another kind would be rounded by a cast.

@@ -4,9 +4,9 @@
 namespace kurumaisu {
 namespace {
 
-constexpr const char* kMatcher = "there is another scan matcher: match_*";
-constexpr const char* kNoise = "here the noise is that of the matched motion: distance_per_* and angle_per_*";
-constexpr const char* kLikelihood = "there is another likelihood: hit_*";
+constexpr const char* kMatcher = "another scan matcher is used: match_*";
+constexpr const char* kNoise = "the noise is that of the matched motion: distance_per_* and angle_per_*";
+constexpr const char* kLikelihood = "another likelihood is used: hit_*";
 constexpr const char* kSampling = "poses are not sampled around the best one";
 constexpr const char* kGrows = "the map begins as large as a scan and grows";
 
@@ -30,7 +30,7 @@ const std::vector<GmappingName>& gmappingNames() {
       {"temporalUpdate", "mapper", "localise_time"},
       {"resampleThreshold", "mapper", "resample_below"},
       {"maxRange", nullptr, "the scan's own range_max says how far the laser sees"},
-      {"minimumScore", nullptr, "MAPPING_BLIND says when a scan shows nothing to go by"},
+      {"minimumScore", nullptr, "MAPPING_BLIND tells when a scan shows nothing to match"},
       {"sigma", nullptr, kMatcher},
       {"kernelSize", nullptr, kMatcher},
       {"lstep", nullptr, kMatcher},

@@ -17,6 +17,7 @@
 #include <optional>
 #include <utility>
 
+#include "command_line.h"
 #include "slam/localization_node_settings.h"
 #include "slam/localization_report.h"
 #include "slam/messages.h"
@@ -30,6 +31,33 @@ namespace {
 using PoseMessage = geometry_msgs::PoseWithCovarianceStamped;
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
+constexpr const char* kHelp = R"(usage: localization_node
+
+Say where the chair is in a known map, from scans and odometry; in the place of
+amcl. localization.launch starts it:
+roslaunch kurumaisu localization.launch map:=FILE.yaml
+
+subscribes to:
+  scan
+  /tf, /tf_static          odom -> base_link, and where the laser is
+  odom                     its covariance
+  map                      or, with use_map_topic false, the service static_map
+  initialpose              where the chair is
+publishes:
+  amcl_pose                where the chair is, with covariance
+  particlecloud
+  /tf                      map -> odom
+  /diagnostics             also how well the scan fits the map
+services:
+  global_localization      the chair may be anywhere in the map
+  request_nomotion_update  use the next scan, though the chair stands
+  set_map                  another map
+parameters:
+  launch/localization_node.yaml. model: launch/md100.yaml
+
+More: docs/localization.md
+)";
+
 constexpr double kPollPeriod = 0.01;      // [s] between looks whether scans have their transforms
 constexpr double kAskPeriod = 1.0;        // [s] between two calls of static_map
 constexpr std::size_t kQueue = 100;       // odometry that may wait
@@ -39,7 +67,7 @@ constexpr double kAhead = 10.0;  // [s] an initial pose stamped farther in the f
 
 // Apart, because the macro counts as a handful of branches.
 void warnFrame(const std::string& frame, const std::string& taken_for) {
-  ROS_WARN("LOCALIZATION_MAP_FRAME: the map is in %s, and taken for one in %s", frame.c_str(),
+  ROS_WARN("LOCALIZATION_MAP_FRAME: the map is in %s, and used as if it were in %s", frame.c_str(),
            taken_for.c_str());
 }
 
@@ -292,6 +320,7 @@ void LocalizationNode::diagnose(Status& status) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (const auto code = k::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "localization_node");
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
   try {

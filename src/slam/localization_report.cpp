@@ -10,7 +10,7 @@ namespace kurumaisu {
 namespace {
 
 std::string lost(const Localizer::Estimate& estimate) {
-  return "LOCALIZATION_LOST: the scan does not fit the map where the chair was believed to be; searched: " +
+  return "LOCALIZATION_LOST: the scan does not fit the map at the estimated pose; searched: " +
          percent(estimate.searched);
 }
 
@@ -18,7 +18,7 @@ std::string ambiguous(const Localizer::Estimate& estimate) {
   const auto& covariance = estimate.map_from_base.covariance;
   std::ostringstream out;
   out.precision(2);
-  out << "LOCALIZATION_AMBIGUOUS: several places, or a wide one, are possible: deviation "
+  out << "LOCALIZATION_AMBIGUOUS: several places, or a wide area, are possible: deviation "
       << std::sqrt(covariance(0, 0) + covariance(1, 1)) << " m; drive on";
   return out.str();
 }
@@ -38,9 +38,9 @@ const char* nameOf(Knowledge knowledge) {
 
 LocalizationVerdict judge(const LocalizationState& state) {
   if (!state.bad_map.empty()) return {2, "LOCALIZATION_BAD_MAP: " + state.bad_map};
-  if (!state.has_map) return {2, "LOCALIZATION_NO_MAP: none has come"};
+  if (!state.has_map) return {2, "LOCALIZATION_NO_MAP: no map has come"};
   if (!state.missing.empty()) return {2, "LOCALIZATION_NO_TRANSFORM: scans come, but " + state.missing};
-  if (state.silence > state.silence_limit) return {2, "LOCALIZATION_NO_SCAN: none came lately"};
+  if (state.silence > state.silence_limit) return {2, "LOCALIZATION_NO_SCAN: no scan came lately"};
   if (state.estimate == nullptr) return {1, "no scan yet"};
   if (state.estimate->knowledge == Knowledge::kLost) return {2, lost(*state.estimate)};
   if (state.estimate->knowledge == Knowledge::kAmbiguous) return {1, ambiguous(*state.estimate)};

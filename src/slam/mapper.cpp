@@ -45,13 +45,13 @@ class Mapper::Impl {
       : settings_(settings), matcher_(settings.match), slip_(settings.slip_gain), seed_(seed) {}
 
   void resume(SavedMap map, const Gaussian& map_from_base) {
-    if (!steps_.empty()) throw std::invalid_argument("a map is gone on from before the first scan");
+    if (!steps_.empty()) throw std::invalid_argument("a map can be continued only before the first scan");
     const auto& covariance = map_from_base.covariance;
     const bool sound = covariance(0, 0) > 0 && covariance(1, 1) > 0 && covariance(2, 2) > 0 &&
                        std::sqrt(std::fmax(covariance(0, 0), covariance(1, 1))) <= kMostDistance &&
                        std::sqrt(covariance(2, 2)) <= kMostAngle;
     if (!sound) throw std::invalid_argument("the start must be known to within 1 m and 0.5 rad");
-    if (map.grid.cells.empty()) throw std::invalid_argument("the map to go on from is empty");
+    if (map.grid.cells.empty()) throw std::invalid_argument("the map to continue is empty");
     settings_.resolution = map.grid.resolution;
     Extent extent;
     extent.add(map.grid);
@@ -180,7 +180,7 @@ class Mapper::Impl {
   Gaussian placed(const Scan& scan) const {
     const Start found = findStart(resumed_->grid, scan, *start_, settings_);
     if (found.fit >= kLeastFit) return found.map_from_base;
-    throw StartError("the map to go on from explains " + percent(found.fit) +
+    throw StartError("the map to continue explains " + percent(found.fit) +
                      " of the scan's readings at best near the pose given, less than " + percent(kLeastFit));
   }
 

@@ -13,6 +13,7 @@
 #include <optional>
 #include <utility>
 
+#include "command_line.h"
 #include "slam/mapper.h"
 #include "slam/mapping_node_parameters.h"
 #include "slam/mapping_output.h"
@@ -27,6 +28,34 @@ namespace k = kurumaisu;
 namespace {
 
 using Status = diagnostic_updater::DiagnosticStatusWrapper;
+
+constexpr const char* kHelp = R"(usage: mapping_node
+
+Make a map from scans and odometry, and say where the chair is in it; in the
+place of slam_gmapping. slam.launch starts it: roslaunch kurumaisu slam.launch
+
+subscribes to:
+  scan
+  /tf, /tf_static              odom -> base_link, and where the laser is
+publishes:
+  map, map_metadata
+  trajectory, particlecloud
+  ~pose                        with covariance
+  ~trajectory_with_covariance
+  ~entropy                     of the particles
+  /tf                          map -> odom
+  /diagnostics
+services:
+  dynamic_map                  the map
+  ~save_map                    write it: .pgm, .yaml, .simplemap
+  ~pause, ~resume              use no scans for a while
+  ~reset                       begin anew
+parameters:
+  launch/mapping_node.yaml, which the node reads itself; also slam_gmapping's
+  start_map: a .simplemap to go on from, or static_map for the service's map
+
+More: docs/mapping.md
+)";
 
 constexpr double kPollPeriod = 0.02;  // [s] between looks whether transforms have come
 constexpr double kAskPeriod = 1.0;    // [s] between two calls of static_map, and two diagnostics
@@ -131,7 +160,7 @@ void MappingNode::advertise(ros::NodeHandle& nh) {
       }));
   offer("reset", [this](auto& response) {
     begin();
-    response.message = "the map starts afresh";
+    response.message = "the map starts again";
   });
   offer("pause", [this](auto& response) {
     feed_.pause(true);
@@ -176,7 +205,7 @@ void MappingNode::askForMap() try {
   nav_msgs::GetMap call;
   if (!client.exists() || !client.call(call)) return;
   const k::Pose2D corner = k::planarOf(call.response.map.info.origin);
-  if (std::abs(corner.theta) > 1e-6) throw std::invalid_argument("its origin is turned");
+  if (std::abs(corner.theta) > 1e-6) throw std::invalid_argument("its origin is rotated");
   k::OccupancyGrid grid = k::gridOf(call.response.map);
   grid.x = corner.x;
   grid.y = corner.y;
@@ -273,6 +302,7 @@ void MappingNode::diagnose(Status& status) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (const auto code = k::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "mapping_node");
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });  // ros::init() sees to SIGINT only
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone

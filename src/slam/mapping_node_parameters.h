@@ -53,7 +53,7 @@ inline void tellUnsupported(const GmappingName& name) {
   ROS_WARN("MAPPING_UNSUPPORTED: %s: is not used: %s", name.name, name.key);
 }
 inline void tellTaken(const GmappingName& name) {
-  ROS_INFO("mapping: %s: is taken for %s/%s", name.name, name.section, name.key);
+  ROS_INFO("mapping: %s: is used as %s/%s", name.name, name.section, name.key);
 }
 
 /// A value of slam_gmapping as one of ours: there, times below 0 mean never.

@@ -124,7 +124,7 @@ void ScanQueue::push(const sensor_msgs::LaserScan::ConstPtr& scan) {
   waiting_.push_back({scan, ros::SteadyTime::now()});
   if (waiting_.size() <= capacity_) return;
   waiting_.pop_front();
-  drop(dropped_.too_slow, "TOO_SLOW", "scans come faster than they can be worked on");
+  drop(dropped_.too_slow, "TOO_SLOW", "scans come faster than they can be processed");
 }
 
 bool ScanQueue::has(const sensor_msgs::LaserScan& scan, std::string* why) const {

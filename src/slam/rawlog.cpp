@@ -124,7 +124,7 @@ LaserLog read(const std::string& path) {
     try {
       object = archive.ReadObject();
     } catch (const std::exception&) {  // MRPT's text is a call stack
-      throw std::runtime_error("is no rawlog, or is damaged or cut off: the object at byte " +
+      throw std::runtime_error("is not a rawlog, or is damaged or cut off: the object at byte " +
                                std::to_string(where) + " (decompressed) cannot be read");
     }
     reader.take(object);

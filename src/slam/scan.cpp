@@ -72,7 +72,7 @@ void validate(const Scan& scan) {
   }
   const double width = std::abs(fan.angle_increment) * static_cast<double>(scan.ranges.size() - 1);
   if (width > 2 * M_PI + 1e-3) {
-    throw std::invalid_argument("the fan is wider than a full turn: " + std::to_string(width) + " rad");
+    throw std::invalid_argument("the beams span more than a full turn: " + std::to_string(width) + " rad");
   }
   if (!std::isfinite(fan.time_increment)) throw std::invalid_argument("time_increment must be finite");
   if (!(fan.range_max > 0)) throw std::invalid_argument("range_max must be positive");

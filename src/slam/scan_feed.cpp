@@ -74,12 +74,12 @@ std::string ScanFeed::missing(double since) const {
   const auto& [odom, base, deadline] = settings_.frames;
   if (!buffer_.canTransform(odom, base, ros::Time())) return "no odometry: tf has no " + odom + " -> " + base;
   if (!buffer_.canTransform(base, frame_, ros::Time()))
-    return "nobody says where the laser is: tf has no " + base + " -> " + frame_;
-  return "no odometry for their times within transform_deadline, or none of them makes sense";
+    return "the mounting of the laser is unknown: tf has no " + base + " -> " + frame_;
+  return "no odometry for their times within transform_deadline, or all of them are invalid";
 }
 
 void ScanFeed::begin(const char* why) {
-  ROS_WARN("%s_TIME_RESET: %s: it starts afresh", settings_.prefix.c_str(), why);
+  ROS_WARN("%s_TIME_RESET: %s: it restarts", settings_.prefix.c_str(), why);
   buffer_.clear();
   queue_.forgetAfter(ros::Time::now() + ros::Duration(kTimeJump));
   last_scan_ = ros::Time();

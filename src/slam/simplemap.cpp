@@ -73,11 +73,11 @@ std::vector<KeyScan> readSimplemap(const std::string& path) {
   std::vector<KeyScan> keys;
   try {
     mrpt::maps::CSimpleMap map;
-    if (!map.loadFromFile(path)) throw std::runtime_error("is no simplemap");
+    if (!map.loadFromFile(path)) throw std::runtime_error("is not a simplemap");
     keys = keysOf(map);
   } catch (const std::exception& error) {
     const std::string what = error.what();  // of MRPT's, the first line says it
-    throw std::runtime_error(path + ": is no simplemap to go on from: " + what.substr(0, what.find('\n')));
+    throw std::runtime_error(path + ": is not a simplemap to continue: " + what.substr(0, what.find('\n')));
   }
   if (keys.empty()) throw std::runtime_error(path + ": has no laser scan");
   return keys;

@@ -32,7 +32,7 @@ Model checkedModel(Model model) {
   require(model.protocol == 1 || model.protocol == 2,
           "protocol must be 1 or 2: " + std::to_string(model.protocol));
   require(model.baud == 0 || std::find(bauds.begin(), bauds.end(), model.baud) != bauds.end(),
-          "baud is none of bauds: " + std::to_string(model.baud));
+          "baud is not one of bauds: " + std::to_string(model.baud));
   require(model.boot_time >= 0, "boot_time must not be negative: " + std::to_string(model.boot_time));
   require(model.output_delay >= 0,
           "output_delay must not be negative: " + std::to_string(model.output_delay));

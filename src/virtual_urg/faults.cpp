@@ -26,18 +26,17 @@ constexpr Part kMust = Part::kMust;
 
 // `err` stands for err01 to err98.
 constexpr std::array kKinds{
-    Kind{"corrupt", kMay, kNever, "a character of the data is another one, the sum is not"},
-    Kind{"trunc", kMay, kNever, "half of the scan is missing, its end, too"},
+    Kind{"corrupt", kMay, kNever, "a character of the data is changed, the sum is not"},
+    Kind{"trunc", kMay, kNever, "half of the scan is missing, with its end"},
     Kind{"noend", kMay, kNever, "the two LF at the end are missing"},
     Kind{"badlf", kMay, kNever, "another byte than LF follows the status"},
     Kind{"garbage", kMay, kMay, "noise before the scan; value: bytes"},
     Kind{"dup", kMay, kNever, "the scan is sent twice"},
-    Kind{"err", kMay, kMay, "errNN: status NN in place of the scan; value: of so many scans"},
+    Kind{"err", kMay, kMay, "errNN: status NN instead of the scan; value: for so many scans"},
     Kind{"zeros", kMay, kNever, "all distances are 0"},
-    Kind{"codes", kMay, kNever, "the distances are 0 to 19, again and again"},
-    Kind{"dribble", kMay, kMay, "the scan trickles out; value: over so many seconds, else 0.8 of a turn"},
-    Kind{"stall", kMay, kMay,
-         "the stream ends without a word; value: it is deaf and dumb for so many seconds"},
+    Kind{"codes", kMay, kNever, "the distances are 0 to 19, repeatedly"},
+    Kind{"dribble", kMay, kMay, "the scan is sent slowly; value: over so many seconds, else 0.8 of a turn"},
+    Kind{"stall", kMay, kMay, "the stream stops without notice; value: it is silent for so many seconds"},
     Kind{"close", kMay, kNever, "the connection is closed after the scan"},
     Kind{"rst", kMay, kNever, "the connection is reset after the scan"},
     Kind{"hangup", kMay, kMay, "the device is unplugged after the scan; value: for so many seconds"},
@@ -97,15 +96,15 @@ Fault fault(std::string_view text) {
   if (at != std::string_view::npos) {
     require(kind.scan != kNever, text, "takes no @scan");
     result.scan = number<int>(head.substr(at + 1));
-    require(result.scan && *result.scan >= 1, text, "@ wants a whole number from 1");
+    require(result.scan && *result.scan >= 1, text, "@ needs a whole number from 1");
   }
   if (equals != std::string_view::npos) {
     require(kind.value != kNever, text, "takes no value");
     result.value = number<double>(text.substr(equals + 1));
     require(result.value && std::isfinite(*result.value) && *result.value >= 0, text,
-            "= wants a number from 0");
+            "= needs a number from 0");
   }
-  require(kind.value != kMust || result.value, text, "wants a value: name=value");
+  require(kind.value != kMust || result.value, text, "needs a value: name=value");
   return result;
 }
 

@@ -9,19 +9,21 @@ from pathlib import Path
 
 import numpy as np
 
+from kurumaisu.bench.table import MarkdownTable
 from kurumaisu.experiments import Script, names, nominal_path, shipped_script
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; draw the paths into a file if one is given."""
-    parser = argparse.ArgumentParser(prog="bench experiments_doc")
+    parser = argparse.ArgumentParser(prog="scripts/bench experiments_doc", description=__doc__)
     parser.add_argument("--picture", type=Path, help="SVG to write")
     options = parser.parse_args(arguments)
     scripts = [shipped_script(name) for name in names()]
+    table = MarkdownTable("", "name", "what it does", "s", "good for")
     for script in scripts:
         b = script.box
         box = f"box {b.ahead:g} x {b.behind:g} x {b.left:g} x {b.right:g}"
-        print(f"| `{script.name}` | {_what(script)}; {box} | {script.seconds:.0f} | {script.good_for} |")
+        table.row(f"`{script.name}`", f"{_what(script)}; {box}", f"{script.seconds:.0f}", script.good_for)
     if options.picture is not None:
         _draw([script for script in scripts if script.kind == "drive"], options.picture)
     return 0

@@ -13,7 +13,7 @@ import numpy as np
 from kurumaisu.errors import Error
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-_DRIVERS = Path(__file__).parent / "drivers"
+DRIVERS = Path(__file__).parent / "drivers"  # programs that are compiled against a peer
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Stage:
             "pkg-config", "--cflags", "stage", environment={**os.environ, "PKG_CONFIG_PATH": f"{libraries}/pkgconfig"}
         ).split()
         search = [f"-L{libraries}", "-lstage", f"-Wl,-rpath,{libraries}"]
-        source, program = str(_DRIVERS / f"{driver}.cpp"), str(self._program)
+        source, program = str(DRIVERS / f"{driver}.cpp"), str(self._program)
         self._run("g++", "-O2", "-w", "-std=c++17", *flags, source, *search, "-o", program)
 
     def _run(self, *command: str, environment: dict[str, str] | None = None) -> str:

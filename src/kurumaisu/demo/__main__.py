@@ -3,22 +3,22 @@
 
 from __future__ import annotations
 
-import argparse
 import secrets
 import sys
 import time
 from pathlib import Path
 
+from kurumaisu import program
 from kurumaisu.demo import hidden, real, round_trip
 from kurumaisu.errors import Error
 
 
 def main() -> int:
     """Run the demonstration; return 0, or 1 when a part failed."""
-    parser = argparse.ArgumentParser(prog="scripts/demo", description="The whole idea in five minutes.")
+    parser = program.Parser(prog="scripts/demo", description="The whole idea in five minutes.")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/demo"), help="folder to write into")
     parser.add_argument("--gui", action="store_true", help="show the drive and its map in rviz")
-    parser.add_argument("--seed", type=int, help="of the drive and of the hidden effect (default: drawn)")
+    parser.add_argument("--seed", type=int, help="seed of the drive and of the hidden effect (default: random)")
     options = parser.parse_args()
     seed = options.seed if options.seed is not None else secrets.randbelow(10_000)
     folder = options.output.resolve()

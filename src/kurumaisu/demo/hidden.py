@@ -10,13 +10,13 @@ import numpy as np
 import yaml
 
 from kurumaisu import effects
-from kurumaisu.critic import cli
-from kurumaisu.critic.job import Job
-from kurumaisu.critic.recording import Run, Series
-from kurumaisu.critic.write_csv import write_csv_run
+from kurumaisu.critic.app import cli
+from kurumaisu.critic.app.job import Job
+from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
-from kurumaisu.sim.chair import NEUTRAL, ChairSimulator, Command
-from kurumaisu.sim.joystick import joystick
+from kurumaisu.sim.chair.joystick import joystick
+from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator, Command
 from kurumaisu.sim.settings import load_dynamics, with_effects
 from kurumaisu.world import load_world
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kurumaisu.critic import cli
-from kurumaisu.critic.job import Job
+from kurumaisu.critic.app import cli
+from kurumaisu.critic.app.job import Job
 
 SENA = Path("/usr/share/mrpt/datasets/2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog")
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu import geometry, slam_score
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.critic.recording import Run, Series
-from kurumaisu.critic.reference import map_run, scan_log
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.data.reference import map_run, scan_log
+from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.demo.processes import roslaunch
 from kurumaisu.errors import Error
 from kurumaisu.maps import Grid, draw_map, save_map

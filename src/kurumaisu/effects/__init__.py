@@ -42,6 +42,7 @@ from kurumaisu.effects.gain import GainV, GainW
 from kurumaisu.effects.lag import LagV, LagW
 from kurumaisu.effects.laser import LASER, BeamEffect, Beams, Echoes, LaserEffect, LaserStage, ReadingEffect
 from kurumaisu.effects.laser.chain import LaserChain, incidence, slanted
+from kurumaisu.effects.laser.smooth import RANGE_COVARIATES, smooth_range_id, smooth_range_of
 from kurumaisu.effects.lateral_slip import LateralSlip
 from kurumaisu.effects.left_right_gain import LeftRightGain
 from kurumaisu.effects.map_error import MapError
@@ -63,11 +64,11 @@ from kurumaisu.effects.smooth_covariates import (
     RECORDING_TIME,
     Follower,
 )
-from kurumaisu.effects.smooth_laser import RANGE_COVARIATES, smooth_range_id, smooth_range_of
 from kurumaisu.effects.steering_law import SteeringLaw
 from kurumaisu.effects.understeer import Understeer
 from kurumaisu.effects.veer import Veer
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.params import EffectSetting
 
 # What the critic looks for.
@@ -143,7 +144,7 @@ def by_id(name: str) -> type[Mechanism]:
     ranged = smooth_range_of(name)
     if ranged is not None:
         return ranged
-    raise Error(f"effects: {name!r} is not in the catalogue: {', '.join(effect.id for effect in ALL)}")
+    raise Error(f"effects: {name!r} is not in the catalogue; {hint(name, _BY_ID, 'docs/effects.md')}")
 
 
 def fluctuation(sd_v: float, sd_w: float, tau: float) -> EffectSetting:

@@ -12,7 +12,7 @@ _HEAD = """\
 Written by `scripts/run python3 -m kurumaisu.effects > docs/effects.md`; a test compares the two.
 
 An effect is one way in which a real chair, laser or world departs from equations (1)-(4). It is switched on in the
-list `effects` of a model file, or in a file of its own, whose effects act besides the model's:
+list `effects` of a model file, or in a separate file, whose effects are added to those of the model:
 
 ```yaml
 effects:
@@ -20,14 +20,14 @@ effects:
   - {id: laser.latency, parameters: {delay: 0.02}}
 ```
 
-`sim.launch effects:=FILE` takes such a file; [real_laser.yaml](../launch/real_laser.yaml) is one. In a running simulator
-each can be switched on, changed and off again: [sim_node.md](sim_node.md#effects-while-it-runs).
+`sim.launch effects:=FILE` takes such a file; [real_laser.yaml](../launch/real_laser.yaml) is one. In a running
+simulator each can be switched on, changed and off again: [sim_node.md](sim_node.md#effects-while-it-runs).
 
 Every parameter must be given. The order of the list does not matter: effects act by stage, those of a stage in the
 order of the tables. Each effect on the laser draws from a generator of its own, so that the laser's noise is the same
-with it and without. With a size of 0 an effect is absent; a form's other parameters have a middle instead, as `tau`
-900 ± 600 s. Sizes are what we expect, for a fit to start from, and measured only where a source says so; bounds are
-what the reader of the file accepts.
+with it and without. An effect of size 0 does nothing; parameters without such a zero have a middle instead, as `tau`
+900 ± 600 s. Sizes are expected ones, where a fit starts, and measured only where a source says so; bounds are
+those that the file may hold.
 
 Symbols: v, u, w forward, leftward speed [m/s] and yaw rate [rad/s]; V_f, V_s voltages [V]; t time [s] since the reset,
 or since the effect was switched on later; r true range [m], φ bearing, a angle of incidence (0: along the wall's
@@ -37,8 +37,8 @@ simulator's steps.
 _BASE = """
 ## The base
 
-Voltages pass the stages CONVERTER and CONTROLLER; the rates that they stand for pass TRANSPORT, THRESHOLD, GAIN,
-RESPONSE and FLOOR; effects of the stage REFERENCE change what `ground_truth` says and not the motion. The critic looks
+Voltages pass the stages CONVERTER and CONTROLLER; the resulting rates pass TRANSPORT, THRESHOLD, GAIN,
+RESPONSE and FLOOR; effects of the stage REFERENCE change `ground_truth`, not the motion. The critic looks
 for all of them.
 """
 _LASER = """
@@ -46,18 +46,18 @@ _LASER = """
 
 GEOMETRY changes where a beam leaves from, and when; then the ray is cast. BIAS changes the mean and SPREAD the
 standard deviation that equation (4) gives, NOISE the noise; the reading is made of the three. OUTLIER and GRID change
-readings. The laser's own resolution and range gate come last: NaN is no valid reading, +inf no return. A stamp that is
-wrong is wrong in truth: the chair is where it is at the beams' own times.
+readings. The laser's own resolution and range limits come last: NaN is an invalid reading, +inf no return. An effect on
+stamps makes them differ from the true times of the beams; the chair is where it is at the true times.
 """
 _WORLD = """
 ## The world
 
-The walls are moved when the simulator is reset, for the laser and for contacts alike; the world file is the map.
+The walls are moved when the simulator is reset, both for the laser and for contacts; the world file is the map.
 """
 _SMOOTH = """
 ## What is not in the catalogue
 
-Where something acts that is none of these, the critic extends the model by a curve, which the simulator runs as it
+For an error that none of these explains, the critic extends the model by a curve, which the simulator runs as it
 runs all others: `smooth.CHANNEL.COVARIATE` adds a rate that follows another quantity, while the chair moves, after
 everything else of the stage FLOOR; the channels `v_gain` and `w_gain` multiply the rate by 1 + curve, `curvature`
 adds a yaw rate of curve · v, and `speed` a forward speed of curve · sign(v).
@@ -70,9 +70,9 @@ effects:
 
 Between knots, which must increase, the curve is straight; beyond the outer ones it is constant. There may be 1 to 64 of
 them, counted from 0. Over a periodic covariate the curve is level + Σ cos_k · cos(2πk · c / period) + sin_k · sin(...),
-counted from 1. Every covariate in the table needs the parameter that stands beside it, too. Any other name is that of
-a quantity that a recording has measured (a column of `covariate.csv`); the simulator does not know it and holds it at
-the parameter `now`, for which the critic writes its mean.
+counted from 1. A covariate in the table also needs the parameter in its row. Any other name is that of
+a quantity measured in a recording (a column of `covariate.csv`); the simulator does not know it and holds it at
+the parameter `now`, which the critic sets to its mean.
 
 `smooth.range.COVARIATE` adds such a curve, in metres, to the laser's readings, with the stage BIAS; all of them have
 knots. They follow `range` [m], `incidence`, `bearing`, `heading`, `world_bearing` [rad, within half a turn], `time` [s]
@@ -102,7 +102,7 @@ def text() -> str:
 def _smooth_table() -> str:
     """Return channels and covariates of smooth effects."""
     rows = [f"Channels: {', '.join(f'`{name}` [{channel.unit}]' for name, channel in effects.CHANNELS.items())}.", ""]
-    rows += ["| covariate | what it is | parameter besides |", "|---|---|---|"]
+    rows += ["| covariate | what it is | further parameter |", "|---|---|---|"]
     for name, meaning in effects.MEANINGS.items():
         constant = effects.CONSTANTS.get(name)
         rows.append(f"| `{name}` | {meaning} | {f'`{constant[0]}` [{constant[1]}]' if constant else ''} |")

@@ -32,7 +32,7 @@ class AccelLimit(Effect):
     separable = True
     forms = ({"round": 0.0}, {"round": 0.04})
     empirical = True
-    sentence = "the rates are ramped: large changes take longer than small ones"
+    sentence = "acceleration is limited: the rates change in ramps"
     formula = (
         "|dv'/dt| ≤ 1 / slowness_v, |dw'/dt| ≤ 1 / slowness_w, towards v, w; then first-order lags of round · slowness"
     )

@@ -14,7 +14,7 @@ class Backlash(Effect):
     stage = Stage.THRESHOLD
     parameters = (Parameter("play", "rad/s", null=0.0, scale=0.03, lower=0.0, upper=1.0),)
     empirical = True
-    sentence = "the yaw rate depends on the direction from which its command came (play)"
+    sentence = "the yaw rate has play: it depends on the direction in which its command changed"
     formula = "w' = min(max(w', w − play/2), w + play/2) while moving"
     source = "assumed: play of joystick or gear; 5-50 mrad/s"
     shows_in = Rate.W

@@ -46,10 +46,10 @@ class Rate(Enum):
 class Follows(Enum):
     """The quantity that an effect follows, so that a residual drawn over it shows the effect's shape."""
 
-    V = "forward speed asked for"
-    W = "yaw rate asked for"
-    V_CHANGE = "change of the forward speed asked for"
-    W_CHANGE = "change of the yaw rate asked for"
+    V = "commanded forward speed"
+    W = "commanded yaw rate"
+    V_CHANGE = "change of the commanded forward speed"
+    W_CHANGE = "change of the commanded yaw rate"
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ class BatterySag(Effect):
     )
     forms = ({"through": 0.0}, {"through": 1.0})
     empirical = True
-    sentence = "the chair gets slower in the course of a drive, as from a battery that runs down"
+    sentence = "the chair gets slower during a drive, as with a battery that runs down"
     formula = "v, w · max(0, 1 − sag · t); t since the start, or with through = 1 since the first run of the recording"
     source = "assumed: battery voltage; 5-15 % in a recording"
     shows_in = Rate.V

@@ -29,7 +29,7 @@ class CasterReversal(Effect):
         Parameter("length", "m", null=0.25, scale=0.25, lower=0.01, upper=5.0),
     )
     empirical = True
-    sentence = "after reversing the chair swings to one side until its casters have turned"
+    sentence = "after a reversal the chair swings to one side until its casters have turned"
     formula = "w ± kick · exp(−s / length) while driving; s: distance since the reversal, ±: side of the last turn"
     source = "study of front casters in reverse, 2003: worst from 90°; 0.05-0.3 rad/s over 0.25 m"
     shows_in = Rate.W

@@ -17,7 +17,7 @@ class ClockScale(ReferenceEffect):
         Parameter("through", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
     )
     forms = ({"through": 0.0}, {"through": 1.0})
-    sentence = "the reference's clock and that of the commands run at different speeds"
+    sentence = "the clocks of the reference and of the commands run at different speeds"
     formula = "t · (1 + scale), rates / (1 + scale); t since the start, or with through = 1 since the first run"
     source = "assumed: computers without a common clock; 0.01-0.5 %"
     shows_in = Rate.V

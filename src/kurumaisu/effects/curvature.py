@@ -21,7 +21,7 @@ class CurvatureV(Effect):
     stage = Stage.GAIN
     parameters = (Parameter("curvature", "s/m", null=0.0, scale=0.05, lower=-1.0, upper=1.0),)
     empirical = True
-    sentence = "the law of the forward speed is bent: fast driving gains less than slow driving"
+    sentence = "the forward speed is not proportional to its command: the gain falls with the speed"
     formula = "v · max(0, 1 − curvature · |v|)"
     source = "assumed: expo of joystick inputs; ±0.1 s/m"
     shows_in = Rate.V
@@ -39,7 +39,7 @@ class CurvatureW(Effect):
     stage = Stage.GAIN
     parameters = (Parameter("curvature", "s/rad", null=0.0, scale=0.05, lower=-1.0, upper=1.0),)
     empirical = True
-    sentence = "the law of the yaw rate is bent: fast turns gain less than slow turns"
+    sentence = "the yaw rate is not proportional to its command: the gain falls with the yaw rate"
     formula = "w · max(0, 1 − curvature · |w|)"
     source = "assumed: expo of joystick inputs; ±0.1 s/rad"
     shows_in = Rate.W

@@ -16,7 +16,7 @@ class DacZeroF(VoltageEffect):
     id = "base.dac_zero_f"
     stage = Stage.CONVERTER
     parameters = _OFFSET
-    sentence = "the translation voltage is off by a constant"
+    sentence = "the translation voltage has a constant offset"
     formula = "V_f + offset, 0 at rest"
     source = "offset error of any D/A converter; 2-20 mV"
     shows_in = Rate.V
@@ -39,7 +39,7 @@ class DacZeroS(VoltageEffect):
     stage = Stage.CONVERTER
     parameters = (*_OFFSET, Parameter("rests", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0))
     forms = ({"rests": 0.0}, {"rests": 1.0})
-    sentence = "the steering voltage is off by a constant"
+    sentence = "the steering voltage has a constant offset"
     formula = "V_s + offset; with rests = 1, 0 where that is beyond the branch meant, or no turn is"
     source = "offset error of any D/A converter; 2-20 mV"
     shows_in = Rate.W

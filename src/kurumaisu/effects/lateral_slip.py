@@ -13,7 +13,7 @@ class LateralSlip(Effect):
     stage = Stage.FLOOR
     parameters = (Parameter("c", "s", null=0.0, scale=0.02, lower=-0.5, upper=0.5),)
     empirical = True
-    sentence = "the chair drifts outwards in bends"
+    sentence = "the chair drifts outwards in curves"
     formula = "u − c · v · w"
     source = "assumed: slip of tyres under side force; 0.01-0.05 s"
     shows_in = Rate.V

@@ -15,7 +15,7 @@ class MapError(WorldEffect):
         Parameter("scale", "1", null=0.0, scale=0.005, lower=-0.2, upper=0.2),
         Parameter("sd", "m", null=0.0, scale=0.005, lower=0.0, upper=0.2),
     )
-    sentence = "walls are not quite where the map has them"
+    sentence = "walls are not exactly where the map shows them"
     formula = "corner · (1 + scale) + n, n drawn once per corner with sd in x and in y"
     source = "assumed: maps and worlds made by hand; walls off by 2-10 mm, askew by 0.1-0.5°"
     random = True

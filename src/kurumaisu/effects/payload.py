@@ -18,7 +18,7 @@ class Payload(Effect):
         Parameter("tau", "s", null=0.0, scale=0.1, lower=0.0, upper=3.0),
     )
     empirical = True
-    sentence = "the chair is slower and more sluggish in both axes alike, as under a load"
+    sentence = "the chair is slower and reacts later in both axes, as under a load"
     formula = "tau · dv'/dt = (1 − droop) · v − v', and w alike"
     source = "assumed: mass and rolling resistance; 5 %, 0.1 s for a bag or a lighter person"
     shows_in = Rate.V

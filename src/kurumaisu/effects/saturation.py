@@ -39,7 +39,7 @@ class Saturation(Effect):
     separable = True
     forms = ({"knee": 0.0}, {"knee": 0.1})
     empirical = True
-    sentence = "the chair is slower than commanded above a certain rate"
+    sentence = "the rates saturate: above some rate the chair is slower than commanded"
     formula = "v (1 + |v · inverse_v|^(1/knee))^−knee, w likewise; knee → 0: |v| ≤ 1 / inverse_v, |w| ≤ 1 / inverse_w"
     source = "paper: the MD-100's speed knob; 0.5-1.5 m/s"
     shows_in = Rate.V

@@ -61,7 +61,7 @@ class Smooth(Effect):
 
     stage = Stage.FLOOR
     parameters = ()
-    sentence = "something unknown changes a rate by a curve over another quantity"
+    sentence = "an unknown effect changes a rate by a curve over another quantity"
     formula = "rate + curve(covariate) while moving"
     source = "the critic, from a recording"
     shows_in = Rate.V
@@ -128,7 +128,7 @@ def smooth_of(name: str) -> type[Smooth] | None:
     if match is None:
         return None
     channel, covariate = match.groups()
-    text = f"something unknown changes {channel} with {covariate}"
+    text = f"an unknown effect changes {channel} with {covariate}"
     return type("Smooth", (Smooth,), {"id": name, "channel": channel, "covariate": covariate, "sentence": text})
 
 

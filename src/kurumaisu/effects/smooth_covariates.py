@@ -31,7 +31,7 @@ MEANINGS: Mapping[str, str] = {
     "wheel_left": "speed of the left wheel, v − w · track / 2 [m/s]",
     "wheel_right": "speed of the right wheel, v + w · track / 2 [m/s]",
     "time": "time since the start [s]",
-    "since_command": "time since the rates asked for changed [s]",
+    "since_command": "time since the commanded rates changed [s]",
     "since_reversal": "distance since the driving direction changed [m]",
     "heading": "heading in the map [rad]; periodic",
     "distance": "distance travelled since the start, back or forth [m]; periodic, for wheels out of round",

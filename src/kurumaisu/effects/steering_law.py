@@ -22,7 +22,7 @@ class SteeringLaw(VoltageEffect):
         Parameter("flip", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
         Parameter("meant", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
     )
-    sentence = "the steering law's intercepts have the other sign"
+    sentence = "the intercepts of the steering law have the opposite sign"
     formula = "w of V_s by (2) with intercepts · (1 − 2 flip); with meant = 1, 0 where that is a turn to the other side"
     source = "paper, equation (2): as printed, its two branches overlap"
     choices = ({"flip": 1.0, "meant": 0.0}, {"flip": 1.0, "meant": 1.0})

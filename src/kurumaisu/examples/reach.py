@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 from typing import Any
 
 import numpy as np
 
-from kurumaisu.errors import Error, one_line
+from kurumaisu import program
+from kurumaisu.errors import Error, failed
 from kurumaisu.types import FloatArray
 
 
@@ -25,16 +24,15 @@ def driver(observation: FloatArray) -> FloatArray:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the example; return 0, or 2 for bad input, which is told on stderr."""
-    parser = argparse.ArgumentParser(prog="example_gym", description=__doc__)
+    """Run the example; return 0, or 1 for bad input, which is told on stderr."""
+    parser = program.Parser(prog="example_gym", description=__doc__)
     parser.add_argument("--episodes", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)
     try:
         env = _make()
     except Error as error:
-        print(f"example_gym: {one_line(error)}", file=sys.stderr)
-        return 2
+        return failed("example_gym", error)
     for episode in range(options.episodes):
         observation, _ = env.reset(seed=options.seed + episode)
         total, ended, steps = 0.0, False, 0

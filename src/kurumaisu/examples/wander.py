@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.errors import Error, one_line
+from kurumaisu import program
+from kurumaisu.errors import Error, failed
 from kurumaisu.params import shipped
 from kurumaisu.sim import Observation, Simulator, load_options
 from kurumaisu.types import FloatArray
@@ -32,8 +31,8 @@ def wander(observation: Observation, side: FloatArray) -> FloatArray:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the example; return 0, or 2 for bad input, which is told on stderr."""
-    parser = argparse.ArgumentParser(prog="example_numpy", description=__doc__)
+    """Run the example; return 0, or 1 for bad input, which is told on stderr."""
+    parser = program.Parser(prog="example_numpy", description=__doc__)
     parser.add_argument("world", type=Path, nargs="?", metavar="FILE.world", help="worlds/wander.world by default")
     parser.add_argument("--seconds", type=float, default=60.0, help="of simulated time (60)")
     options = parser.parse_args(arguments)
@@ -43,8 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
         if not simulator.robots or len(simulator.rangers) != len(simulator.robots):
             raise Error(f"{world.path}: this example wants robots with one laser each")
     except Error as error:
-        print(f"example_numpy: {one_line(error)}", file=sys.stderr)
-        return 2
+        return failed("example_numpy", error)
     began = time.perf_counter()
     observation = simulator.reset(seed=1)
     way = np.zeros(len(simulator.robots))

@@ -12,6 +12,7 @@ from kurumaisu import settings
 from kurumaisu.errors import Error
 from kurumaisu.experiments import timeline
 from kurumaisu.experiments.timeline import Phase
+from kurumaisu.names import hint
 from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray
 
@@ -90,9 +91,9 @@ def names() -> tuple[str, ...]:
 
 
 def shipped_script(name: str) -> Script:
-    """Return one of the package's own experiments. Raise Error, which lists them, for another name."""
+    """Return one of the package's own experiments. Raise Error, with near names, for another one."""
     if name not in names():
-        raise Error(f"{name!r} is not an experiment: {', '.join(names())}")
+        raise Error(f"{name!r} is not an experiment; {hint(name, names(), 'docs/experiments.md')}")
     return load_script(shipped(f"{_FOLDER}/{name}.yaml"))
 
 

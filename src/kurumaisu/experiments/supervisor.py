@@ -146,7 +146,7 @@ class Supervisor:
 
     def _leap(self, seconds: float) -> None:
         if self.stage is Stage.RUNNING:
-            self.stop(f"time leapt by {seconds:.2f} s")
+            self.stop(f"time jumped by {seconds:.2f} s")
 
     def _wait(self, now: float) -> None:
         absent = [source for source in self._sources if source not in self._poses]

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import os
 import sys
@@ -11,6 +10,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from kurumaisu import program
 from kurumaisu.errors import Error, failed
 
 # Module and what it is a recording of.
@@ -28,8 +28,8 @@ NAMES = {
 
 def main(arguments: Sequence[str]) -> int:
     """Print a recording's measures by hand and its verdict; return 0, or 1 where it is not there."""
-    parser = argparse.ArgumentParser(prog="scripts/real", description=__doc__)
-    parser.add_argument("name", choices=sorted(NAMES))
+    parser = program.Parser(prog="scripts/real", description=__doc__)
+    parser.add_argument("name", choices=sorted(NAMES), metavar="NAME", help=f"one of {', '.join(sorted(NAMES))}")
     parser.add_argument("--data", type=Path, required=True, help="folder of the real recordings")
     parser.add_argument("--output", type=Path, help="folder for tables and reports; without it nothing is kept")
     options = parser.parse_args(arguments)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.real.asking import ask, there
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.real.criticise import ask, there
 
 
 def run(data: Path, output: Path) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.real.asking import ask, recording, there
 from kurumaisu.real.by_hand import best_shift, least_squares, range_flow, robust
+from kurumaisu.real.criticise import ask, recording, there
 from kurumaisu.types import FloatArray
 
 RADIUS, TRACK = 0.077, 0.330  # [m] of the wheels, between them: as its own reader has them

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.real.asking import ask, there
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.real.by_hand import least_squares
+from kurumaisu.real.criticise import ask, there
 
 _SPAN = 2.0  # [s]
 

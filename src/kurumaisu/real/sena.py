@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.reading import read_recording
-from kurumaisu.real.asking import ask, there
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.real.criticise import ask, there
 from kurumaisu.types import FloatArray
 
 FOLDER = Path("/usr/share/mrpt/datasets")

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.real import urg_log
-from kurumaisu.real.asking import ask, recording, there
 from kurumaisu.real.by_hand import least_squares
+from kurumaisu.real.criticise import ask, recording, there
 from kurumaisu.types import FloatArray
 
 STILL = 34  # scans before somebody moves the sensor

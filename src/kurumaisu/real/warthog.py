@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.real.asking import ask, recording, there
 from kurumaisu.real.by_hand import least_squares
+from kurumaisu.real.criticise import ask, recording, there
 from kurumaisu.types import BoolArray, FloatArray
 
 RADIUS = 0.30  # [m] of the wheels, nominal; what it really is, is asked

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.real import warthog
-from kurumaisu.real.asking import ask, recording
 from kurumaisu.real.by_hand import step_response
+from kurumaisu.real.criticise import ask, recording
 from kurumaisu.types import FloatArray
 
 # [s] in which commands count, and the wheels follow; 298-302 s they count, too, but the wheels rest.

@@ -10,8 +10,8 @@ import numpy as np
 
 from kurumaisu._core import AxisLaw, Branch
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.explain import Criticism
-from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import EffectSetting, Model, shipped
 from kurumaisu.riddles import lab
 

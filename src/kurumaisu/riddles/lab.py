@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.laser.finding import LaserFinding
-from kurumaisu.critic.laser.verdicts import criticise as criticise_laser
-from kurumaisu.critic.recording import LaserMount, Recording, Series
-from kurumaisu.critic.rehearsal import Manner, Rehearsal
-from kurumaisu.critic.rehearse import manner
+from kurumaisu.critic.experiment.rehearsal import Manner, Rehearsal
+from kurumaisu.critic.experiment.rehearse import manner
+from kurumaisu.critic.judge.scan_verdict import criticise_scans as criticise_laser
+from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.recording import LaserMount, Recording, Series
 from kurumaisu.experiments import Place, Script, shipped_script
 from kurumaisu.experiments.script import Box
 from kurumaisu.params import Laser, Model, load_model, shipped

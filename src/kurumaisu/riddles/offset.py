@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu._core import LaserError
-from kurumaisu.critic.recording import Recording
+from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import Model
 from kurumaisu.riddles import lab
 

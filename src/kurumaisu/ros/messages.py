@@ -13,7 +13,7 @@ from sensor_msgs.msg import LaserScan
 from kurumaisu.msg import Voltages
 from kurumaisu.params import Laser
 from kurumaisu.ros.rotation import quaternion_of
-from kurumaisu.sim.chair import Command
+from kurumaisu.sim.chair.simulator import Command
 from kurumaisu.types import FloatArray
 
 

@@ -15,9 +15,9 @@ import rosgraph
 import rospy
 
 from kurumaisu.children import interrupt
-from kurumaisu.critic.split_bag import numbered
+from kurumaisu.critic.data.bag_parts import numbered
 from kurumaisu.errors import Error
-from kurumaisu.ros.experiment_ground import publishers
+from kurumaisu.ros.graph import publishers
 
 _GLANCE = 0.05  # [s] of wall time
 _PATIENCE = 20.0  # [s] of wall time for a process to start or to end
@@ -35,7 +35,7 @@ class Recorder:
         self._path = path
         self._first = path.with_name(f"{path.stem}_0{path.suffix}") if split else path
         if self._first.exists():
-            raise Error(f"{self._first}: is there already")
+            raise Error(f"{self._first}: exists already")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:

@@ -95,7 +95,7 @@ class Services:
     def _step(self, _request: TriggerRequest) -> TriggerResponse:
         def step() -> None:
             if not self._simulation.paused:
-                raise Error("step: goes on from a pause, but nothing is paused")
+                raise Error("step: works only while paused")
             self._simulation.step()
 
         return TriggerResponse(*self._outcome(step))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The simulator, without ROS."""
 
-from kurumaisu.sim.observation import Observation
 from kurumaisu.sim.options import Options, load_options
-from kurumaisu.sim.pool import SimulatorPool
-from kurumaisu.sim.scans import Scan
-from kurumaisu.sim.simulator import Simulator
+from kurumaisu.sim.rangers.scans import Scan
+from kurumaisu.sim.robots.observation import Observation
+from kurumaisu.sim.robots.pool import SimulatorPool
+from kurumaisu.sim.robots.simulator import Simulator
 
 __all__ = ["Observation", "Options", "Scan", "Simulator", "SimulatorPool", "load_options"]

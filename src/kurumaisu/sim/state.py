@@ -22,7 +22,7 @@ _PLAIN = {
     ("numpy.core.numeric", "_frombuffer"),
     ("pathlib", "PosixPath"),
 }
-_OURS = ("kurumaisu.world.model", "kurumaisu.sim.population", "kurumaisu.sim.scans")
+_OURS = ("kurumaisu.world.model", "kurumaisu.sim.robots.population", "kurumaisu.sim.rangers.scans")
 _SENSORS = "kurumaisu.sim.sensors."
 
 
@@ -80,4 +80,4 @@ class _Reader(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         if (module, name) in _PLAIN or module in _OURS or module.startswith(_SENSORS):
             return super().find_class(module, name)
-        raise pickle.UnpicklingError(f"{module}.{name} is no part of a state")
+        raise pickle.UnpicklingError(f"{module}.{name} is not part of a state")

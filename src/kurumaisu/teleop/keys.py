@@ -26,7 +26,7 @@ SPEEDS = {"q": (1, 1), "z": (-1, -1), "w": (1, 0), "x": (-1, 0), "e": (0, 1), "c
 HELP = """\
    u    i    o       i , forward, backward      hold a key: when none comes for {timeout:g} s, the chair stops
    j    k    l       j l turn                   k or any other key: stop
-   m    ,    .       u o m . in a bend
+   m    ,    .       u o m . in curves
 q/z both speeds, w/x forward speed, e/c turning speed: {percent:g} % more or less        Ctrl-C ends
 """
 

@@ -53,7 +53,7 @@ class Reader:
         axes = [Axis(code, info.min, info.max, info.flat) for code, info in has.get(_ABSOLUTE, ())]
         self.joystick = Joystick(axes, has.get(_KEY, ()), dead_zone)
         if not self.joystick.axes or not self.joystick.buttons:
-            raise Error("the device has no axes, or no buttons: it is no joystick")
+            raise Error("the device has no axes, or no buttons: it is not a joystick")
         self._codes = [axis.code for axis in axes]
         self._synchronise()
 

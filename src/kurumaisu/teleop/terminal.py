@@ -22,7 +22,7 @@ class Terminal:
         try:
             self._before = termios.tcgetattr(descriptor)
         except termios.error as error:
-            raise Error("teleop_keyboard: standard input is no terminal: start it by rosrun, in one") from error
+            raise Error("teleop_keyboard: standard input is not a terminal: start it in one, with rosrun") from error
 
     def __enter__(self) -> Terminal:
         tty.setcbreak(self._descriptor)  # Ctrl-C still interrupts

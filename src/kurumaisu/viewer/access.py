@@ -41,7 +41,7 @@ class Keys:
         """Return a session for a token, which is used up. Raise Error for one that is not good."""
         known = next((one for one in self._tokens if _same(one, token)), None)
         if known is None:
-            raise Error("token: is not good, or was used already; ask for another one")
+            raise Error("token: is not valid, or was used already; ask for a new one")
         self._tokens.remove(known)
         session = secrets.token_urlsafe(_SECRET)
         self._sessions.append(session)
@@ -50,7 +50,7 @@ class Keys:
     def check(self, session: str) -> None:
         """Raise Error for a session that this server has not given."""
         if not any(_same(one, session) for one in self._sessions):
-            raise Error("session: is not one of this server's; it may have been started anew: ask for a token")
+            raise Error("session: is unknown to this server, which may have been restarted: ask for a token")
 
 
 def check_host(host: str | None, names: tuple[str, ...]) -> None:
@@ -64,7 +64,7 @@ def check_host(host: str | None, names: tuple[str, ...]) -> None:
     except ValueError:  # no address between its brackets
         name = None
     if name is None or not (name == "localhost" or name in names or _is_address(name)):
-        raise Error(f"Host {host!r}: is no name of this server; see `names` in its settings")
+        raise Error(f"Host {host!r}: is not a name of this server; see `names` in its settings")
 
 
 def check_origin(origin: str | None, host: str | None) -> None:

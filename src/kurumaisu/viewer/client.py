@@ -156,7 +156,7 @@ class Client:
         if not self._control:
             raise Error(f"{said.name}: {_why_not(self._keys)}")
         if said.name not in self._source.abilities:
-            raise Error(f"{said.name}: is nothing that a {self._source.mode} does here")
+            raise Error(f"{said.name}: is not possible in the mode {self._source.mode}")
         if said.name in URGENT:
             self._run(said)
             return
@@ -173,7 +173,7 @@ class Client:
         for older in [one for one in self._waiting if one.name == newer.name]:
             if older.arguments["body"] == newer.arguments["body"]:
                 self._waiting.remove(older)
-                self._answer(older.id, False, "set_pose: overtaken by a newer one")
+                self._answer(older.id, False, "set_pose: replaced by a newer one")
 
     def _let_in(self, said: Credential) -> None:
         session = None
@@ -234,5 +234,5 @@ class Client:
 
 def _why_not(keys: Keys | None) -> str:
     if keys is None:
-        return "this viewer only shows: it was not started with control"
+        return "this viewer is read-only: it was started without control"
     return "needs a token: open the address that the viewer printed, or ask it for a new one"

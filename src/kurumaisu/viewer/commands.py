@@ -89,7 +89,7 @@ def read(message: str) -> Command | Credential:
     try:
         content = json.loads(message, parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
-        raise Error(f"message: is no JSON: {error}") from error
+        raise Error(f"message: is not JSON: {error}") from error
     if not isinstance(content, dict):
         raise Error("message: must be an object")
     kind = content.pop("type", None)
@@ -144,4 +144,4 @@ def _is_id(number: Any) -> bool:
 
 
 def _refuse(word: str) -> NoReturn:
-    raise ValueError(f"{word} is no number")
+    raise ValueError(f"{word} is not a number")

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.viewer import protocol
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.play_clock import PlayClock
@@ -88,7 +89,7 @@ class Playback:
     def _change(self, name: str) -> None:
         run = name if name in self._runs else _PIECE.sub("", name)
         if run not in self._runs:
-            raise Error(f"run: there is no run {name!r}; there are: {', '.join(self._runs)}")
+            raise Error(f"run: there is no run {name!r}; {hint(name, self._runs)}")
         with self._loading:
             if run == self._tape.name:
                 return

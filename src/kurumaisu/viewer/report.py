@@ -15,7 +15,7 @@ ADDRESS = f"report/{NAME}"
 _LARGEST = 50_000_000  # bytes: the critic's are below 2 MB
 _STYLE = re.compile(rb"<style[^>]*>(.*?)</style>", re.DOTALL)
 _END = b"</body>"
-_SCRIPT = b'<script type="module" src="../page/report.js"></script>\n'
+_SCRIPT = b'<script type="module" src="../page/report/report.js"></script>\n'
 
 
 def check(folder: Path) -> Path:

@@ -21,7 +21,7 @@ from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
 
 PAGE = Path(__file__).with_name("page")
-_NAME = re.compile(r"[\w-]+(\.[\w-]+)*")
+_NAME = re.compile(r"([\w-]+/)?[\w-]+(\.[\w-]+)*")  # a file, or one in a folder
 _WORKERS = 8  # commands that are under way at a time, of all clients, beside the urgent ones
 _PATIENCE = 5.0  # [s] for the loop to begin, and to end
 
@@ -71,7 +71,7 @@ class Server:
     def new_address(self) -> str:
         """Return where the page is, with a token to command, which is good once. Raise Error if nobody may."""
         if not self._control:
-            raise Error("this viewer only shows: it was not started with control")
+            raise Error("this viewer is read-only: it was started without control")
         return f"{self.address}#token={self._keys.new_token()}"
 
     def accounts(self) -> tuple[list[Account], int]:
@@ -87,7 +87,7 @@ class Server:
         app.add_routes(
             [
                 web.get("/", self._index),
-                web.get("/page/{name}", self._file),
+                web.get("/page/{name:.+}", self._file),
                 web.get(r"/map/{number:\d+}.png", self._map),
                 web.get("/report/{name}", self._report),
                 web.get("/ws", self._socket),
@@ -102,8 +102,8 @@ class Server:
         except OSError as error:
             await self._runner.cleanup()
             raise Error(
-                f"viewer: {self._settings.host}:{self._settings.port} cannot be had: {error.strerror}; "
-                "another port may be free, port 0 takes any"
+                f"viewer: {self._settings.host}:{self._settings.port} cannot be used: {error.strerror}; "
+                "choose another port; port 0 takes any free one"
             ) from error
         self._port = self._runner.addresses[0][1]
 
@@ -132,7 +132,7 @@ class Server:
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["name"]
-        if not _NAME.fullmatch(name):  # it may hold encoded slashes
+        if not _NAME.fullmatch(name):  # it may lead out of the page
             raise web.HTTPNotFound
         return files.served(request, PAGE / name)
 
@@ -152,7 +152,7 @@ class Server:
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         access.check_origin(request.headers.get("Origin"), request.headers.get("Host"))
         if len(self._open) >= self._settings.most_clients:
-            raise web.HTTPServiceUnavailable(reason=f"{self._settings.most_clients} look already")
+            raise web.HTTPServiceUnavailable(reason=f"{self._settings.most_clients} pages are open already")
         client = Client(self._settings, self._hub, self._source, self._keys if self._control else None, self._workers)
         self._open.add(client)
         try:

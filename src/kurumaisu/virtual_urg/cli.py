@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kurumaisu import program
 from kurumaisu._core import urg_fault_help
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
@@ -21,31 +22,31 @@ from kurumaisu.virtual_urg.models import Sensor, load_sensor, sensor_names
 from kurumaisu.virtual_urg.urg import Pty, Tcp, VirtualUrg
 
 _COUNTED = {
-    "clients": "clients came",
+    "clients": "clients connected",
     "commands": "commands heard, of which",
     "refused": "refused",
     "scans": "scans sent, of which",
     "dropped": "dropped: the client left no room",
-    "unheard": "with nobody there",
-    "late": "turns left out: this computer was too busy",
+    "unheard": "without a client",
+    "late": "turns skipped: this computer was too busy",
     "bytes_in": "bytes in",
     "bytes_out": "bytes out",
     "garbled": "bytes in or out at the wrong rate",
-    "lost_input": "bytes in thrown away: too long a line, or while booting or stalled",
+    "lost_input": "bytes in dropped: line too long, or while booting or stalled",
 }
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; return 0, or 2 for bad input, which is told on stderr."""
+    """Run the command; return 0, or 1 for bad input, which is told on stderr."""
     parser = _parser()
-    if arguments is None:
-        arguments = [word for word in sys.argv[1:] if ":=" not in word]  # roslaunch gives every node its name
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(program.words(arguments))
     if options.faults:
         print(urg_fault_help())
         return 0
     if options.pty is None and options.tcp is None:
         parser.error("one of the arguments --pty --tcp is required")
+    if (options.world is None) != (options.pose is None):
+        parser.error("--world and --pose: give both or neither")
     try:
         sensor = load_sensor(options.sensor)
         feed, changes = _feed(sensor, options)
@@ -54,12 +55,12 @@ def main(arguments: list[str] | None = None) -> int:
             _serve(urg, feed, changes, options)
     except Error as error:
         print(f"virtual_urg: {error}", file=sys.stderr)
-        return 2
+        return 1
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="virtual_urg", description="Be a laser scanner, for any client.")
+    parser = program.Parser(prog="virtual_urg", description="Simulate a laser scanner, for any client.")
     names = ", ".join(sensor_names())
     parser.add_argument("--sensor", default="urg_04lx", metavar="NAME", help=f"a file *.yaml or one of {names}")
     place = parser.add_mutually_exclusive_group()
@@ -67,19 +68,19 @@ def _parser() -> argparse.ArgumentParser:
     place.add_argument("--tcp", type=int, metavar="PORT", help="a TCP port; 0: any that is free")
     parser.add_argument("--host", default="127.0.0.1", help="address of --tcp; 0.0.0.0: of all networks (127.0.0.1)")
     sight = parser.add_mutually_exclusive_group()
-    sight.add_argument("--range", type=_length, default=1.0, metavar="R", help="all around [m] (1.0); inf: nothing")
+    sight.add_argument("--range", type=_length, default=1.0, metavar="R", help="walls all around [m] (1.0); inf: none")
     sight.add_argument("--wall", type=_length, metavar="D", help="a wall ahead [m], with noise")
     sight.add_argument("--world", type=Path, metavar="FILE", help="a Stage world, with noise")
     parser.add_argument(
-        "--pose", type=float, nargs=3, metavar=("X", "Y", "YAW"), help="of the sensor in --world [m, m, rad]"
+        "--pose", type=float, nargs=3, metavar=("X", "Y", "YAW"), help="pose of the sensor in --world [m, m, rad]"
     )
-    parser.add_argument("--intensity", type=float, metavar="I", help="of every step, where the sensor tells it")
+    parser.add_argument("--intensity", type=float, metavar="I", help="of every step, if the sensor sends it")
     parser.add_argument("--fault", action="append", default=[], metavar="NAME[@SCAN][=VALUE]", help="see --faults")
-    parser.add_argument("--faults", action="store_true", help="say what faults there are, and exit")
-    parser.add_argument("--drift", type=float, default=0.0, metavar="D", help="its clock gains, as 1.25e-3 (0)")
-    parser.add_argument("--line-rate", action="store_true", help="bytes take their time, as on RS-232")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the noise (1)")
-    parser.add_argument("--duration", type=float, default=math.inf, metavar="S", help="[s] until it ends by itself")
+    parser.add_argument("--faults", action="store_true", help="list the faults and exit")
+    parser.add_argument("--drift", type=float, default=0.0, metavar="D", help="drift of its clock, as 1.25e-3 (0)")
+    parser.add_argument("--line-rate", action="store_true", help="send bytes as slowly as RS-232 does")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the noise (1)")
+    parser.add_argument("--duration", type=float, default=math.inf, metavar="S", help="end after so long [s]")
     return parser
 
 
@@ -92,8 +93,6 @@ def _length(text: str) -> float:
 
 def _feed(sensor: Sensor, options: argparse.Namespace) -> tuple[feeds.Feed, bool]:
     """Return what the sensor sees, and whether it changes from turn to turn."""
-    if (options.world is None) != (options.pose is None):
-        raise Error("--world and --pose: neither goes without the other")
     if options.world is not None:
         return feeds.world(sensor, options.world, np.array(options.pose), options.seed), True
     if options.wall is not None:

@@ -11,11 +11,11 @@ import numpy as np
 
 from kurumaisu.effects import LaserChain
 from kurumaisu.params import Laser, Mount, load_model, shipped
-from kurumaisu.sim.chair_body import seat
-from kurumaisu.sim.chair_world import ChairWorld
-from kurumaisu.sim.scanner import Scanner
+from kurumaisu.sim.chair.body import seat
+from kurumaisu.sim.chair.scanner import Scanner
+from kurumaisu.sim.chair.sight import Sight
+from kurumaisu.sim.chair.world import ChairWorld
 from kurumaisu.sim.settings import load_dynamics
-from kurumaisu.sim.sight import Sight
 from kurumaisu.types import FloatArray
 from kurumaisu.virtual_urg.models import Sensor
 from kurumaisu.world import Start, load_world

@@ -11,6 +11,7 @@ import numpy as np
 from kurumaisu import settings
 from kurumaisu._core import UrgCodes, UrgModel
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray
 
@@ -65,7 +66,7 @@ def load_sensor(name: str | Path) -> Sensor:
     """Read a sensor that is shipped, by its name, or a file of one. Raise Error naming file and key."""
     if isinstance(name, str) and not name.endswith(".yaml"):
         if name not in sensor_names():
-            raise Error(f"sensor: must be a file *.yaml or one of {', '.join(sensor_names())}: {name!r}")
+            raise Error(f"sensor: {name!r} is neither a file *.yaml nor a known one; {hint(name, sensor_names())}")
         name = shipped(_FOLDER) / f"{name}.yaml"
     path = Path(name)
     top = settings.load(path)

@@ -80,7 +80,7 @@ class VirtualUrg:
         """The TCP port. Raise Error at a pty."""
         host, colon, port = self.address.rpartition(":")
         if not colon or "/" in host:
-            raise Error(f"{self.address}: is no TCP port")
+            raise Error(f"{self.address}: is not a TCP port")
         return int(port)
 
     @property

@@ -73,13 +73,13 @@ _DEAD: dict[str, set[str]] = {
 
 # Without an effect in Stage 4, although one might rely on it.
 _TRAPS: dict[str, dict[str, str]] = {
-    "model": {"laser_return": "Stage 4 heeds ranger_return instead"},
+    "model": {"laser_return": "Stage 4 uses ranger_return instead"},
     "sensor": {
-        "range_max": "Stage 4 heeds range [MIN MAX] instead",
-        "range_min": "Stage 4 heeds range [MIN MAX] instead",
-        "update_interval": "Stage 4 heeds that of the ranger",
+        "range_max": "Stage 4 uses range [MIN MAX] instead",
+        "range_min": "Stage 4 uses range [MIN MAX] instead",
+        "update_interval": "Stage 4 uses that of the ranger",
     },
-    "position": {"odom": "Stage 4 heeds localization_origin instead"},
+    "position": {"odom": "Stage 4 uses localization_origin instead"},
 }
 
 
@@ -103,13 +103,13 @@ def _check_type(entity: Entity, parent: Entity, notes: Notes) -> None:
     if (kind not in MODELS and kind not in _OTHERS) or kind == "world":
         raise entity.name.error(f"{kind} is not a type of model")
     if kind == "block" and parent.type not in MODELS:
-        raise entity.name.error(f"a block belongs into a model, not into {_article(parent.type)}")
+        raise entity.name.error(f"a block belongs in a model, not in {_article(parent.type)}")
     if kind == "sensor" and parent.type != "ranger":
-        raise entity.name.error(f"a sensor belongs into a ranger, not into {_article(parent.type)}")
+        raise entity.name.error(f"a sensor belongs in a ranger, not in {_article(parent.type)}")
     if kind in MODELS and parent.type not in (*MODELS, "world"):
         notes.add(entity.name, f"a {kind} in a {parent.type} stands on the ground, as in Stage")
     if kind in _BODY_ONLY:
-        notes.add(entity.name, f"{kind}: has only a body here", kind)
+        notes.add(entity.name, f"{kind}: only its body is simulated here", kind)
 
 
 def _article(kind: str) -> str:

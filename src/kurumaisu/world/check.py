@@ -59,7 +59,7 @@ def _thin(world: World) -> Iterator[Finding]:
             yield Finding(
                 model.place,
                 f"{_name(model)} is {1000 * extent.min():.0f} mm thin, less than the resolution of "
-                f"{1000 * world.resolution:.0f} mm: Stage may draw nothing of it, here it is solid",
+                f"{1000 * world.resolution:.0f} mm: Stage may ignore it; here it is solid",
             )
 
 
@@ -89,7 +89,9 @@ def _speed(world: World) -> Iterator[Finding]:
     stage = np.array([[-1, 1]] * 3 + [[-math.pi / 2, math.pi / 2]])
     for model, position in _positions(world):
         if np.allclose(position.velocity_bounds, stage):
-            yield Finding(model.place, f"{_name(model)} is clamped to 1 m/s and 90 deg/s, for want of velocity_bounds")
+            yield Finding(
+                model.place, f"{_name(model)} is limited to 1 m/s and 90 deg/s, because it has no velocity_bounds"
+            )
 
 
 def _localization(world: World) -> Iterator[Finding]:
@@ -102,7 +104,7 @@ def _localization(world: World) -> Iterator[Finding]:
             share = world.interval / model.update_interval
             yield Finding(
                 model.place,
-                f"{_name(model)}: odometry adds up only {100 * share:.0f} % of the way, as in Stage, because "
+                f"{_name(model)}: odometry adds up only {100 * share:.0f} % of the distance, as in Stage, because "
                 "update_interval is longer than interval_sim",
             )
 
@@ -159,11 +161,11 @@ def _slopes(world: World) -> Iterator[Finding]:
         if travels(model, world.models) or model.mass > 0 or model.hinge is not None:
             yield Finding(model.place, f"{_name(model)}: slope has no effect on what can move")
         if model.obstacle_return:
-            yield Finding(model.place, f"{_name(model)} has a slope, but stops robots: it wants obstacle_return 0")
+            yield Finding(model.place, f"{_name(model)} has a slope, but stops robots: it needs obstacle_return 0")
         low, high = (model.shape.heights + world.poses[model.index, 2]).T
         if model.ranger_return >= 0 and any(((low <= z) & (z <= high)).any() for z in beams):
             yield Finding(
-                model.place, f"{_name(model)} has a slope, but is a wall to lasers: it wants ranger_return -1"
+                model.place, f"{_name(model)} has a slope, but is a wall to lasers: it needs ranger_return -1"
             )
 
 
@@ -172,8 +174,8 @@ def _own_tree(world: World) -> Iterator[Finding]:
         if model.root != model.index and not isinstance(world.models[model.root].device, Position):
             yield Finding(
                 model.place,
-                f"{_name(model)} stands inside {_name(world.models[model.root])}: its lasers see nothing of it, "
-                "nor does it bump into it",
+                f"{_name(model)} stands inside {_name(world.models[model.root])}: its lasers do not see it, "
+                "and it does not collide with it",
             )
 
 

@@ -71,7 +71,5 @@ def color(values: Values, order: int) -> Color:
         return (*colorsys.hsv_to_rgb(order * _GOLDEN % 1, 0.7, 0.9), 1.0)
     found = named(name)
     if found is None:
-        values.notes.add(
-            values.entity.properties["color"].name, f"there is no color {name!r}: red is taken, as in Stage"
-        )
+        values.notes.add(values.entity.properties["color"].name, f"unknown color {name!r}: red is used, as in Stage")
     return (*found, 1.0) if found else _RED

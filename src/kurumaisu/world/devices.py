@@ -54,7 +54,7 @@ def _one_of(values: Values, name: str, words: tuple[str, ...]) -> str:
     if word in words:
         return word
     given = values.entity.properties[name].name
-    values.notes.add(given, f"{name} must be one of {', '.join(words)}, not {word!r}: {words[0]} is taken")
+    values.notes.add(given, f"{name} must be one of {', '.join(words)}, not {word!r}: {words[0]} is used")
     return words[0]
 
 

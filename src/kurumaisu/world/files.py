@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from kurumaisu.errors import Error
+from kurumaisu.names import hint, nearest
 from kurumaisu.world.notes import Notes
 from kurumaisu.world.tokens import Kind, Source, Token, skip_line, tokenize
 
@@ -66,7 +67,8 @@ class Reader:
         self.tokens.append(Token(Kind.END, "", source, len(source.text)))
         unused = sorted(set(self.values) - self.used)
         if unused:
-            raise Error(f"{self.top}: has no parameter ${{{unused[0]}}}, for which a value was given")
+            near = hint(unused[0], sorted(self.used))
+            raise Error(f"{self.top}: has no parameter ${{{unused[0]}}}, for which a value was given; {near}")
         return self.tokens
 
     def _splice(self, source: Source, depth: int) -> None:
@@ -113,7 +115,8 @@ class Reader:
             with path.open("rb") as file:
                 data = file.read(_MOST_BYTES + 1)
         except (OSError, ValueError) as error:
-            reason = f"{path}: {getattr(error, 'strerror', None) or error}"
+            near = _near(path) if isinstance(error, FileNotFoundError) else ""
+            reason = f"{path}: {getattr(error, 'strerror', None) or error}{near}"
             raise asked.error(reason) if asked else Error(reason) from error
         if len(data) > _MOST_BYTES:
             raise Error(f"{path}: is larger than {_MOST_BYTES} bytes")
@@ -145,6 +148,13 @@ class Reader:
         if re.search(r"[\r\n]", value):
             raise source.error(at, f"the value of the parameter {name} has more than one line")
         return value
+
+
+def _near(path: Path) -> str:
+    """Return which worlds beside a missing file have a like name."""
+    there = sorted(file.name for file in path.parent.glob(f"*{path.suffix}")) if path.suffix else []
+    near = nearest(path.name, there)
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def parse_values(given: Iterable[str]) -> dict[str, str]:

@@ -117,8 +117,8 @@ def _note_stretch(values: Values, bitmap: Bitmap, name: str) -> None:
     factors = np.array([bitmap.width, bitmap.height]) / (points.max(axis=0) - points.min(axis=0))
     if factors.max() > 1 + _NOTEWORTHY:
         text = (
-            f"{name}: its walls without its margins fill the size, as in Stage: {factors[0]:.3f} times as wide and "
-            f"{factors[1]:.3f} times as high as in the whole image (image_extents takes that instead)"
+            f"{name}: trimmed to its walls, then scaled to the size, as in Stage: {factors[0]:.3f} times as wide and "
+            f"{factors[1]:.3f} times as high as the untrimmed image (image_extents does not trim)"
         )
         values.notes.add(values.entity.properties["bitmap"].name, text)
 

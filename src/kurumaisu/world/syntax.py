@@ -188,7 +188,7 @@ class _Parser:
 
         It ends at the same ')', and there is none if the type is a macro.
         """
-        self._notes.add(bracket, "a '(' without a name: is this meant?")
+        self._notes.add(bracket, "a '(' without a name: is that intended?")
         self._count(bracket, 1)
         if entity.name.text in self.macros:
             return entity

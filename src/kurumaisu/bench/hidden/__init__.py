@@ -9,7 +9,7 @@
 Seeds 0 to 999 are for tuning, those from 1000 on for reports.
 """
 
-from kurumaisu.bench.hidden.case import Ask, Case, Truth
+from kurumaisu.bench.hidden.generator.case import Ask, Case, Truth
 from kurumaisu.bench.hidden.make import make, names_of
 
 __all__ = ["Ask", "Case", "Truth", "make", "names_of"]

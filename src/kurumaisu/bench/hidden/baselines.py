@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from kurumaisu.bench.hidden import laws
-from kurumaisu.critic.recording import Recording, Run
+from kurumaisu.bench.hidden.generator import laws
+from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.types import FloatArray
 
 _LEVEL = 0.01  # of false alarms that a test allows itself, over all its columns

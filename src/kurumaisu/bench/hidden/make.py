@@ -8,17 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.bench.hidden.base_catalogue import BASE
-from kurumaisu.bench.hidden.base_make import make_base
-from kurumaisu.bench.hidden.case import KINDS, Ask, Case, Truth
+from kurumaisu.bench.hidden.base.cases import make_base
+from kurumaisu.bench.hidden.base.catalogue import BASE
 from kurumaisu.bench.hidden.confounded import CONFOUNDED
-from kurumaisu.bench.hidden.laser_case import make_laser
-from kurumaisu.bench.hidden.laser_catalogue import LASER
-from kurumaisu.bench.hidden.rooms import draw_room, world_text
-from kurumaisu.bench.hidden.strange_case import strange_base, strange_laser
-from kurumaisu.bench.hidden.unknown import STRANGE_BASE, STRANGE_LASER
-from kurumaisu.bench.hidden.wrong import WRONG, spoilt
+from kurumaisu.bench.hidden.contradictions import WRONG, spoilt
+from kurumaisu.bench.hidden.generator.case import KINDS, Ask, Case, Truth
+from kurumaisu.bench.hidden.generator.rooms import draw_room, world_text
+from kurumaisu.bench.hidden.laser.cases import make_laser
+from kurumaisu.bench.hidden.laser.catalogue import LASER
+from kurumaisu.bench.hidden.unknown.cases import strange_base, strange_laser
+from kurumaisu.bench.hidden.unknown.forms import STRANGE_BASE, STRANGE_LASER
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 
 
 def make(ask: Ask, seed: int, folder: Path | None = None) -> Case:
@@ -57,9 +58,7 @@ def _check(ask: Ask) -> None:
     there = [*names_of(ask.kind, "base"), *names_of(ask.kind, "laser")]
     for name in ask.ids:
         if name not in there:
-            raise Error(
-                f"hidden: {name!r} cannot be hidden in a case of kind {ask.kind!r}; there are: {', '.join(there)}"
-            )
+            raise Error(f"hidden: {name!r} cannot be hidden in a case of kind {ask.kind!r}; {hint(name, there)}")
     if len({name in BASE for name in ask.ids}) > 1 and ask.kind in ("pair", "triple"):
         raise Error(f"hidden: {', '.join(ask.ids)}: are not all of the base or all of the laser")
 

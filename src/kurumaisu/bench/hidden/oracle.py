@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.bench.hidden.case import Case, Known
-from kurumaisu.bench.hidden.noise import Regime
-from kurumaisu.critic.drive import Drive, prepare
-from kurumaisu.critic.noise import Noise, whitened
-from kurumaisu.critic.verdict import Gain
+from kurumaisu.bench.hidden.generator.case import Case, Known
+from kurumaisu.bench.hidden.generator.noise import Regime
+from kurumaisu.critic.base.drive import Drive, prepare
+from kurumaisu.critic.noise.base_noise import Noise, whitened
+from kurumaisu.critic.values.verdict import Gain
 from kurumaisu.params import load_model, shipped
 from kurumaisu.types import FloatArray
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.bench.hidden.case import APART, Truth
-from kurumaisu.bench.hidden.wrong import WRONG
-from kurumaisu.critic.verdict import Verdict
+from kurumaisu.bench.hidden.contradictions import WRONG
+from kurumaisu.bench.hidden.generator.case import APART, Truth
+from kurumaisu.critic.values.verdict import Verdict
 
 SURE = 0.95  # probability from which an answer is taken for sure
 _SEEN = 3.0  # whitened norm below which nobody can tell two effects apart for sure

@@ -21,7 +21,7 @@ class BeamBias(ReadingEffect):
         Parameter("amplitude", "m", null=0.0, scale=0.003, lower=-0.1, upper=0.1),
         Parameter("phase", "rad", null=0.0, scale=1.0, lower=-6.3, upper=6.3),
     )
-    sentence = "each beam has an offset of its own"
+    sentence = "each beam has its own offset"
     formula = "µ + b_i + amplitude · cos(φ − phase), b_i drawn once per beam with sd"
     source = "Olivka 2016: internal geometry of the URG-04LX; sd 0.5-2 mm, mirror 1-5 mm"
     random = True

@@ -15,7 +15,7 @@ class BeamCorrelation(ReadingEffect):
     id = "laser.beam_correlation"
     stage = LaserStage.NOISE
     parameters = (Parameter("rho", "1", null=0.0, scale=0.3, lower=-0.99, upper=0.99),)
-    sentence = "neighbouring beams err together"
+    sentence = "errors of neighbouring beams are correlated"
     formula = "z_i = rho · z_(i−1) + √(1 − rho²) · n_i"
     source = "a real URG-04LX: 0.52, 0.31, 0.18, 0.09 at lags 1, 2, 3, 5"
     empirical = True

@@ -12,7 +12,7 @@ class ClockSkew(BeamEffect):
 
     id = "laser.clock_skew"
     parameters = (Parameter("skew", "1", null=0.0, scale=1.0e-4, lower=-0.05, upper=0.05),)
-    sentence = "the laser's clock runs fast or slow, so that its stamps go more and more wrong"
+    sentence = "the laser's clock runs fast or slow, so that its stamps drift"
     formula = "beams fired at t / (1 + skew)"
     source = "urg_stamped; 10-500 ppm, one real unit 0.125 %"
 

@@ -18,7 +18,7 @@ class CommonMode(ReadingEffect):
         Parameter("sd", "m", null=0.0, scale=5.0e-4, lower=0.0, upper=0.1),
         Parameter("rho", "1", null=0.8, scale=0.1, lower=0.0, upper=0.9999),
     )
-    sentence = "all ranges of a scan are off together"
+    sentence = "all ranges of a scan share one error"
     formula = "µ + s_k, s_k = rho · s_(k−1) + √(1 − rho²) · sd · n"
     source = "assumed; 0.1-1 mm, rho 0-0.99"
     random = True

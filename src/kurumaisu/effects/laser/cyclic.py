@@ -19,7 +19,7 @@ class Cyclic(ReadingEffect):
         Parameter("wavelength", "m", null=3.0, scale=1.0, lower=0.1, upper=4.0),
         Parameter("phase", "rad", null=0.0, scale=1.0, lower=-6.3, upper=6.3),
     )
-    sentence = "the error of the ranges repeats with the range, as of a phase-shift laser"
+    sentence = "the range error repeats with the range, as with a phase-shift laser"
     formula = "µ + amplitude · sin(2π r / wavelength + phase)"
     source = "Kawata 2005: the phase of amplitude-modulated light; 1-10 mm"
     empirical = True

@@ -21,7 +21,7 @@ class Dropout(ReadingEffect):
         Parameter("oblique", "1", null=0.0, scale=0.1, lower=0.0, upper=1.0),
         Parameter("dark", "1", null=0.0, scale=0.1, lower=0.0, upper=1.0),
     )
-    sentence = "some beams give no valid reading"
+    sentence = "some beams return no valid reading"
     formula = "NaN with probability + per_metre · r + oblique · (1 − cos a) + dark · (1 − ρ), within 0 and 1"
     source = "codes 0-19 of the URG-04LX; 12 % of the beams of a real one"
     empirical = True

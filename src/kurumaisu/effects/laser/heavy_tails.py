@@ -26,7 +26,7 @@ class HeavyTails(ReadingEffect):
         Parameter("outliers", "1", null=0.0, scale=0.02, lower=0.0, upper=0.5),
         Parameter("reach", "m", null=0.1, scale=0.1, lower=0.001, upper=10.0),
     )
-    sentence = "large errors of the ranges are more frequent than of normal noise"
+    sentence = "large range errors are more frequent than with normal noise"
     formula = (
         "z · (1 − 2 / ν)^((1 − core) / 2) · √(ν / χ²_ν), ν = 1 / inverse_nu; "
         "with probability outliers: reach / σ · n added, n normal"

@@ -24,7 +24,7 @@ class IncidenceBias(ReadingEffect):
     stage = LaserStage.BIAS
     oblique = True
     parameters = (Parameter("k", "m", null=0.0, scale=0.003, lower=-0.1, upper=0.1),)
-    sentence = "walls that are met obliquely read too long or too short"
+    sentence = "walls at oblique incidence read too long or too short"
     formula = "µ + k · (1 / cos a − 1), a up to 80°"
     source = "Kneip 2009, Ye and Borenstein 2002, Okubo 2009; 1-10 mm at 60°"
     empirical = True
@@ -41,7 +41,7 @@ class IncidenceNoise(ReadingEffect):
     stage = LaserStage.SPREAD
     oblique = True
     parameters = (Parameter("gain", "1", null=0.0, scale=0.5, lower=0.0, upper=10.0),)
-    sentence = "walls that are met obliquely read more noisily"
+    sentence = "walls at oblique incidence have noisier readings"
     formula = "σ · (1 + gain · (1 / cos a − 1)), a up to 80°"
     source = "paper, on figure 9: noise at short range is from oblique incidence; gain 0-1"
     empirical = True

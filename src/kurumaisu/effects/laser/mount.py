@@ -18,7 +18,7 @@ class MountX(BeamEffect):
 
     id = "laser.mount_x"
     parameters = (Parameter("x", "m", null=0.0, scale=0.02, lower=-0.5, upper=0.5),)
-    sentence = "the laser sits further forward or back than the model says"
+    sentence = "the laser is mounted further forward or back than in the model"
     formula = "mount ⊕ x along base_link's x"
     source = "Censi 2013; 10-50 mm"
 
@@ -32,7 +32,7 @@ class MountY(BeamEffect):
 
     id = "laser.mount_y"
     parameters = (Parameter("y", "m", null=0.0, scale=0.02, lower=-0.5, upper=0.5),)
-    sentence = "the laser sits further to one side than the model says"
+    sentence = "the laser is mounted further to one side than in the model"
     formula = "mount ⊕ y along base_link's y"
     source = "Censi 2013; 10-50 mm"
 
@@ -46,7 +46,7 @@ class MountYaw(BeamEffect):
 
     id = "laser.mount_yaw"
     parameters = (Parameter("yaw", "rad", null=0.0, scale=0.02, lower=-0.5, upper=0.5),)
-    sentence = "the laser looks further to one side than the model says"
+    sentence = "the laser is turned further to one side than in the model"
     formula = "mount's yaw + yaw"
     source = "Censi 2013; 0.5-3°"
 

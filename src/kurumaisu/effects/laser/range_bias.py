@@ -15,7 +15,7 @@ class RangeOffset(ReadingEffect):
     id = "laser.offset"
     stage = LaserStage.BIAS
     parameters = (Parameter("offset", "m", null=0.0, scale=0.01, lower=-0.5, upper=0.5),)
-    sentence = "all ranges are off by a constant"
+    sentence = "all ranges have a constant offset"
     formula = "µ + offset"
     source = _SOURCE + "10 mm"
 
@@ -30,7 +30,7 @@ class RangeScale(ReadingEffect):
     id = "laser.scale"
     stage = LaserStage.BIAS
     parameters = (Parameter("scale", "1", null=0.0, scale=0.005, lower=-0.5, upper=0.5),)
-    sentence = "ranges are off in proportion to the range"
+    sentence = "the range error is proportional to the range"
     formula = "µ + scale · r"
     source = _SOURCE + "0.5 %"
 
@@ -45,7 +45,7 @@ class RangeQuadratic(ReadingEffect):
     id = "laser.quadratic"
     stage = LaserStage.BIAS
     parameters = (Parameter("quadratic", "1/m", null=0.0, scale=0.002, lower=-0.1, upper=0.1),)
-    sentence = "ranges are off in proportion to the range's square"
+    sentence = "the range error is proportional to the square of the range"
     formula = "µ + quadratic · r²"
     source = _SOURCE + "2 mm/m²"
     empirical = True

@@ -24,7 +24,7 @@ class RangeNoise(ReadingEffect):
         Parameter("share", "1", null=0.0, scale=0.3, lower=-1.0, upper=20.0),
         Parameter("slope", "1", null=0.0, scale=0.001, lower=-0.1, upper=0.1),
     )
-    sentence = "ranges are noisier or steadier than modelled"
+    sentence = "the range noise is larger or smaller than modelled"
     formula = "max(0, σ · (1 + share) + slope · (r − 2 m))"
     source = "Pomerleau 2012 gives 8-14 times equation (4)'s σ; a real unit 2.3-3.6 mm"
     empirical = True

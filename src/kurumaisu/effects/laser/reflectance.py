@@ -18,7 +18,7 @@ class Reflectance(ReadingEffect):
         Parameter("bias", "m", null=0.0, scale=0.02, lower=-0.2, upper=0.2),
         Parameter("noise", "1", null=0.0, scale=1.0, lower=0.0, upper=20.0),
     )
-    sentence = "ranges depend on the colour of what they meet"
+    sentence = "ranges depend on the reflectance of the surface"
     formula = "µ + bias · (1 − ρ), σ · max(0, 1 + noise · (1 − ρ)); ρ: the world's ranger_return"
     source = "Kneip 2009: strongly dependent on the target; 5-30 mm"
     empirical = True

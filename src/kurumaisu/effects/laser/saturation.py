@@ -18,7 +18,7 @@ class LaserSaturation(ReadingEffect):
         Parameter("near", "m", null=0.0, scale=0.1, lower=0.0, upper=10.0),
         Parameter("inverse_far", "1/m", null=0.0, scale=0.3, lower=0.0, upper=20.0),
     )
-    sentence = "ranges pile up at a nearest and a farthest value"
+    sentence = "ranges are cut off at a smallest and a largest value"
     formula = "min(max(reading, near), 1 / inverse_far)"
     source = "data sheet: 60 mm and 4 m"
 

@@ -12,7 +12,7 @@ class Sweep(BeamEffect):
 
     id = "laser.sweep"
     parameters = (Parameter("stretch", "1", null=0.0, scale=0.1, lower=-1.0, upper=1.0),)
-    sentence = "a scan takes another time than its message says, so motion distorts it otherwise"
+    sentence = "the duration of a scan differs from its message, so motion distorts it differently"
     formula = "beam i fired at t₀ + i · time_increment · (1 + stretch)"
     source = "geometry; −1 for drivers that correct the scan for motion"
 

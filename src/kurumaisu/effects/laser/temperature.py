@@ -19,7 +19,7 @@ class Temperature(ReadingEffect):
         Parameter("reference", "deg C", null=20.0, scale=2.0, lower=10.0, upper=30.0),
         Parameter("period", "s", null=600.0, scale=600.0, lower=1.0, upper=1.0e5),
     )
-    sentence = "ranges follow the temperature"
+    sentence = "ranges change with the temperature"
     formula = "µ + coefficient · (T − reference); T − reference = swing · sin(2π t / period) where T is unknown"
     source = "assumed; 0.1-1 mm/K"
     empirical = True

@@ -12,6 +12,7 @@ import numpy as np
 
 from kurumaisu.errors import Error
 from kurumaisu.geometry import attached
+from kurumaisu.names import hint
 from kurumaisu.sim.sensors.battery import Battery, BatterySettings
 from kurumaisu.sim.sensors.bumper import BumperSensor, BumperSettings
 from kurumaisu.sim.sensors.camera import CameraSensor, Scenery, mounted_eye
@@ -82,7 +83,10 @@ class SensorSuite:
                 i for i, robot in enumerate(robots) if settings.robot == EVERY_ROBOT or robot.name == settings.robot
             ]
             if not carriers and settings.robot != EVERY_ROBOT:
-                raise Error(f"sensor {settings.name}: robot: the world has no position of this name: {settings.robot}")
+                near = hint(settings.robot, [robot.name for robot in robots if robot.name])
+                raise Error(
+                    f"sensor {settings.name}: robot: the world has no position of this name: {settings.robot}; {near}"
+                )
             rows: IntArray = np.array(carriers, dtype=np.int64)
             bodies: IntArray = np.array([robots[i].index for i in carriers], dtype=np.int64)
             roots: IntArray = np.array([robots[i].root for i in carriers], dtype=np.int64)

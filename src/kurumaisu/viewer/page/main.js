@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Puts the parts together.
 
-import {Bag} from "./bag.js";
-import {BodyPanel} from "./body_panel.js";
-import {Picture} from "./canvas.js";
-import {answer} from "./channel.js";
-import {Connection} from "./connection.js";
-import {byId} from "./dom.js";
-import {Edit} from "./edit.js";
-import {Effects} from "./effects.js";
-import {download} from "./files.js";
-import {keyTable, listen} from "./keys.js";
-import {Options} from "./options.js";
-import {Permit} from "./permit.js";
-import {Places} from "./places.js";
-import {Pointer} from "./pointer.js";
-import {Recording} from "./recording.js";
-import {Residuals} from "./residuals.js";
-import {Scene} from "./scene.js";
-import {setUpHelp, setUpTabs, setUpTheme} from "./shell.js";
-import {Status} from "./status.js";
-import {Stick} from "./stick.js";
-import {Transport} from "./transport.js";
+import {Bag} from "./panels/playback.js";
+import {BodyPanel} from "./panels/body.js";
+import {Picture} from "./picture/canvas.js";
+import {answer} from "./common/channel.js";
+import {Connection} from "./server/connection.js";
+import {byId} from "./common/dom.js";
+import {Edit} from "./picture/edit.js";
+import {Effects} from "./panels/effects.js";
+import {download} from "./common/download.js";
+import {keyTable, listen} from "./panels/keys.js";
+import {Options} from "./panels/options.js";
+import {Permit} from "./server/permit.js";
+import {Places} from "./report/places.js";
+import {Pointer} from "./picture/pointer.js";
+import {Recording} from "./panels/recording.js";
+import {Residuals} from "./panels/residuals.js";
+import {Scene} from "./scene/scene.js";
+import {setUpHelp, setUpTabs, setUpTheme} from "./panels/shell.js";
+import {Status} from "./panels/status.js";
+import {Stick} from "./panels/stick.js";
+import {Transport} from "./panels/transport.js";
 
 /** Take the one-time secret out of the address: it must not stay in the history. */
 function takeToken() {

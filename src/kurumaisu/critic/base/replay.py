@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Simulate the very run that was measured, with the plant that the simulator runs."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from kurumaisu import effects, geometry
+from kurumaisu.critic.base.drive import GRID, Drive
+from kurumaisu.critic.values.recording import Recording, Series
+from kurumaisu.params import EffectSetting, Model, follow_commands, load_model
+from kurumaisu.sim import plant
+from kurumaisu.types import FloatArray
+
+_ROOM = 3 * 2**25  # bytes of increments that are kept: for ten minutes of driving, nearly all that are asked for again
+_UNUSED = np.random.default_rng(0)  # nothing is drawn: effects that draw are left out
+
+
+def model_of(recording: Recording, model_file: Path, *, assume_law: bool) -> Model:
+    """Return the model that a recording is compared with.
+
+    It is "velocity follows command" where no voltages were recorded and commands ask for more than those of the model
+    can say: that is a robot of another make. Else, and where the recording names a model or assume_law says that the
+    robot has the model's voltage law, commands become voltages by that law, and rates again: the same, until something
+    happens to the voltages.
+    """
+    model = load_model(model_file)
+    if assume_law or recording.model is not None or any(run.voltage is not None for run in recording.runs):
+        return model
+    commands = [run.command for run in recording.runs if run.command is not None]
+    return model if all(_sayable(model, command) for command in commands) else follow_commands(model)
+
+
+def _sayable(model: Model, command: Series) -> bool:
+    """Tell whether all that is commanded lies within the model's voltages."""
+    axes = (("v", model.translation, model.voltages.translation), ("w", model.steering, model.voltages.steering))
+    for name, law, channel in axes:
+        rates = command.column(name)
+        volts = law.volts(rates[np.isfinite(rates)])
+        if ((volts < channel.min) | (volts > channel.max)).any():
+            return False
+    return True
+
+
+def extend(model: Model, settings: Sequence[EffectSetting]) -> Model:
+    """Return the model with these effects in place of its own of the same id."""
+    whole = completed(model, settings)
+    given = {setting.id for setting in whole}
+    return replace(model, effects=(*(own for own in model.effects if own.id not in given), *whole))
+
+
+def completed(model: Model, settings: Sequence[EffectSetting]) -> tuple[EffectSetting, ...]:
+    """Return the effects with every parameter: those that are not given as the model has them, or absent."""
+    own = {setting.id: setting.parameters for setting in model.effects}
+    whole = []
+    for setting in settings:
+        parameters = {p.name: p.null for p in effects.by_id(setting.id).parameters}
+        whole.append(EffectSetting(setting.id, {**parameters, **own.get(setting.id, {}), **setting.parameters}))
+    return tuple(whole)
+
+
+def motion(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> effects.Motion:
+    """Return the motion of the simulated chair on the drive's grid, without random effects."""
+    return _driven(drive, model, settings)[1]
+
+
+def odometry(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[FloatArray, FloatArray]:
+    """Return times (n,) [s] and poses (n, 3) of the simulated chair itself, whatever a reference would see of it."""
+    poses = plant.path(_driven(drive, model, settings)[1], np.zeros(3))
+    return drive.start + GRID * np.arange(len(poses)), poses
+
+
+def path(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
+    """Return the simulated reference at its times, (m + 1, 3), starting at the first measured pose."""
+    at = seen(drive, model, settings)
+    return geometry.compose(drive.poses[0], geometry.between(at[0], at))
+
+
+def increments(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
+    """Return the simulated body increments between the reference's times, (m, 3)."""
+    at = seen(drive, model, settings)
+    return geometry.between(at[:-1], at[1:])
+
+
+class Increments:
+    """Simulated body increments of drives by one model: a search asks for many of them again and again."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._known: OrderedDict[Hashable, tuple[Drive, FloatArray]] = OrderedDict()
+        self._room = _ROOM
+
+    def of(self, drive: Drive, settings: Sequence[EffectSetting]) -> FloatArray:
+        """Return the increments with these effects, (m, 3), not to be written to."""
+        whole = ((each.id, tuple(sorted(each.parameters.items()))) for each in completed(self._model, settings))
+        key = (id(drive), *whole)
+        if key in self._known:
+            self._known.move_to_end(key)
+            return self._known[key][1]
+        found = increments(drive, self._model, settings)
+        found.flags.writeable = False
+        self._known[key] = drive, found
+        self._room -= found.nbytes
+        while self._room < 0:
+            self._room += self._known.popitem(last=False)[1][1].nbytes
+        return found
+
+
+def seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
+    """Return what the reference measures of the simulated chair at its times, (m + 1, 3), in a frame of its own."""
+    chair, motion = _driven(drive, model, settings)
+    poses = plant.path(motion, np.zeros(3))
+    if not chair.effects.reference:
+        below, share = drive.places
+        low, high = poses.take(below, axis=0), poses.take(below + 1, axis=0)
+        return np.asarray(low + share[:, None] * (high - low))
+    # A clock that runs fast is right at the start, of the drive or of the first one.
+    started = drive.known.get(effects.RECORDING_TIME)
+    start = 0.0 if started is None else float(started[0])
+    times = start + GRID * np.arange(len(poses))
+    measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses), start))
+    return geometry.interpolate(drive.start + (measured.times - start), measured.poses, drive.times)
+
+
+def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:
+    extended = extend(model, settings)
+    mean = replace(extended, effects=tuple(own for own in extended.effects if own.id not in _random()))
+    chair = plant.Plant(mean, GRID, _UNUSED)
+    # The grid begins at the first pose, or a little before it, unless the drive is a part of a longer one.
+    heading = float(drive.poses[0, 2]) if drive.heading is None else drive.heading
+    return chair, chair.from_rates(drive.v, drive.w, heading, drive.known)
+
+
+@cache
+def _random() -> frozenset[str]:
+    return frozenset(effect.id for effect in effects.ALL if effect.random)

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turn rows as they were recorded into a Series, and say in words whatever was wrong with them.
+
+Mended: rows out of order are sorted, repeated rows and rows that are not numbers are dropped. It is always
+noted; and where there is more of it than a delivery hiccup explains, the recording is unfit for a verdict.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kurumaisu.critic.values.recording import Series
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+# More than this share of rows out of order, contradictory or not numbers is no hiccup [1].
+HICCUP_SHARE = 0.05
+# A stamp further back than this was not delayed on its way: the clock was set [s].
+HICCUP_TIME = 0.5
+# Between two samples, a turn above this may as well have been one the other way round [rad].
+LARGEST_TURN = 2.5
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What was found wrong, in words: notes holds all, invalid those that forbid a verdict on causes."""
+
+    notes: list[str] = field(default_factory=list)
+    invalid: list[str] = field(default_factory=list)
+
+    def add(self, message: str, *, fatal: bool = False) -> None:
+        """Record one finding."""
+        self.notes.append(message)
+        if fatal:
+            self.invalid.append(message)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows in the order of the file: t (n,) [s], values (n, m).
+
+    where: file or topic; rows are called `row` and counted from `first`, as an editor would show them.
+    """
+
+    where: str
+    t: FloatArray
+    values: FloatArray
+    columns: tuple[str, ...]
+    row: str
+    first: int
+
+    def place(self, index: int) -> str:
+        """Return where a row is, in words."""
+        return f"{self.row} {index + self.first}, t = {self.t[index]:.6g} s"
+
+    def select(self, index: BoolArray | IntArray) -> Series:
+        """Return chosen rows as a Series."""
+        return Series(self.t[index], self.values[index], self.columns)
+
+
+def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | None:
+    """Return the rows in the order of time, or None when none is left.
+
+    ranges: values are laser ranges, for which nan and inf have a meaning; any other value must be finite.
+    """
+    keep = np.isfinite(table.t) & (ranges | np.isfinite(table.values).all(axis=1))
+    _report(table, ~keep, faults, "not a number: dropped", "has no number in most rows", 0.5)
+    kept = np.flatnonzero(keep)
+    kept = kept[~_repeated(table, kept, faults)]
+    _out_of_order(table, kept, faults)
+    if not len(kept):
+        faults.add(f"{table.where}: has no rows")
+        return None
+    series = table.select(kept[np.argsort(table.t[kept], kind="stable")])
+    if ranges:
+        return _ranges(table.where, series, faults)
+    return _unwrapped(table.where, series, faults) if "theta" in table.columns else series
+
+
+def _report(table: Table, bad: BoolArray, faults: Faults, noted: str, fatal: str, share: float = HICCUP_SHARE) -> None:
+    count = int(bad.sum())
+    if count:
+        faults.add(f"{table.where}: {_rows(count)} {noted} (first: {table.place(int(np.argmax(bad)))})")
+    if count > share * len(bad):
+        faults.add(f"{table.where}: {fatal} ({count} of {len(bad)})", fatal=True)
+
+
+def _repeated(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
+    """Return which of the kept rows repeat the time of an earlier one, (k,)."""
+    order = kept[np.argsort(table.t[kept], kind="stable")]
+    t = table.t[order]
+    starts = np.r_[True, np.diff(t) > 0] if len(t) else np.zeros(0, dtype=bool)
+    first = order[np.maximum.accumulate(np.where(starts, np.arange(len(t)), 0))]
+    a, b = table.values[order], table.values[first]
+    equal = ((a == b) | (np.isnan(a) & np.isnan(b))).all(axis=1)
+    same, conflict = np.zeros(len(table.t), dtype=bool), np.zeros(len(table.t), dtype=bool)
+    same[order] = ~starts & equal
+    conflict[order] = ~starts & ~equal
+    _report(table, same, faults, "repeated: the first is kept", "repeats its rows: drop the copies")
+    _report(table, conflict, faults, "at a time already given: the first is kept", "has different rows for one time")
+    repeated: BoolArray = (same | conflict)[kept]
+    return repeated
+
+
+def _out_of_order(table: Table, kept: IntArray, faults: Faults) -> None:
+    steps = np.diff(table.t[kept])
+    back = np.flatnonzero(steps < 0)
+    if not len(back):
+        return
+    furthest = float(-steps.min())
+    fatal = len(back) > HICCUP_SHARE * len(steps) or furthest > HICCUP_TIME
+    times = "once" if len(back) == 1 else f"{len(back)} times"
+    ending = "the clock cannot be trusted" if fatal else "rows sorted"
+    faults.add(
+        f"{table.where}: time goes backward {times}, by up to {furthest:.3g} s "
+        f"(first: {table.place(int(kept[back[0] + 1]))}): {ending}",
+        fatal=fatal,
+    )
+
+
+def _ranges(where: str, series: Series, faults: Faults) -> Series:
+    values = np.where(series.values == -np.inf, np.nan, series.values)
+    senseless = values <= 0
+    if senseless.any():
+        faults.add(f"{where}: {int(senseless.sum())} ranges of 0 or less are taken as invalid")
+    values = np.where(senseless, np.nan, values)
+    if not np.isfinite(values).any():
+        faults.add(f"{where}: no reading is valid")
+    return Series(series.t, values, series.columns)
+
+
+def _unwrapped(where: str, series: Series, faults: Faults) -> Series:
+    """Unwrap theta where it was wrapped; a column that goes past one turn counts the turns itself."""
+    column = series.columns.index("theta")
+    theta = series.values[:, column]
+    steps = np.abs(np.diff(theta))
+    if ((steps > 300) & (steps < 420)).any():
+        faults.add(f"{where}: theta jumps by about 360: degrees, not radians", fatal=True)
+        return series
+    if np.abs(theta).max() <= 2 * np.pi + 1e-6:
+        theta = np.unwrap(theta)
+        turn = np.abs(np.diff(theta))
+        doubtful = np.flatnonzero(turn > LARGEST_TURN)
+        if len(doubtful):
+            faults.add(
+                f"{where}: theta turns by more than {LARGEST_TURN:g} rad between samples "
+                f"{_times(len(doubtful))} (first: t = {series.t[doubtful[0]]:.6g} s): the direction is a guess"
+            )
+        # The same heading reads the same whatever multiple of a turn the file started from.
+        theta = theta - 2 * np.pi * np.floor((theta[0] + np.pi) / (2 * np.pi))
+    values = series.values.copy()
+    values[:, column] = theta
+    return Series(series.t, values, series.columns)
+
+
+def _rows(count: int) -> str:
+    return "1 row is" if count == 1 else f"{count} rows are"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"

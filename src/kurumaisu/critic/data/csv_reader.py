@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Read a run from a folder of CSV tables, each with one header line."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.values.recording import Run, Series, run_of_parts
+from kurumaisu.errors import Error
+from kurumaisu.types import FloatArray
+
+# Columns beside t that a table must have; scan and covariate have as many as there are.
+REQUIRED: dict[str, tuple[str, ...]] = {
+    "command": ("v", "w"),
+    "voltage": ("v_f", "v_s"),
+    "pose": ("x", "y", "theta"),
+    "odom": ("x", "y", "theta", "v", "w"),
+    "scan": (),
+    "covariate": (),
+}
+# Columns that belong to a table when it has them; any other one is a covariate.
+OPTIONAL: dict[str, tuple[str, ...]] = {"voltage": ("v", "w")}
+QUERY = "query"
+
+
+def is_csv_run(folder: Path) -> bool:
+    """Tell whether a folder holds a table of a run."""
+    return any((folder / f"{name}.csv").is_file() for name in (*REQUIRED, QUERY))
+
+
+def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
+    """Read the tables of a folder; a table that is not there is a missing part.
+
+    Raise Error naming file, line and column for what cannot be read.
+    """
+    for path in sorted(folder.glob("*.csv")):
+        if path.stem not in (*REQUIRED, QUERY):
+            known = ", ".join(f"{table}.csv" for table in (*REQUIRED, QUERY))
+            faults.add(f"{name}/{path.name}: not read: its name is none of {known}")
+    parts: dict[str, Series | None] = {}
+    covariates: dict[str, Series] = {}
+    for part in REQUIRED:
+        path = folder / f"{part}.csv"
+        if path.is_file():
+            parts[part], more = _part(path, f"{name}/{path.name}", part, faults)
+            _merge(covariates, more, path)
+    query = folder / f"{QUERY}.csv"
+    return replace(run_of_parts(name, parts, covariates), queries=read_queries(query) if query.is_file() else None)
+
+
+def read_queries(path: Path) -> FloatArray:
+    """Read query.csv into (q, 2) of t0, t1 [s]. Raise Error naming file and line for t1 before t0."""
+    columns, rows, _ = _read(path, ("t0", "t1"))
+    return check_queries(str(path), rows[:, [columns.index("t0"), columns.index("t1")]], first=2)
+
+
+def check_queries(where: str, queries: FloatArray, first: int = 0) -> FloatArray:
+    """Return queries (q, 2). Raise Error naming where, and the row counted from `first`, for t1 before t0."""
+    if queries.shape[1] != 2:
+        raise Error(f"{where}: must have the columns t0, t1; it has {queries.shape[1]} columns")
+    bad = np.flatnonzero(~(queries[:, 1] >= queries[:, 0]) | ~np.isfinite(queries).all(axis=1))
+    if len(bad):
+        t0, t1 = queries[bad[0]]
+        raise Error(f"{where}:{bad[0] + first}: t1 must not be before t0: {t0:g}, {t1:g}")
+    return queries
+
+
+def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | None, dict[str, Series]]:
+    """Return the part itself and the covariates among its columns."""
+    columns, rows, dropped = _read(path, ("t", *REQUIRED[part]))
+    for column in dropped:
+        faults.add(f"{where}: column {column!r} is not read: it has no numbers")
+    optional = tuple(name for name in OPTIONAL.get(part, ()) if name in columns)
+    own = (*REQUIRED[part], *optional)
+    if part == "scan":
+        own = tuple(f"r{i}" for i in range(sum(_is_beam(name) for name in columns)))
+        missing = [name for name in own if name not in columns]
+        if missing or not own:
+            raise Error(f"{path}:1: column {missing[0] if missing else 'r0'!r} is missing")
+    t = rows[:, columns.index("t")]
+    series = None
+    if own:
+        values = rows[:, [columns.index(name) for name in own]]
+        series = clean(Table(where, t, values, own, "line", 2), faults, ranges=part == "scan")
+    covariates = {}
+    for name in columns:
+        if name not in ("t", *own):
+            covariate = _covariate(where, name, t, rows[:, columns.index(name)], faults)
+            if covariate is not None:
+                covariates[name] = covariate
+    return series, covariates
+
+
+def _covariate(where: str, name: str, t: FloatArray, values: FloatArray, faults: Faults) -> Series | None:
+    """Return one column without its empty cells, or None when nothing is left."""
+    given = ~np.isnan(values)
+    # Line numbers would be off by the empty cells, so rows are counted instead.
+    return clean(Table(f"{where}: {name}", t[given], values[given, None], (name,), "value", 1), faults)
+
+
+def _merge(covariates: dict[str, Series], more: dict[str, Series], path: Path) -> None:
+    for name, series in more.items():
+        if name in covariates:
+            raise Error(f"{path}:1: column {name!r} is a covariate that another table of the run has too")
+        covariates[name] = series
+
+
+def _is_beam(name: str) -> bool:
+    return name.startswith("r") and name[1:].isdecimal()
+
+
+def _read(path: Path, required: tuple[str, ...]) -> tuple[list[str], FloatArray, list[str]]:
+    """Return column names, rows (n, columns), and the names of columns without any number, left out."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            columns = [name.strip() for name in next(csv.reader(stream), [])]
+            _check_header(path, columns, required)
+            body = stream.read()
+    except OSError as error:
+        raise Error(f"{path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise Error(f"{path}: is not UTF-8 text") from error
+    if not body.strip():
+        return columns, np.empty((0, len(columns))), []
+    try:
+        rows = np.loadtxt(io.StringIO(body), delimiter=",", comments=None, ndmin=2)
+    except ValueError:
+        return _read_cells(path, columns, required)
+    return (columns, rows, []) if rows.shape[1] == len(columns) else _read_cells(path, columns, required)
+
+
+def _check_header(path: Path, columns: list[str], required: tuple[str, ...]) -> None:
+    for name in required:
+        if name not in columns:
+            raise Error(f"{path}:1: column {name!r} is missing; there are: {', '.join(columns) or 'none'}")
+    for name in columns:
+        if not name or columns.count(name) > 1:
+            raise Error(f"{path}:1: column {name!r} {'occurs twice' if name else 'has no name'}")
+
+
+def _read_cells(path: Path, columns: list[str], required: tuple[str, ...]) -> tuple[list[str], FloatArray, list[str]]:
+    """Read cell by cell: slow, but finds the fault, and takes quotes and the empty cells of covariates."""
+    cells, lines = [], []
+    with path.open(encoding="utf-8-sig", newline="") as stream:
+        reader = csv.reader(stream)
+        next(reader)
+        for row in reader:
+            if row and len(row) != len(columns):
+                raise Error(f"{path}:{reader.line_num}: {len(row)} cells under {len(columns)} columns")
+            if row:
+                cells.append([cell.strip() for cell in row])
+                lines.append(reader.line_num)
+    kept, dropped = [], []
+    values = np.empty((len(cells), len(columns)))
+    for i, name in enumerate(columns):
+        blank = name not in required and not _is_beam(name)
+        column = [row[i] for row in cells]
+        numbers = [_number(cell, blank) for cell in column]
+        bad = [k for k, number in enumerate(numbers) if number is None]
+        if bad and blank and all(number is None or np.isnan(number) for number in numbers):
+            dropped.append(name)
+        elif bad:
+            raise Error(f"{path}:{lines[bad[0]]}: column {name!r}: is not a number: {column[bad[0]]!r}")
+        else:
+            kept.append(i)
+            values[:, i] = np.asarray(numbers, dtype=np.float64)
+    return [columns[i] for i in kept], values[:, kept], dropped
+
+
+def _number(cell: str, blank: bool) -> float | None:
+    if blank and not cell:
+        return float("nan")
+    try:
+        return float(cell)
+    except ValueError:
+        return None

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What each message type says, as a row of numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from kurumaisu.critic.values.recording import Fan
+
+# Parts of a run that have a type of their own; any other topic is a covariate.
+PARTS = ("command", "voltage", "pose", "odom", "scan")
+COLUMNS = {
+    "command": ("v", "w"),
+    "voltage": ("v_f", "v_s", "v", "w"),
+    "pose": ("x", "y", "theta"),
+    "odom": ("x", "y", "theta", "v", "w"),
+}
+# The field of a message that gives the covariate its plain name; others are called topic.field.
+MAIN_FIELD = {
+    "sensor_msgs/msg/BatteryState": "voltage",
+    "sensor_msgs/msg/Temperature": "temperature",
+}
+# Ranges are float32 in a bag: rounding to this many decimals gives back what the sensor reported in metres.
+RANGE_DECIMALS = 6
+
+Converter = Callable[[Any], Any]
+
+
+def converter(part: str, kind: str) -> Converter | None:
+    """Return the function from a message to its row for a part of a run, None where the type does not fit."""
+    if part not in PARTS:
+        return lambda message: _numbers(message, MAIN_FIELD.get(kind, "data"))
+    return _CONVERTERS[part].get(kind)
+
+
+def accepted(part: str) -> list[str]:
+    """Return the message types that a part may have."""
+    return list(_CONVERTERS[part])
+
+
+def _twist(message: Any) -> tuple[float, ...]:
+    return message.linear.x, message.angular.z
+
+
+def _pose(pose: Any) -> tuple[float, ...]:
+    return pose.position.x, pose.position.y, _yaw(pose.orientation)
+
+
+def _yaw(q: Any) -> float:
+    """Return the rotation about z [rad], nan for a quaternion that is none."""
+    if abs(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w - 1.0) > 0.1:
+        return math.nan
+    return math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
+
+
+def _scan(message: Any) -> tuple[Fan, Any, Any]:
+    """Return the fan, its ranges, and its intensities, None where there is not one for each."""
+    ranges = np.round(np.asarray(message.ranges, dtype=np.float64), RANGE_DECIMALS)
+    # REP 117 for drivers that predate it: below the limit there is no reading, above it no return.
+    ranges[(ranges < round(message.range_min, RANGE_DECIMALS)) | (ranges <= 0)] = np.nan
+    if message.range_max > message.range_min:
+        ranges[ranges > round(message.range_max, RANGE_DECIMALS)] = np.inf
+    numbers = (message.angle_min, message.angle_increment, message.time_increment, message.scan_time)
+    angle_min, increment, time_increment, scan_time = (float(number) for number in numbers)
+    intensities = message.intensities if len(message.intensities) == len(ranges) else None
+    return Fan(angle_min, increment, len(ranges), time_increment, scan_time), ranges, intensities
+
+
+def _numbers(message: Any, main: str) -> dict[str, float]:
+    """Return the numeric fields of a message by name; the main one is called ''."""
+    found = dict(_leaves(message, ""))
+    return {("" if name == main else name): value for name, value in found.items()}
+
+
+def _leaves(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
+    for item in fields(message):
+        value = getattr(message, item.name)
+        # rosbags gives a message's constants as fields; ROS writes their names in capitals.
+        if item.name == "header" or item.name.isupper() or type(value).__name__.startswith("builtin_interfaces"):
+            continue
+        if isinstance(value, (bool, int, float, np.number)):
+            yield f"{prefix}{item.name}", float(value)
+        elif is_dataclass(value):
+            yield from _leaves(value, f"{prefix}{item.name}.")
+
+
+_CONVERTERS: dict[str, dict[str, Converter]] = {
+    "command": {
+        "geometry_msgs/msg/Twist": _twist,
+        "geometry_msgs/msg/TwistStamped": lambda m: _twist(m.twist),
+    },
+    "voltage": {"kurumaisu/msg/Voltages": lambda m: (m.translation, m.steering, m.v, m.w)},
+    "pose": {
+        "nav_msgs/msg/Odometry": lambda m: _pose(m.pose.pose),
+        "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
+        "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
+    },
+    "odom": {"nav_msgs/msg/Odometry": lambda m: (*_pose(m.pose.pose), *_twist(m.twist.twist))},
+    "scan": {"sensor_msgs/msg/LaserScan": _scan},
+}

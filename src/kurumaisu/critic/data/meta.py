@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""meta.yaml of a recording: every key may be left out, none may be misspelt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from kurumaisu import settings
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.values.recording import LaserMount, Recording, Run
+from kurumaisu.errors import Error
+from kurumaisu.params import shipped
+
+
+@dataclass(frozen=True)
+class Meta:
+    """What meta.yaml says. train, test: names of runs, empty where left out; topics: topic of each part."""
+
+    model: Path | None = None
+    world: Path | None = None
+    laser: LaserMount | None = None
+    truth: tuple[float, float] | None = None
+    train: tuple[str, ...] = ()
+    test: tuple[str, ...] = ()
+    topics: dict[str, str] = field(default_factory=dict)
+
+
+def recording_of_meta(
+    name: str, runs: Sequence[Run], meta: Meta, faults: Faults, *, train: tuple[str, ...], test: tuple[str, ...]
+) -> Recording:
+    """Return runs with what meta.yaml says of them; train, test: names of runs; faults: what was found wrong."""
+    return Recording(
+        name=name,
+        runs=tuple(runs),
+        train=train,
+        test=test,
+        model=meta.model,
+        world=meta.world,
+        laser=meta.laser,
+        truth=meta.truth,
+        problems=tuple(faults.notes),
+        invalid=tuple(faults.invalid),
+    )
+
+
+def read_meta(path: Path) -> Meta:
+    """Read meta.yaml; a file named in it lies beside it. A model may also be one of the package's own.
+
+    Raise Error naming file and key.
+    """
+    top = settings.load(path)
+    meta = Meta(
+        model=_file(top, "model", path.parent, "launch") if "model" in top else None,
+        world=_file(top, "world", path.parent, "") if "world" in top else None,
+        laser=_laser(top.section("laser")) if "laser" in top else None,
+        truth=_truth(top.section("truth")) if "truth" in top else None,
+        train=_names(top, "train") if "train" in top else (),
+        test=_names(top, "test") if "test" in top else (),
+        topics=_topics(top.section("topics")) if "topics" in top else {},
+    )
+    top.end()
+    both = sorted(set(meta.train) & set(meta.test))
+    if both:
+        raise top.error("test", f"{both[0]!r} is in train too: a run that was fitted cannot judge")
+    return meta
+
+
+def _file(top: settings.Section, key: str, folder: Path, package_folder: str) -> Path:
+    name = top.text(key)
+    path = folder / name
+    if path.is_file():
+        return path
+    if package_folder and Path(name).name == name:
+        try:
+            return shipped(f"{package_folder}/{name}")
+        except Error:
+            pass
+    raise top.error(key, f"is not a file: {path}")
+
+
+def _laser(section: settings.Section) -> LaserMount:
+    numbers = {name: section.number(name) for name in ("x", "y", "yaw", "angle_min", "angle_increment")}
+    laser = LaserMount(**numbers, beams=section.integer("beams", at_least=1))
+    section.end()
+    return laser
+
+
+def _truth(section: settings.Section) -> tuple[float, float]:
+    truth = section.number("position_sd", at_least=0), section.number("heading_sd", at_least=0)
+    section.end()
+    return truth
+
+
+def _names(top: settings.Section, key: str) -> tuple[str, ...]:
+    names = top.take(key)
+    if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
+        raise top.error(key, f"must be a list of names of runs: {names!r}")
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise top.error(key, f"{twice[0]!r} is listed twice")
+    return tuple(names)
+
+
+def _topics(section: settings.Section) -> dict[str, str]:
+    return {name: section.text(name) for name in section.names()}

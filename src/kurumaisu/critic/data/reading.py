@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Read a recording, whatever it is made of: bags, CSV tables, or an MRPT rawlog."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from kurumaisu.critic.data.bag_parts import is_split
+from kurumaisu.critic.data.bag_reader import PutAside, read_bag_run, resolve
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.consistency import check_run, usable
+from kurumaisu.critic.data.csv_reader import QUERY, is_csv_run, read_csv_run, read_queries
+from kurumaisu.critic.data.meta import Meta, read_meta, recording_of_meta
+from kurumaisu.critic.data.rawlog_reader import is_rawlog, rawlog_name, read_rawlog_run
+from kurumaisu.critic.values.recording import LaserMount, Recording, Run
+from kurumaisu.critic.values.selection import matching
+from kurumaisu.errors import Error
+from kurumaisu.names import hint
+
+
+def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
+    """Read a folder of runs, one folder of CSV tables, one bag or one rawlog.
+
+    NAME.bag may have been split into NAME_0.bag, NAME_1.bag, ...
+    wanted: names of runs, or patterns like drive_*; only those are read and used; empty takes all.
+    Raise Error naming file, line and column, topic or key for anything that cannot be read, and saying what
+    is missing when nothing can be done with what was read.
+    """
+    if not path.exists() and not is_split(path):
+        raise Error(f"{path}: there is no such file or folder")
+    meta_file = path / "meta.yaml"
+    meta = read_meta(meta_file) if meta_file.is_file() else Meta()
+    faults = Faults()
+    laser = meta.laser
+    runs = []
+    for source in chosen(sources(path), wanted):
+        run, mount = read_run(source, meta, faults)
+        laser = laser or mount
+        check_run(run, laser, faults)
+        runs.append(run)
+    require_use(path, runs, meta, faults)
+    train, test = split(meta_file, meta, [run.name for run in runs], partly=bool(wanted))
+    name = path.resolve().name if path.is_dir() else path.resolve().stem
+    return recording_of_meta(name, runs, replace(meta, laser=laser), faults, train=train, test=test)
+
+
+def sources(path: Path) -> list[Path]:
+    """Return what each run is read from: a bag, a rawlog, or a folder of tables."""
+    if not path.is_dir():
+        if path.suffix != ".bag" and not is_rawlog(path):
+            raise Error(f"{path}: is not a recording: give a folder, a .bag or a .rawlog")
+        return [path]
+    inside = sorted(path.iterdir())
+    bags = [item for item in inside if item.suffix == ".bag" or is_rawlog(item)]
+    folders = [item for item in inside if item.is_dir() and is_csv_run(item)]
+    if is_csv_run(path):
+        if bags or folders:
+            raise Error(f"{path}: holds both tables and runs ({(bags + folders)[0].name}): one or the other")
+        return [path]
+    # The queries of a bag's run lie in a folder of its name, alone.
+    names = [bag.stem for bag in bags]
+    for folder in [folder for folder in folders if folder.name in names]:
+        others = [item.name for item in folder.glob("*.csv") if item.stem != QUERY]
+        if others:
+            raise Error(f"{folder / others[0]}: the run {folder.name} also exists as a bag")
+        folders.remove(folder)
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise Error(f"{path}: the run {twice[0]} exists twice")
+    if not bags and not folders:
+        raise Error(f"{path}: holds no run: neither a .bag, nor a .rawlog, nor a folder with tables like pose.csv")
+    return sorted(bags + folders, key=lambda item: item.stem)
+
+
+def read_run(
+    source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None = None
+) -> tuple[Run, LaserMount | None]:
+    """Return a run, and the laser's mounting where the file itself states it; put_aside: of a bag, as read_bag_run."""
+    if source.is_dir():
+        return read_csv_run(source, source.resolve().name, faults), None
+    if is_rawlog(source):
+        return read_rawlog_run(source, faults)
+    run = read_bag_run(source, meta.topics, faults, put_aside)
+    queries = source.with_suffix("") / f"{QUERY}.csv"
+    return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
+
+
+def chosen(sources: list[Path], wanted: Sequence[str]) -> list[Path]:
+    """Return the sources of the runs that are wanted, in their own order."""
+    if not wanted:
+        return sources
+    names = [_run_name(source) for source in sources]
+    kept = {name for pattern in wanted for name in matching("--runs", pattern, names, "run")}
+    return [source for source, name in zip(sources, names, strict=True) if name in kept]
+
+
+def _run_name(source: Path) -> str:
+    """Return the name that a run of this source has."""
+    if source.is_dir():
+        return source.resolve().name
+    return rawlog_name(source) if is_rawlog(source) else source.stem
+
+
+def split(
+    meta_file: Path | str, meta: Meta, names: list[str], *, partly: bool
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the runs to fit and the runs to judge by; partly: not all runs were read."""
+    for key, chosen in (("train", meta.train), ("test", meta.test)):
+        for name in chosen if not partly else ():
+            if name not in names:
+                raise Error(f"{meta_file}: {key}: there is no run {name!r}; {hint(name, names)}")
+    train = tuple(name for name in meta.train or names if name in names and name not in meta.test)
+    if not train:
+        where = "--runs" if partly else f"{meta_file}: train"
+        raise Error(f"{where}: no run is left to fit: all are in test")
+    return train, tuple(name for name in meta.test if name in names)
+
+
+def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
+    """Raise Error unless a run says something about base or laser; note the runs that do not."""
+    useless = [run for run in runs if not usable(run)]
+    told = {f"{run.name}: is of no use: it has {_has(run)}" for run in useless}
+    for words in sorted(told):
+        faults.add(words)
+    if len(useless) == len(runs):
+        topic = resolve(meta.topics)
+        raise Error(
+            f"{path}: nothing to criticise a model with: {runs[0].name} has {_has(runs[0])}. "
+            f"Needed are scans (scan.csv or {topic['scan']}), or commands or voltages "
+            f"(command.csv, voltage.csv, {topic['command']} or {topic['voltage']}) "
+            f"together with poses (pose.csv, odom.csv, {topic['pose']} or {topic['odom']})"
+            + "".join(f"; {note}" for note in faults.notes if note not in told)
+        )
+
+
+def _has(run: Run) -> str:
+    parts = [part for part in ("command", "voltage", "pose", "odom", "scan") if getattr(run, part) is not None]
+    return f"only {' and '.join(parts)}" if parts else "no part of a run"

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What effects on the laser are worth on scans that they were not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic.heldout.drive_gain import log_density_gain, rmse_gain
+from kurumaisu.critic.predict.motion import Forecast
+from kurumaisu.critic.predict.scan import Expected, Joint, ScanModel, scattered
+from kurumaisu.critic.predict.scan_cache import Expectations
+from kurumaisu.critic.predict.scan_poses import ScanPoses, chosen, joined
+from kurumaisu.critic.ranges.scans.beams import Shots, why_not_usable
+from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.verdict import ChannelGain
+from kurumaisu.params import EffectSetting, Model
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+CHANNEL = "range"
+_SCANS = 60  # of test runs
+_PARTS = 4  # of a single run, of which each is held out in turn
+_BLOCK = 5  # scans resampled as a whole: neighbours share the errors of their poses
+_OUTLIER = 5.0  # deviations
+_STEP = 0.05  # of a parameter, as a share of its distance from the null, to see what it does
+_VAGUE = 1.0  # sd of a parameter before it is fitted again, as a share of the same
+Settings = tuple[EffectSetting, ...]
+
+
+@dataclass(frozen=True)
+class Split:
+    """Scans to fit and scans to judge by, as rows of those known; apart: the latter did not find what extends."""
+
+    known: Expectations
+    train: IntArray
+    test: IntArray
+    apart: bool
+
+
+def measure(recording: Recording, model: Model, forecast: Forecast | None, settings: Settings) -> ChannelGain | None:
+    """Return the gain per reading of what extends a model's laser; None where there is nothing to measure it on.
+
+    forecast: of the base, None where nothing drove it; settings: the laser's and the map's.
+    """
+    if not settings or why_not_usable(recording) is not None:
+        return None
+    sums: tuple[list[FloatArray], list[FloatArray]] = ([], [])
+    squares: tuple[list[FloatArray], list[FloatArray]] = ([], [])
+    for split in _splits(recording, model, forecast):
+        refitted = settings if split.apart else _refit(split.known, split.train, settings)
+        sides = [_side(split, some, recording.truth) for some in ((), refitted)]
+        use = sides[0].counts & sides[1].counts
+        for i, side in enumerate(sides):
+            joint = Joint(side.what, side.error, use)
+            density = joint.log_density(side.trained.factors)
+            for rows in np.array_split(np.arange(len(use)), max(len(use) // _BLOCK, 1)):
+                if use[rows].any():
+                    share = density[rows].sum() / joint.count[rows].sum()
+                    sums[i].append(np.full(int(joint.count[rows].sum()), share))
+                    squares[i].append(side.error[rows][use[rows]] ** 2)
+    if not sums[0]:
+        return None
+    return ChannelGain(log_density_gain(*sums), rmse_gain(*squares, "m"))
+
+
+@dataclass(frozen=True)
+class _Side:
+    """Of one model on scans held out: how it was trained, what it expects, errors (k, b) [m]; those that count.
+
+    A reading counts that is away from edges and no outlier: nobody expects those.
+    """
+
+    trained: ScanModel
+    what: Expected
+    error: FloatArray
+    counts: BoolArray
+
+
+def _side(split: Split, settings: Settings, truth: tuple[float, float] | None) -> _Side:
+    measured = split.known.shots.measured
+    trained = scattered(split.known.rows(settings, split.train), measured[split.train], settings, truth)
+    what = split.known.rows(settings, split.test)
+    error = measured[split.test] - what.mean
+    with np.errstate(invalid="ignore"):
+        counts = what.place & (np.abs(error / trained.of(what)[1]) < _OUTLIER)
+    return _Side(trained, what, error, counts)
+
+
+def _splits(recording: Recording, model: Model, forecast: Forecast | None) -> Iterator[Split]:
+    places = ScanPoses(recording, model, forecast)
+    parts = places.trained()
+    tests = [run for run in recording.runs if run.name in recording.test and run.pose]
+    picked = [(run, *chosen(run, _SCANS)) for run in tests]
+    held = [places.of(run, stamps, measured) for run, stamps, measured in picked if len(stamps)]
+    if held:
+        sizes = len(joined(parts).stamps), len(joined(held).stamps)
+        rows = np.arange(sum(sizes))
+        yield Split(Expectations(joined([*parts, *held])), rows[: sizes[0]], rows[sizes[0] :], apart=True)
+        return
+    known = Expectations(joined(parts))
+    rows = np.arange(len(known.shots.stamps))
+    if len(parts) == 1:
+        cuts = [part for part in np.array_split(rows, _PARTS) if len(part)]
+    else:
+        cuts = np.split(rows, np.cumsum([len(part.stamps) for part in parts[:-1]]))
+    for test in cuts:
+        if len(test) < len(rows):
+            yield Split(known, np.setdiff1d(rows, test), test, apart=False)
+
+
+def refit(shots: Shots, settings: Settings) -> Settings:
+    """Return settings whose parameters are those that explain some shots best, near those given."""
+    return _refit(Expectations(shots), np.arange(len(shots.stamps)), settings)
+
+
+def _refit(known: Expectations, rows: IntArray, settings: Settings) -> Settings:
+    """Return the same for some of the scans."""
+    base, measured = known.rows(settings, rows), known.shots.measured[rows]
+    changes = []
+    for setting in settings:
+        for p in effects.by_id(setting.id).parameters:
+            size = abs(setting.parameters[p.name] - p.null)
+            if size == 0 or p.lower == p.upper:
+                continue
+            moved = _with(settings, {(setting.id, p.name): _inside(p, setting.parameters[p.name] + _STEP * size)})
+            change = known.rows(moved, rows).mean - base.mean
+            if np.any(change[base.place]):
+                changes.append(((setting.id, p.name), size, change))
+    if not changes:
+        return settings
+    error = measured - base.mean
+    sd = scattered(base, measured, settings, None).of(base)[1]
+    use = base.place & (np.abs(np.nan_to_num(error / sd, nan=np.inf)) < _OUTLIER)
+    keys, columns, sizes = [], [], []
+    for key, size, change in changes:
+        column = change[use] / sd[use]
+        if np.isfinite(column).all() and np.any(column):
+            keys.append(key)
+            columns.append(column / _STEP)
+            sizes.append(size)
+    if not keys:
+        return settings
+    j = np.column_stack(columns)
+    shares = np.linalg.solve(j.T @ j + np.eye(len(keys)) / _VAGUE**2, j.T @ (error / sd)[use])
+    at = {(setting.id, name): value for setting in settings for name, value in setting.parameters.items()}
+    bounds = {(s.id, p.name): p for s in settings for p in effects.by_id(s.id).parameters}
+    return _with(
+        settings,
+        {
+            key: _inside(bounds[key], at[key] + share * size)
+            for key, share, size in zip(keys, shares.tolist(), sizes, strict=True)
+        },
+    )
+
+
+def _inside(parameter: effects.Parameter, value: float) -> float:
+    return float(np.clip(value, parameter.lower, parameter.upper))
+
+
+def _with(settings: Settings, values: dict[tuple[str, str], float]) -> Settings:
+    return tuple(
+        EffectSetting(s.id, {name: values.get((s.id, name), value) for name, value in s.parameters.items()})
+        for s in settings
+    )

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One verdict of what the drives and what the scans say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from kurumaisu.critic.judge.sentences import named_causes, wrong_data
+from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.verdict import Kind, Verdict
+
+_NOTHING_SAID = "none"
+_PLACES = {"hit x": "x of the walls", "hit y": "y of the walls"}
+_TOLD = 4  # ids in a sentence; the verdict has them all
+
+
+def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
+    """Return a criticism of the base with what the scans say besides."""
+    if finding.wrong is not None:
+        verdict = Verdict("invalid_data", problems=(finding.wrong, *criticism.verdict.problems))
+        told = replace(criticism.story, headline=wrong_data([finding.wrong]), details=(finding.wrong,))
+        return replace(criticism, verdict=verdict, story=told, settings=())
+    criticism = _with_drive(criticism, finding)
+    verdict, story = criticism.verdict, criticism.story
+    if finding.refused is not None:
+        told = replace(story, details=(*story.details, _refusal(finding.refused), *finding.details))
+        if not story.noise and verdict.verdict == _NOTHING_SAID:  # nothing was said of the base either
+            told = replace(told, headline=f"No effect can be named: {finding.refused}.")
+        return replace(criticism, story=told)
+    kind: Kind = verdict.verdict
+    if finding.unknown:
+        kind = "unknown"
+    elif finding.causes and kind != "unknown":
+        kind = "named"
+    elif finding.confounded and kind == _NOTHING_SAID:
+        kind = "confounded"
+    joined = replace(
+        verdict,
+        verdict=kind,
+        causes=(*verdict.causes, *finding.causes),
+        confounded=(*verdict.confounded, *finding.confounded),
+        unknown=(*verdict.unknown, *finding.unknown),
+    )
+    words = headline(finding)
+    if words and verdict.verdict in ("named", "confounded", "unknown"):
+        words = f"{story.headline} {words}"
+    if finding.small and not words and kind == _NOTHING_SAID:
+        slight = f"{', '.join(finding.small)} is detectable in the scans, but too small to matter."
+        words = f"{story.headline} {slight}" if story.noise else f"No effect matters: {slight}"
+    shown = finding.pictures
+    told = replace(
+        story,
+        headline=words or story.headline,
+        details=(*story.details, *finding.details),
+        # The base's nearest suspect is of no interest where the scans have found something.
+        misfits=(*(() if verdict.verdict == _NOTHING_SAID and words else story.misfits), *shown.misfits),
+        comparisons=(*story.comparisons, *shown.comparisons),
+        rivals=(*story.rivals, *shown.rivals),
+        noise=(*story.noise, *shown.noise),
+    )
+    return replace(criticism, verdict=joined, story=told, settings=(*criticism.settings, *finding.settings))
+
+
+def _with_drive(criticism: Criticism, finding: LaserFinding) -> Criticism:
+    """Return a criticism that proposes what the scans need, where the drives need nothing."""
+    drive = finding.next_experiment
+    if drive is None or criticism.verdict.next_experiment is not None:
+        return criticism
+    first, more = ", ".join(drive.separates[:_TOLD]), len(drive.separates) - _TOLD
+    listed = f"{first} and {more} more" if more > 0 else first
+    sentence = f"critic experiment {drive.id} ({drive.seconds:.0f} s). Its scans tell {listed} from similar effects."
+    return replace(
+        criticism,
+        verdict=replace(criticism.verdict, next_experiment=drive),
+        story=replace(criticism.story, next_drive=criticism.story.next_drive or sentence),
+    )
+
+
+def headline(finding: LaserFinding) -> str:
+    """Return what the scans say in a sentence; empty when they say nothing."""
+    if finding.unknown:
+        first = finding.unknown[0]
+        over = _PLACES.get(first.covariate, first.covariate)
+        return f"No effect in the catalogue explains the error of the ranges. It follows the {over}: {first.shape}."
+    if finding.causes:
+        return named_causes(finding.causes)
+    if finding.confounded:
+        return f"The model lacks an effect, but these scans cannot tell which: {' or '.join(finding.confounded[0])}."
+    return ""
+
+
+def _refusal(why: str) -> str:
+    return f"laser not criticised: {why}."

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What was fitted as a model file has it, and as the causes of a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic.engine.search import NAMED
+from kurumaisu.critic.ranges.search import block_evidence
+from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
+from kurumaisu.critic.ranges.search.normal_equations import NormalEquations
+from kurumaisu.critic.scatter.scatter_search import ScatterEffect
+from kurumaisu.critic.values.verdict import NORMAL90, Cause, Estimate
+from kurumaisu.params import EffectSetting
+from kurumaisu.types import FloatArray
+
+# Share of the largest size that walls may be off by, beyond which all of them surely are of another map: of rooms about
+# as large, half the walls lie near those of the other one. The same where the map lacks a part of what is there, too.
+_ANOTHER, _ANOTHER_LACKS = 0.4, 0.2
+_LACKS = 0.05  # share of readings of that part, at least
+
+
+def estimates_of(setting: EffectSetting, sds: Mapping[str, float]) -> dict[str, Estimate]:
+    """Return what was fitted of an effect, with its 90 % intervals within bounds; sds: of the parameters fitted."""
+    out = {}
+    for p in effects.by_id(setting.id).parameters:
+        if p.name in sds:
+            value, half = setting.parameters[p.name], NORMAL90 * sds[p.name]
+            out[p.name] = Estimate(value, max(value - half, p.lower), min(value + half, p.upper), p.unit)
+    return out
+
+
+def of_block(
+    winner: SetWithBlock, coefficients: FloatArray, normal: NormalEquations
+) -> tuple[EffectSetting, dict[str, Estimate]]:
+    """Return a block as a model file has it, and the estimate of its size."""
+    free = winner.free
+    if free.basis is not None:
+        return EffectSetting(free.id, free.basis.parameters(coefficients)), {}
+    p = free.parameter
+    assert p is not None
+    at, low, high = (
+        float(np.clip(p.null + p.scale * x, p.lower, p.upper)) for x in block_evidence.block_size(winner, normal.gram)
+    )
+    nulls = {each.name: each.null for each in effects.by_id(free.id).parameters}
+    return EffectSetting(free.id, {**nulls, p.name: at}), {p.name: Estimate(at, low, high, p.unit)}
+
+
+def another_map(winner: SetWithBlock | None, normal: NormalEquations, lacking: float) -> str | None:
+    """Return words for walls that are surely farther off than a map's errors; None where none are.
+
+    lacking: share of the readings that are of something else than the map has there.
+    """
+    p = None if winner is None else winner.free.parameter
+    if winner is None or p is None:
+        return None
+    low = p.null + p.scale * block_evidence.block_size(winner, normal.gram)[1]
+    if low < (_ANOTHER_LACKS if lacking > _LACKS else _ANOTHER) * p.upper:
+        return None
+    return (
+        f"scans do not match the map, whose walls would be off by {low:.2g} m or more (1 sd), each in its own "
+        f"direction; another place?"
+    )
+
+
+def with_scatter(
+    causes: Sequence[Cause], settings: Mapping[str, EffectSetting], scatter: Sequence[ScatterEffect]
+) -> tuple[tuple[Cause, ...], tuple[EffectSetting, ...]]:
+    """Return causes and settings, also of what acts on the scatter."""
+    known, out = {cause.id: cause for cause in causes}, dict(settings)
+    for each in scatter:
+        name, mean = each.setting.id, settings.get(each.setting.id)
+        if each.p >= NAMED:
+            known[name] = _joined(known.get(name), each)
+        out[name] = EffectSetting(name, {**each.setting.parameters, **(_off_null(mean) if mean else {})})
+    return tuple(known.values()), tuple(out.values())
+
+
+def _off_null(setting: EffectSetting) -> dict[str, float]:
+    nulls = {p.name: p.null for p in effects.by_id(setting.id).parameters}
+    return {name: value for name, value in setting.parameters.items() if value != nulls[name]}
+
+
+def _joined(cause: Cause | None, scatter: ScatterEffect) -> Cause:
+    parameters = {p.name: p for p in effects.by_id(scatter.setting.id).parameters}
+    estimates = dict(cause.parameters) if cause is not None else {}
+    for name, (below, above) in scatter.sds.items():
+        p, value = parameters[name], scatter.setting.parameters[name]
+        low, high = max(value - NORMAL90 * below, p.lower), min(value + NORMAL90 * above, p.upper)
+        estimates[name] = Estimate(value, low, high, p.unit)
+    nats = scatter.nats + (cause.gain_nats if cause is not None else 0.0)
+    return Cause(scatter.setting.id, max(min(scatter.p, 1.0), cause.p if cause is not None else 0.0), estimates, nats)

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Laser criticism from a recording to causes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic.base.replay import extend
+from kurumaisu.critic.engine.search import NAMED, RIVAL
+from kurumaisu.critic.judge.clock_drift import without_double_delay
+from kurumaisu.critic.judge.scan_estimates import another_map, estimates_of, of_block, with_scatter
+from kurumaisu.critic.judge.scan_experiment import every_id, supplying_experiment
+from kurumaisu.critic.judge.scan_shortcomings import shortcomings
+from kurumaisu.critic.judge.unknown_readings import unknowns
+from kurumaisu.critic.ranges.scans import repeatability
+from kurumaisu.critic.ranges.scans.beams import gather, why_not_usable
+from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
+from kurumaisu.critic.ranges.search import block_evidence
+from kurumaisu.critic.ranges.search import misfits as pictures
+from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merged
+from kurumaisu.critic.ranges.search.dominant_effect import dominant_effect, with_dominant
+from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormSearch
+from kurumaisu.critic.ranges.search.large_effect import large_effect
+from kurumaisu.critic.ranges.search.mean_effects import MeanEffects, gain_of, mean_effects, refitted, settled
+from kurumaisu.critic.ranges.search.misfits import misfits, noise_rows
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
+from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
+from kurumaisu.critic.scatter.common_offset import beyond_own_offset, own_sd, with_common_offset
+from kurumaisu.critic.scatter.scatter_fit import ScatterFit
+from kurumaisu.critic.scatter.scatter_search import ScatterEffect, ScatterSearch
+from kurumaisu.critic.scatter.simulation import ScatterSimulator
+from kurumaisu.critic.scatter.statistics import Statistics
+from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
+from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
+from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.story import Comparison
+from kurumaisu.critic.values.verdict import Cause, NextExperiment
+from kurumaisu.params import EffectSetting, Model
+from kurumaisu.types import FloatArray
+
+MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
+# Share of what single readings scatter by, from which it matters that whole scans are off together: what neighbours
+# have in common beyond the simplest equation for it moves the mean of a scan as well.
+_HEARD = 0.06
+_SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
+Progress = Callable[[str], None]
+
+
+def criticise_scans(
+    recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None = None
+) -> LaserFinding:
+    """Return what the scans of a recording say against a model, or why they cannot.
+
+    ids: the effects that may be named; None for all.
+    """
+    why = why_not_usable(recording)
+    if why is not None:
+        drive = supplying_experiment(model, every_id(), recording.truth) if recording.world is not None else None
+        return LaserFinding(refused=why, details=repeatability.sentences(recording, model), next_experiment=drive)
+
+    def rest_with(setting: EffectSetting) -> LaserFinding:
+        progress(f"laser: looking for more effects, with {setting.id} in the model")
+        return criticise_scans(recording, extend(model, [setting]), progress, ids)
+
+    progress("laser: predicting the scans")
+    assembly = Assembly(gather(recording, model), ids)
+    progress("laser: estimating the noise")
+    normal = assembly.settle(recording.truth)
+    far = large_effect(assembly.shots, ids)
+    if far is not None:
+        form = next(form for form in assembly.forms if form.id == far.id)
+        (placed,) = fit_parameters(assembly, normal, [form], [far], None, {}, recording.truth).settings
+        evidence = (1.0, FormSearch([form], normal.gram).run().best.log_likelihood)
+        return _with_rest(assembly, normal, placed, evidence, rest_with(placed[0]))
+    progress("laser: comparing effects")
+    found = FormSearch(assembly.forms, normal.gram).run()
+    if found.best.forms:
+        assembly.refine(found.best.forms, normal.beam_noise, normal.wary)
+        shaped = [form for form in assembly.forms if form.start in {each.start for each in found.best.forms}]
+        normal = assembly.settle(recording.truth, shaped)
+        found = FormSearch(assembly.forms, normal.gram).run()
+    normal = assembly.full(normal)
+    made = mean_effects(assembly, normal, found)
+    if (wrong := another_map(made.winner, normal, float(assembly.displaced.readings.mean()))) is not None:
+        return LaserFinding(wrong=wrong)
+    made = made.without_spurious(assembly, normal)
+    progress("laser: fitting the effects found")
+    fit = refitted(assembly, normal, made, recording.truth)
+    lead = dominant_effect(assembly, normal, made.fit, fit)
+    certain = lead is not None and made.found.p[lead.id] >= NAMED
+    if lead is not None and certain and all(own.id != lead.id for own in model.effects):
+        placed = next(each for each in fit.settings if each[0] is lead)
+        evidence = (min(made.found.p[lead.id], 1.0), gain_of(made, lead.id))
+        return _with_rest(assembly, normal, placed, evidence, rest_with(placed[0]))
+    made, fit = settled(assembly, normal, made, fit, recording.truth)
+    progress("laser: comparing effects on the scatter")
+    away = 0.0 if made.winner is None else block_evidence.wall_error(made.winner, normal.gram)
+    scatter, comparison = (
+        ([], ()) if fit.assembly.strange else _scatter(assembly, fit, ids, strange=made.curve, away=away)
+    )
+    own = own_sd(model.effects)
+    if not made.curve and not fit.assembly.strange:
+        seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, own)
+        scatter = with_common_offset(scatter, seen, fit.normal.scan_noise, recording, ids)
+        scatter = beyond_own_offset(scatter, FORM_ERROR * _spread_of(assembly, normal, made), own)
+    heard = beyond_own_offset(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])), own)
+    finding = without_double_delay(_finding(assembly, normal, made, fit, heard), assembly.shots.stamps)
+    slight = tuple(each.setting.id for each in scatter if each not in heard)
+    words = tuple(
+        f"{name}: detectable, but too small to matter, compared with the scatter of single readings." for name in slight
+    )
+    finding = replace(finding, small=(*finding.small, *slight), details=(*finding.details, *words))
+    finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
+    shown = misfits(assembly, normal, made.parts())
+    return replace(finding, pictures=Pictures(shown, pictures.alternatives(made.found), noise_rows(normal), comparison))
+
+
+def _with_rest(
+    assembly: Assembly,
+    normal: NormalEquations,
+    lead: tuple[EffectSetting, dict[str, float]],
+    evidence: tuple[float, float],
+    rest: LaserFinding,
+) -> LaserFinding:
+    """Return an effect, which must be in place before the rest can be seen, with the rest that was found then.
+
+    lead: its setting, and the sds of what was fitted; evidence: its posterior, and the log evidence of it [nat].
+    """
+    setting, sds = lead
+    cause = Cause(setting.id, evidence[0], estimates_of(setting, sds), evidence[1])
+    size = size_of(assembly.marks.together([setting])[normal.beam_noise.valid])
+    rest = replace(rest, details=(*rest.details, *_sentences({setting.id: size}, ())))
+    return without_double_delay(with_dominant(rest, setting, cause, assembly, normal), assembly.shots.stamps)
+
+
+def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model: Model) -> NextExperiment | None:
+    """Return the experiment that tells apart what the scans cannot, or that supplies what they lack."""
+    open_ids = sorted({name for group in finding.confounded for name in group})
+    if not open_ids and not shortcomings(assembly):
+        return None
+    return supplying_experiment(model, open_ids or every_id(), recording.truth)
+
+
+def _scatter(
+    assembly: Assembly, fit: ParameterFit, ids: frozenset[str] | None, *, strange: bool, away: float
+) -> tuple[list[ScatterEffect], tuple[Comparison, ...]]:
+    """Return the effects on how readings scatter about the best fit of their mean, and what they mend.
+
+    strange: something that is in no catalogue acts on the mean. A curve misses steps and edges of it, nobody can say
+    how far, so that errors about it say nothing of scatter. away [m]: by how far ends of walls may be elsewhere.
+    """
+    rows = fit.assembly.smooth_rows(_SCATTERED)
+    few = fit.assembly.thinned(rows)
+    few.geometry &= usable_beams(few.shots, few.marks.seen, few.marks.base, away)
+    statistics = Statistics(few, fit.normal.scan_noise)
+    means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
+    means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
+    measured = few.shots.measured
+    seen = statistics.of(measured, np.where(np.isfinite(measured), fit.left[rows], np.nan))
+    heard = ~statistics.of_errors() | (not strange)
+    simulate = ScatterSimulator(few, statistics, fit.missed[rows])
+    search = ScatterSearch(ScatterFit(simulate, seen, sorted(means), ids, heard))
+    found = search.run()
+    return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
+
+
+def _finding(
+    assembly: Assembly, normal: NormalEquations, made: MeanEffects, fit: ParameterFit, scatter: list[ScatterEffect]
+) -> LaserFinding:
+    p = made.p
+    sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
+    settings = {setting.id: setting for setting, _ in fit.settings}
+    estimates = {setting.id: estimates_of(setting, sds) for setting, sds in fit.settings}
+    if made.winner is not None:
+        free = made.winner.free
+        valid = normal.beam_noise.valid
+        sizes[free.id] = size_of(assembly.columns[valid][:, free.span] @ made.coefficients)
+        settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
+    matters = {name for name, size in sizes.items() if size >= MATERIAL}
+    settings = {name: setting for name, setting in settings.items() if name in matters}
+    curve = made.winner is not None and made.curve and made.winner.free.id in matters
+    gains = {name: gain_of(made, name) for name in settings if p.get(name, 0.0) >= NAMED}
+    # A curve is what one covariate shows of a thing nobody knows: what it leaves may be as much, and looks like others.
+    least = made.winner.evidence.nats if made.winner is not None and curve else -np.inf
+    causes = tuple(
+        Cause(name, min(p[name], 1.0), estimates[name], gain) for name, gain in gains.items() if gain >= least
+    )
+    # Of the scans as they are seen with what acts: a laser that is askew looks past the ends of walls.
+    unknown = tuple(fit.assembly.unknowns())
+    unknown += tuple(unknowns(made.weighed, normal.gram)) if curve else ()
+    groups = () if curve else _confused(assembly, normal, made, causes)
+    confounded = tuple(group for group in groups if matters & set(group))
+    causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
+    small = tuple(name for name in sizes if name not in matters and p.get(name, 0.0) >= NAMED)
+    details = (_noise_sentences(assembly, normal), *shortcomings(assembly), *_sentences(sizes, small))
+    causes, added = with_scatter(causes, settings, scatter)
+    confounded += tuple(group for group in map(_set_of, scatter) if group)
+    return LaserFinding(causes, confounded, unknown, added, details, small=small)
+
+
+def _set_of(scatter: ScatterEffect) -> tuple[str, ...]:
+    """Return the effects of which one makes readings scatter so, where it is not certain which."""
+    every = {scatter.setting.id: scatter.p, **scatter.rivals}
+    group = tuple(sorted(name for name, p in every.items() if p >= RIVAL or name == scatter.setting.id))
+    certain = len(group) > 1 and sum(every[name] for name in group) >= NAMED
+    return group if certain and scatter.p < NAMED else ()
+
+
+def _confused(assembly: Assembly, normal: NormalEquations, made: MeanEffects, causes: Sequence[Cause]) -> Groups:
+    # Of a set, too: what explains the readings as well as its likeliest member belongs to it.
+    open_ids = {name for group in made.found.confounded for name in group}
+    later = made.more.found.best.ids if made.more is not None else frozenset()
+    names = [*(cause.id for cause in causes if cause.id not in later), *sorted((open_ids & made.fit.ids) - later)]
+    groups = merged(made.found.confounded, confounded(made.found, made.winner, assembly.free, normal.gram, names))
+    return groups if made.more is None else merged(groups, made.more.groups)
+
+
+def _noise_sentences(assembly: Assembly, normal: NormalEquations) -> str:
+    noise, beam = normal.scan_noise, normal.beam_noise
+    return (
+        f"laser: {normal.readings} readings of {len(assembly.shots.stamps)} scans. Noise: neighbours correlate by "
+        f"{beam.rho:.2f}, whole scans {1e3 * noise.common_sd:.2g} mm over {noise.common_tau:.2g} s, "
+        f"single beams {1e3 * beam.own_sd:.2g} mm, reference {1e3 * noise.position_sd:.2g} mm and "
+        f"{1e3 * noise.heading_sd:.2g} mrad."
+    )
+
+
+def _sentences(sizes: Mapping[str, float], small: Sequence[str]) -> list[str]:
+    return [
+        f"{name}: changes the readings it affects by {1e3 * size:.2g} mm"
+        f"{': detectable, but too small to matter' if name in small else ''}."
+        for name, size in sorted(sizes.items())
+    ]
+
+
+def _rms(assembly: Assembly, normal: NormalEquations, fit: FittedForms, name: str) -> float:
+    valid = normal.beam_noise.valid
+    change, start = np.zeros(int(valid.sum())), 0
+    for form in fit.forms:
+        stop = start + len(form.columns)
+        if form.id == name:
+            change = assembly.columns[valid][:, form.span] @ fit.coefficients[start:stop]
+        start = stop
+    return size_of(change)
+
+
+def size_of(change: FloatArray) -> float:
+    """Return how far [m] an effect moves the readings that it moves: of dark walls, say, not divided by all."""
+    power = change.astype(float) ** 2
+    return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))
+
+
+def _spread_of(assembly: Assembly, normal: NormalEquations, made: MeanEffects) -> float:
+    """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others.
+
+    In the curves that some of it may follow instead no scans are off together.
+    """
+    valid, blocks = normal.beam_noise.valid, {free.id for free in assembly.free}
+    parts = [part for part in made.parts() if part.id in blocks or effects.by_id(part.id).empirical]
+    parts = [part for part in parts if part.id not in made.others]
+    moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in parts]
+    return float(np.std(sum(moved))) if moved else 0.0

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where a chair will be: motion from t0 to t1 by the inputs, given the reference's poses up to t0 and none after.
+
+Predicted is what the reference would measure: its row at t1 as seen from its row at t0. So the error of both rows
+counts, of which that at t0 is partly known, because the rows before it say where the chair really was. What the noise
+of the rates is doing at t0 is known in the same way, and goes on for some time constants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from kurumaisu import geometry
+from kurumaisu.critic.base.drive import POSE_INTERVAL, Drive
+from kurumaisu.critic.noise.base_noise import Noise, whitened
+from kurumaisu.params import EffectSetting, Model
+from kurumaisu.types import FloatArray
+
+Settings = tuple[EffectSetting, ...]
+_SAME = 1e-6  # [s] within which a stamp is meant
+_MEMORY = 6.0  # time constants of the noise that are looked back on
+_LEAST_MEMORY = 5.0  # [s]
+_MOST_ROWS = 400  # that are looked back on
+_STEP = 0.25  # [s] into which the way ahead is cut: a rate's error acts along its mean heading
+_MOST_STEPS = 40
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What is needed to predict motion: the extended model, its noise, and models that it might as well be."""
+
+    model: Model
+    settings: Settings
+    noise: Noise
+    others: tuple[Settings, ...] = ()
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """Motion from t0 to t1 [s] in the body frame at t0: mean (3,) and its covariance (3, 3) [m, m, rad]."""
+
+    t0: float
+    t1: float
+    mean: FloatArray
+    covariance: FloatArray
+
+    @property
+    def sds(self) -> FloatArray:
+        """Standard deviations, (3,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+
+class Known(Protocol):
+    """What is known of the way: Paths, or what stands in for them."""
+
+    def at(
+        self, drive: Drive, times: FloatArray, past: Sequence[int], t0: float
+    ) -> tuple[FloatArray, list[FloatArray]]:
+        """Return poses (n, 3) at times, and as many by each other model."""
+
+
+def motion_ahead(drive: Drive, paths: Known, noise: Noise, t0: float, t1: float) -> Ahead:
+    """Return the motion from t0 to t1; drive: all its poses, of which those after t0 are not used.
+
+    paths: what the reference would see of the model, on the drive's inputs up to t1 at least.
+    """
+    past = _past(drive, noise, t0)
+    last = float(drive.times[past[-1]]) if len(past) else t0
+    knots = _knots(last, t0, t1)
+    times = np.concatenate([drive.times[past[:-1]], knots])
+    sim, others = paths.at(drive, times, past, t0)
+    steps = geometry.between(sim[:-1], sim[1:])
+    turned = [geometry.between(other[:-1], other[1:]) - steps for other in others]
+    start = drive.poses[past[-1]] if len(past) else np.zeros(3)
+    here = max(len(past) - 1, 0)  # row of the last measured pose
+    ahead = geometry.compose(start, geometry.between(sim[here], sim[here:]))
+    poses = np.concatenate([drive.poses[past[:-1]], ahead])
+    error = geometry.between(poses[:-1], poses[1:])[:here] - steps[:here]
+    error[:, 2] = geometry.wrap(error[:, 2])  # across a gap nobody counted the turns
+    mean, covariance = _conditional(drive, times, poses, error, turned, noise)
+    begin = int(np.argmin(np.abs(times[here:] - t0)))  # steps before it lead from the last pose to t0
+    return _composed(t0, t1, steps[here:] + mean, covariance, begin)
+
+
+def _past(drive: Drive, noise: Noise, t0: float) -> list[int]:
+    """Return rows up to t0, in order, the last one first chosen, as far apart as those the noise was estimated on."""
+    slow = noise.slow_tau if noise.slow_v or noise.slow_w else 0.0
+    tau = max(noise.tau, slow, noise.lasting_tau if noise.lasting else 0.0)
+    since = t0 - max(_MEMORY * tau, _LEAST_MEMORY, 3 * POSE_INTERVAL[drive.source])
+    least = POSE_INTERVAL[drive.source] * (1 - _SAME)
+    rows: list[int] = []
+    row = int(np.searchsorted(drive.times, t0 + _SAME)) - 1
+    while row >= 0 and len(rows) < _MOST_ROWS and (not rows or drive.times[row] >= since):
+        rows.append(row)
+        row = int(np.searchsorted(drive.times, drive.times[row] - least, side="right")) - 1
+    return rows[::-1]
+
+
+def _knots(last: float, t0: float, t1: float) -> FloatArray:
+    """Return times from the last pose by way of t0 to t1."""
+    parts = [np.array([last])]
+    for begin, end in ((last, t0), (t0, t1)):
+        if end - begin > _SAME:
+            count = int(np.clip(np.ceil((end - begin) / _STEP), 1, _MOST_STEPS))
+            parts.append(np.linspace(begin, end, count + 1)[1:])
+    return np.concatenate(parts)
+
+
+def _conditional(
+    drive: Drive, times: FloatArray, poses: FloatArray, error: FloatArray, turned: Sequence[FloatArray], noise: Noise
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean (f, 3) and covariance (3 f, 3 f) of what is added to the last f steps, given the errors before.
+
+    turned: how the steps change by errors of the model that are independent and of sd 1.
+    """
+    known, rows = error.size, 3 * (len(times) - 1)
+    first = np.zeros(rows)
+    first[:known] = error.ravel()
+    doubt = np.column_stack([change.ravel() for change in turned]) if turned else np.empty((rows, 0))
+    white, _ = whitened_at(drive, times, poses, np.hstack([first[:, None], doubt, np.eye(rows)[:, known:]]), noise)
+    k = 1 + doubt.shape[1]
+    # Each row of `white` is a unit normal: what is measured, less what the doubt makes of it.
+    by = white[:known, 1:k]
+    spread = np.linalg.inv(np.eye(k - 1) + by.T @ by)
+    guess = spread @ (by.T @ white[:known, 0])
+    unit, swing = white[known:, k:], white[known:, 1:k]
+    mean = np.linalg.solve(unit, swing @ guess - white[known:, 0])
+    inverse = np.linalg.inv(unit)
+    covariance = inverse @ (np.eye(len(unit)) + swing @ spread @ swing.T) @ inverse.T
+    return mean.reshape(-1, 3), np.asarray(covariance)
+
+
+def whitened_at(
+    drive: Drive, times: FloatArray, poses: FloatArray, columns: FloatArray, noise: Noise
+) -> tuple[FloatArray, FloatArray]:
+    """Return columns whitened as of a drive whose poses are others."""
+    return whitened(drive.seen_at(times, poses), columns, noise)
+
+
+def _composed(t0: float, t1: float, steps: FloatArray, covariance: FloatArray, begin: int) -> Ahead:
+    """Return the motion that steps (f, 3) from `begin` on add up to, their covariance carried along to first order."""
+    places = [np.zeros(3)]
+    for step in steps[begin:]:
+        places.append(geometry.compose(places[-1], step))
+    end = places[-1]
+    carried = np.zeros((3, 3 * len(steps)))
+    for i in range(begin, len(steps)):
+        before, after = places[i - begin], places[i - begin + 1]
+        c, s = np.cos(before[2]), np.sin(before[2])
+        rest = end - after  # swings with the turn of this step
+        carried[:, 3 * i : 3 * i + 3] = [[c, -s, -rest[1]], [s, c, rest[0]], [0, 0, 1]]
+    return Ahead(t0, t1, end, np.asarray(carried @ covariance @ carried.T))

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where a chair was while it scanned: by the reference up to then and, where something drove it, by the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu import geometry
+from kurumaisu.critic.base.covariates import with_covariates_but_place
+from kurumaisu.critic.base.drive import Drive, driven, prepare_all
+from kurumaisu.critic.predict.motion import Forecast, motion_ahead
+from kurumaisu.critic.predict.reference_path import Paths
+from kurumaisu.critic.ranges.scans.beams import Shots, Track, gather, thin
+from kurumaisu.critic.values.recording import Recording, Run
+from kurumaisu.params import Model
+from kurumaisu.types import FloatArray
+
+_AROUND = np.array([-0.5, -0.3, -0.2, -0.1, 0.0, 0.05, 0.1, 0.2, 0.3])  # [s] about a stamp: late clocks, slow sweeps
+_AFTER = 1e-3  # [s] so much later a pose is asked for, where the last row is of the very stamp
+_NEAR = 0.3  # [s] from a pose on either side within which a scan's place is known
+_SAME = 1e-3  # [s]
+_RANDOM = 60  # scans that the scatter is estimated from
+
+
+class ScanPoses:
+    """Shots of a recording's laser, each scan on the track that is known for it."""
+
+    def __init__(self, recording: Recording, model: Model, forecast: Forecast | None) -> None:
+        """Take a recording whose laser can be criticised; forecast: None where nobody knows how the chair moves."""
+        self._recording, self._model, self._forecast = recording, model, forecast
+        self._base = gather(recording, model)
+        first = next(run for run in recording.runs if run.name in recording.train and run.scan is not None and run.pose)
+        assert first.pose is not None
+        #: [s] at which the laser's time begins.
+        self.zero = float(first.pose.t[0] - self._base.tracks[0].times[0])
+
+    def of(self, run: Run, stamps: FloatArray, measured: FloatArray | None = None) -> Shots:
+        """Return shots of a run with poses at stamps (k,) [s]; measured (k, b) [m], if known."""
+        tracks = self._tracks(run, stamps)
+        shape = (len(stamps), self._base.laser.beams)
+        return replace(
+            self._base,
+            tracks=tuple(Track(track.times - self.zero, track.poses) for track in tracks),
+            stamps=stamps - self.zero,
+            run=np.arange(len(stamps)) if len(tracks) > 1 else np.zeros(len(stamps), dtype=int),
+            measured=np.full(shape, np.nan) if measured is None else measured,
+            shift=np.zeros((*shape, 3)),
+            known={
+                name: np.interp(stamps, run.covariates[name].t, run.covariates[name].values[:, 0])
+                for name in self._base.known
+                if name in run.covariates
+            },
+        )
+
+    def trained(self) -> list[Shots]:
+        """Return shots of the runs to fit, few of them, per run."""
+        return [shots for _, shots in self.trained_runs()]
+
+    def trained_runs(self) -> list[tuple[Run, Shots]]:
+        """Return the runs to fit, each with few of its shots."""
+        few = thin(self._base, _RANDOM)
+        scanned = [
+            run
+            for run in self._recording.runs
+            if run.name in self._recording.train and run.scan is not None and run.pose
+        ]
+        return [
+            (run, self.of(run, few.stamps[few.run == i] + self.zero, few.measured[few.run == i]))
+            for i, run in enumerate(scanned)
+            if (few.run == i).any()
+        ]
+
+    def _tracks(self, run: Run, stamps: FloatArray) -> list[Track]:
+        assert run.pose is not None
+        if self._forecast is None or not driven(run):
+            return [Track(run.pose.t, run.pose.values[:, :3])]
+        forecast = self._forecast
+        drive = with_covariates_but_place(prepare_all(run, forecast.model, float(stamps.max()) + _AROUND[-1]), run)
+        paths = Paths(drive, forecast.model, forecast.settings, ())
+        return [_around(drive, paths, forecast, stamp) for stamp in stamps.tolist()]
+
+
+def _around(drive: Drive, paths: Paths, forecast: Forecast, stamp: float) -> Track:
+    """Return where the chair was about a stamp, by the rows up to it: each errs, all together less."""
+    row = int(np.searchsorted(drive.times, stamp + 1e-6)) - 1
+    if row < 0:
+        return Track(drive.times, drive.poses)
+    last = float(drive.times[row])
+    ahead = motion_ahead(drive, paths, forecast.noise, last, max(stamp, last + _AFTER))
+    there = geometry.compose(drive.poses[row], ahead.mean)
+    times = stamp + _AROUND
+    sim = paths.at(drive, times, [row], stamp)[0]
+    middle = int(np.argmin(np.abs(_AROUND)))
+    return Track(times, geometry.compose(np.broadcast_to(there, sim.shape), geometry.between(sim[middle], sim)))
+
+
+def joined(parts: Sequence[Shots]) -> Shots:
+    """Return shots of one laser together."""
+    offsets = np.cumsum([0, *(len(part.tracks) for part in parts[:-1])])
+    return replace(
+        parts[0],
+        tracks=tuple(track for part in parts for track in part.tracks),
+        stamps=np.concatenate([part.stamps for part in parts]),
+        run=np.concatenate([part.run + offset for part, offset in zip(parts, offsets, strict=True)]),
+        measured=np.concatenate([part.measured for part in parts]),
+        shift=np.concatenate([part.shift for part in parts]),
+        known={
+            name: np.concatenate([part.known[name] for part in parts])
+            for name in parts[0].known
+            if all(name in part.known for part in parts)
+        },
+    )
+
+
+def chosen(run: Run, most: int) -> tuple[FloatArray, FloatArray]:
+    """Return stamps (k,) and readings (k, b) of at most so many scans of a run at which its poses are known."""
+    if run.scan is None or run.pose is None:
+        return np.empty(0), np.empty((0, 0))
+    next_to = np.abs(run.pose.t[np.searchsorted(run.pose.t[:-1], run.scan.t)] - run.scan.t)
+    before = np.abs(run.pose.t[np.maximum(np.searchsorted(run.pose.t, run.scan.t) - 1, 0)] - run.scan.t)
+    known = (np.maximum(next_to, before) < _NEAR) | (np.minimum(next_to, before) < _SAME)
+    rows = np.flatnonzero(known & np.isfinite(run.scan.values).any(axis=1))
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))] if len(rows) else rows
+    return run.scan.t[rows], run.scan.values[rows]

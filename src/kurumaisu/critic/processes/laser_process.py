@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The criticism of the scans in a process of its own, while that of the drives goes on in this one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.processes.worker import ProgressMessage, Worker
+from kurumaisu.critic.ranges.scans.beams import why_not_usable
+from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.recording import Recording
+from kurumaisu.params import Model, load_model
+
+_MANY = 500  # scans from which it is worth the second that another interpreter needs
+
+Tell = Callable[[str], None]
+
+
+@contextmanager
+def criticise_aside(
+    recording: Recording, model: Model, model_file: Path, ids: frozenset[str] | None
+) -> Iterator[Callable[[Tell], LaserFinding]]:
+    """Give a function that returns what the scans say, which may have been found out meanwhile.
+
+    model_file: of the model, whose laws of the voltages no scan depends on.
+    It makes no difference to the result where that happens; what fails in the other process is done again in this one.
+    """
+    worker = Worker() if _worth_it(recording) else None
+    if worker is not None:
+        worker.send(_criticise, recording, model_file, ids)
+
+    def finding(progress: Tell) -> LaserFinding:
+        found = None if worker is None else _received(worker)
+        return found or criticise_scans(recording, model, progress, ids)
+
+    try:
+        yield finding
+    finally:
+        if worker is not None:
+            worker.close()
+
+
+def _worth_it(recording: Recording) -> bool:
+    scans = sum(len(run.scan.t) for run in recording.runs if run.scan is not None)
+    return scans >= _MANY and len(os.sched_getaffinity(0)) > 1 and why_not_usable(recording) is None
+
+
+def _criticise(recording: Recording, model_file: Path, ids: frozenset[str] | None, progress: Tell) -> LaserFinding:
+    return criticise_scans(recording, load_model(model_file), progress, ids)
+
+
+def _received(worker: Worker) -> LaserFinding | None:
+    """Return what came of it; None where the process has died, of whatever it was."""
+    try:
+        while isinstance(found := worker.receive(), ProgressMessage):
+            pass
+    except EOFError:
+        return None
+    return found if isinstance(found, LaserFinding) else None

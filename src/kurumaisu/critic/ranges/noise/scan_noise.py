@@ -1,0 +1,346 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How laser readings err at random, estimated on every data set: beams, neighbours, scans, poses.
+
+Readings of one scan share its pose and its common mode, neighbours share light and wall. Counting 170 000 readings as
+so many independent ones makes a critic certain of effects that are not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import block_diag, cho_factor, cho_solve
+from scipy.optimize import minimize, minimize_scalar
+
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+_FLOOR = 1e-6  # [m, rad] below which no sd counts
+# Of position [m], heading [rad], common mode [m], its time constant [s], the share of the poses' errors that lasts and
+# how long [s]: what is usual, the sd of its log, bounds.
+_USUAL = np.array([0.005, 0.005, 2e-4, 1.0, 0.05, 5.0])
+# A common mode may be of each scan alone, at 30 ms, or last for ten seconds.
+_SPREAD = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 1.0])
+_LOW, _HIGH = np.array([1e-5, 1e-5, 1e-6, 0.01, 1e-4, 1.0]), np.array([0.3, 0.3, 0.1, 10.0, 0.98, 60.0])
+_WHOLE = 0.99  # of the largest common mode
+_NONE = 0.003  # share that lasts of a reference that does not wander, as far as can be seen
+_TRIED = (0.05, 0.2, 0.6)  # shares, one of which must be likelier
+_STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that last are one
+_STRETCHES = 40  # at most, and one more for each run: where scans are so far apart, what lasts less long hardly counts
+_WEAK = 1e-9  # prior precision of a column's coefficient, in what the readings would tell if nothing else erred
+_CERTAIN = 5.0  # [nat] from which there is a common mode
+_UNLIKELY = 0.01  # times as likely as the likeliest, below which no longer one counts
+_LENGTHS = 7  # of a common mode that are tried
+_APART = 0.2  # in logs, to see how surely each is known
+
+
+@dataclass(frozen=True)
+class ScanNoise:
+    """Errors that the readings of a scan share.
+
+    position_sd [m], heading_sd [rad]: of a reference pose; common_sd [m]: of the offset of a scan, whose correlation
+    with the next one falls off with a time constant common_tau [s]; lasting: share of the poses' variance that falls
+    off with lasting_tau [s], as of a reference that wanders: the rest is each pose's own.
+    """
+
+    position_sd: float
+    heading_sd: float
+    common_sd: float
+    common_tau: float
+    lasting: float = 0.0
+    lasting_tau: float = 5.0
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How scans hang together: times (k,) [s]; run (k,); stand (k,): scans of one and the same pose row, or -1."""
+
+    times: FloatArray
+    run: IntArray
+    stand: IntArray
+
+    @cached_property
+    def places(self) -> IntArray:
+        """Which error of a pose that several scans share each scan (k,) has: its stand's, then its stretch's."""
+        return np.asarray(np.where(self.stand >= 0, self.stand, self._stands + self._stretches[1]))
+
+    @cached_property
+    def _stretches(self) -> tuple[FloatArray, IntArray]:
+        """Run and middle [s] (m, 2) of all stretches, and of which each scan (k,) is."""
+        driven = sum(float(np.ptp(self.times[self.run == run])) for run in np.unique(self.run))
+        length = max(_STRETCH, driven / _STRETCHES)
+        found, of = np.unique(np.column_stack([self.run, np.floor(self.times / length)]), axis=0, return_inverse=True)
+        return np.column_stack([found[:, 0], length * (found[:, 1] + 0.5)]), of.ravel()
+
+    def kept(self, noise: ScanNoise) -> tuple[FloatArray, float]:
+        """Return the precision of the errors of stands and stretches, x, y, yaw in turn, and its log determinant."""
+        lasting = np.maximum(np.sqrt(noise.lasting) * pose_sds(noise), _FLOOR) ** -2
+        runs, middles = self._stretches[0].T
+        along, log_det = autoregressive(middles, runs, noise.lasting_tau)
+        stands = np.diag(np.tile(pose_sds(noise) ** -2, self._stands))
+        logs = self._stands * np.log(pose_sds(noise) ** -2).sum() + 3 * log_det + len(middles) * np.log(lasting).sum()
+        return block_diag(stands, np.kron(along, np.diag(lasting))), float(logs)
+
+    @property
+    def _stands(self) -> int:
+        return int(self.stand.max(initial=-1)) + 1
+
+
+@dataclass(frozen=True)
+class Gram:
+    """Normal equations of one scan, whitened within the scan.
+
+    own: number of leading columns, for the errors of its own reference poses, x, y, yaw in turn; shared: of those that
+    follow, one for its common mode and three for the error of its stand's pose or, where asked for, of its stretch; the
+    rest are common to all scans.
+    """
+
+    matrix: FloatArray
+    own: int
+    shared: int
+
+
+def whitened(columns: FloatArray, valid: BoolArray, sd: FloatArray, rho: float) -> FloatArray:
+    """Return L^-1 X, (valid readings of the scan, m), for columns X (b, m), deviations sd (b,) [m] and neighbours' rho.
+
+    Neighbours with gaps between them correlate by rho to the power of their distance.
+    """
+    at = np.flatnonzero(valid)
+    z = columns[at] / sd[at, np.newaxis]
+    shared = rho ** np.diff(at)[:, np.newaxis]
+    out = z.copy()
+    out[1:] = (z[1:] - shared * z[:-1]) / np.sqrt(1 - shared**2)
+    return np.asarray(out)
+
+
+def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[FloatArray, float]:
+    """Return the normal equations of the columns common to all, scans' errors integrated out, and a log determinant.
+
+    The latter is that of the covariance, relative to independent readings.
+    """
+    size = own_pose_sds(noise)
+    prior, prior_log_det = precision(layout, noise)
+    scans = len(grams)
+    common = len(grams[0].matrix) - grams[0].own - grams[0].shared
+    inner = np.zeros_like(prior)
+    cross = np.zeros((len(inner), common))
+    total = np.zeros((common, common))
+    log_det = 0.0
+    for rows in _alike(grams):
+        rest, more = _without_own(np.array([grams[k].matrix for k in rows]), grams[rows[0]].own, size)
+        log_det += more
+        lead = grams[rows[0]].shared
+        total += rest[:, lead:, lead:].sum(axis=0)
+        kept = scans + 3 * layout.places[rows, np.newaxis] + np.arange(lead - 1)
+        index = np.column_stack([rows, kept])
+        np.add.at(inner, (index[:, :, np.newaxis], index[:, np.newaxis]), rest[:, :lead, :lead])
+        np.add.at(cross, index, rest[:, :lead, lead:])
+    factor = cho_factor(inner + prior)
+    log_det += 2 * float(np.log(np.diag(factor[0])).sum()) - prior_log_det
+    return total - cross.T @ cho_solve(factor, cross), log_det
+
+
+def pose_sds(noise: ScanNoise) -> FloatArray:
+    """Return the sds (3,) of a reference pose."""
+    return np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], _FLOOR)
+
+
+def own_pose_sds(noise: ScanNoise) -> FloatArray:
+    """Return the sds (3,) of what of a reference pose's error is its own."""
+    return np.asarray(np.sqrt(1 - noise.lasting) * pose_sds(noise))
+
+
+def _alike(grams: Sequence[Gram]) -> list[list[int]]:
+    """Return the scans whose grams have the same parts, together."""
+    groups: dict[tuple[int, int], list[int]] = {}
+    for k, gram in enumerate(grams):
+        groups.setdefault((gram.own, gram.shared), []).append(k)
+    return list(groups.values())
+
+
+def _without_own(matrices: FloatArray, own: int, size: FloatArray) -> tuple[FloatArray, float]:
+    """Return the rest (n, m, m) of grams when errors of their own poses are integrated out, and a log determinant."""
+    if own == 0:
+        return matrices, 0.0
+    scale = np.tile(size, own // 3)
+    inner = matrices[:, :own, :own] * np.outer(scale, scale) + np.eye(own)
+    cross = matrices[:, :own, own:] * scale[:, np.newaxis]
+    rest = matrices[:, own:, own:] - cross.transpose(0, 2, 1) @ np.linalg.solve(inner, cross)
+    return rest, float(np.linalg.slogdet(inner)[1].sum())
+
+
+def precision(layout: Layout, noise: ScanNoise) -> tuple[FloatArray, float]:
+    """Return the precision of common modes, autoregressive within a run, and kept errors; and its log determinant."""
+    sd = max(noise.common_sd, _FLOOR)
+    common, log_det = autoregressive(layout.times, layout.run, noise.common_tau)
+    kept, more = layout.kept(noise)
+    return block_diag(common / sd**2, kept), log_det - 2 * len(common) * float(np.log(sd)) + more
+
+
+def autoregressive(times: FloatArray, run: IntArray | FloatArray, tau: float) -> tuple[FloatArray, float]:
+    """Return the precision (n, n) of unit errors that fall off with tau [s] within a run, and its log determinant."""
+    n = len(times)
+    rho = np.where(np.diff(run) == 0, np.exp(-np.abs(np.diff(times)) / tau), 0.0)
+    innovation = np.maximum(np.concatenate([[1.0], 1 - rho**2]), 1e-9)  # variances
+    diagonal = 1 / innovation
+    diagonal[:-1] += rho**2 / innovation[1:]
+    out = np.diag(diagonal)
+    out[range(n - 1), range(1, n)] = out[range(1, n), range(n - 1)] = -rho / innovation[1:]
+    return out, -float(np.log(innovation).sum())
+
+
+@dataclass(frozen=True)
+class CommonMode:
+    """What says that whole scans are off together: log evidence [nat], and sds of the logs of its sd and its tau.
+
+    wary: the noise with a longer one that is nearly as likely, about an sd from the likeliest, if that is known.
+    """
+
+    nats: float
+    log_sd: float
+    log_tau: float
+    wary: ScanNoise | None = None
+
+    def ends(self, noise: ScanNoise, sds: float) -> tuple[FloatArray, FloatArray]:
+        """Return sd [m] and tau [s] at so many sds below and above those of a noise."""
+        logs = np.array([-sds, sds])
+        sizes, taus = noise.common_sd * np.exp(logs * self.log_sd), noise.common_tau * np.exp(logs * self.log_tau)
+        if self.wary is not None:
+            sizes[1] = max(sizes[1], noise.common_sd * (self.wary.common_sd / noise.common_sd) ** sds)
+            taus[1] = max(taus[1], noise.common_tau * (self.wary.common_tau / noise.common_tau) ** sds)
+        return sizes, taus
+
+
+class _Likelihood:
+    """The negative log restricted likelihood of a noise, and how far it is from what is usual."""
+
+    def __init__(self, grams: Sequence[Gram], layout: Layout, project: IntArray) -> None:
+        """Take common columns to project out; the last common column is the residual."""
+        self._grams, self._layout = [_only(gram, project) for gram in grams], layout
+        # Of columns that others draw as well, as a curve over the time does one over the heading of stands, nothing is
+        # learnt, whatever the noise: what is known of them beforehand must not follow it. Else each of them speaks for
+        # more noise.
+        each = sum(np.diag(gram.matrix)[gram.own + gram.shared : -1] for gram in self._grams)
+        self._norms = np.sqrt(np.maximum(each, 1e-300))
+
+    def __call__(self, noise: ScanNoise) -> float:
+        s, log_det = marginal(self._grams, self._layout, noise)
+        yy = float(s[-1, -1])
+        x = s[:-1, :-1] / np.outer(self._norms, self._norms) + _WEAK * np.eye(len(s) - 1)
+        b = s[:-1, -1] / self._norms
+        fitted = float(b @ np.linalg.solve(x, b)) if len(b) else 0.0
+        return 0.5 * (log_det + yy - fitted + float(np.linalg.slogdet(x)[1]))
+
+
+def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] | None, project: IntArray) -> ScanNoise:
+    """Return the scans' noise by restricted maximum likelihood; project: common columns to project out.
+
+    The last common column is the residual. truth: known sd of the reference, else it is estimated too.
+    """
+    likelihood, start, known = _Likelihood(grams, layout, project), np.log(_USUAL), 0
+    if truth is not None:
+        start[:2], known = np.log(np.maximum(truth, 1e-5)), 2
+    none = np.where(np.arange(6) == 4, np.log(_NONE), start)
+    found = _likeliest(likelihood, none, np.arange(known, 4))
+    here = likelihood(found)
+    lasting = min(_TRIED, key=lambda share: likelihood(replace(found, lasting=share)))
+    if likelihood(replace(found, lasting=lasting)) > here:
+        return found
+    begun = np.log(astuple(replace(found, lasting=lasting)))
+    return _likeliest(likelihood, start, np.arange(known, 6), begun[known:])
+
+
+def with_lasting_common_mode(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
+    """Return a noise whose common mode, where there is one for sure, is the mean of those that last longer, too.
+
+    The scans of a stand tell how far it wanders while they last. How far it comes until the next stand is told by no
+    more than that: the longer it lasts, the farther. Effects of the time or of the place must be surer than that.
+    """
+    likelihood = _Likelihood(grams, layout, project)
+    least = likelihood(noise)
+    if likelihood(replace(noise, common_sd=_FLOOR)) - least < _CERTAIN:
+        return noise
+    found = [(1.0, noise.common_sd**2, noise.common_tau)]
+    for tau in np.geomspace(noise.common_tau, _HIGH[3], _LENGTHS)[1:].tolist():
+        reach = np.log(noise.common_sd) + np.array([0.0, 0.5 * np.log(tau / noise.common_tau) + _APART])
+
+        def cost(log_sd: float, tau: float = tau) -> float:
+            return likelihood(replace(noise, common_sd=float(np.exp(log_sd)), common_tau=tau))
+
+        best = minimize_scalar(cost, bounds=reach, method="bounded", options={"maxiter": 8})
+        found.append((float(np.exp(min(least - best.fun, 0.0))), float(np.exp(2 * best.x)), tau))
+        if found[-1][0] < _UNLIKELY:
+            break
+    weights, squares, taus = np.array(found).T
+    mean = weights / weights.sum()
+    return replace(noise, common_sd=float(np.sqrt(mean @ squares)), common_tau=float(mean @ taus))
+
+
+def common_mode(
+    grams: Sequence[Gram],
+    layout: Layout,
+    truth: tuple[float, float] | None,
+    project: IntArray,
+    noise: ScanNoise,
+    own_sd: float = 0.0,
+) -> CommonMode:
+    """Return what says that scans have a common mode, by all of them; noise: the likeliest one, other arguments alike.
+
+    own_sd [m]: of what the model already has, which then needs another one; of how long that lasts the model knows
+    only from scan to scan. By Laplace's approximation of the integral over its sd and its time constant. One as large
+    as any may be stands for something else that is wrong.
+    """
+    if noise.common_sd > _WHOLE * _HIGH[2]:
+        return CommonMode(-np.inf, 1.0, 1.0)
+    likelihood = _Likelihood(grams, layout, project)
+
+    def cost(x: FloatArray) -> float:
+        sd, tau = (np.array([noise.common_sd, noise.common_tau]) * np.exp(x)).tolist()
+        far = (np.log([sd, tau]) - np.log(_USUAL[2:4])) / _SPREAD[2:4]
+        return likelihood(replace(noise, common_sd=sd, common_tau=tau)) + 0.5 * float(far @ far)
+
+    one, other = _APART * np.eye(2)
+    here = cost(np.zeros(2))
+    bent = [cost(x) + cost(-x) - 2 * here for x in (one, other)]
+    mixed = 0.25 * (cost(one + other) + cost(-one - other) - cost(one - other) - cost(other - one))
+    values, vectors = np.linalg.eigh(np.array([[bent[0], mixed], [mixed, bent[1]]]) / _APART**2)
+    values = np.maximum(values, 1 / np.max(_SPREAD[2:4]) ** 2)  # no less is known than before the data
+    sds = np.sqrt(np.diag(vectors @ np.diag(1 / values) @ vectors.T))
+    none = replace(noise, common_sd=max(own_sd, _FLOOR))
+    # Errors of the reference may stand in for it, where nobody knows them, and the model's own may last.
+    free = [*(range(2) if truth is None else ()), *([3] if own_sd else ())]
+    if free:
+        start = np.log(np.clip(astuple(none), _LOW, _HIGH))
+        none = _likeliest(likelihood, start, np.array(free))
+    return CommonMode(likelihood(none) - here - 0.5 * float(np.log(values).sum()), float(sds[0]), float(sds[1]))
+
+
+def _likeliest(
+    likelihood: _Likelihood, start: FloatArray, free: IntArray, begin: FloatArray | None = None
+) -> ScanNoise:
+    """Return the noise with some of its logs fitted, from `begin` or `start` on, the others as they are."""
+
+    def noise_at(values: FloatArray) -> ScanNoise:
+        every = start.copy()
+        every[free] = np.clip(values, np.log(_LOW)[free], np.log(_HIGH)[free])
+        return ScanNoise(*(float(value) for value in np.exp(every)))
+
+    def cost(values: FloatArray) -> float:
+        distance = (values - start[free]) / _SPREAD[free]
+        return likelihood(noise_at(values)) + 0.5 * float(distance @ distance)
+
+    at = start[free] if begin is None else begin
+    for step in (1.0, 0.3):  # a second start from the end of the first: it may stop early on a ridge
+        simplex = np.vstack([at, at + step * np.eye(len(at))])
+        options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 100, "initial_simplex": simplex}
+        at = minimize(cost, at, method="Nelder-Mead", options=options).x
+    return noise_at(at)
+
+
+def _only(gram: Gram, project: IntArray) -> Gram:
+    """Return a gram with some of the common columns, and the last, which is the residual."""
+    lead = gram.own + gram.shared
+    keep = np.concatenate([np.arange(lead), lead + project, [len(gram.matrix) - 1]])
+    return Gram(gram.matrix[np.ix_(keep, keep)], gram.own, gram.shared)

@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scans of a recording, where and when each beam was fired, and what the model predicts for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kurumaisu import effects, geometry
+from kurumaisu.critic.ranges.scans.standstill import stands_averaged, with_pause_rows
+from kurumaisu.critic.ranges.scans.walls import Rays, Walls, walls_at
+from kurumaisu.critic.values.recording import LaserMount, Recording, Run
+from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
+from kurumaisu.params import EffectSetting, Laser, Model, Mount
+from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.world import load_world
+
+MOST_SCANS = 250  # that are criticised, evenly taken from all: 170 000 readings
+_FEWEST_SCANS = 5
+_DAY = 86400.0  # [s] a first stamp beyond this is a date, not a time since the laser was switched on
+
+
+@dataclass(frozen=True)
+class Track:
+    """Reference poses of a run: times (p,) [s], poses (p, 3)."""
+
+    times: FloatArray
+    poses: FloatArray
+
+
+@dataclass(frozen=True)
+class Shots:
+    """Scans that can be predicted.
+
+    stamps (k,) [s] since the laser's time 0, which is `zero` [s] by the clock of the runs; run (k,): index into tracks
+    and runs, their names; measured (k, b) [m], nan no valid reading,
+    inf no return; said (b,) [s] after the stamp at which beams are fired by the model. Times of tracks count alike.
+    known: what else was recorded, by name, at each scan (k,).
+    shift (k, b, 3): how far the tracks have been moved from the reference, to where the readings put the chair. All is
+    linearised there; a rate taken from noisy poses would be a noisy covariate.
+    """
+
+    laser: Laser
+    own: tuple[EffectSetting, ...]
+    walls: Walls
+    tracks: tuple[Track, ...]
+    stamps: FloatArray
+    run: IntArray
+    measured: FloatArray
+    said: FloatArray
+    shift: FloatArray
+    known: Mapping[str, FloatArray]
+    zero: float
+    runs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class BeamHits:
+    """What beams meet, (k, b): ranges [m], level ones without tilt, incidence [rad], returns [1]; and the beams.
+
+    origins (k, b, 3): poses of the laser when each is fired.
+    """
+
+    ranges: FloatArray
+    level: FloatArray
+    incidence: FloatArray
+    returns: FloatArray
+    beams: tuple[Beams, ...]
+    origins: FloatArray
+
+
+def why_not_usable(recording: Recording) -> str | None:
+    """Return why a recording's laser cannot be criticised, and what supplies what is missing; None when it can."""
+    scanned = [run for run in recording.runs if run.name in recording.train and run.scan is not None]
+    if not scanned:
+        return "no scans were recorded; room_poses records them"
+    if recording.world is None:
+        return "there is no map: give world in meta.yaml, a Stage world with measured walls"
+    posed = [run for run in scanned if _referred(run)]
+    if not posed and any(run.pose is not None for run in scanned):
+        return "the reference pose was computed from these scans; measure one, as room_poses does"
+    if not posed:
+        return "there is no reference pose at the scans; give pose.csv, as room_poses does"
+    if sum(len(_within(run)) for run in posed) < _FEWEST_SCANS:
+        return f"fewer than {_FEWEST_SCANS} scans lie within the times of the reference poses; record room_poses"
+    return None
+
+
+def _referred(run: Run) -> bool:
+    """Tell whether a run has poses that its scans can be judged by."""
+    return run.pose is not None and run.pose_source == "measured"
+
+
+def gather(recording: Recording, model: Model) -> Shots:
+    """Return the scans of the runs to fit, thinned evenly to at most MOST_SCANS. missing(recording) must be None."""
+    assert recording.world is not None
+    laser = laser_of(model.laser, recording.laser, recording.runs)
+    runs = [run for run in recording.runs if run.name in recording.train and run.scan is not None and _referred(run)]
+    chosen = [(i, index) for i, run in enumerate(runs) for index in _within(run)]
+    chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, MOST_SCANS).astype(int))]
+    zero = time_zero(runs)
+    tracks, stamps, measured = [], [], []
+    names = set.intersection(*(set(run.covariates) for run in runs))
+    known: dict[str, list[FloatArray]] = {name: [] for name in sorted(names)}
+    for i, run in enumerate(runs):
+        assert run.scan is not None
+        assert run.pose is not None
+        tracks.append(Track(*with_pause_rows(run.pose.t - zero, stands_averaged(run.pose.t, run.pose.values[:, :3]))))
+        rows = [index for j, index in chosen if j == i]
+        stamps.append(run.scan.t[rows] - zero)
+        measured.append(run.scan.values[rows])
+        for name, parts in known.items():
+            series = run.covariates[name]
+            parts.append(np.interp(run.scan.t[rows], series.t, series.values[:, 0]))
+    readings = np.concatenate(measured)
+    return Shots(
+        laser=laser,
+        own=model.effects,
+        walls=walls_at(load_world(recording.world), laser.mount.z),
+        tracks=tuple(tracks),
+        stamps=np.concatenate(stamps),
+        run=np.array([i for i, _ in chosen]),
+        measured=readings,
+        said=laser.time_increment * np.arange(laser.beams),
+        shift=np.zeros((*readings.shape, 3)),
+        known={name: np.concatenate(parts) for name, parts in known.items()},
+        zero=zero,
+        runs=tuple(run.name for run in runs),
+    )
+
+
+def time_zero(runs: Sequence[Run]) -> float:
+    """Return the time 0 of a laser [s] by the clock of its runs: its first scan, where stamps are dates."""
+    first = min(float(run.scan.t[0]) for run in runs if run.scan is not None)
+    return first if first > _DAY else 0.0
+
+
+def _within(run: Run) -> IntArray:
+    """Return the scans of a run whose whole time lies within that of its poses."""
+    assert run.scan is not None
+    if run.pose is None:
+        return np.empty(0, dtype=np.int64)
+    slack = 0.1  # [s] of extrapolation at the ends
+    inside = (run.scan.t >= run.pose.t[0] - slack) & (run.scan.t <= run.pose.t[-1] + slack)
+    return np.asarray(np.flatnonzero(inside & np.isfinite(run.scan.values).any(axis=1)))
+
+
+def laser_of(laser: Laser, mount: LaserMount | None, runs: Sequence[Run]) -> Laser:
+    """Return the model's laser, mounted and fanned as the recording says."""
+    if mount is not None:
+        place = Mount(mount.x, mount.y, laser.mount.z, mount.yaw)
+        laser = replace(
+            laser,
+            mount=place,
+            angle_min=mount.angle_min,
+            angle_increment=mount.angle_increment,
+            beams=mount.beams,
+        )
+    known = next((run.fan for run in runs if run.fan is not None), None)
+    if known is not None:
+        laser = replace(
+            laser,
+            angle_min=known.angle_min,
+            angle_increment=known.angle_increment,
+            beams=known.beams,
+            time_increment=known.time_increment,
+        )
+    return laser
+
+
+def model_effects_with(shots: Shots, settings: Sequence[EffectSetting]) -> tuple[EffectSetting, ...]:
+    """Return the model's own effects with these in place of those of the same id."""
+    given = {setting.id for setting in settings}
+    return (*(own for own in shots.own if own.id not in given), *settings)
+
+
+def hits_of(
+    shots: Shots,
+    settings: Sequence[EffectSetting],
+    seed: int,
+    *,
+    shift: FloatArray | None = None,
+    like: BeamHits | None = None,
+) -> BeamHits:
+    """Return what the beams meet with these effects.
+
+    seed: of what is drawn; shift (3,): added to all poses; like: has nearly the same incidence, which is taken over.
+    """
+    every = model_effects_with(shots, settings)
+    chain = effects.build_laser(every, np.random.default_rng(seed))
+    segments = shots.walls.segments
+    for effect in effects.build_world(every, np.random.default_rng([seed, 1])):
+        segments = effect.apply(segments)
+    rays = Rays(replace(shots.walls, segments=segments))
+    beams = [chain.aim(_stated_beams(shots, stamp)) for stamp in shots.stamps.tolist()]
+    poses = poses_at(shots, np.array([each.times for each in beams]))
+    if shift is not None:
+        poses = poses + shift
+    placed = geometry.compose(poses, np.array([each.mount for each in beams])[:, np.newaxis, :])
+    origins = placed.reshape(-1, 3)
+    bearings = np.concatenate([each.bearings for each in beams])
+    level, returns = rays.cast(origins, bearings)
+    shape = shots.measured.shape
+    angles = incidence(rays.ranges, origins, bearings, level).reshape(shape) if like is None else like.incidence
+    level = level.reshape(shape)
+    ranges = np.array([slanted(row, each) for row, each in zip(level, beams, strict=True)])
+    return BeamHits(ranges, level, angles, returns.reshape(shape), tuple(beams), placed)
+
+
+def firing_times(shots: Shots, scan: int) -> FloatArray:
+    """Return when the beams (b,) [s] of a scan leave by the model, its own effects at work."""
+    chain = effects.build_laser(shots.own, np.random.default_rng(0))
+    return chain.aim(_stated_beams(shots, float(shots.stamps[scan]))).times
+
+
+def _stated_beams(shots: Shots, stamp: float) -> Beams:
+    """Return the beams of a scan as its message says."""
+    place = shots.laser.mount
+    mount = np.array([place.x, place.y, place.yaw])
+    return Beams(stamp, stamp + shots.said, mount, place.z, shots.laser.bearings, np.zeros(shots.laser.beams))
+
+
+def poses_at(shots: Shots, times: FloatArray) -> FloatArray:
+    """Return base_link (k, b, 3) at times (k, b)."""
+    out = np.empty((*times.shape, 3))
+    for i, track in enumerate(shots.tracks):
+        rows = shots.run == i
+        out[rows] = geometry.interpolate(track.times, track.poses, times[rows])
+    return out
+
+
+def read(
+    shots: Shots, seen: BeamHits, chain: LaserChain, noise: FloatArray, moved: FloatArray | float = 0.0
+) -> FloatArray:
+    """Return readings (k, b) [m] of what is met by a chain, for standard deviates (k, b); neither rounded nor gated.
+
+    moved (k, b) [m]: added to the mean, as errors of the poses are.
+    """
+    mean, sd = shots.laser.error.mean(seen.ranges) + moved, shots.laser.error.deviation(seen.ranges)
+    known = [{name: float(v[k]) for name, v in shots.known.items()} for k in range(len(shots.stamps))]
+    parts = (seen.ranges, seen.incidence, seen.returns, mean, sd, noise, seen.ranges, seen.origins, known)
+    rows = [
+        chain.read(Echoes(stamp, shots.laser.bearings, *row))
+        for stamp, row in zip(shots.stamps.tolist(), zip(*parts, strict=True), strict=True)
+    ]
+    return np.array(rows)
+
+
+def predict(
+    shots: Shots, settings: Sequence[EffectSetting], seen: BeamHits, seed: int, noise: float = 0.0
+) -> FloatArray:
+    """Return the mean readings (k, b) [m], nan where nothing is met; noise: deviations that each is off.
+
+    Without what is random scan by scan.
+    """
+    shaping = tuple(s for s in model_effects_with(shots, settings) if acts_on_readings(s.id))
+    chain = effects.build_laser(shaping, np.random.default_rng(seed))
+    mean = read(shots, seen, chain, np.full_like(seen.ranges, noise))
+    return np.where(np.isfinite(mean), mean, np.nan)
+
+
+def thin(shots: Shots, most: int) -> Shots:
+    """Return at most so many of the scans, evenly taken."""
+    return some_scans(shots, np.unique(np.linspace(0, len(shots.stamps) - 1, most).astype(int)))
+
+
+def some_scans(shots: Shots, rows: IntArray) -> Shots:
+    """Return some of the scans."""
+    return replace(
+        shots,
+        stamps=shots.stamps[rows],
+        run=shots.run[rows],
+        measured=shots.measured[rows],
+        shift=shots.shift[rows],
+        known={name: values[rows] for name, values in shots.known.items()},
+    )
+
+
+def acts_on_readings(name: str) -> bool:
+    """Return whether an effect acts on the mean or the deviation of readings, or on where beams leave from."""
+    effect = effects.by_id(name)
+    return issubclass(effect, effects.LaserEffect) and effect.stage <= effects.LaserStage.SPREAD

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which readings may speak about the mean: those that meet a wall well inside, within the gate, and are no outliers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, firing_times
+from kurumaisu.types import BoolArray, FloatArray
+
+_KINK = 1e-4  # departure from a straight wall, where 1/r(i+1) + 1/r(i-1) = 2 cos(increment) / r(i), relative to 1/r
+_BESIDE = 4  # beams on each side of a corner or jump: an error of the pose or the mounting moves it so far
+# [rad] oblique beyond this, a beam slides along the wall with every error of the pose, which then acts by its square,
+# too; and what becomes of a footprint four times as long as wide is another equation for everybody.
+_STEEPEST = np.radians(75.0)
+_GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
+_PILED = 20  # readings of one value, the least or the greatest, that are a pile if hardly more lie beside them
+_MICRON = 6  # decimals of a metre: readings a grid apart are not within it, however they were rounded
+_GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
+
+
+def edges(seen: BeamHits, increment: float, reach: float = 0.0) -> BoolArray:
+    """Return (k, b) which beams have a corner or a jump of the range beside them; increment [rad] between beams.
+
+    reach [m]: by how far corners may be elsewhere than on the map.
+    """
+    with np.errstate(divide="ignore"):
+        near = 1 / seen.level
+    middle = near[:, 1:-1]
+    jump = ~(near > 0)
+    jump[:, [0, -1]] = True  # nobody sees what lies beyond
+    jump[:, 1:-1] |= np.abs(near[:, 2:] + near[:, :-2] - 2 * np.cos(increment) * middle) > _KINK * middle
+    beside = _BESIDE + reach * maximum_filter1d(np.nan_to_num(near), 3, axis=1) / increment
+    wide = jump.copy()
+    for shift in range(1, int(min(beside[jump].max(), jump.shape[1] - 1)) + 1):
+        far = jump & (beside >= shift)
+        wide[:, shift:] |= far[:, :-shift]
+        wide[:, :-shift] |= far[:, shift:]
+    return wide
+
+
+def usable_beams(shots: Shots, seen: BeamHits, base: FloatArray, reach: float = 0.0) -> BoolArray:
+    """Return (k, b) which beams meet a wall where a reading may speak about the mean, whatever they read.
+
+    reach [m]: as of edges.
+    """
+    inside = (base > shots.laser.range_min + _GATE) & (base < shots.laser.range_max - _GATE)
+    beside = edges(seen, shots.laser.angle_increment, reach)
+    return np.asarray(inside & ~beside & (seen.incidence < _STEEPEST))
+
+
+def usable_readings(shots: Shots, seen: BeamHits, base: FloatArray) -> BoolArray:
+    """Return (k, b) which readings may speak about the mean, outliers aside."""
+    inside = inside_ends(base, cut_off_ends(shots.measured))
+    return np.asarray(usable_beams(shots, seen, base) & inside & np.isfinite(shots.measured))
+
+
+def inside_ends(base: FloatArray, ends: tuple[float, float], doubt: FloatArray | float = 0.0) -> BoolArray:
+    """Return (k, b) which beams are to be read well inside the ends [m] at which readings are cut off.
+
+    doubt [m]: by how much they may be read elsewhere, where that is more than a gate.
+    """
+    low, high = ends
+    gate = np.maximum(_GATE, doubt)
+    return np.asarray((base > low + gate) & (base < high - gate))
+
+
+def cut_off_ends(readings: FloatArray) -> tuple[float, float]:
+    """Return the least and the greatest reading [m] where readings pile up there, as if cut off; else infinite ones.
+
+    Of a pile that is not sharp, the end that lies inside.
+    """
+    values = readings[np.isfinite(readings)]
+    ends = []
+    for sign in (-1.0, 1.0):
+        off = np.round(np.max(sign * values) - sign * values if len(values) else values, _MICRON)
+        grids = [grid for grid in _GRIDS if np.sum(off < grid) > max(_PILED, np.sum((off >= grid) & (off < _GATE)))]
+        within = float(np.max(off[off < grids[0]])) if grids else np.inf
+        ends.append(sign * (float(np.max(sign * values)) - within) if grids else sign * np.inf)
+    return ends[0], ends[1]
+
+
+def without_cut_off(readings: FloatArray) -> FloatArray:
+    """Return readings [m] without those cut off, of which nobody knows where they are: NaN in their place."""
+    low, high = cut_off_ends(readings)
+    with np.errstate(invalid="ignore"):
+        return np.where((readings > low) & (readings < high), readings, np.nan)
+
+
+@dataclass(frozen=True)
+class PoseWeights:
+    """The q reference poses around a scan: rows of its track, and (b, q) the weight of each in each beam's pose."""
+
+    rows: slice
+    weights: FloatArray
+
+
+def pose_weights(shots: Shots, scan: int) -> PoseWeights:
+    """Return on which reference poses a scan rests: those around the times at which its beams leave by the model."""
+    track = shots.tracks[shots.run[scan]]
+    times = firing_times(shots, scan)
+    last = len(track.times) - 1
+    first = min(max(int(np.searchsorted(track.times, times.min(), side="right")) - 1, 0), last)
+    rows = slice(first, min(max(int(np.searchsorted(track.times, times.max())), first), last) + 1)
+    knots = track.times[rows]
+    return PoseWeights(rows, np.stack([np.interp(times, knots, unit) for unit in np.eye(len(knots))], axis=-1))

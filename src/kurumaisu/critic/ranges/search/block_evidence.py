@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Blocks of many coefficients against sets of few, on the same normal equations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, FittedForms, FormPosterior, confusion
+from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
+from kurumaisu.critic.unknown.curves import CurveEvidence, curve_evidence
+from kurumaisu.critic.values.prior import odds
+from kurumaisu.types import FloatArray, IntArray
+
+BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
+LEFT = 0.05  # share of a curve's evidence that the curve itself may leave to other effects
+_ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
+_FITS = 10  # best sets beside which blocks are tried
+_SINGLES = 12  # best single effects likewise
+_PRUNED = 3  # best sets with a block that are pruned
+_WEAK = 1e-4  # prior precision of a coefficient of the catalogue, in units of its parameter's scale
+_FARTHEST = 3.0  # sds of a block's coefficients, beyond which hardly one lies
+_SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in units of its scale
+
+
+@dataclass(frozen=True)
+class SetWithBlock:
+    """A set of forms with a block beside it: log posterior, not normalised."""
+
+    fit: FittedForms
+    free: Block
+    evidence: CurveEvidence
+    log_posterior: float
+
+
+@dataclass(frozen=True)
+class BlockComparison:
+    """found: with blocks in the running; rivals: best first; lead: of the best curve over all without one [nat].
+
+    p: posterior of each curve.
+    """
+
+    found: FormPosterior
+    rivals: tuple[SetWithBlock, ...]
+    lead: float
+    p: dict[str, float]
+
+    @property
+    def least(self) -> float:
+        """Lead that a curve needs [nat]: an effect of the catalogue of a slightly other form leaves some, too."""
+        nothing = max((fit.score for fit in self.found.fits if not fit.forms), default=0.0)
+        curve = next((rival.log_posterior for rival in self.rivals if rival.free.basis is not None), nothing)
+        return max(BEYOND, LEFT * (curve - nothing))
+
+    @property
+    def winner(self) -> SetWithBlock | None:
+        """The block that acts, if any: a curve only if it is far better than the catalogue."""
+        if not self.rivals:
+            return None
+        best = self.rivals[0]
+        if best.free.basis is not None and self.lead <= self.least:
+            best = next((rival for rival in self.rivals if rival.free.basis is None), best)
+        if best.free.basis is not None:
+            return self._plainest(best) if self.lead > self.least else None
+        return best if best.log_posterior > self.found.best.score else None
+
+    def _plainest(self, best: SetWithBlock) -> SetWithBlock:
+        """Return the curve of the best rival beside as few effects as explain much of what it explains.
+
+        Straight lines between knots miss a step, say, by a little, which then looks like one more effect.
+        """
+        least = LEFT * best.evidence.nats
+        same = [rival for rival in self.rivals if rival.free.id == best.free.id and rival.fit.ids <= best.fit.ids]
+        return max(same, key=lambda rival: rival.log_posterior - least * len(rival.fit.ids))
+
+
+def compare_blocks(found: FormPosterior, free: Sequence[Block], gram: FloatArray) -> BlockComparison:
+    """Try every block beside the best sets, beside single effects, and beside none."""
+    ids = tuple(dict.fromkeys([*found.p, *(each.id for each in free if each.basis is None)]))
+    count = len(ids)
+    curves = sum(each.basis is not None for each in free)
+    shares = {e.id: float(np.log(odds(count) if e.basis is None else _ODDS / curves)) for e in free}
+    known = {fit.ids: fit for fit in reversed(found.fits)}
+    rivals = []
+    for fit in _tried(found.fits):
+        rivals += [_with_block(fit, each, gram, shares[each.id]) for each in free if each.id not in fit.ids]
+    rivals.sort(key=lambda rival: -rival.log_posterior)
+    rivals = [*_pruned(rivals[:_PRUNED], known, gram, shares), *rivals]
+    rivals.sort(key=lambda rival: -rival.log_posterior)
+    plain = [(fit.ids, fit.score) for fit in found.fits]
+    plain += [(rival.fit.ids | {rival.free.id}, rival.log_posterior) for rival in rivals if rival.free.basis is None]
+    curved = [rival for rival in rivals if rival.free.basis is not None]
+    total = logsumexp([*(score for _, score in plain), *(rival.log_posterior for rival in curved)])
+    sets = [*plain, *((rival.fit.ids, rival.log_posterior) for rival in curved)]
+    weights = [(ids, float(np.exp(score - total))) for ids, score in sets]
+    best = max(plain, key=lambda each: each[1])
+    p, confounded = confusion(weights, best[0], ids)
+    lead = curved[0].log_posterior - best[1] if curved else -np.inf
+    by_curve = {each.id: 0.0 for each in free if each.basis is not None}
+    for rival in curved:
+        by_curve[rival.free.id] += float(np.exp(rival.log_posterior - total))
+    made = BlockComparison(replace(found, p=p, confounded=confounded), tuple(rivals), lead, by_curve)
+    if lead > made.least:
+        return made
+    # A curve that does not lead by enough takes nothing from the effects that it imitates.
+    total = logsumexp([score for _, score in plain])
+    p, confounded = confusion([(names, float(np.exp(score - total))) for names, score in plain], best[0], ids)
+    return replace(made, found=replace(found, p=p, confounded=confounded))
+
+
+def _with_block(fit: FittedForms, free: Block, gram: FloatArray, share: float) -> SetWithBlock:
+    seen = curve_evidence(*without_own_span(fit, free, gram), free.priors)
+    # Walls that are each where they like have no equation that could be wrong by a share; curves have few knots.
+    doubted = fit.log_likelihood + (seen.nats if free.basis is not None else 0.0)
+    left = LINE_ERROR * doubted if fit.forms else 0.0
+    return SetWithBlock(fit, free, seen, fit.score + seen.nats + share - left)
+
+
+def _pruned(
+    rivals: Sequence[SetWithBlock],
+    known: Mapping[frozenset[str], FittedForms],
+    gram: FloatArray,
+    shares: Mapping[str, float],
+) -> Iterator[SetWithBlock]:
+    """Yield the rivals with as few effects beside the block as are worth it."""
+    done: set[tuple[frozenset[str], str]] = set()
+    for rival in rivals:
+        best = rival
+        while True:
+            fewer = [best.fit.ids - {name} for name in best.fit.ids]
+            fits = [known[ids] for ids in fewer if ids in known and (ids, best.free.id) not in done]
+            done |= {(fit.ids, best.free.id) for fit in fits}
+            tried = [_with_block(fit, best.free, gram, shares[best.free.id]) for fit in fits]
+            yield from tried
+            top = max(tried, key=lambda each: each.log_posterior, default=best)
+            if top.log_posterior <= best.log_posterior:
+                break
+            best = top
+
+
+def fit_with_block(rival: SetWithBlock, gram: FloatArray) -> tuple[FittedForms, FloatArray, FloatArray]:
+    """Return the forms fitted beside the block, and the block's coefficients (m,) and their covariance (m, m)."""
+    values, vectors = np.linalg.eigh(rival.evidence.prior)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    fixed, own = _use(rival.fit), np.arange(rival.free.span.start, rival.free.span.stop)
+    use = np.concatenate([fixed, own])
+    turn = np.eye(len(use))
+    turn[len(fixed) :, len(fixed) :] = root
+    inner = turn.T @ gram[np.ix_(use, use)] @ turn
+    inverse = np.linalg.inv(inner + np.diag(np.r_[np.full(len(fixed), _WEAK), np.ones(len(own))]))
+    at = turn @ (inverse @ (turn.T @ gram[use, -1]))
+    covariance = turn @ inverse @ turn.T
+    n = len(fixed)
+    fit = replace(rival.fit, coefficients=at[:n], sds=np.sqrt(np.diag(covariance)[:n]))
+    return fit, at[n:], covariance[n:, n:]
+
+
+def block_size(rival: SetWithBlock, gram: FloatArray) -> tuple[float, float, float]:
+    """Return the sd of a block's coefficients in units of its scale, with its 90 % interval."""
+    inner, b = without_own_span(rival.fit, rival.free, gram)
+    values, vectors = np.linalg.eigh(inner)
+    c, values = vectors.T @ b, np.maximum(values, 0.0)
+    square = _SIZES[:, np.newaxis] ** 2
+    nats = 0.5 * ((c**2 * square / (1 + square * values)) - np.log1p(square * values)).sum(axis=1)
+    cumulated = np.cumsum(np.exp(nats - logsumexp(nats)))
+    low, middle, high = (float(np.interp(q, cumulated, _SIZES)) for q in (0.05, 0.5, 0.95))
+    return middle, low, high
+
+
+def wall_error(rival: SetWithBlock, gram: FloatArray) -> float:
+    """Return how far [m] a block may have put any wall of the map; of a curve, 0."""
+    p = rival.free.parameter
+    return 0.0 if p is None else _FARTHEST * p.scale * block_size(rival, gram)[0]
+
+
+def _tried(fits: Sequence[FittedForms]) -> Iterator[FittedForms]:
+    """Yield the best sets, the best single effects, and none."""
+    yield from fits[:_FITS]
+    rest = [fit for fit in fits[_FITS:] if len(fit.forms) <= 1]
+    yield from [fit for fit in rest if fit.forms][:_SINGLES]
+    yield from [fit for fit in rest if not fit.forms]
+
+
+def _use(fit: FittedForms) -> IntArray:
+    return np.concatenate([np.arange(0), *(np.arange(form.span.start, form.span.stop) for form in fit.forms)])
+
+
+def without_own_span(fit: FittedForms, free: Block, gram: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return gram and target of a block, without what a set's own columns could take up."""
+    use, own = _use(fit), np.arange(free.span.start, free.span.stop)
+    inner, b = gram[np.ix_(own, own)], gram[own, -1]
+    if not len(use):
+        return inner, b
+    cross = gram[np.ix_(use, own)]
+    solved = np.linalg.solve(gram[np.ix_(use, use)] + _WEAK * np.eye(len(use)), np.column_stack([cross, gram[use, -1]]))
+    return inner - cross.T @ solved[:, :-1], b - cross.T @ solved[:, -1]

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An effect that sends beams so far elsewhere that no line leads to its size: sought by where readings then belong."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from kurumaisu import effects
+from kurumaisu.critic.ranges.scans.beams import Shots, hits_of, predict, thin
+from kurumaisu.critic.ranges.scans.valid_readings import without_cut_off
+from kurumaisu.effects import BeamEffect, LaserStage, Mechanism, Parameter
+from kurumaisu.params import EffectSetting
+
+_SCANS = 25  # that are looked at: each look takes a hundredth of a second
+_TOLERANCE = (0.1, 0.02)  # [m] and share of the range, within which a reading is where it belongs
+_FEW, _MOST = 0.9, 0.95  # share of them that do: more need no search; of fewer, something else is wrong as well
+_ALTERNATIVE = (
+    0.5  # share of what it mends that another effect may mend: small changes must tell it from one that mends more
+)
+_STEP = 2.0**0.5  # between sizes that are tried
+_LARGEST = 32.0  # times a usual size
+_FINER = 8  # sizes that are tried about the best
+
+
+def large_effect(shots: Shots, ids: frozenset[str] | None) -> EffectSetting | None:
+    """Return the one effect on beams that sends nearly all readings where they belong, which are elsewhere without it.
+
+    ids: the effects that may be named; None for all.
+    """
+    sought = _SizeSearch(thin(shots, _SCANS))
+    plain = sought.plain
+    if plain > _FEW:
+        return None
+    own = {setting.id for setting in shots.own}
+    known = [effect for effect in effects.LASER if effect.id not in own and effect.stage <= LaserStage.BIAS]
+    tried = [sought.best(effect) for effect in known if ids is None or effect.id in ids]
+    ranked = sorted(tried, key=lambda each: -each[0])
+    if not ranked or ranked[0][0] < _MOST or not issubclass(effects.by_id(ranked[0][1].id), BeamEffect):
+        return None
+    rival = max((share for share, _ in ranked[1:]), default=plain)
+    return ranked[0][1] if rival - plain < _ALTERNATIVE * (ranked[0][0] - plain) else None
+
+
+class _SizeSearch:
+    """Which share of the readings of some scans are where they belong."""
+
+    def __init__(self, shots: Shots) -> None:
+        self._shots, self._measured = shots, without_cut_off(shots.measured)
+        self._seen = np.isfinite(self._measured)
+        self.plain = self.share(())
+
+    def share(self, settings: tuple[EffectSetting, ...]) -> float:
+        """Return the share with effects at work."""
+        off = np.abs(self._measured - predict(self._shots, settings, hits_of(self._shots, settings, 0), 0))
+        near = off[self._seen] < _TOLERANCE[0] + _TOLERANCE[1] * self._measured[self._seen]
+        return float(near.mean()) if near.size else 1.0
+
+    def best(self, effect: type[Mechanism]) -> tuple[float, EffectSetting]:
+        """Return the greatest share with one of an effect's parameters off its null, and the setting."""
+        null = {p.name: p.null for p in effect.parameters}
+        out = (0.0, EffectSetting(effect.id, null))
+        for p in effect.parameters:
+
+            @cache
+            def missed(value: float, name: str = p.name) -> float:
+                return 1 - self.share((EffectSetting(effect.id, {**null, name: value}),))
+
+            sizes = _sizes(p)
+            if not sizes or missed(sizes[0]) == missed(sizes[-1]) == 1 - self.plain:
+                continue  # alone it does nothing
+            value = min(sizes, key=missed)
+            ends = np.clip(p.null + (value - p.null) * np.array([1 / _STEP, _STEP]), p.lower, p.upper)
+            finer = minimize_scalar(missed, bounds=np.sort(ends), method="bounded", options={"maxiter": _FINER})
+            value = min((value, float(finer.x)), key=missed)
+            if 1 - missed(value) > out[0]:
+                out = (1 - missed(value), EffectSetting(effect.id, {**null, p.name: value}))
+        return out
+
+
+def _sizes(p: Parameter) -> list[float]:
+    """Return sizes of a parameter from its usual one on, either way, within bounds."""
+    steps = p.scale * _STEP ** np.arange(np.log(_LARGEST) / np.log(_STEP) + 1e-9)
+    values = p.null + np.r_[-steps[::-1], steps]
+    return [float(value) for value in values if p.lower <= value <= p.upper]

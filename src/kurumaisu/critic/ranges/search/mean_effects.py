@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What acts on the mean readings: found by its line, refitted by simulation, cleared of what only seemed to act."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from kurumaisu.critic.ranges.search import block_evidence
+from kurumaisu.critic.ranges.search.block_evidence import BlockComparison, SetWithBlock
+from kurumaisu.critic.ranges.search.dominant_effect import vanished_effects
+from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior
+from kurumaisu.critic.ranges.search.effect_settings import settings_of
+from kurumaisu.critic.ranges.search.further_effects import FurtherEffects, further_effects
+from kurumaisu.critic.ranges.search.misfits import Part
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
+from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
+from kurumaisu.critic.ranges.search.spurious_effects import form_families, without_spurious
+from kurumaisu.critic.ranges.signals.form_error import FormFamily
+from kurumaisu.types import FloatArray
+
+
+@dataclass(frozen=True)
+class MeanEffects:
+    """What acts on the mean: the forms' fit; winner: a block beside it, if any, its coefficients and covariance.
+
+    others: curves that what acts may follow instead; more: what of the fit was found when the rest of it was in place.
+    """
+
+    weighed: BlockComparison
+    fit: FittedForms
+    winner: SetWithBlock | None
+    coefficients: FloatArray
+    covariance: FloatArray
+    others: Mapping[str, FormFamily] = field(default_factory=dict)
+    more: FurtherEffects | None = None
+
+    @property
+    def found(self) -> FormPosterior:
+        """The search's result with blocks in the running, before more was found."""
+        return self.weighed.found
+
+    @property
+    def p(self) -> dict[str, float]:
+        """The posterior of each effect."""
+        return self.found.p if self.more is None else {**self.found.p, **self.more.found.p}
+
+    @property
+    def curve(self) -> bool:
+        """Whether a curve acts, which is in no catalogue."""
+        return self.winner is not None and self.winner.free.basis is not None
+
+    def without_spurious(self, assembly: Assembly, normal: NormalEquations) -> MeanEffects:
+        """Return the same without effects that others of another form explain; of a curve, which is unlike any, all."""
+        made = replace(self, others=form_families(assembly, normal, self.fit))
+        if self.curve:
+            return made
+        fit, winner = without_spurious(assembly, normal, self.found, (self.fit, self.winner), made.others)
+        if fit is self.fit and winner is self.winner:
+            return made
+        if winner is None:
+            return replace(made, fit=fit, winner=None, coefficients=np.empty(0), covariance=np.empty((0, 0)))
+        fit, winner, coefficients, covariance = _with(winner, normal)
+        return replace(made, fit=fit, winner=winner, coefficients=coefficients, covariance=covariance)
+
+    def with_further(self, assembly: Assembly, normal: NormalEquations, more: FurtherEffects) -> MeanEffects:
+        """Return the same with what acts beside it."""
+        fit = more.added_to(self.fit)
+        return replace(self, fit=fit, others=form_families(assembly, normal, fit), more=more)
+
+    def parts(self) -> list[Part]:
+        """Return what acts, one by one."""
+        out, start = [], 0
+        for form in self.fit.forms:
+            stop = start + len(form.columns)
+            out.append(Part(form.id, form.span, self.fit.coefficients[start:stop]))
+            start = stop
+        return [*out, Part(self.winner.free.id, self.winner.free.span, self.coefficients)] if self.winner else out
+
+
+def mean_effects(assembly: Assembly, normal: NormalEquations, found: FormPosterior) -> MeanEffects:
+    """Return what acts by a search, with blocks in the running."""
+    weighed = block_evidence.compare_blocks(found, assembly.free, normal.gram)
+    winner = weighed.winner
+    if winner is None:
+        return MeanEffects(weighed, found.best, None, np.empty(0), np.empty((0, 0)))
+    return MeanEffects(weighed, *_with(winner, normal))
+
+
+def _with(winner: SetWithBlock, normal: NormalEquations) -> tuple[FittedForms, SetWithBlock, FloatArray, FloatArray]:
+    fit, coefficients, covariance = block_evidence.fit_with_block(winner, normal.gram)
+    return fit, winner, coefficients, covariance
+
+
+def refitted(
+    assembly: Assembly, normal: NormalEquations, made: MeanEffects, truth: tuple[float, float] | None
+) -> ParameterFit:
+    """Return what acts, refitted by simulation; truth: known sd of the reference [m, rad]."""
+    settings = settings_of(assembly, made.fit)
+    return fit_parameters(assembly, normal, made.fit.forms, settings, made.winner, made.others, truth)
+
+
+def settled(
+    assembly: Assembly, normal: NormalEquations, made: MeanEffects, fit: ParameterFit, truth: tuple[float, float] | None
+) -> tuple[MeanEffects, ParameterFit]:
+    """Return what acts without what its refit takes back, and with what acts beside it, refitted."""
+    while made.winner is None:
+        gone = vanished_effects(assembly, made.fit, fit)
+        if gone:
+            made = replace(made, fit=made.fit.without(gone))
+        elif made.more is None and (more := further_effects(assembly, normal, made.found, made.fit, fit, made.others)):
+            made = made.with_further(assembly, normal, more)
+        else:
+            break
+        fit = refitted(assembly, normal, made, truth)
+    return made, fit
+
+
+def gain_of(made: MeanEffects, name: str) -> float:
+    """Return the log evidence of the best set over the best one without an effect [nat]."""
+    more = made.more.found if made.more is not None else None
+    if more is not None and name in more.best.ids:
+        sets = [(fit.ids, fit.score) for fit in more.fits]
+    else:
+        # A curve that does not lead by enough is out of the running here, too, as it is where p comes from.
+        running = [rival for rival in made.weighed.rivals if made.curve or rival.free.basis is None]
+        sets = [(fit.ids, fit.score) for fit in made.found.fits]
+        sets += [(rival.fit.ids | {rival.free.id}, rival.log_posterior) for rival in running]
+    own = max((score for ids, score in sets if name in ids), default=-np.inf)
+    return float(own - max((score for ids, score in sets if name not in ids), default=-np.inf))

@@ -1,0 +1,399 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From readings to normal equations: residuals and columns, whitened, the errors that scans share integrated out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kurumaisu.critic.ranges.noise.beam_offsets import OffsetProducts, offset_products, without_beam_offsets
+from kurumaisu.critic.ranges.noise.reading_noise import (
+    MAD,
+    OUTLIER,
+    BeamNoise,
+    estimate_reading_noise,
+    expected_readings,
+)
+from kurumaisu.critic.ranges.noise.scan_noise import (
+    CommonMode,
+    Gram,
+    Layout,
+    ScanNoise,
+    common_mode,
+    estimate,
+    marginal,
+    whitened,
+    with_lasting_common_mode,
+)
+from kurumaisu.critic.ranges.poses.likeliest_path import MotionEvidence, PoseEvidence, motion_evidence
+from kurumaisu.critic.ranges.poses.pose_corrections import pose_corrected, stands_of
+from kurumaisu.critic.ranges.scans.beams import Shots, hits_of, model_effects_with, predict, some_scans
+from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
+from kurumaisu.critic.ranges.scans.map_changes import map_change
+from kurumaisu.critic.ranges.scans.passing_objects import passing_objects
+from kurumaisu.critic.ranges.scans.range_step import grid_step, unrounded
+from kurumaisu.critic.ranges.scans.valid_readings import pose_weights, usable_beams, usable_readings, without_cut_off
+from kurumaisu.critic.ranges.signals.coefficient_blocks import blocks
+from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns, Form
+from kurumaisu.critic.ranges.signals.form_error import FormFamily
+from kurumaisu.critic.values.verdict import Unknown
+from kurumaisu.params import EffectSetting
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+_MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
+_SURE = 0.3  # share of the scans that must lie on a smooth path, or else none is preferred
+_ROUNDS = 3
+_SHIFTS = 2  # times that poses are sought by the scans
+_LEAST = 1e-4  # [m] deviation of a reading
+_BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau=1.0)  # before any is known
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """gram (p + 1, p + 1): normal equations of all columns and, last, the residual; noise that made them so.
+
+    scan_noise: the likeliest; wary: with which the equations are made; nobody knows how long its common mode lasts.
+    """
+
+    gram: FloatArray
+    scan_noise: ScanNoise
+    wary: ScanNoise
+    beam_noise: BeamNoise
+    readings: int
+
+
+class Assembly:
+    """Residuals, columns and what scans share, of some shots."""
+
+    def __init__(self, shots: Shots, ids: frozenset[str] | None = None) -> None:
+        """Take the shots, and the effects to look for; None for all."""
+        self.hats = [pose_weights(shots, row) for row in range(len(shots.stamps))]
+        self.layout = Layout(shots.stamps, shots.run, stands_of(shots))
+        self.tracks = shots.tracks
+        self.kinked = [np.zeros(len(track.times), dtype=bool) for track in shots.tracks]
+        self.columns = np.empty((*shots.measured.shape, 0), dtype=np.float32)
+        self._linearise(shots, roughly=True)
+        self.motion: list[MotionEvidence] | None = None
+        self.blocked = blocked_beams(shots.measured, self.marks.base)
+        somewhere = without_cut_off(shots.measured)
+        self.displaced = map_change(somewhere, self.marks.base, self.hits(), self.marks.seen.incidence)
+        # Which readings (k, b) are of what the map has, as far as is known.
+        self.mapped = ~self.blocked & ~self.displaced.readings
+        others = np.where(self.mapped, somewhere, np.nan)
+        self.strangers = passing_objects(others, self.marks.base, shots.laser.bearings)
+        self.mapped &= ~self.strangers.readings
+        self.first = self._trust()
+        for i in range(_SHIFTS):
+            found, self.kinked = pose_corrected(self.shots, self.tracks, self.hats, self.layout, self._sights())
+            self._linearise(found, roughly=i < _SHIFTS - 1)
+        self.motion = self._motion()
+        self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
+        self.geometry = usable_beams(self.shots, self.marks.seen, self.marks.base) & self.mapped
+        self.forms, fixed = self.marks.forms(ids)
+        self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
+        self.columns = np.concatenate([fixed, more], axis=2)
+        # A beam that meets nothing with one of the effects at work says nothing about it.
+        self.first = replace(self.first, valid=self.first.valid & np.isfinite(self.columns).all(axis=2))
+        self._fixed = fixed.shape[2]
+        self._nuisance = slice(0, 0)
+
+    def _linearise(self, shots: Shots, *, roughly: bool) -> None:
+        """Predict at the shots' shifted poses; the residual is as of the reference's own.
+
+        roughly: where poses are only sought, one side of a difference will do.
+        """
+        self.shots = shots
+        self.marks = EffectColumns(shots)
+        self.poses = self._by_pose((1.0,) if roughly else (-1.0, 1.0))
+        self.residual = unrounded(shots.measured) - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
+
+    def _trust(self) -> BeamNoise:
+        one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
+        sd = np.maximum(np.nan_to_num(one), _LEAST)  # a beam that meets nothing has none
+        smooth = self._on_smooth_path()[:, np.newaxis]
+        trust = usable_readings(self.shots, self.marks.seen, self.marks.base)
+        return BeamNoise(sd, 0.0, trust & smooth & self.mapped)
+
+    def unknowns(self) -> list[Unknown]:
+        """Return what stands where the map has it not, rides with the chair, or comes and goes."""
+        riding = described(self.blocked, self.shots.measured, self.shots.laser.bearings)
+        staying = list(self.displaced.unknowns())
+        known = {each.covariate for each in staying}
+        return [*riding, *staying, *(each for each in self.strangers.unknowns() if each.covariate not in known)]
+
+    @property
+    def strange(self) -> bool:
+        """Whether things are there that the map does not have: how far others scatter by them, nobody can say."""
+        return bool(self.displaced.readings.any()) or self.strangers.many
+
+    def hits(self) -> FloatArray:
+        """Return where (k, b, 2) [m] the beams meet the map."""
+        poses, bearings = self.origins()
+        angles = poses[:, :, 2] + bearings
+        way = self.marks.base[:, :, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        return np.asarray(poses[:, :, :2] + way)
+
+    def _on_smooth_path(self) -> BoolArray:
+        """Return which scans (k,) lie where the chair's path is smooth; all where that is seldom."""
+        sure = np.array([not self.kinked[self.shots.run[k]][hat.rows].any() for k, hat in enumerate(self.hats)])
+        return sure if sure.mean() >= _SURE else np.ones_like(sure)
+
+    def _sights(self) -> list[PoseEvidence]:
+        """Return what each scan alone says of the errors of its poses, within what is plausible."""
+        size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
+        beam = self._begun()
+        out: list[PoseEvidence] = []
+        for _ in range(2):  # without outliers in the second round
+            left, out = np.full_like(self.residual, np.nan), []
+            for k, gram in enumerate(self.grams(beam)):
+                own, shared, _ = self._rows(k, None)
+                lead = gram.own + gram.shared
+                sizes = np.concatenate([np.tile(size, gram.own // 3), [_BROAD.common_sd], size])[:lead]
+                errors = np.linalg.solve(gram.matrix[:lead, :lead] + np.diag(sizes**-2), gram.matrix[:lead, -1])
+                left[k] = self.residual[k] - np.hstack([own, shared]) @ errors
+                # What nothing fits as well as its noise allows, says less by as much.
+                z = np.abs(left[k] / self.first.sd[k])[beam.valid[k]]
+                width = max(MAD * float(np.median(z)), 1.0) if len(z) else 1.0
+                out.append(_pose_evidence(gram, self.hats[k].rows, width))
+            z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
+            beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * MAD * np.nanmedian(z)))
+        return out
+
+    def _begun(self) -> BeamNoise:
+        """Return the noise of the readings before any is known, without those that are of something else."""
+        size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
+        with np.errstate(invalid="ignore"):
+            reach = np.sqrt(np.sum((self.poses * size) ** 2, axis=2)) / self.first.sd
+            return replace(self.first, valid=expected_readings(self.residual / self.first.sd, self.first.valid, reach))
+
+    def refine(self, fitted: Sequence[Form], beam: BeamNoise, scan: ScanNoise) -> None:
+        """Put in place of each fitted form's shape the one between those of the grid that explains most."""
+        for form in fitted:
+            best, at, columns = -np.inf, form.at, None
+            for shape, some in self.marks.finer(form):
+                if not np.isfinite(some[beam.valid]).all():
+                    continue  # with this shape some beams meet nothing
+                self.columns[:, :, form.span] = some
+                use = np.concatenate([np.arange(other.span.start, other.span.stop) for other in fitted])
+                gram = marginal(self.grams(beam, use, lasting=True), self.layout, scan)[0]
+                gain = float(gram[:-1, -1] @ _solve(gram[:-1, :-1], gram[:-1, -1]))
+                if gain > best:
+                    best, at, columns = gain, shape, some
+            if columns is not None:
+                self.columns[:, :, form.span] = columns
+                self.forms[self.forms.index(form)] = replace(form, at=at)
+
+    def smooth_rows(self, most: int) -> IntArray:
+        """Return at most so many of the scans, evenly taken from those where the chair's path is smooth.
+
+        Where a rate jumps nobody knows just where the chair was, and readings seem to scatter far.
+        """
+        rows = np.flatnonzero(self._on_smooth_path())
+        return np.asarray(rows[np.unique(np.linspace(0, len(rows) - 1, most).astype(int))])
+
+    def thinned(self, rows: IntArray) -> Assembly:
+        """Return some of the scans, without columns."""
+        out = copy(self)
+        out.shots, out.marks = some_scans(self.shots, rows), self.marks.thinned(rows)
+        out.columns = np.empty((*out.shots.measured.shape, 0), dtype=np.float32)
+        out.hats = [self.hats[row] for row in rows]
+        out.layout = Layout(self.layout.times[rows], self.layout.run[rows], self.layout.stand[rows])
+        out.motion = None if self.motion is None else [self.motion[row] for row in rows]
+        out.residual, out.poses, out.geometry = self.residual[rows], self.poses[rows], self.geometry[rows]
+        out.first = BeamNoise(self.first.sd[rows], self.first.rho, self.first.valid[rows])
+        return out
+
+    def settle(self, truth: tuple[float, float] | None, fitted: Sequence[Form] = ()) -> NormalEquations:
+        """Return the normal equations with the noise estimated from these very data; fitted: forms to project out.
+
+        Without the blocks of many columns, but for those that change whole scans.
+        """
+        project = self._projected(fitted)
+        beam = self._begun()
+        seen, layout, grid = self.marks.seen, self.layout, grid_step(self.shots.measured)
+        for _ in range(_ROUNDS):
+            beam = estimate_reading_noise(
+                self.first, beam, lambda last: self.leftover(last, project), seen, layout, grid
+            )
+        narrow = max(self._fixed, self._nuisance.stop, *(free.span.stop for free in self.free if free.whole))
+        grams, cross = self._crossed(beam, narrow)
+        scan = estimate(grams, self.layout, truth, project)
+        wary = with_lasting_common_mode(grams, self.layout, project, scan)
+        gram = without_beam_offsets(grams, cross, self.layout, wary, beam.own_sd)
+        return NormalEquations(gram, scan, wary, beam, int(beam.valid.sum()))
+
+    def _projected(self, fitted: Sequence[Form]) -> IntArray:
+        """Return the columns of every effect, and of the blocks that change whole scans."""
+        spans = [form.span for form in self._plain(fitted)] + [free.span for free in self.free if free.whole]
+        spans.append(self._nuisance)
+        return np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
+
+    def common_mode(
+        self, normal: NormalEquations, truth: tuple[float, float] | None, fitted: Sequence[Form], own_sd: float = 0.0
+    ) -> CommonMode:
+        """Return what says that whole scans are off together, whatever effects on the mean there are.
+
+        fitted: forms that act, with their shapes; own_sd [m]: of whole scans in the model.
+        """
+        project = self._projected(fitted)
+        grams = self.grams(normal.beam_noise, project, lasting=True)
+        seen = common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise, own_sd)
+        return replace(seen, wary=normal.wary)
+
+    def full(self, normal: NormalEquations) -> NormalEquations:
+        """Return the normal equations of all columns, in the noise that is known."""
+        grams, cross = self._crossed(normal.beam_noise, self.columns.shape[2])
+        gram = without_beam_offsets(grams, cross, self.layout, normal.wary, normal.beam_noise.own_sd)
+        return replace(normal, gram=gram)
+
+    def again(self, settings: Sequence[EffectSetting]) -> Assembly:
+        """Return the same scans predicted with effects at work, and poses sought anew; without columns."""
+        shots = replace(
+            self.shots,
+            own=model_effects_with(self.shots, settings),
+            tracks=self.tracks,
+            shift=np.zeros_like(self.shots.shift),
+        )
+        return Assembly(shots, frozenset())
+
+    def with_families(self, others: Sequence[FormFamily]) -> Assembly:
+        """Return the same scans with columns of what effects may do instead, of which no noise is made, either."""
+        out, count = copy(self), self.columns.shape[2]
+        more = [each.columns(self.shots, self.marks.seen).astype(np.float32) for each in others]
+        out.columns = np.concatenate([self.columns, *more], axis=2)
+        out._nuisance = slice(count, out.columns.shape[2])
+        return out
+
+    def products(self, normal: NormalEquations, columns: FloatArray, residual: FloatArray) -> FloatArray:
+        """Return the normal equations of other columns (k, b, m) and another residual (k, b), in the noise known."""
+        other = copy(self)
+        other.columns, other.residual = columns.astype(np.float32), residual
+        known = np.isfinite(columns).all(axis=2) & np.isfinite(residual)
+        grams, cross = other._crossed(
+            replace(normal.beam_noise, valid=normal.beam_noise.valid & known), columns.shape[2]
+        )
+        return without_beam_offsets(grams, cross, self.layout, normal.wary, normal.beam_noise.own_sd)
+
+    def _crossed(self, beam: BeamNoise, count: int) -> tuple[list[Gram], OffsetProducts]:
+        """Return the first columns' normal equations of each scan, and what single beams' offsets share with them."""
+        beams = self.residual.shape[1]
+        inner, common = np.zeros((beams, beams)), np.zeros((beams, count + 1))
+        grams, parts = [], []
+        for k in range(len(self.residual)):
+            own, shared, last = self._rows(k, np.arange(count), lasting=True)
+            rows = whitened(np.hstack([own, shared, last]), beam.valid[k], beam.sd[k], beam.rho)
+            grams.append(self._gram(k, rows, own.shape[1], shared.shape[1]))
+            products = offset_products(rows, beam.valid[k], beam.sd[k], beam.rho, inner)
+            lead = own.shape[1] + shared.shape[1]
+            parts.append(products[:, :lead])
+            common += products[:, lead:]
+        return grams, OffsetProducts(tuple(parts), common, inner)
+
+    def grams(self, beam: BeamNoise, columns: IntArray | None = None, *, lasting: bool = False) -> list[Gram]:
+        """Return the normal equations of each scan; columns: which of all, None for all.
+
+        lasting: with the error of the poses that a stretch of the way shares.
+        """
+        out = []
+        for k in range(len(self.residual)):
+            own, shared, common = self._rows(k, columns, lasting=lasting)
+            rows = whitened(np.hstack([own, shared, common]), beam.valid[k], beam.sd[k], beam.rho)
+            out.append(self._gram(k, rows, own.shape[1], shared.shape[1]))
+        return out
+
+    def _gram(self, k: int, rows: FloatArray, own: int, shared: int) -> Gram:
+        """Return the normal equations of a scan, of its readings and of how the chair moved."""
+        matrix = rows.T @ rows
+        if own and self.motion is not None:
+            steady = self.motion[k]
+            matrix[:own, :own] += steady.rows.T @ steady.rows
+            matrix[:own, -1] += steady.rows.T @ steady.left
+            matrix[-1, :own] = matrix[:own, -1]
+            matrix[-1, -1] += steady.left @ steady.left
+        return Gram(matrix, own, shared)
+
+    def _motion(self) -> list[MotionEvidence]:
+        """Return what the chair's motion says of the errors of the poses under each scan."""
+        out: dict[int, MotionEvidence] = {}
+        for i, (track, first) in enumerate(zip(self.shots.tracks, self.tracks, strict=True)):
+            own = np.flatnonzero((self.shots.run == i) & (self.layout.stand < 0)).tolist()
+            made = motion_evidence(track.times, first.poses, track.poses, [self.hats[k].rows for k in own])
+            out |= dict(zip(own, made, strict=True))
+        none = MotionEvidence(np.empty((0, 0)), np.empty(0))
+        return [out.get(k, none) for k in range(len(self.hats))]
+
+    def leftover(self, beam: BeamNoise, columns: IntArray) -> FloatArray:
+        """Return what some columns, the poses and the common modes leave of the residual (k, b) [m]."""
+        grams = self.grams(beam, columns)
+        total = marginal(grams, self.layout, _BROAD)[0]
+        beta = _solve(total[:-1, :-1], total[:-1, -1])
+        out: FloatArray = np.empty_like(self.residual)
+        for k, gram in enumerate(grams):
+            own, shared, common = self._rows(k, columns)
+            lead = gram.own + gram.shared
+            target = gram.matrix[:lead, -1] - gram.matrix[:lead, lead:-1] @ beta
+            random = _solve(gram.matrix[:lead, :lead], target)
+            out[k] = common[:, -1] - common[:, :-1] @ beta - np.hstack([own, shared]) @ random
+        return out
+
+    def _plain(self, fitted: Sequence[Form]) -> list[Form]:
+        """Return a form per effect: the fitted one, else the one in the middle of its grid."""
+        chosen = {form.id: form for form in fitted}
+        by_id: dict[str, list[Form]] = {}
+        for form in self.forms:
+            by_id.setdefault(form.id, []).append(form)
+        return [chosen.get(name, forms[len(forms) // 2]) for name, forms in by_id.items()]
+
+    def _rows(
+        self, k: int, columns: IntArray | None, *, lasting: bool = False
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        poses = self.poses[k]
+        one = np.ones((poses.shape[0], 1))
+        common = self.columns[k] if columns is None else self.columns[k][:, columns]
+        last = np.column_stack([common, self.residual[k]])
+        if self.layout.stand[k] >= 0:
+            return np.empty((len(one), 0)), np.hstack([one, poses]), last
+        own = (self.hats[k].weights[:, :, np.newaxis] * poses[:, np.newaxis, :]).reshape(len(one), -1)
+        return own, np.hstack([one, poses]) if lasting else one, last
+
+    def random_columns(self, k: int) -> FloatArray:
+        """Return (b, q) what the readings of a scan do by its common mode and by errors of its reference poses."""
+        own, shared, _ = self._rows(k, None)
+        return np.hstack([shared[:, :1], own, shared[:, 1:]])
+
+    def origins(self) -> tuple[FloatArray, FloatArray]:
+        """Return poses (k, b, 3) of the laser and bearings (k, b) [rad] at which beams leave it, by the model."""
+        seen = self.marks.seen
+        return seen.origins, np.array([each.bearings for each in seen.beams])
+
+    def _by_pose(self, signs: Sequence[float]) -> FloatArray:
+        """Return the change (k, b, 3) of the mean readings per metre and radian of the pose."""
+        out = []
+        for axis in range(3):
+            moved = [self.marks.base] if len(signs) == 1 else []
+            for sign in signs:
+                seen = hits_of(self.shots, (), 0, shift=sign * np.eye(3)[axis] * _MOVE, like=self.marks.seen)
+                moved.append(predict(self.shots, (), seen, 0))
+            out.append((moved[1] - moved[0]) / (len(signs) * _MOVE[axis]))
+        return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
+
+
+def _pose_evidence(gram: Gram, rows: slice, width: float) -> PoseEvidence:
+    """Return what a scan says of its poses, its common mode integrated out.
+
+    rows: of the track, that it rests on; width: of what it leaves, in deviations.
+    """
+    common, poses = gram.own, np.arange(gram.own) if gram.own else np.arange(1, 4)
+    matrix = gram.matrix / width**2
+    beside = matrix[poses, common] / (matrix[common, common] + _BROAD.common_sd**-2)
+    inner = matrix[np.ix_(poses, poses)] - np.outer(beside, matrix[common, poses])
+    return PoseEvidence(rows, inner, matrix[poses, -1] - beside * matrix[common, -1])
+
+
+def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:
+    norms = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    inside = gram / np.outer(norms, norms) + 1e-9 * np.eye(len(gram))
+    return np.asarray(np.linalg.solve(inside, target / norms) / norms)

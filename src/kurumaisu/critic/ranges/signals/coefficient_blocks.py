@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What changes the mean readings by many coefficients at once: walls that are off at random, and unknown curves.
+
+The coefficients are normal before the data. Which effect of the catalogue draws such numbers is found by giving it a
+generator that draws 0 but once. No effect is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kurumaisu import effects
+from kurumaisu.critic.ranges.noise.level_jumps import knots_parted, level_jumps
+from kurumaisu.critic.ranges.poses.pose_corrections import stands_of
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
+from kurumaisu.critic.ranges.scans.walls import Rays
+from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns
+from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of
+from kurumaisu.effects import Echoes, Parameter
+from kurumaisu.types import FloatArray
+
+_HATS = 14
+_PAUSE = 5.0  # [s] between scans, which makes two stops of what was one
+_STOPS = 20  # stops of which each may have a knot of its own
+_DRAWS = 150  # coefficients of an effect that are still told one by one; of more, so many draws stand for all
+_STEP = 0.2  # of a finite difference, in units of a parameter's scale
+_ROUNDING = 1e-6
+_LEAST = 0.3  # [m, rad, s] spread of a covariate that a curve may follow
+_SAMPLES = 20000  # readings that say how often a covariate has which value
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block of columns whose coefficients are normal before the data, with covariances `priors`, to a factor.
+
+    id: of the effect; parameter: the sd of the coefficients, in units of its scale, None of a curve; basis: of the
+    curve, None of an effect of the catalogue; whole: it changes all readings of a scan alike.
+    """
+
+    id: str
+    parameter: Parameter | None
+    basis: Basis | None
+    priors: tuple[FloatArray, ...]
+    span: slice
+    whole: bool = False
+
+
+class _Spike(np.random.Generator):
+    """Draws 0 from the normal distribution, but `size` in one place; counts what it is asked for."""
+
+    def __init__(self, at: int, size: float) -> None:
+        super().__init__(np.random.PCG64(0))
+        self._at, self._size, self.asked = at, size, 0
+
+    def standard_normal(self, size: Any = None, *_: Any, **__: Any) -> Any:
+        """Return zeros, and the spike where it belongs."""
+        out = np.zeros(size if size is not None else ())
+        if self.asked <= self._at < self.asked + out.size:
+            out.flat[self._at - self.asked] = self._size
+        self.asked += out.size
+        return out
+
+
+def blocks(
+    shots: Shots, marks: EffectColumns, start: int, ids: frozenset[str] | None
+) -> tuple[list[Block], FloatArray]:
+    """Return all blocks, those first that change whole scans, and their columns (k, b, m).
+
+    start: index of the first one in the whole matrix.
+    """
+    found: list[Block] = []
+    columns: list[NDArray[np.float32]] = []
+    parts = [*_drawn(shots, marks, ids), *(_curves(shots, marks) if ids is None or effects.SMOOTH in ids else ())]
+    for free, part in sorted(parts, key=lambda each: not each[0].whole):
+        found.append(replace(free, span=slice(start, start + part.shape[2])))
+        columns.append(part.astype(np.float32))
+        start += part.shape[2]
+    return found, np.concatenate([np.empty((*marks.base.shape, 0), dtype=np.float32), *columns], axis=2)
+
+
+def _drawn(shots: Shots, marks: EffectColumns, ids: frozenset[str] | None) -> Iterator[tuple[Block, FloatArray]]:
+    """Yield effects of the world whose walls are moved by normal numbers that are drawn once."""
+    slope = _slope(shots, marks.seen.ranges)
+    for effect in effects.WORLD:
+        null = marks.null(effect)
+        for p in effect.parameters:
+            if not effect.random or (ids is not None and effect.id not in ids):
+                continue
+            values = {**null, p.name: p.null + _STEP * p.scale}
+            counter = _Spike(-1, 0.0)
+            drawn = effect(values, np.random.default_rng(0)).apply(shots.walls.segments)
+            still = effect(values, counter).apply(shots.walls.segments)
+            if not counter.asked or not np.array_equal(still, shots.walls.segments) or np.array_equal(still, drawn):
+                continue
+            many = counter.asked > _DRAWS
+            made = []
+            for i in range(_DRAWS if many else counter.asked):
+                rng = np.random.default_rng(i) if many else _Spike(i, 1.0)
+                change = _moved(shots, effect(values, rng).apply(shots.walls.segments), marks)
+                made.append((change * slope / _STEP / (np.sqrt(_DRAWS) if many else 1.0)).astype(np.float32))
+            columns: Any = np.stack([one for one in made if np.abs(one).max() > 0], axis=-1)
+            yield Block(effect.id, p, None, (np.eye(columns.shape[2]),), slice(0)), columns
+
+
+def _moved(shots: Shots, segments: FloatArray, marks: EffectColumns) -> FloatArray:
+    """Return how much farther level beams (k, b) go [m] before other walls; 0 where they meet another one."""
+    seen = marks.seen
+    bearings = np.array([each.bearings for each in seen.beams])
+    rays = Rays(replace(shots.walls, segments=segments))
+    ranges = rays.ranges(seen.origins.reshape(-1, 3), bearings.ravel()).reshape(seen.level.shape)
+    with np.errstate(invalid="ignore"):
+        change = ranges - seen.level
+    return np.where(np.isfinite(change) & (np.abs(change) < 0.1), change, 0.0)
+
+
+def _slope(shots: Shots, ranges: FloatArray) -> FloatArray:
+    """Return how the mean reading grows with the range."""
+    error, step = shots.laser.error, 1e-3
+    safe = np.where(np.isfinite(ranges), ranges, 1.0)
+    return np.asarray((error.mean(safe + step) - error.mean(safe - step)) / (2 * step))
+
+
+def _curves(shots: Shots, marks: EffectColumns) -> Iterator[tuple[Block, FloatArray]]:
+    echoes = echoes_of(shots, marks.seen)
+    known = np.isfinite(marks.base)
+    stand = stands_of(shots)
+    jumped = level_jumps(np.where(np.isfinite(shots.measured), shots.measured, np.nan) - marks.base, stand)
+    for name, of in effects.RANGE_COVARIATES.items():
+        at = np.asarray(of(echoes), dtype=float)
+        values = at[known]
+        if np.ptp(values) < _LEAST:
+            continue
+        whole = bool((np.ptp(at, axis=1) <= _ROUNDING).mean() > 0.5) or name == "heading"
+        knots = _knots(at[:, 0] if whole else values[:: max(len(values) // _SAMPLES, 1)])
+        if len(knots) < 3:
+            continue
+        knots, places = knots_parted(knots, at[:, 0], stand, jumped) if whole else (knots, knots)
+        few = values[:: max(len(values) // _SAMPLES, 1)]
+        matrix = np.column_stack([np.interp(few, knots, row) for row in np.eye(len(knots))])
+        low, high = np.quantile(few, [0.025, 0.975])
+        priors = tuple(priors_of(places, matrix))
+        basis = Basis(name, knots, {}, priors, float(low), float(high))
+        columns = basis.matrix(at.ravel()).reshape(*at.shape, len(knots))
+        yield Block(effects.smooth_range_id(name), None, basis, priors, slice(0), whole), columns
+
+
+def echoes_of(shots: Shots, seen: BeamHits) -> Echoes:
+    """Return what the beams (k, b) of all scans meet, for curves over it; of nothing, at a range of 0."""
+    still = np.where(np.isfinite(seen.ranges), seen.ranges, 0.0)
+    stamp: Any = shots.stamps[:, np.newaxis]
+    bearings = np.broadcast_to(shots.laser.bearings, still.shape)
+    return Echoes(stamp, bearings, still, seen.incidence, seen.returns, still, still, still, still, seen.origins)
+
+
+def _knots(values: FloatArray) -> FloatArray:
+    """Return knots of a curve: one for each value where there are few, as of stops."""
+    ordered = np.sort(values)
+    gaps = np.flatnonzero(np.diff(ordered) > 0.02 * max(float(np.ptp(ordered)), 1e-9))
+    groups = np.split(ordered, gaps + 1)
+    if 3 <= len(groups) <= _STOPS and sum(float(np.ptp(group)) for group in groups) < 0.1 * float(np.ptp(ordered)):
+        return np.array([group.mean() for group in groups])
+    return knots_of(values, _HATS)

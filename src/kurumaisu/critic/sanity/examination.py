@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Stage 0: data that are wrong rather than surprising. They are said, with the transform that would mend them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu.critic.base.drive import from_voltages
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.ranges.scans.beams import laser_of, time_zero
+from kurumaisu.critic.sanity import (
+    headings,
+    input_match,
+    map_agreement,
+    pose_jumps,
+    pose_stamps,
+    rates,
+    rows,
+    scans,
+    time_units,
+    voltage_law,
+    voltages,
+)
+from kurumaisu.critic.sanity.headings import Course
+from kurumaisu.critic.sanity.input_match import Match
+from kurumaisu.critic.sanity.rates import Rates
+from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
+from kurumaisu.params import Model
+from kurumaisu.types import FloatArray
+from kurumaisu.world import load_world
+
+# A reference may be written twice as often as it measures, but not this often.
+_REPEATS = 3.0
+# Every row twice is such a reference; some rows twice is a buffer that was stuck.
+_SOME_TWICE = (1.04, 1.7)
+
+
+def examine(recording: Recording, model: Model) -> Faults:
+    """Return what is wrong with the runs to fit and to judge by, in words that begin with the run's name."""
+    faults = Faults()
+    segments, laser = _segments(recording), _mounted(recording, model)
+    told = []
+    for run in recording.runs:
+        words = _of_run(run, model)
+        told += [(run, line) for line in [*words, *_of_scans(run, laser, model, None if words else segments)]]
+    late = [line.startswith(map_agreement.CLOCKS) for _, line in told]
+    if any(late) and laser is not None and segments is not None and _drifts(recording, laser, model, segments):
+        told = [each for each, clock in zip(told, late, strict=True) if not clock]
+    for run, line in told:
+        faults.add(f"{run.name}: {line}", fatal=True)
+    return faults
+
+
+def _segments(recording: Recording) -> FloatArray | None:
+    """Return the walls of the recording's map; None where it has none, or nothing to compare it with."""
+    usable = any(run.scan is not None for run in recording.runs)
+    return load_world(recording.world).segments if recording.world is not None and usable else None
+
+
+def _mounted(recording: Recording, model: Model) -> LaserMount | None:
+    """Return the laser of the recording, else the model's; None where its fan cannot be that of the scans."""
+    laser = laser_of(model.laser, recording.laser, recording.runs)
+    if recording.laser is None and any(run.scan.values.shape[1] != laser.beams for run in recording.runs if run.scan):
+        return None
+    place = laser.mount
+    return LaserMount(place.x, place.y, place.yaw, laser.angle_min, laser.angle_increment, laser.beams)
+
+
+def _of_scans(run: Run, laser: LaserMount | None, model: Model, segments: FloatArray | None) -> list[str]:
+    """Return what is wrong with scans; segments (m, 4) of the map [m], None to leave it out."""
+    if run.scan is None or len(run.scan.t) < 2:
+        return []
+    words = scans.problems(run.scan, run.pose, laser, model.laser.range_max)
+    if words or laser is None or segments is None or run.pose is None or run.pose_source != "measured":
+        return words
+    return _one(map_agreement.problem(run.scan, run.pose, laser, segments, _mean_error(model)))
+
+
+def _drifts(recording: Recording, laser: LaserMount, model: Model, segments: FloatArray) -> bool:
+    """Tell whether the laser's clock runs fast or slow, which the catalogue has: no run alone can tell it."""
+    runs = [run for run in recording.runs if run.scan is not None]
+    both = [(run.scan, run.pose) for run in runs if run.scan and run.pose and run.pose_source == "measured"]
+    return map_agreement.drifts(both, laser, segments, _mean_error(model), time_zero(runs))
+
+
+def _mean_error(model: Model) -> FloatArray:
+    """Return slope and offset [m] of a reading of a range."""
+    ends = model.laser.error.mean(np.array([0.0, 1.0]))
+    return np.array([ends[1] - ends[0], ends[0]])
+
+
+def _of_run(run: Run, model: Model) -> list[str]:
+    untimely = time_units.problems(run)
+    if untimely or run.pose is None or len(run.pose.t) < 3:
+        return untimely
+    found = headings.course(run.pose)
+    pose = _mended(run.pose, found)
+    inputs = [(name, part, rates) for name, part in _inputs(run) if (rates := _rates(part, pose)) is not None]
+    known, lawful, follows = [], True, dict[str, FloatArray]()
+    for name, _, rates in inputs:
+        asked = rates[0] if name != "voltage" else _from_volts(run, rates[1], model)
+        plain = input_match.compare(asked, rates[1], name)
+        match = voltage_law.match(run, name, plain, rates[1], model) if name != "odometry" else plain
+        known.append((name, match, _number(*rates)))
+        follows[name] = plain.correlation
+        lawful &= match is plain
+    words = _one(headings.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
+    words += [*pose_jumps.problems(run.pose, run.command), *_one(rows.blocks(run.pose, "pose"))]
+    words += _one(headings.folded(run.pose))
+    # Poses that were worked out repeat themselves at rest, to the last bit; measured ones never do.
+    measured = run.pose_source == "measured"
+    words += _one(pose_stamps.problem(run.pose)) if measured else []
+    told = [
+        line
+        for name, part, rates in inputs
+        for line in _against(name, part, pose if measured else None, rates, model, follows[name])
+    ]
+    for name, match, number in known:
+        told += [*match.words, *input_match.sign_and_unit(match, number, name)]
+    # Of poses that are mirrored every input seems to have the wrong sign; by another law some voltages have.
+    reflected = found is not None and found.factor < 0
+    words += [line for line in told if not ((reflected or not lawful) and "wrong sign" in line)]
+    return list(dict.fromkeys(words))
+
+
+def _one(words: str | None) -> list[str]:
+    return [] if words is None else [words]
+
+
+def _inputs(run: Run) -> list[tuple[str, Series]]:
+    parts = (("command", run.command), ("voltage", run.voltage), ("odometry", run.odom))
+    return [(name, part) for name, part in parts if part is not None and len(part.t) > 1]
+
+
+def _against(
+    name: str, part: Series, pose: Series | None, rates: tuple[Rates, Rates], model: Model, follows: FloatArray
+) -> list[str]:
+    """Return what is wrong with an input, or with measured poses in its light; follows: as volts have it."""
+    words = voltages.problems(part, rates[1], model, follows) if name == "voltage" else []
+    if pose is None:
+        return words
+    times = rows.repeats(pose, rates[1])
+    words += [rows.held(times)] if times > _REPEATS or _SOME_TWICE[0] < times < _SOME_TWICE[1] else []
+    for check in (
+        rows.frozen(pose, *rates),
+        rows.coarse(pose, rates[1]),
+    ):
+        words += _one(check)
+    return words
+
+
+def _from_volts(run: Run, driven: Rates, model: Model) -> Rates:
+    t, v, w = from_voltages(run, model)
+    return rates.of_input(t, np.column_stack([v, w]), driven.t)
+
+
+def _mended(pose: Series, found: Course | None) -> Series:
+    """Return the poses with the heading that their course suggests."""
+    if found is None or found.right or found.agreement < 0.85:
+        return pose
+    values = pose.values.copy()
+    values[:, 2] = found.factor * values[:, 2] + found.offset
+    return replace(pose, values=values)
+
+
+def _rates(part: Series, pose: Series) -> tuple[Rates, Rates] | None:
+    """Return what was asked for and what was driven on one grid, None where there is too little of both."""
+    t = rates.grid(min(part.t[0], pose.t[0]), max(part.t[-1], pose.t[-1]))
+    if len(t) < 100:
+        return None
+    by_poses = "theta" in part.columns
+    asked = rates.of_poses(part, t) if by_poses else rates.of_input(part.t, part.values[:, :2], t)
+    if by_poses:
+        asked.values[(t < part.t[0]) | (t > part.t[-1])] = np.nan
+    driven = rates.of_poses(pose, t)
+    driven.values[(t < pose.t[0]) | (t > pose.t[-1])] = np.nan
+    return (asked, driven) if _number(asked, driven) >= 8 else None
+
+
+def _number(asked: Rates, driven: Rates) -> float:
+    """Return how many independent samples both have in common."""
+    known = np.isfinite(asked.values + driven.values).all(axis=1)
+    return float(known.sum() * rates.STEP / rates.SPAN)
+
+
+def _agreement(factor: float, known: list[tuple[str, Match, float]]) -> tuple[bool | None, bool | None]:
+    """Return whether the heading as given turns, and the robot goes ahead, as the first input asks for."""
+    for _, match, _ in known:
+        ahead, turns = (bool(c > 0) if abs(c) > 0.5 else None for c in match.correlation)
+        return (turns if turns is None or factor > 0 else not turns), ahead
+    return None, None

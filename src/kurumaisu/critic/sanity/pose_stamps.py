@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Stamps that say when a pose came, not when it was: the way made between two poses does not go with their times."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kurumaisu.critic.sanity.headings import position_noise
+from kurumaisu.critic.sanity.pose_jumps import fresh
+from kurumaisu.critic.sanity.rows import MOVING
+from kurumaisu.critic.values.recording import Series
+from kurumaisu.types import BoolArray, FloatArray
+
+_AROUND = 1.5  # [s] to either side that tell the speed, but
+_HALF = 8  # intervals at least
+_LEAST = 40  # intervals while driving
+_CLEAR = 3.0  # sd of the positions' noise that a usual interval's way exceeds
+_PAUSE = 5.0  # [s] without a pose after which nobody knows the speed
+_JITTER = 0.05  # [s] rms of a stamp's error, from which it is more than rows written on a grid
+_TRUE = 0.7  # of the stamps' variation that the way follows, below which
+_SURE = 4.0  # standard errors away from it the stamps are wrong
+
+
+def problem(pose: Series) -> str | None:
+    """Return what is wrong with the stamps of a reference, in words; None when the way made follows them.
+
+    Over neighbouring intervals of a drive the way made is regressed on their lengths. True stamps give 1 whatever the
+    gain of the odometry and the noise of the poses; poses that wait in a queue give 0.
+    """
+    new = fresh(pose)
+    rows = _intervals(new, _rests(pose, new))
+    if rows is None:
+        return None
+    longer, further = rows
+    wander = float(np.std(np.cumsum(longer)))  # of stamps from even ones
+    if wander < _JITTER:
+        return None
+    energy = float(longer @ longer)
+    follows = float(longer @ further) / energy
+    left = further - follows * longer
+    error = float(np.sqrt(np.sum((longer * left) ** 2))) / energy  # whatever the residuals' spread
+    jitter = (1 - follows) * wander
+    if jitter < _JITTER or follows + _SURE * error > _TRUE:
+        return None
+    return (
+        f"stamps of the reference pose look like times of arrival: for poses {np.diff(new.t).min():.2g} to "
+        f"{np.diff(new.t).max():.2g} s apart, the distance follows their times only by {max(follows, 0.0):.2f} (true "
+        f"stamps: 1), as if they were off by {jitter:.2g} s rms; record the time of measurement, or drop delayed poses"
+    )
+
+
+def _rests(pose: Series, new: Series) -> BoolArray:
+    """Tell of each interval between fresh poses whether the robot rested in it: it repeated a pose, and hardly moved.
+
+    A pose that waited in a queue repeats none.
+    """
+    repeated = np.diff(np.searchsorted(pose.t, new.t)) > 1
+    way = np.hypot(*np.diff(new.values[:, :2], axis=0).T)
+    return np.asarray(repeated & (way < MOVING * np.diff(new.t)))
+
+
+def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray] | None:
+    """Return how much longer than its neighbours each interval is, and how much further it went [s], both (n,).
+
+    rests (len(pose) - 1,): intervals that do not count, nor do those about them.
+    """
+    if len(pose.t) < _LEAST:
+        return None
+    dt = np.diff(pose.t)
+    half = max(_HALF, int(_AROUND / dt.mean()))
+    if len(dt) < _LEAST + 2 * half:
+        return None
+    way = np.hypot(*np.diff(pose.values[:, :2], axis=0).T)
+    around = np.ones(2 * half + 1)
+    time, gone = (np.convolve(each, around, mode="same") for each in (dt, way))
+    speed = gone / time
+    driving = speed * time / len(around) > _CLEAR * position_noise(pose)
+    driving &= np.convolve((dt > _PAUSE) | rests, around, mode="same") == 0
+    driving[:half] = driving[-half:] = False
+    if driving.sum() < _LEAST:
+        return None
+    usual = time[driving] / len(around)
+    return dt[driving] - usual, way[driving] / speed[driving] - usual

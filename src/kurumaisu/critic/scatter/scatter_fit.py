@@ -1,0 +1,323 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fits of effects on the scatter: which numbers an effect changes, how far, and how surely its parameters are known.
+
+Which numbers an effect changes is found by simulating it. No effect is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic.scatter.likelihood import StatisticsLikelihood
+from kurumaisu.critic.scatter.simulation import ScatterSimulator
+from kurumaisu.critic.values.verdict import NORMAL90
+from kurumaisu.effects import LaserStage, Mechanism, Parameter
+from kurumaisu.params import EffectSetting
+from kurumaisu.types import BoolArray, FloatArray
+
+_NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
+_SIZES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # in units of a parameter's scale, tried first
+_FINELY = 4  # steps between two of these of what says where readings pile up
+_ROUNDS = 4  # Gauss-Newton steps of a refit
+_SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
+_FARTHEST = 3.0  # such a step, in units of the first difference
+_FINER = 0.5  # of one step's difference is the next one's
+_SETTLED = 0.3  # nats that another step must bring
+_FREE = 2.0  # nats that a further parameter must bring
+_PASSES = 2  # over an effect's further parameters: one may help only where another has been found
+_POOR = 15.0  # nats of misfit from which shapes of an effect are tried, too
+# Factor, at 90 %, by which another form of an effect that is empirical may pass for another size: all numbers follow it
+# together, so that many of them do not average it out. What one counts for each edge, another counts for each beam.
+_OTHER = 2.0
+
+
+@dataclass(frozen=True)
+class RoughFit:
+    """An effect with the best of some sizes of its parameters, and the misfit then."""
+
+    low: float
+    effect: type[Mechanism]
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class StatisticsChange:
+    """What a parameter at a value does to the statistics."""
+
+    effect: type[Mechanism]
+    name: str
+    value: float
+    change: FloatArray
+
+
+@dataclass(frozen=True)
+class ScatterPiece:
+    """An effect that acts: its setting, which parameters are fitted, posterior and log evidence of it.
+
+    rivals: effects, fitted likewise, that might have done what it does.
+    """
+
+    effect: type[Mechanism]
+    setting: EffectSetting
+    free: tuple[str, ...]
+    p: float
+    nats: float
+    rivals: tuple[ScatterPiece, ...] = ()
+
+    @property
+    def price(self) -> float:
+        """What its parameters but the first cost [nat]."""
+        return _FREE * (len(self.free) - 1)
+
+
+class ScatterFit:
+    """Fits effects to the statistics."""
+
+    def __init__(
+        self,
+        simulate: ScatterSimulator,
+        measured: FloatArray,
+        means: Sequence[str],
+        ids: frozenset[str] | None = None,
+        heard: BoolArray | None = None,
+    ) -> None:
+        """Take the measured statistics; means: parameters, as id.name, that act on the mean and are not for here.
+
+        ids: the effects to look for, heard: which of the statistics say anything; None for all.
+        """
+        self._ids = ids
+        nulls = simulate.nulls(range(1000, 1000 + _NULLS))
+        self._simulate, self._means = simulate, set(means)
+        self._known: dict[tuple[object, ...], FloatArray] = {}
+        self._shapes: set[tuple[str, str]] = set()
+        self.likeness = StatisticsLikelihood(
+            nulls, measured, simulate.kinds(), np.ones(len(measured), dtype=bool) if heard is None else heard
+        )
+
+    def overlap(self, one: ScatterPiece, other: ScatterPiece) -> float:
+        """Return the cosine of what two effects do to the statistics, whatever its sign."""
+        plain = self.statistics((), (1, 2))
+        a, b = (
+            self.likeness.whitened(self.statistics((piece.setting,), (1, 2)) - plain, plain) for piece in (one, other)
+        )
+        return float(abs(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-9))
+
+    def pushes(self) -> Iterator[StatisticsChange]:
+        """Yield what each parameter alone does to the statistics, at some values, the largest last."""
+        plain = self._numbers((), 1)
+        for effect in self.candidates(set()):
+            null = self._simulate.null(effect)
+            for p in self._parameters(effect):
+                found: list[StatisticsChange] = []
+                least = 0.0
+                for value in sorted(_sizes(p), key=lambda value: -abs(value - p.null)):
+                    moved = self._numbers((EffectSetting(effect.id, {**null, p.name: value}),), 1)
+                    if np.array_equal(moved, plain):
+                        least = value
+                        break  # it only shapes what others do, or does nothing when it is smaller
+                    found.append(StatisticsChange(effect, p.name, value, moved - plain))
+                if not found:
+                    self._shapes.add((effect.id, p.name))
+                yield from reversed(found)
+                if any(self.likeness.moves_places(push.change) for push in found):
+                    yield from self._between(found, least, plain)
+
+    def _between(
+        self, found: Sequence[StatisticsChange], least: float, plain: FloatArray
+    ) -> Iterator[StatisticsChange]:
+        """Yield a parameter's pushes at values between those tried; least: one that did nothing.
+
+        Where readings pile up is known to a step of them: from half or twice as far off no small step leads there.
+        """
+        values, null = sorted({least, *(push.value for push in found)}), self._simulate.null(found[0].effect)
+        for low, high in pairwise(values):
+            if low > 0:
+                for value in np.geomspace(low, high, _FINELY + 1)[1:-1].tolist():
+                    setting = EffectSetting(found[0].effect.id, {**null, found[0].name: value})
+                    yield replace(found[0], value=value, change=self._numbers((setting,), 1) - plain)
+
+    def candidates(self, without: set[type[Mechanism]]) -> Iterator[type[Mechanism]]:
+        """Yield the effects that may be looked for, without some."""
+        for effect in effects.LASER:
+            asked = self._ids is None or effect.id in self._ids
+            if asked and effect not in without and effect.stage > LaserStage.GEOMETRY and self._parameters(effect):
+                yield effect
+
+    def _parameters(self, effect: type[Mechanism]) -> list[Parameter]:
+        return [p for p in effect.parameters if f"{effect.id}.{p.name}" not in self._means]
+
+    def statistics(self, settings: Sequence[EffectSetting], seeds: Sequence[int]) -> FloatArray:
+        """Return the statistics of simulations with effects, the mean over seeds."""
+        return np.asarray(np.mean([self._numbers(settings, seed) for seed in seeds], axis=0))
+
+    def _numbers(self, settings: Sequence[EffectSetting], seed: int) -> FloatArray:
+        """Return the statistics of a simulation, which is made once."""
+        key = (seed, *((setting.id, *setting.parameters.items()) for setting in settings))
+        if key not in self._known:
+            self._known[key] = self._simulate(settings, seed)
+        return self._known[key]
+
+    def misfit(self, settings: Sequence[EffectSetting]) -> float:
+        """Return how ill simulations with effects agree with what was measured [nat]."""
+        return self.likeness.cost(self.statistics(settings, (1, 2)))
+
+    def rough(self, pushes: Sequence[StatisticsChange], at: FloatArray) -> RoughFit:
+        """Return the best of some sizes of an effect's parameters, as if changes of the statistics were sums."""
+        low, best = np.inf, dict[str, float]()
+        for name in dict.fromkeys(push.name for push in pushes):
+            known = at + sum(push.change for push in pushes if best.get(push.name) == push.value)
+            for push in pushes:
+                misfit = self.likeness.cost(known + push.change) if push.name == name else np.inf
+                if misfit < low - _FREE:
+                    low, best = misfit, {**{k: v for k, v in best.items() if k != name}, name: push.value}
+        return RoughFit(low, pushes[0].effect, best)
+
+    def halves(
+        self, piece: ScatterPiece, rival: ScatterPiece, beside: Sequence[EffectSetting]
+    ) -> tuple[ScatterPiece, float]:
+        """Return the second of two effects that were fitted in each other's place, fitted together, and the misfit.
+
+        Each begins with half of its power.
+        """
+        pair = []
+        for one in (piece, rival):
+            sizes = {
+                p.name: p.null + np.sqrt(0.5) * (one.setting.parameters[p.name] - p.null)
+                for p in one.effect.parameters
+                if p.name in one.free
+            }
+            values = {**one.setting.parameters, **sizes}
+            pair.append(replace(one, setting=EffectSetting(one.setting.id, values)))
+        (_, new), misfit = self.together(pair, beside)
+        return new, misfit
+
+    def plain(self, start: RoughFit) -> ScatterPiece:
+        """Return an effect of such sizes, nothing fitted yet."""
+        setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.values})
+        return ScatterPiece(start.effect, setting, tuple(start.values), 0.0, 0.0)
+
+    def alone(self, start: RoughFit, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
+        """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
+        (piece,), low = self.together([self.plain(start)], beside)
+        for _ in range(_PASSES):
+            known = piece.free
+            for p in self._parameters(start.effect):
+                if p.name not in piece.free and low > _POOR:
+                    piece, low = self._with(p, piece, low, beside)
+            if piece.free == known:
+                break
+        return piece, low
+
+    def _with(
+        self, p: Parameter, piece: ScatterPiece, low: float, beside: Sequence[EffectSetting]
+    ) -> tuple[ScatterPiece, float]:
+        """Return an effect with a further parameter fitted, where that helps, and its misfit; low: without it."""
+        name, values = piece.setting.id, piece.setting.parameters
+        tried = [EffectSetting(name, {**values, p.name: value}) for value in _sizes(p)]
+        misfits = [self.misfit((*beside, each)) for each in tried]
+        more = replace(piece, setting=tried[int(np.argmin(misfits))], free=(*piece.free, p.name))
+        if min(misfits) < low - _FREE:
+            (better,), least = self.together([more], beside)
+        elif (name, p.name) in self._shapes:
+            # A wider burst of fewer readings: neither of both helps alone.
+            (better,), least = self.together([replace(more, setting=piece.setting)], beside)
+        else:
+            return piece, low
+        return (better, least) if least < low - _FREE else (piece, low)
+
+    def together(
+        self, pieces: Sequence[ScatterPiece], beside: Sequence[EffectSetting]
+    ) -> tuple[list[ScatterPiece], float]:
+        """Return effects fitted together beside others, and the misfit."""
+        places = [(i, p) for i, each in enumerate(pieces) for p in each.effect.parameters if p.name in each.free]
+        centre = np.array([pieces[i].setting.parameters[p.name] for i, p in places])
+        step = np.array([_step(p, x) for x, (_, p) in zip(centre.tolist(), places, strict=True)])
+
+        def at(x: FloatArray) -> list[ScatterPiece]:
+            values = [dict(piece.setting.parameters) for piece in pieces]
+            for (i, p), value in zip(places, (centre + step * x).tolist(), strict=True):
+                values[i][p.name] = float(np.clip(value, p.lower, p.upper))
+            made = zip(pieces, values, strict=True)
+            return [replace(piece, setting=EffectSetting(piece.setting.id, each)) for piece, each in made]
+
+        def numbers(x: FloatArray) -> FloatArray:
+            return self.statistics((*beside, *(piece.setting for piece in at(x))), (1, 2))
+
+        x, reach = np.zeros(len(places)), 1.0
+        here = numbers(x)
+        low = self.likeness.cost(here)
+        for _ in range(_ROUNDS):
+            moved = [numbers(x + reach * one) - here for one in np.eye(len(x))]
+            move = self.likeness.step(here, np.array(moved) / reach)
+            before, move, reach = low, np.clip(move, -_FARTHEST, _FARTHEST), _FINER * reach
+            for share in _SHARES:
+                tried = numbers(x + share * move)
+                if self.likeness.cost(tried) < low:
+                    x, here, low = x + share * move, tried, self.likeness.cost(tried)
+                    break
+            if before - low < _SETTLED:
+                break
+        return at(x), low
+
+    def errors(self, piece: ScatterPiece, every: Sequence[EffectSetting]) -> dict[str, tuple[float, float]]:
+        """Return sds below and above the parameters that were fitted, from how the statistics follow each.
+
+        The effect's other parameters are in doubt, too, fitted or not: as far as is usual. So is its form.
+        """
+        setting = piece.setting
+        shapes = {p.name for p in piece.effect.parameters if (setting.id, p.name) in self._shapes}
+        parameters = self._parameters(piece.effect)
+        usual = shapes | {p.name for p in parameters if p.name not in piece.free}
+        beside = [other for other in every if other is not setting]
+        slopes = []
+        for p in parameters:
+            step = 0.1 * max(abs(setting.parameters[p.name] - p.null), p.scale)
+            ends = np.clip(setting.parameters[p.name] + np.array([-step, step]), p.lower, p.upper)
+            each = [
+                [
+                    self._simulate((*beside, EffectSetting(setting.id, {**setting.parameters, p.name: end})), seed)
+                    for seed in (1, 2)
+                ]
+                for end in ends.tolist()
+            ]
+            low, high = np.array(each[0]), np.array(each[1])
+            middle = 0.25 * (low + high).sum(axis=0)
+            first, second = (self.likeness.whitened(change, middle) for change in high - low)
+            change, chance = 0.5 * (first + second), 0.25 * float((first - second) @ (first - second))
+            sure = np.sqrt(max(1 - chance / max(float(change @ change), 1e-9), 0.0))  # other draws alone differ, too
+            slopes.append(sure * change / (ends[1] - ends[0]))
+        j = np.array(slopes).T
+        scale = np.array([p.scale for p in parameters])
+        prior = np.array([1.0 if p.name in usual else 1e-4 for p in parameters])
+        inverse = np.linalg.inv((j * scale).T @ (j * scale) + np.diag(prior))
+        sds = np.sqrt(np.diag(inverse)) * scale
+        form = np.array([_of_form(piece, p) if p.name not in shapes else (0.0, 0.0) for p in parameters])
+        both = np.hypot(sds[:, np.newaxis], form).tolist()
+        return {p.name: (low, high) for p, (low, high) in zip(parameters, both, strict=True) if p.name in piece.free}
+
+
+def _of_form(piece: ScatterPiece, p: Parameter) -> tuple[float, float]:
+    """Return the sds below and above a parameter by which another form passes for another size.
+
+    What cannot change its sign is off by a factor either way, of anything else as much of its size.
+    """
+    size = abs(piece.setting.parameters[p.name] - p.null) * piece.effect.empirical / NORMAL90
+    below = (1 - 1 / _OTHER) * size
+    return below, (_OTHER - 1) * size if p.lower >= p.null else below
+
+
+def _step(p: Parameter, value: float) -> float:
+    """Return by how far a parameter is moved to see what it does: what may have either sign can cross zero."""
+    share = 0.3 * abs(value - p.null)
+    return max(share, 0.1 * p.scale) if p.lower < p.null else share or 0.1 * p.scale
+
+
+def _sizes(p: Parameter) -> list[float]:
+    """Return values to try for a parameter, off its null."""
+    values = [p.null + sign * size * p.scale for size in _SIZES for sign in (1.0, -1.0)]
+    return [value for value in values if p.lower <= value <= p.upper]

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The numbers that scans would have with effects on their scatter, by the very effects that the simulator runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic.ranges.scans.beams import model_effects_with, read
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.scatter.likelihood import StatisticKinds
+from kurumaisu.critic.scatter.statistics import Statistics
+from kurumaisu.effects import Mechanism
+from kurumaisu.params import EffectSetting
+from kurumaisu.types import FloatArray
+
+
+class ScatterSimulator:
+    """Statistics of the shots with effects on how readings scatter."""
+
+    def __init__(self, assembly: Assembly, statistics: Statistics, missed: FloatArray) -> None:
+        """Take the geometry; missed (k, b, n) [m]: what equations of the mean may have wrong in the readings, 1 sd."""
+        self._assembly = assembly
+        self._statistics = statistics
+        self._missed = missed
+
+    def kinds(self) -> StatisticKinds:
+        """Return of which kinds the statistics are."""
+        return self._statistics.kinds()
+
+    def null(self, effect: type[Mechanism]) -> dict[str, float]:
+        """Return an effect's parameters in the model as it is."""
+        return self._assembly.marks.null(effect)
+
+    def nulls(self, seeds: Sequence[int]) -> FloatArray:
+        """Return the statistics of simulations without effects, about means that are not quite right, (n, m)."""
+        draws = (np.random.default_rng([seed, 8]).standard_normal(self._missed.shape[2]) for seed in seeds)
+        return np.array(
+            [self._simulated((), seed, self._missed @ draw) for seed, draw in zip(seeds, draws, strict=True)]
+        )
+
+    def __call__(self, settings: Sequence[EffectSetting], seed: int) -> FloatArray:
+        """Return the statistics of a simulation."""
+        return self._simulated(settings, seed, np.zeros(self._missed.shape[:2]))
+
+    def _simulated(self, settings: Sequence[EffectSetting], seed: int, off: FloatArray) -> FloatArray:
+        """Return the statistics of readings that are off (k, b) [m] from where they are expected."""
+        shots, seen, base = self._assembly.shots, self._assembly.marks.seen, self._assembly.marks.base
+        rng = np.random.default_rng([seed, 7])
+        chain = effects.build_laser(model_effects_with(shots, settings), np.random.default_rng(seed))
+        error = shots.laser.error
+        raw = read(shots, seen, chain, rng.standard_normal(base.shape), self._statistics.pose_errors(rng))
+        readings = error.reading(error.range(raw), np.zeros_like(raw))
+        with np.errstate(invalid="ignore"):
+            return self._statistics.of(readings, np.where(np.isfinite(readings), readings - base + off, np.nan))

@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How readings scatter, in some forty numbers that know nothing of any effect, alike for measured and simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
+from kurumaisu.critic.ranges.noise.scan_noise import ScanNoise
+from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_ends
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.scatter.likelihood import StatisticKinds
+from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, fluctuating, steepest
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+_ALONG = ("range", "incidence")  # in whose order readings are grouped, from near to far and from straight to oblique
+_PARTS = 4  # groups of either, and of reflectances at most
+_CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
+_FAR = 6.0  # deviations of an outlier
+_WITHIN = 3.0  # sds of errors of poses, within which a reading may be one that is cut off
+_KEPT = 4  # fits of all scans, one for each place at which readings are cut off: a few megabytes each
+_CELL = 0.5  # [m] of the map in which errors are averaged
+_PILE = 0.05  # [m] of the place of a pile, counted as one: it is known to a step of the readings, which is a fiftieth
+_PLACES = 3  # numbers, the last ones, that are such places, or the step of a grid
+_GRID = 1e-3  # [m] to which readings are rounded before their values are counted
+_AMID = (0.1, 0.9)  # quantiles of readings between which walls are everywhere
+_SQUARE = np.radians(60.0)  # [rad] within which a wall beside a jump hardly moves with an error of the heading
+_JUMP = 0.15  # [m] between the two sides of an edge, at least
+_FLAT = 0.2  # share of it by which either side may go on
+_BESIDE = 3  # beams by which errors of the pose move a narrow face that lies between two sides in truth
+_INSIDE = 0.15  # share of it from either side, beyond which a reading lies between them
+_LASTS = 0.03  # [m] within which a reading between two sides comes again where a beam meets a third one
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Masks (k, b) by what is known of a beam beforehand, each a part of the readings that are to be expected.
+
+    kinds: by what each is, names: what a reader calls it; folds (g,): logs of the middle range of each that is by the
+    range, less their mean; 0 of the others.
+    """
+
+    kinds: tuple[str, ...]
+    names: tuple[str, ...]
+    masks: tuple[BoolArray, ...]
+    folds: FloatArray
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """A number: what a reader calls it, whether it is the root of a count, and whether it follows readings' errors.
+
+    group: of the readings that it is of, None of all.
+    """
+
+    name: str
+    count: bool
+    off: bool
+    group: int | None = None
+
+
+class Statistics:
+    """The numbers of one set of shots."""
+
+    def __init__(self, assembly: Assembly, noise: ScanNoise) -> None:
+        """Take the geometry; noise: of the reference, which each scan's poses are sought within."""
+        seen = assembly.marks.seen
+        self._base = assembly.marks.base
+        self._sd = assembly.first.sd
+        self._trust = assembly.geometry
+        self._farthest = assembly.shots.laser.range_max
+        self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
+        self._cells = _cells(assembly)
+        self._jumps = _jumps(seen.ranges, seen.incidence)
+        self._stand = assembly.layout.stand
+        self._basis, self._size = basis_of(assembly, noise)
+        axes = np.r_[0, 1 + np.arange(self._basis.shape[2] - 1) % 3]
+        limit = steepest(seen.level, seen.incidence)[:, :, axes]
+        self._moves = np.clip(self._basis, -limit, limit)
+        self._reach = np.sqrt(np.sum((self._moves[:, :, 1:] * self._size[:, np.newaxis, 1:]) ** 2, axis=2))
+        self._fits: dict[tuple[float, float], ScanFit] = {}
+
+    def pose_errors(self, rng: np.random.Generator) -> FloatArray:
+        """Return errors of readings (k, b) [m] by errors of the reference, drawn."""
+        draws = rng.standard_normal(self._size.shape) * self._size
+        draws[:, 0] = 0.0
+        for stand in np.unique(self._stand[self._stand >= 0]):  # scans of one pose have its one error
+            draws[self._stand == stand] = draws[np.flatnonzero(self._stand == stand)[0]]
+        return np.asarray((self._moves @ draws[:, :, np.newaxis])[:, :, 0])
+
+    def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
+        """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
+        said = readings[self._trust]
+        ends = cut_off_ends(said)
+        left, common = self._leftover(error, ends)
+        inside = self._trust & np.isfinite(left)
+        z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
+        free, known = fluctuating(z, inside, self._stand)
+        out = [_log(_mean(free[group & known] ** 2, 1.0)) for group in self._groups.masks]
+        out += _correlations(free, known)
+        size = np.abs(left[inside])
+        out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > ELSEWHERE)]
+        far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
+        out.append(_share((far[:, 1:] & far[:, :-1])[inside[:, 1:]]))
+        out += [_log(float(np.mean(common**2))), _correlation(common)]
+        beams = np.broadcast_to(np.arange(z.shape[1]), z.shape)
+        out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
+        out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
+        out.append(_share(np.isinf(readings[self._trust])))
+        out.append(_share(_mixed(readings) & self._jumps & ~_lasting(readings, self._stand)))
+        return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(ends)])
+
+    def names(self) -> list[str]:
+        """Return what a reader calls the numbers, in their order."""
+        return [one.name for one in self._told()]
+
+    def kinds(self) -> StatisticKinds:
+        """Return which of the numbers are roots of counts, which are places of piles, and which follow one another."""
+        counts = np.array([one.count for one in self._told()])
+        places = np.arange(len(counts)) >= len(counts) - _PLACES
+        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), self._folds())
+
+    def _folds(self) -> FloatArray:
+        """Return the folds of the numbers that tell how far readings scatter: the first ones, by groups."""
+        known = self._groups.folds
+        return np.asarray(np.r_[known, np.zeros(len(self._told()) - len(known))])
+
+    def of_errors(self) -> BoolArray:
+        """Return which of the numbers follow how far readings are off their mean."""
+        return np.array([one.off for one in self._told()])
+
+    def _told(self) -> list[Statistic]:
+        """Return what the numbers are, in their order."""
+        groups = list(enumerate(self._groups.names))
+        return [
+            *(Statistic(f"spread, {name}", count=False, off=True, group=i) for i, name in groups),
+            *(Statistic(f"correlation of beams {lag} apart", count=False, off=True) for lag in (1, 2, 4)),
+            *(
+                Statistic(f"readings more than {far:g} sd off", count=True, off=True)
+                for far in (3, 4.5, _FAR, ELSEWHERE)
+            ),
+            Statistic(f"neighbours more than {_FAR:g} sd off", count=True, off=True),
+            Statistic("spread of whole scans", count=False, off=True),
+            Statistic("correlation of whole scans", count=False, off=True),
+            Statistic("spread of the means per beam", count=False, off=True),
+            Statistic("spread of the means per place", count=False, off=True),
+            *(Statistic(f"missing readings, {name}", count=True, off=False, group=i) for i, name in groups),
+            Statistic("readings without return", count=True, off=True),
+            Statistic("readings inside range jumps", count=True, off=True),
+            Statistic("number of different values", count=False, off=False),
+            Statistic("readings of the smallest value", count=True, off=True),
+            Statistic("readings of the largest value", count=True, off=True),
+            Statistic("step between values", count=False, off=False),
+            Statistic("lower cut-off of the readings", count=False, off=False),
+            Statistic("upper cut-off of the readings", count=False, off=False),
+        ]
+
+    def _piles(self, ends: tuple[float, float]) -> list[float]:
+        """Return the ends [m] at which readings are cut off, in units in which a step of them matters to nobody."""
+        low, high = ends
+        return [max(low, 0.0) / _PILE, min(high, self._farthest) / _PILE]
+
+    def _leftover(
+        self, error: FloatArray, ends: tuple[float, float] = (-np.inf, np.inf)
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what poses and common mode leave of the errors (k, b), and the common modes (k,), in deviations.
+
+        ends [m]: where readings are cut off. What lies beyond, or may by an error of the pose, says nothing.
+        """
+        if ends not in self._fits:
+            if len(self._fits) >= _KEPT:
+                del self._fits[next(iter(self._fits))]
+            trust = self._trust & inside_ends(self._base, ends, _WITHIN * self._reach)
+            self._fits[ends] = ScanFit(self._basis, self._size, self._sd, trust, self._stand)
+        return self._fits[ends].leftover(error)
+
+
+def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, returns: FloatArray) -> Groups:
+    found: list[tuple[str, str, BoolArray]] = []
+    for kind, values in zip(_ALONG, (ranges, incidence), strict=True):
+        cuts = np.quantile(values[expected], np.linspace(0, 1, _PARTS + 1)[1:-1])
+        bins = np.digitize(values, cuts)
+        found += [(kind, f"{kind} {i + 1} of {_PARTS}", expected & (bins == i)) for i in range(_PARTS)]
+    for value in np.unique(returns[expected])[:_PARTS]:
+        found.append(("reflectance", f"reflectance {value:g}", expected & (returns == value)))
+    kinds, names, masks = zip(*(each for each in found if each[2].any()), strict=True)
+    logs = [np.log(np.median(ranges[m])) if kind == "range" else np.nan for kind, m in zip(kinds, masks, strict=True)]
+    return Groups(kinds, names, masks, np.nan_to_num(np.array(logs) - np.nanmean(logs)))
+
+
+def _trends(told: Sequence[Statistic], kinds: Sequence[str]) -> FloatArray:
+    """Return weights (g, m) from -1 to 1 over each numbers' groups of ranges, and of incidences; kinds: of groups."""
+    out = []
+    for off, kind in product((True, False), _ALONG):
+        own = [i for i, one in enumerate(told) if one.group is not None and (one.off, kinds[one.group]) == (off, kind)]
+        out.append(np.zeros(len(told)))
+        out[-1][own] = np.linspace(-1.0, 1.0, len(own))
+    return np.array(out)
+
+
+def _cells(assembly: Assembly) -> IntArray:
+    """Return the cell of the map (k, b) in which each beam ends, numbered."""
+    origins, bearings = assembly.origins()
+    angle = origins[:, :, 2] + bearings
+    ranges = np.nan_to_num(assembly.marks.seen.level, posinf=0.0)
+    ends = origins[:, :, :2] + ranges[:, :, np.newaxis] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    _, index = np.unique(np.floor(ends / _CELL).reshape(-1, 2), axis=0, return_inverse=True)
+    return np.asarray(index.reshape(ranges.shape))
+
+
+def _mixed(readings: FloatArray) -> BoolArray:
+    """Return which readings (k, b - 6) lie well between the two sides of a jump, which both go on as they are.
+
+    By the readings alone: where a jump is moves with every error of the pose.
+    """
+    before, left, here, right, after = (readings[:, i : i - 6 or None] for i in (0, 1, 3, 5, 6))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        jump = right - left
+        share = (here - left) / jump
+        flat = np.maximum(np.abs(left - before), np.abs(after - right)) < _FLAT * np.abs(jump)
+        return np.asarray((np.abs(jump) > _JUMP) & flat & (share > _INSIDE) & (share < 1 - _INSIDE))
+
+
+def _lasting(readings: FloatArray, stand: IntArray) -> BoolArray:
+    """Return which readings (k, b - 6) come again in the scan before or after from the same place; stand (k,).
+
+    What lies between two sides there is a narrow face that an error of the pose hides from the model: one face, but
+    counted in every scan. Mixed readings differ from scan to scan.
+    """
+    with np.errstate(invalid="ignore"):
+        same = np.abs(np.diff(readings[:, 3:-3], axis=0)) < _LASTS
+    same &= ((stand[1:] == stand[:-1]) & (stand[1:] >= 0))[:, np.newaxis]
+    out = np.zeros(readings[:, 3:-3].shape, dtype=bool)
+    out[1:] |= same
+    out[:-1] |= same
+    return out
+
+
+def _jumps(ranges: FloatArray, incidence: FloatArray) -> BoolArray:
+    """Return where (k, b - 6) a jump from one face to another is to be expected, and no narrow face lies between."""
+    narrow = _widened(_mixed(ranges))
+    with np.errstate(invalid="ignore"):
+        jump = np.abs(np.diff(np.where(incidence < _SQUARE, ranges, np.nan), axis=1)) > _JUMP
+    beside = np.zeros(ranges.shape, dtype=bool)
+    beside[:, 1:] |= jump
+    beside[:, :-1] |= jump
+    return np.asarray(_widened(beside)[:, 3:-3] & ~narrow)
+
+
+def _widened(mask: BoolArray) -> BoolArray:
+    """Return a mask (k, b) with some more beams on either side of each."""
+    return np.asarray(maximum_filter1d(mask, 2 * _BESIDE + 1, axis=1, mode="constant"))
+
+
+def _between(z: FloatArray, free: FloatArray, group: IntArray) -> float:
+    """Return the log of the mean squared group mean, each in deviations of what readings that scatter so give it.
+
+    free: what of them scatters. Else any noise would spread means, too, and hide that beams keep something.
+    """
+    count = np.bincount(group)
+    sums, chance = np.bincount(group, z), np.bincount(group, free**2)
+    many = (count > 5) & (chance > 0)
+    return _log(_mean(sums[many] ** 2 / chance[many], 1.0))
+
+
+def _values(readings: FloatArray) -> list[float]:
+    """Return how many different values there are, and how many readings have the least and the greatest of them."""
+    steps = np.rint(readings[np.isfinite(readings)] / _GRID).astype(np.int64)
+    if not len(steps):
+        return [0.0, 0.0, 0.0]
+    counts = np.bincount(steps - steps.min())
+    return [_log(np.count_nonzero(counts)), _root(int(counts[0])), _root(int(counts[-1]))]
+
+
+def _spacing(readings: FloatArray) -> float:
+    """Return the mean step [m] between values amid the readings, where every value of their grid occurs."""
+    known = readings[np.isfinite(readings)]
+    if not len(known):
+        return _GRID
+    low, high = np.quantile(known, _AMID)
+    steps = np.unique(np.rint(known[(known >= low) & (known <= high)] / _GRID))
+    return _GRID * float(np.ptp(steps)) / (len(steps) - 1) if len(steps) > 1 else _GRID
+
+
+def _share(hits: BoolArray) -> float:
+    """Return the square root of a count: its variance does not depend on how many are to be expected."""
+    return _root(int(np.count_nonzero(hits)))
+
+
+def _root(count: int) -> float:
+    return 2 * float(np.sqrt(count + 0.375))
+
+
+def _correlations(z: FloatArray, inside: BoolArray) -> list[float]:
+    """Return how readings (k, b) of a scan correlate with those some beams on."""
+    power = _mean(z[inside] ** 2, 1.0)
+    both = ((lag, inside[:, lag:] & inside[:, :-lag]) for lag in (1, 2, 4))
+    return [_mean(z[:, lag:][of] * z[:, :-lag][of], 0.0) / max(power, 1e-12) for lag, of in both]
+
+
+def _correlation(common: FloatArray) -> float:
+    """Return how common modes (k,) follow those of the scans before."""
+    power = float(common @ common)
+    return float(common[1:] @ common[:-1]) / power if power else 0.0
+
+
+def _mean(values: FloatArray, none: float) -> float:
+    """Return the mean; none: what it is of no values, as chance would give it."""
+    return float(np.mean(values)) if values.size else none
+
+
+def _log(value: float) -> float:
+    return float(np.log(max(value, 1e-12)))

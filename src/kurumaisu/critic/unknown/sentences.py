@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is outside the catalogue, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic.unknown.curves import Curve
+from kurumaisu.critic.unknown.joint_fit import FitWithCurve
+from kurumaisu.critic.unknown.shapes import Shape, grid, shape_of
+
+# How a reader calls them, and their units.
+CHANNELS = {
+    "v": "forward speed",
+    "lateral": "sideways speed",
+    "w": "yaw rate",
+    "v_gain": "forward speed",
+    "w_gain": "yaw rate",
+    "curvature": "curvature of the path",
+    "speed": "absolute forward speed",
+}
+_SHARES = {"v_gain": "of the forward speed", "w_gain": "of the yaw rate"}  # in place of a unit
+COVARIATES = {
+    "v": ("v", "forward speed", "m/s"),
+    "abs_v": ("|v|", "speed", "m/s"),
+    "w": ("w", "yaw rate", "rad/s"),
+    "abs_w": ("|w|", "absolute yaw rate", "rad/s"),
+    "v_times_w": ("vw", "product of speed and yaw rate", "m/s^2"),
+    "wheel_left": ("wheel_left", "speed of the left wheel", "m/s"),
+    "wheel_right": ("wheel_right", "speed of the right wheel", "m/s"),
+    "time": ("time", "time since the start", "s"),
+    effects.RECORDING_TIME: (effects.RECORDING_TIME, "time since the first run began", "s"),
+    "since_command": ("time_since_command", "time since the command changed", "s"),
+    "since_reversal": ("distance_since_reversal", "distance since the last reversal", "m"),
+    "heading": ("heading", "heading", "rad"),
+    "distance": ("distance", "distance travelled", "m"),
+    "x": ("x", "x in the map", "m"),
+    "y": ("y", "y in the map", "m"),
+    effects.MOVING: ("constant", "time since the start", "s"),
+    "v_f": ("v_f mod step", "translation voltage within one D/A step", "V"),
+    "v_s": ("v_s mod step", "steering voltage within one D/A step", "V"),
+}
+
+
+def covariate(curve: Curve) -> tuple[str, str, str]:
+    """Return a covariate's name in the verdict, as a reader calls it, and its unit; another column is its own name."""
+    name = curve.basis.covariate
+    return COVARIATES.get(name, (name, name, ""))
+
+
+def channel(curve: Curve) -> str:
+    """Return the channel as the verdict has it."""
+    return f"base.{effects.CHANNELS[curve.channel].rate}"
+
+
+def followed(curve: Curve) -> str:
+    """Return what a curve follows: over a covariate, or nothing."""
+    return "constant" if curve.basis.covariate == effects.MOVING else f"over {covariate(curve)[0]}"
+
+
+def unit_of(curve: Curve) -> str:
+    """Return the unit of the curve; in words where it is a share."""
+    return _SHARES.get(curve.channel, effects.CHANNELS[curve.channel].unit)
+
+
+def shape(extension: FitWithCurve, *, intervals: bool = True) -> str:
+    """Return the curve's shape with place and size, each with its unit and, if asked for, its 90 % interval."""
+    found = shape_of(extension)
+    unit, rate = covariate(extension.curve)[2], unit_of(extension.curve)
+    size = _quantity(found, "size", rate, intervals)
+    if found.kind == "periodic":
+        times = round(extension.curve.basis.constants["period"] / found.place[0])
+        turn = extension.curve.basis.covariate == "heading"
+        period = f"2 pi{f'/{times}' if times > 1 else ''}" if turn else f"{found.place[0]:.3g} {unit}"
+        return f"periodic, period {period}, amplitude {size}"
+    at = grid(extension)
+    span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}".rstrip()
+    if found.kind == "line":
+        return f"monotone, {'rises' if found.size[0] > 0 else 'falls'} by {size} {span}"
+    if found.kind == "irregular":
+        return f"irregular, within {size} {span}"
+    place = _quantity(found, "place", unit, intervals)
+    if found.kind == "constant":
+        return f"constant, {size} while the chair moves"
+    if found.kind == "jump":
+        return f"it jumps at {place} by {size}"
+    what = {"step": f"of {size}", "bump": f"of {size}", "threshold": f"; beyond it a change of up to {size}"}
+    return f"{found.kind} at {place} {what[found.kind]}".replace(" ;", ";")
+
+
+def headline(extension: FitWithCurve) -> str:
+    """Return the finding in one sentence."""
+    name = covariate(extension.curve)[1]
+    if extension.curve.basis.covariate == effects.MOVING:
+        return (
+            f"No effect in the catalogue explains the error of the {CHANNELS[extension.curve.channel]}. "
+            f"It follows no known quantity: {shape(extension, intervals=False)}."
+        )
+    return (
+        f"No effect in the catalogue explains the error of the {CHANNELS[extension.curve.channel]}. It follows the "
+        f"{name}: {shape(extension, intervals=False)}."
+    )
+
+
+def _quantity(found: Shape, which: str, unit: str, interval: bool) -> str:
+    estimate, low, high = np.abs(found.size) if which == "size" and found.kind == "line" else getattr(found, which)
+    if not interval:
+        return f"{estimate:.3g} {unit}".rstrip()
+    low, high = min(low, high), max(low, high)
+    return f"{estimate:.3g} {unit} (90 %: {low:.3g} to {high:.3g})".replace("  ", " ")

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Recordings in the browser, moment by moment, beside the simulated drive."""

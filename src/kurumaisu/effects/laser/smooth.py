@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""smooth.range.COVARIATE: readings depart from the model by a curve over something that they follow.
+
+What the critic puts into the model for an effect of the laser that is not in the catalogue.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from typing import ClassVar
+
+import numpy as np
+
+from kurumaisu.effects.laser.base import Echoes, LaserStage, ReadingEffect
+from kurumaisu.effects.smooth import numbered
+from kurumaisu.errors import Error
+from kurumaisu.geometry import wrap
+from kurumaisu.types import FloatArray
+
+_ID = re.compile(r"smooth\.range\.(\w+)")
+_MOST = 64  # knots
+Reads = Callable[[Echoes], FloatArray]
+
+
+def _ends(echoes: Echoes, axis: int) -> FloatArray:
+    turn = np.cos if axis == 0 else np.sin
+    reach = np.where(np.isfinite(echoes.ranges), echoes.ranges, 0.0)
+    return np.asarray(_origins(echoes)[..., axis] + reach * turn(_origins(echoes)[..., 2] + echoes.bearings))
+
+
+def _origins(echoes: Echoes) -> FloatArray:
+    assert echoes.origins is not None
+    return echoes.origins
+
+
+# What a curve may follow, of a scan whose echoes know it; angles within half a turn.
+RANGE_COVARIATES: Mapping[str, Reads] = {
+    "range": lambda echoes: echoes.ranges,
+    "incidence": lambda echoes: echoes.incidence,
+    "bearing": lambda echoes: echoes.bearings + 0.0 * echoes.ranges,
+    "time": lambda echoes: echoes.stamp + 0.0 * echoes.ranges,
+    "heading": lambda echoes: wrap(_origins(echoes)[..., 2]),
+    "world_bearing": lambda echoes: wrap(_origins(echoes)[..., 2] + echoes.bearings),
+    "hit_x": lambda echoes: _ends(echoes, 0),
+    "hit_y": lambda echoes: _ends(echoes, 1),
+}
+_PLACED = ("heading", "world_bearing", "hit_x", "hit_y")
+
+
+class SmoothRange(ReadingEffect):
+    """A curve over a covariate, added to the mean; straight between knots, constant beyond the outer ones.
+
+    Where nobody knows the laser's pose, curves over it add nothing. Made by smooth_range_of.
+    """
+
+    stage = LaserStage.BIAS
+    parameters = ()
+    formula = "µ + curve(covariate)"
+    source = "the critic, from a recording"
+    covariate: ClassVar[str]
+
+    @classmethod
+    def check(cls, values: Mapping[str, float]) -> None:
+        """Raise Error for a parameter that is missing, unknown or not finite, and for knots that do not increase."""
+        count = sum(name.startswith("knot_") for name in values)
+        names = [f"{stem}_{i}" for stem in ("knot", "value") for i in range(count)]
+        if sorted(values) != sorted(names) or not 1 <= count <= _MOST:
+            raise Error(f"{cls.id}: needs the parameters knot_0, ..., value_0, ...; got {', '.join(values) or 'none'}")
+        for name, value in values.items():
+            if not np.isfinite(value):
+                raise Error(f"{cls.id}: {name} must be a finite number: {value}")
+        if (np.diff(numbered(values, "knot", 0)) <= 0).any():
+            raise Error(f"{cls.id}: knots must increase: {numbered(values, 'knot', 0)}")
+
+    def apply(self, echoes: Echoes) -> Echoes:
+        """Shift the mean by the curve."""
+        if self.covariate in _PLACED and echoes.origins is None:
+            return echoes
+        at = RANGE_COVARIATES[self.covariate](echoes)
+        added = np.interp(at, numbered(self.values, "knot", 0), numbered(self.values, "value", 0))
+        return replace(echoes, mean=echoes.mean + added)
+
+
+@cache
+def smooth_range_of(name: str) -> type[SmoothRange] | None:
+    """Return the effect of an id smooth.range.COVARIATE, None for another one."""
+    match = _ID.fullmatch(name)
+    if match is None or match[1] not in RANGE_COVARIATES:
+        return None
+    text = f"an unknown effect changes the ranges with {match[1].replace('_', ' ')}"
+    own = {"id": name, "covariate": match[1], "sentence": text, "oblique": match[1] == "incidence"}
+    return type("SmoothRange", (SmoothRange,), own)
+
+
+def smooth_range_id(covariate: str) -> str:
+    """Return the id of the effect on readings that follows a covariate."""
+    return f"smooth.range.{covariate}"

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line of a program or node. --help and a wrong option need no master."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from kurumaisu.names import hint
+
+_ROS = "OLD:=NEW renames a topic or service, _KEY:=VALUE sets a parameter, __name:=NAME\nthe node's name."
+
+
+class Parser(argparse.ArgumentParser):
+    """Says of an unknown name or part which are near it, not all that there are."""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            known = [str(choice) for choice in action.choices]
+            raise argparse.ArgumentError(action, f"there is no {str(value)!r}; {hint(str(value), known)}")
+
+
+def node_parser(name: str, text: str) -> Parser:
+    """Return the parser of a node. text: a paragraph on what it does; then topics, services, parameters."""
+    about, _, names = text.strip().partition("\n\n")
+    return Parser(
+        prog=name,
+        description=about,
+        epilog=f"{names}\n\n{_ROS}".strip(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+
+
+def words(arguments: Sequence[str] | None = None) -> list[str]:
+    """Return the command line without what is ROS's: roslaunch gives every node its name."""
+    return [word for word in (sys.argv[1:] if arguments is None else arguments) if ":=" not in word]
+
+
+def no_arguments(name: str, text: str) -> None:
+    """End the program for --help, or with 2 for any argument that is not ROS's; text as of node_parser."""
+    node_parser(name, text).parse_args(words())

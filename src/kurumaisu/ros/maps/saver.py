@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""map_saver: writes the next map that comes as an image and its YAML file, for map_server."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import rospy
+
+from kurumaisu import program
+from kurumaisu.errors import Error, failed
+from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, write_map
+from kurumaisu.ros.maps.messages import GridMessage, map_of
+
+_HELP = """
+Save the next map that comes, as an image and its YAML file, and end.
+
+subscribes to:
+  map  nav_msgs/OccupancyGrid
+"""
+
+
+def main() -> int:
+    """Save one map; return 1 when none comes, or it cannot be written."""
+    parser = program.node_parser("map_saver", _HELP)
+    parser.add_argument(
+        "-f", dest="name", type=Path, default=Path("map"), metavar="NAME", help="name of the files (map)"
+    )
+    parser.add_argument(
+        "--occ", type=float, default=OCCUPIED_ABOVE, metavar="PERCENT", help="cells above this are walls (65)"
+    )
+    parser.add_argument(
+        "--free", type=float, default=FREE_BELOW, metavar="PERCENT", help="cells below this are free (19.6)"
+    )
+    parser.add_argument("--png", action="store_true", help="write a .png instead of a .pgm")
+    parser.add_argument("--wait", type=float, default=30.0, metavar="SECONDS", help="wait for a map at most (30)")
+    options = parser.parse_args(program.words())
+    if not 0 <= options.free < options.occ <= 100:
+        parser.error(f"--free must be from 0 and below --occ, which is at most 100: {options.free:g}, {options.occ:g}")
+    rospy.init_node("map_saver", anonymous=True, disable_signals=True)
+    try:
+        served = map_of(rospy.wait_for_message("map", GridMessage, options.wait))
+        suffix = ".png" if options.png else ".pgm"
+        image, text = write_map(served, options.name, suffix, options.occ, options.free)
+    except rospy.ROSException:
+        print(f"map_saver: {rospy.resolve_name('map')}: no map came within {options.wait:g} s", file=sys.stderr)
+        return 1
+    except Error as error:
+        return failed("map_saver", error)
+    print(f"written: {image}, {text}")
+    return 0

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""sim_node: the simulated chair behind the chair's topics."""

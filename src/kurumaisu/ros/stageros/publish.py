@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Everything that stageros publishes of a step of the world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from rosgraph_msgs.msg import Clock
+from tf2_msgs.msg import TFMessage
+
+from kurumaisu.ros.outlet import DEPTH, Outlet
+from kurumaisu.ros.stageros.camera import Cameras
+from kurumaisu.ros.stageros.names import Names
+from kurumaisu.ros.stageros.plan import RobotPlan
+from kurumaisu.ros.stageros.rates import Pace
+from kurumaisu.ros.stageros.robot import Ears, RobotTopics, Timing, transform_of
+from kurumaisu.ros.stageros.settings import StagerosSettings
+from kurumaisu.ros.stageros.truth import Truth
+from kurumaisu.ros.wire import ClockWire, Stamp, TransformsWire, planar
+from kurumaisu.sim.robots.observation import Observation
+from kurumaisu.types import FloatArray
+from kurumaisu.world.model import Model
+
+_TF_DEPTH = 100  # as of tf2_ros
+
+
+class Transforms:
+    """odom -> base_footprint -> base_link -> sensors of all robots, in one message on /tf."""
+
+    def __init__(self, settings: StagerosSettings) -> None:
+        self.outlet = Outlet("/tf", TFMessage, _TF_DEPTH)
+        self._frames = settings.frames
+        self._odom: list[int] = []
+        self._wire = TransformsWire([])
+
+    def change(self, plans: Sequence[RobotPlan]) -> None:
+        """Take other robots from now on."""
+        pairs: list[tuple[str, str]] = []
+        mounts: list[tuple[int, list[float]]] = []
+        self._odom = []
+        frames = self._frames
+        for plan in plans:
+            odom, foot, base = map(plan.names.frame, (frames.odom, frames.base_footprint, frames.base_link))
+            for scan in plan.scans:
+                mounts.append((len(pairs), transform_of(scan.mount)))
+                pairs.append((base, scan.frame))
+            pairs.append((foot, base))
+            self._odom.append(len(pairs))
+            pairs.append((odom, foot))
+        self._wire = TransformsWire(pairs)
+        for index, mount in mounts:
+            self._wire.fill(index, mount)
+
+    def publish(self, odometry: Sequence[Sequence[float]], stamp: Stamp) -> None:
+        """Send the transforms with each robot's odometry (7,)."""
+        if self.outlet.wanted and self._odom:
+            self._wire.stamp(stamp)
+            for index, pose in zip(self._odom, odometry, strict=True):
+                self._wire.fill(index, pose)
+            self.outlet.send(self._wire.data)
+
+
+class Publisher:
+    """The topics of a world."""
+
+    def __init__(self, settings: StagerosSettings, interval: float, ears: Callable[[Names], Ears]) -> None:
+        """Advertise; interval [s]: of the steps; ears: what listens to the commands for a robot of these names."""
+        self._settings = settings
+        self._pace = Pace(settings.rates, interval)
+        self._interval = interval
+        self._ears = ears
+        self._transforms = Transforms(settings) if settings.publish_tf else None
+        self._cameras = Cameras(settings, self._pace, self._transforms.outlet if self._transforms else None)
+        self._robots: list[RobotTopics] = []
+        self._clock, self._clock_wire = Outlet("/clock", Clock, DEPTH), ClockWire()
+        self._truth = Truth(interval)
+        self._kinds: dict[str, Callable[[Observation, Stamp], None]] = {
+            "odom": self._publish_odometry,
+            "base_pose_ground_truth": self._publish_truth,
+            "collision": self._publish_collisions,
+            "clock": self._publish_clock,  # last: who hears a time has been sent all before it
+        }
+
+    def change(self, models: Sequence[Model], plans: Sequence[RobotPlan]) -> None:
+        """Publish these models' robots from now on; those that stay, by their names, keep their topics."""
+        there = {robot.plan.likeness: robot for robot in self._robots}
+        stay = {plan.likeness for plan in plans}
+        for likeness in [likeness for likeness in there if likeness not in stay]:
+            there.pop(likeness).close()  # first, as another one may have the name
+        self._robots = []
+        for plan in plans:
+            robot = there.get(plan.likeness)
+            if robot is None:
+                robot = RobotTopics(plan, self._settings, self._pace, self._timing, self._ears(plan.names))
+            robot.plan = plan
+            self._robots.append(robot)
+        if self._transforms:
+            self._transforms.change(plans)
+        self._cameras.change(models, plans)
+        self._truth.forget()
+
+    def publish(self, observation: Observation, poses: Callable[[], FloatArray], number: int, stamp: Stamp) -> None:
+        """Publish a step, the number-th; poses: tells the poses (m, 4) of all models."""
+        self._truth.take(observation)
+        if self._cameras.wanted:
+            self._cameras.publish(poses, number, stamp)
+        if number % self._pace.every("tf") == 0:
+            self._publish_transforms(observation, stamp)
+        self._publish_sensors(observation, number, stamp)
+        for kind, publish in self._kinds.items():
+            if number % self._pace.every(kind) == 0:
+                publish(observation, stamp)
+
+    def check_rates(self) -> None:
+        """Raise Error for a rate of a sensor that there is not."""
+        self._pace.check(topic for robot in self._robots for topic in robot.sensors)
+
+    def _timing(self, every: int) -> Timing:
+        said = self._settings.scan_timing
+        return Timing(every * self._interval, self._settings.options.scan_sweep) if said else Timing(0.0, 0.0)
+
+    def _publish_transforms(self, observation: Observation, stamp: Stamp) -> None:
+        if self._transforms:
+            self._transforms.publish(planar(observation.odometry.tolist()), stamp)
+
+    def _publish_sensors(self, observation: Observation, number: int, stamp: Stamp) -> None:
+        for robot in self._robots:
+            for index, topic, every in robot.scans:
+                if number % every == 0:
+                    scan = observation.scans[index]
+                    if scan.count:  # as in 1.8.0, nothing before the ranger has looked
+                        topic.publish(scan, stamp)
+            for device in robot.devices:
+                device.take(observation.devices)
+                if number % device.every == 0:
+                    device.publish(stamp)
+
+    def _publish_odometry(self, observation: Observation, stamp: Stamp) -> None:
+        poses, velocities = planar(observation.odometry.tolist()), observation.velocities.tolist()
+        for robot, pose, (v, sideways, w) in zip(self._robots, poses, velocities, strict=True):
+            robot.odometry.publish(pose, (v, sideways, 0.0, 0.0, 0.0, w), stamp)
+
+    def _publish_truth(self, _observation: Observation, stamp: Stamp) -> None:
+        for robot, message in zip(self._robots, self._truth.messages(stamp), strict=True):
+            robot.truth.publish(*message)
+
+    def _publish_collisions(self, observation: Observation, _stamp: Stamp) -> None:
+        for robot, stalled in zip(self._robots, observation.stalled.tolist(), strict=True):
+            if robot.collision is not None:
+                robot.collision.publish(stalled)
+
+    def _publish_clock(self, _observation: Observation, stamp: Stamp) -> None:
+        if self._clock.wanted:
+            self._clock_wire.stamp(stamp)
+            self._clock.send(self._clock_wire.data)

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The chosen body in numbers: the way to choose and place one without a mouse.
+
+import {byId, degrees, fixed, make, radians, setText} from "../common/dom.js";
+
+export class BodyPanel {
+  /** ask(name, values): a command; say(text): for those who do not see the picture. */
+  constructor(scene, options, permit, ask, say) {
+    Object.assign(this, {scene, options, permit, ask, say});
+    const select = byId("body-select");
+    select.addEventListener("change", () => options.set({selected: select.value ? this.#bodies[select.value].id : null}));
+    scene.on("world", () => this.#fill());
+    scene.on("state", () => this.#show());
+    options.on("change", () => this.#choose());
+    permit.on("change", () => this.#choose());
+    byId("place").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#place();
+    });
+    this.#fill();
+  }
+
+  #bodies = [];
+  #shown; // whose numbers the fields were filled with
+
+  get #chosen() {
+    return this.#bodies.find(({id}) => id === this.options.selected) ?? null;
+  }
+
+  /** Ids may be numbers or words; the options count. */
+  #fill() {
+    this.#bodies = this.scene.world.bodies.filter(({kind}) => kind !== "wall");
+    const entries = this.#bodies.map(({name, kind}, i) => make("option", {value: String(i), textContent: `${name} (${kind})`}));
+    byId("body-select").replaceChildren(make("option", {value: "", textContent: "none"}), ...entries);
+    this.#choose();
+  }
+
+  #choose() {
+    const body = this.#chosen;
+    byId("body-select").value = body ? String(this.#bodies.indexOf(body)) : "";
+    const usable = Boolean(body?.movable) && this.permit.can("set_pose");
+    byId("place-fields").disabled = !usable;
+    let why = this.permit.why;
+    if (!body) why = "Choose a body here, or click on one in the picture.";
+    else if (!why && !body.movable) why = "This body cannot be moved.";
+    else if (!why && !usable) why = "This source cannot move bodies.";
+    setText(byId("place-why"), why);
+    this.#show();
+  }
+
+  #show() {
+    const body = this.#chosen;
+    const pose = body && this.scene.poseOf(body);
+    const text = pose ? `${fixed(pose[0], 3)} m, ${fixed(pose[1], 3)} m, ${fixed(degrees(pose[2]), 1)}°` : "–";
+    setText(byId("body-pose"), text);
+    setText(byId("body-hit"), body ? (this.scene.touches(body) ? "touches something" : "none") : "–");
+    if (!pose || this.#shown === body.id) return;
+    this.#shown = body.id;
+    byId("place-x").value = pose[0].toFixed(3);
+    byId("place-y").value = pose[1].toFixed(3);
+    byId("place-yaw").value = degrees(pose[2]).toFixed(1);
+  }
+
+  async #place() {
+    const [x, y, yaw] = ["x", "y", "yaw"].map((name) => byId(`place-${name}`).valueAsNumber);
+    const body = this.#chosen;
+    const reply = await this.ask("set_pose", {body: body.id, x, y, yaw: radians(yaw)});
+    if (reply.ok) this.say(`${body.name} was moved there.`);
+  }
+}

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Pause, step, speed, reset, seed, record, emergency stop: what the simulator or the robot is told.
+
+import {byId, make, setPressed, setText} from "../common/dom.js";
+
+export class Transport {
+  /** ask(name, values): a command, failures are said elsewhere; stick: to be let go at a stop; say(text). */
+  constructor(scene, permit, ask, stick, say) {
+    Object.assign(this, {scene, permit, ask, stick, say});
+    scene.on("state", () => this.#show());
+    permit.on("change", () => this.#show());
+    const click = (id, action) => byId(id).addEventListener("click", action);
+    click("pause", () => this.togglePause());
+    click("step", () => this.step());
+    click("reset", () => ask("reset"));
+    click("reseed", () => this.#reseed());
+    click("record", () => this.#record());
+    click("estop", () => (this.stopped ? ask("estop", {on: false}) : this.stop()));
+    byId("speed").addEventListener("change", (event) => ask("speed", {value: Number(event.target.value)}));
+    byId("seed").addEventListener("keydown", (event) => event.key === "Enter" && this.#reseed());
+  }
+
+  get stopped() {
+    return Boolean(this.scene.state?.estop);
+  }
+
+  /** Emergency stop. Keys only ever set it; letting go of it takes the button. */
+  stop() {
+    this.stick.drive.disarm();
+    if (this.permit.can("estop")) this.ask("estop", {on: true});
+  }
+
+  togglePause() {
+    if (this.permit.can("pause")) this.ask("pause", {on: !this.scene.state?.paused});
+  }
+
+  step() {
+    if (!byId("step").disabled && !byId("step").hidden) this.ask("step");
+  }
+
+  async #record() {
+    const reply = await this.ask("record", {on: !this.scene.state?.recording});
+    if (reply.ok) this.say(reply.message); // where the bag is
+  }
+
+  #reseed() {
+    const seed = byId("seed");
+    if (seed.reportValidity() && seed.value !== "") this.ask("seed", {value: Number(seed.value)});
+  }
+
+  /** Show the speed that is wanted, whoever asked for it. */
+  #showSpeed(speed) {
+    const choice = byId("speed");
+    if (speed == null || document.activeElement === choice) return;
+    const value = String(Number(speed.toPrecision(3))); // it may have been a float of 32 bits
+    if (choice.value === value) return;
+    if (![...choice.options].some((option) => option.value === value)) {
+      choice.append(make("option", {value, textContent: `${value}×`}));
+    }
+    choice.value = value;
+  }
+
+  #show() {
+    const state = this.scene.state;
+    if (!state) return;
+    this.#showSpeed(state.speed);
+    setText(byId("pause"), state.paused ? "Run" : "Pause");
+    byId("step").disabled = !this.permit.can("step") || !state.paused;
+    if (this.permit.can("step")) byId("step").title = state.paused ? byId("step").dataset.title : "Pause first";
+    setText(byId("record"), state.recording ? `Stop recording ${state.recording}` : "Record a bag");
+    setPressed(byId("record"), state.recording);
+    setText(byId("estop"), this.stopped ? "Stopped: release" : "E-stop");
+    setPressed(byId("estop"), this.stopped);
+    byId("drive").disabled = !this.permit.can("drive") || this.stopped || !this.scene.hello.limits;
+  }
+}

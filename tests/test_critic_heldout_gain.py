@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What an extension is worth on data held out: by channel, on scans, and to SLAM; beside each gain its null."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laser_scene import recording as scanned
+
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.base.recordings import draw_drives, recording
+from kurumaisu.bench.hidden.generator.case import Known
+from kurumaisu.bench.hidden.generator.motion import drive as driven_by
+from kurumaisu.bench.hidden.generator.noise import USUAL
+from kurumaisu.bench.hidden.oracle import gain_share, noise_of
+from kurumaisu.critic.app.job import Outcome
+from kurumaisu.critic.app.results import summary
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import prepare, split
+from kurumaisu.critic.heldout import drive_gain, scan_gain, slam_gain
+from kurumaisu.critic.heldout.corrected_scans import corrected
+from kurumaisu.critic.heldout.extension_gain import Extension, with_laser_gain, with_slam
+from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.story import Story
+from kurumaisu.critic.values.verdict import (
+    Gain,
+    LogDensityGain,
+    RmseGain,
+    SlamGain,
+    Verdict,
+    read_verdict,
+    write_verdict,
+)
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+NOISE = noise_of(USUAL)
+NONE = LogDensityGain(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def hidden(name, size, seed=1):
+    drives = draw_drives(None, USUAL, np.random.default_rng(seed), 30.0)
+    return drives, recording("made", drives, (BASE[name].fault({"size": size}, "plain"),) if name else ())
+
+
+def measured(data, settings, noise=NOISE):
+    drives = [prepare(run, MODEL) for run in data.runs]
+    return drive_gain.measure(
+        MODEL, drive_gain.folds(drives, []), lambda _: drive_gain.FittedExtension(settings), noise, noise
+    )
+
+
+def test_channels_add_up_and_say_where_the_gain_is():
+    settings = (EffectSetting("base.gain_w", {"gain": 0.08}),)
+    worth = measured(hidden("base.gain_w", 0.08)[1], settings)
+    parts = {name: channel.log_density_per_sample for name, channel in worth.channels.items()}
+    assert list(parts) == ["dx", "dy", "dtheta"]
+    for side in ("baseline", "extended", "gain"):
+        total = getattr(worth.log_density_per_sample, side)
+        assert sum(getattr(part, side) for part in parts.values()) == pytest.approx(total, abs=1e-9)
+    assert parts["dtheta"].lo90 > 0
+    assert abs(parts["dx"].gain) < 0.1 * parts["dtheta"].gain
+    assert worth.channels["dtheta"].rmse.unit == "rad"
+    assert worth.channels["dtheta"].rmse.lo90 > 0
+
+
+def test_what_is_not_there_gains_nothing():
+    worth = measured(hidden(None, 0.0)[1], (EffectSetting("base.gain_w", {"gain": 0.05}),))
+    assert worth.log_density_per_sample.hi90 < 0
+    assert worth.channels["dtheta"].log_density_per_sample.hi90 < 0
+
+
+def test_a_model_without_fault_is_as_good_as_noise_allows():
+    """Errors of the true model are what is said to be achievable; those of the wrong one are larger."""
+    worth = measured(hidden("base.gain_v", 0.08)[1], (EffectSetting("base.gain_v", {"gain": 0.08}),))
+    for error in worth.rmse.values():
+        assert error.extended == pytest.approx(error.achievable, rel=0.35)
+    near = worth.rmse["position after 2 s"]
+    assert near.baseline > 1.5 * near.achievable
+    story = summary(Outcome(None, 0.0, verdict=Verdict("none", gain=worth)), 100)
+    told = re.search(r"after 2 s: .*noise alone: ([\d.]+) (mm|cm|m)\)", story)
+    assert float(told[1]) * {"mm": 1e-3, "cm": 1e-2, "m": 1.0}[told[2]] == pytest.approx(near.achievable, rel=0.1)
+
+
+def test_a_gap_of_a_whole_turn_is_no_surprise():
+    data = hidden(None, 0.0, 2)[1]
+    runs = []
+    for run in data.runs:
+        keep = np.abs((run.pose.t % 10.0) - 4.0) > 2.0
+        values = run.pose.values[keep].copy()
+        values[:, 2] = np.unwrap(values[:, 2])
+        runs.append(replace(run, pose=replace(run.pose, t=run.pose.t[keep], values=values)))
+    with_gaps = measured(replace(data, runs=tuple(runs)), ()).log_density_per_sample
+    assert with_gaps.baseline > measured(data, ()).log_density_per_sample.baseline - 1.0
+
+
+def test_withheld_drives_are_judged_by_beside_the_others_but_not_across_gaps():
+    data = hidden("base.gain_v", 0.08, 3)[1]
+    *train, last = [prepare(run, MODEL) for run in data.runs]
+    keep = np.abs((last.times % 10.0) - 4.0) > 2.0
+    held = replace(last, times=last.times[keep], poses=last.poses[keep])
+    splits = drive_gain.with_withheld(drive_gain.folds(train, []), train, [held])
+    assert [len(split.test) for split in splits] == [1, 1, 4]
+    pieces = splits[-1].test
+    assert max(np.diff(piece.times).max() for piece in pieces) < 0.5
+    assert sum(len(piece.times) for piece in pieces) == keep.sum()
+    settings = (EffectSetting("base.gain_v", {"gain": 0.08}),)
+    worth = drive_gain.measure(MODEL, splits, lambda _: drive_gain.FittedExtension(settings), NOISE, NOISE)
+    assert worth.log_density_per_sample.lo90 > 0
+    alone = replace(held, times=held.times[:2], poses=held.poses[:2])
+    assert drive_gain.with_withheld([], train, [alone]) == []
+
+
+def test_a_part_of_a_drive_still_knows_the_heading_at_its_start():
+    whole = prepare(hidden(None, 0.0, 4)[1].runs[0], MODEL)
+    climb = (EffectSetting("base.slope", {"climb_x": 0.1, "climb_y": 0.0}),)
+    parts = np.concatenate([replay.increments(part, MODEL, climb) for part in split(whole, 4)])
+    np.testing.assert_allclose(parts, replay.increments(whole, MODEL, climb), atol=1e-12)
+
+
+def test_the_oracle_gains_all_and_nothing_gains_nothing():
+    case = make(Ask("single", ("base.gain_w",), z=25.0, regime="usual", form="plain"), 7)
+    truth = case.truth.parameters["base.gain_w"]["gain"]
+    worth = measured(case.recording, (EffectSetting("base.gain_w", {"gain": truth}),))
+    assert gain_share(case, worth) == pytest.approx(1.0, abs=0.03)
+    half = measured(case.recording, (EffectSetting("base.gain_w", {"gain": truth / 2}),))
+    assert gain_share(case, half) == pytest.approx(0.75, abs=0.08)
+    assert gain_share(case, None) == 0.0
+    assert gain_share(replace(case, known=None), worth) is None
+    assert isinstance(case.known, Known)
+    drives, _ = hidden(None, 0.0)
+    still = driven_by(replace(drives.settings[0], noise=None), ())[0]
+    assert len(still) == len(drives.settings[0].stamps)
+
+
+def test_a_fault_of_the_laser_gains_on_scans_held_out_and_a_wrong_one_loses(tmp_path):
+    right = (EffectSetting("laser.scale", {"scale": 0.01}),)
+    data = scanned(tmp_path, "laser.scale", 0.01, 1, scans=28)
+    worth = scan_gain.measure(data, MODEL, None, right)
+    assert worth.log_density_per_sample.lo90 > 0
+    assert worth.rmse.lo90 > 0
+    assert worth.rmse.extended < 0.02
+    nothing = scanned(tmp_path, None, 0.0, 2, scans=28)
+    named = (replace(nothing.runs[0], name="a"), replace(nothing.runs[0], name="b"))
+    split = replace(nothing, runs=named, train=("a",), test=("b",))
+    wrong = scan_gain.measure(split, MODEL, None, right)  # with test runs nothing is fitted again
+    assert wrong.log_density_per_sample.hi90 < 0
+    assert scan_gain.measure(data, MODEL, None, ()) is None
+    assert scan_gain.measure(replace(data, world=None), MODEL, None, right) is None
+
+
+def test_a_fit_to_other_scans_finds_the_size(tmp_path):
+    data = scanned(tmp_path, "laser.scale", 0.01, 3, scans=40)
+    shots = scan_gain.joined(scan_gain.Places(data, MODEL, None).trained())
+    (again,) = scan_gain.refit(shots, (EffectSetting("laser.scale", {"scale": 0.02}),))
+    assert again.parameters["scale"] == pytest.approx(0.01, abs=0.002)
+
+
+def bare():
+    story = Story("r", "m", "", (), "", {})
+    return Criticism(Verdict("named", gain=Gain(NONE)), story, MODEL, ())
+
+
+def test_slam_goes_wrong_with_a_wrong_mounting_and_says_so(tmp_path: Path):
+    data = make(Ask("null", design="drive", family="laser", regime="usual"), 3, tmp_path).null
+    data = replace(data, train=("run_1",), test=("run_2",))  # else it would be fitted again, and found out
+    wrong = (EffectSetting("laser.mount_yaw", {"yaw": 0.1}),)
+    out = with_slam(bare(), data, Extension(None, wrong, lambda _: ()))
+    seen = out.verdict.gain.slam
+    assert seen.scans > 100
+    assert seen.position.baseline < 0.02
+    assert seen.heading.extended == pytest.approx(0.1, abs=0.05)
+    assert seen.heading.hi90 < 0
+    assert "no improvement" in out.story.details[-1]
+    assert out.story.overlays[0].run == f"SLAM on {seen.run}"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"scan": None}, "no scans"),
+        ({"pose": None}, "no reference pose"),
+        ({"pose_source": "particle filter"}, "SLAM's own"),
+        ({"command": None, "voltage": None, "odom": None}, "what drove the chair"),
+    ],
+)
+def test_why_slam_was_not_compared_is_said(tmp_path, change, words):
+    data = make(Ask("null", design="drive", family="laser", regime="usual"), 3, tmp_path).null
+    data = replace(data, runs=tuple(replace(run, **change) for run in data.runs))
+    assert words in slam_gain.measure(data, MODEL, lambda _: ()).told
+
+
+def test_scans_of_another_laser_are_no_reason_to_fail(tmp_path):
+    data = make(Ask("null", design="drive", family="laser", regime="usual"), 3, tmp_path).null
+    assert "682" in slam_gain.measure(replace(data, laser=replace(data.laser, beams=681)), MODEL, lambda _: ()).told
+
+
+def test_slam_gets_the_ranges_behind_the_readings(tmp_path):
+    data = scanned(tmp_path, "laser.scale", 0.02, 4, scans=6)
+    run, rows = data.runs[0], list(range(6))
+    plain, free = (
+        corrected(data, run, rows, MODEL, settings, known=True).ranges
+        for settings in ((), (EffectSetting("laser.scale", {"scale": 0.02}),))
+    )
+    seen = np.isfinite(plain)
+    # Equation (4), and 2 % of the range more than it says.
+    reading = 1.004587 * free[seen] + 0.058826 + 0.02 * free[seen]
+    np.testing.assert_allclose(reading, run.scan.values[seen], atol=1e-3)
+    np.testing.assert_array_equal(np.isfinite(free), seen)
+
+
+def test_a_laser_alone_gives_the_overall_gain(tmp_path):
+    data = scanned(tmp_path, "laser.scale", 0.01, 1, scans=12)
+    right = (EffectSetting("laser.scale", {"scale": 0.01}),)
+    alone = replace(bare(), verdict=Verdict("none"))
+    out = with_laser_gain(alone, data, Extension(None, right, lambda _: ()))
+    whole = out.verdict.gain
+    assert whole.log_density_per_sample == whole.channels["range"].log_density_per_sample
+    assert "nats per reading" in out.story.details[-1]
+    beside = with_laser_gain(bare(), data, Extension(None, right, lambda _: ()))
+    assert beside.verdict.gain.log_density_per_sample == NONE
+    assert with_laser_gain(alone, data, Extension(None, (), lambda _: ())) == alone
+
+
+def test_a_verdict_of_before_is_still_read(tmp_path):
+    path = tmp_path / "verdict.json"
+    error = RmseGain(2.0, 1.0, 1.0, 0.5, 1.5, "m", 0.9)
+    whole = Gain(NONE, {"position": error}, {"dx": drive_gain.ChannelGain(NONE, error)}, SlamGain("r", 9, error, error))
+    write_verdict(path, Verdict("none", gain=whole))
+    assert read_verdict(path).gain == whole
+    content = json.loads(path.read_text())
+    del content["gain"]["channels"], content["gain"]["slam"], content["gain"]["rmse"]["position"]["achievable"]
+    path.write_text(json.dumps(content))
+    old = read_verdict(path).gain
+    assert old == Gain(NONE, {"position": replace(error, achievable=None)})

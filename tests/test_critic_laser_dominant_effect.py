@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Beside an effect that does far more than small changes tell, nothing else is seen that is not there."""
+
+import pytest
+
+from kurumaisu.bench.hidden import Ask, make
+from kurumaisu.critic.base.replay import extend
+from kurumaisu.critic.judge import scan_verdict
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+
+
+@pytest.mark.parametrize("own", [(), (EffectSetting("laser.sweep", {"stretch": -0.6}),)])
+def test_scans_that_are_taken_nearly_at_once_have_no_other_fault(own, tmp_path):
+    """A slow clock, a wrong mounting and a wrong map drew the rest of a line; a model may know a part of it already."""
+    case = make(Ask("single", ("laser.sweep",), 300.0, "other", family="laser"), 29301, tmp_path)
+    found = scan_verdict.criticise_scans(case.recording, extend(MODEL, own), lambda _: None)
+    assert [cause.id for cause in found.causes] == ["laser.sweep"]
+    assert not found.confounded
+    assert not found.unknown
+    stretch = found.causes[0].parameters["stretch"]
+    assert stretch.estimate == pytest.approx(case.truth.parameters["laser.sweep"]["stretch"], abs=0.01)
+    assert {setting.id: setting.parameters for setting in found.settings} == {
+        "laser.sweep": {"stretch": pytest.approx(stretch.estimate, abs=1e-6)}
+    }
+    assert [misfit.explained_by for misfit in found.pictures.misfits] == ["laser.sweep"]
+    assert any(line.startswith("laser.sweep: changes the readings") for line in found.details)

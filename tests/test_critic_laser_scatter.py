@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects on the scatter: rivals weighed in the company that is found last, far outliers, scans that may speak."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from laser_scene import recording
+
+from kurumaisu import effects
+from kurumaisu.critic.ranges.noise.reading_noise import BeamNoise, _repeated, estimate_reading_noise
+from kurumaisu.critic.ranges.noise.scan_noise import Layout, ScanNoise
+from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.range_step import grid_step
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.scatter.likelihood import StatisticKinds
+from kurumaisu.critic.scatter.scatter_fit import ScatterFit, ScatterPiece
+from kurumaisu.critic.scatter.scatter_search import ScatterSearch, _weighed
+from kurumaisu.critic.scatter.simulation import ScatterSimulator
+from kurumaisu.critic.scatter.statistics import Statistics, _lasting, _mixed, _spacing
+from kurumaisu.params import EffectSetting, load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """Numbers that follow effects in proportion: marks by id.name, for a parameter at its scale."""
+
+    marks: dict[str, tuple[float, ...]]
+
+    def kinds(self):
+        none = np.zeros(5, dtype=bool)
+        return StatisticKinds(none, none)
+
+    def null(self, effect):
+        return {p.name: p.null for p in effect.parameters}
+
+    def nulls(self, seeds):
+        return np.array([self((), seed) for seed in seeds])
+
+    def __call__(self, settings, seed):
+        out = 0.02 * np.random.default_rng(seed).standard_normal(5)
+        for setting in settings:
+            for p in effects.by_id(setting.id).parameters:
+                mark = np.array(self.marks.get(f"{setting.id}.{p.name}", (0.0,) * 5))
+                out = out + mark * (setting.parameters[p.name] - p.null) / p.scale
+        return out
+
+
+def at(name, **values):
+    """A setting of an effect with these values, the others as of none."""
+    return EffectSetting(name, {**{p.name: p.null for p in effects.by_id(name).parameters}, **values})
+
+
+def test_what_is_likeliest_alone_is_weighed_again_in_company():
+    simulate = _Linear(
+        {
+            "laser.quantisation.step": (3.0, 3.0, 3.0, 3.0, 0.0),
+            "laser.beam_correlation.rho": (0.0, 0.0, 0.6, 0.6, 4.0),
+            "laser.incidence_noise.gain": (3.0, 3.0, 3.6, 3.6, 0.0),
+        }
+    )
+    truth = [at("laser.quantisation", step=0.01), at("laser.beam_correlation", rho=0.3)]
+    ids = frozenset({"laser.quantisation", "laser.beam_correlation", "laser.incidence_noise"})
+    found = ScatterSearch(ScatterFit(simulate, simulate(truth, 5), (), ids)).run()
+    assert {each.setting.id for each in found} == {setting.id for setting in truth}
+
+
+def test_it_is_not_certain_which_of_two_alike_acts():
+    simulate = _Linear({"laser.quantisation.step": (1.0,) * 5, "laser.incidence_noise.gain": (1.0,) * 5})
+    ids = frozenset({"laser.quantisation", "laser.incidence_noise"})
+    (found,) = ScatterSearch(ScatterFit(simulate, simulate([at("laser.quantisation", step=0.01)], 5), (), ids)).run()
+    assert found.p < 0.9
+    assert sum(found.rivals.values()) + found.p == pytest.approx(1.0, abs=1e-6)
+
+
+def test_odds_between_effects_of_which_none_fits_are_worth_less():
+    def piece(name, nats):
+        return ScatterPiece(effects.by_id(name), at(name), (), 0.0, nats)
+
+    likeliest, other = piece("laser.quantisation", 40.0), piece("laser.incidence_noise", 36.0)
+    assert _weighed([likeliest, other]).p > 0.98
+    best = _weighed([likeliest, other], heat=4.0)
+    assert best.p == pytest.approx(1 / (1 + np.exp(-1.0)), abs=1e-6)
+    assert best.p + best.rivals[0].p == pytest.approx(1.0, abs=1e-6), "that something acts is as certain as before"
+
+
+def test_what_may_have_either_sign_crosses_zero_though_it_was_taken_for_next_to_nothing():
+    simulate = _Linear(
+        {
+            "laser.range_noise.share": (6.0, 6.0, 6.0, 6.0, 6.0),
+            "laser.range_noise.slope": (-4.0, -2.0, 0.0, 3.0, 6.0),
+        }
+    )
+    ids = frozenset({"laser.range_noise"})
+    fit = ScatterFit(simulate, simulate([at("laser.range_noise", share=0.3, slope=0.0013)], 5), (), ids)
+    start = at("laser.range_noise", share=0.6, slope=-5e-5)
+    (found,), _ = fit.together([ScatterPiece(effects.by_id(start.id), start, ("share", "slope"), 0.0, 0.0)], ())
+    assert found.setting.parameters["slope"] == pytest.approx(0.0013, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "size", "least", "most"),
+    [
+        ("laser.heavy_tails", "outliers", 0.1, 0.025, 0.035),
+        ("laser.quantisation", "step", 0.01, 0.0, 0.001),
+    ],
+)
+def test_another_form_may_pass_for_another_size_however_many_numbers_follow_it(name, parameter, size, least, most):
+    """A grid is a grid, but outliers come in many ways."""
+    simulate = _Linear({f"{name}.{parameter}": (9.0, 9.0, 9.0, 9.0, 9.0)})
+    truth = [at(name, **{parameter: size})]
+    (found,) = ScatterSearch(ScatterFit(simulate, simulate(truth, 5), (), frozenset({name}))).run()
+    below, above = found.sds[parameter]
+    assert least < below < most
+    assert above > 1.5 * below or name == "laser.quantisation", "a factor of two either way"
+
+
+def _assembly(tmp_path):
+    return Assembly(gather(recording(tmp_path, None, 0.0, 1, scans=12), MODEL), frozenset())
+
+
+def test_noise_of_heavy_tails_hardly_goes_as_far_as_readings_of_something_else(tmp_path):
+    assembly = _assembly(tmp_path)
+    statistics = Statistics(assembly, ScanNoise(0.002, 0.001, 1e-4, 1.0))
+    missed = np.empty((*assembly.residual.shape, 0))
+    simulate, names = ScatterSimulator(assembly, statistics, missed), statistics.names()
+    far = next(i for i, name in enumerate(names) if name.startswith("readings more than 25"))
+    plain, tails, bursts = (
+        simulate(settings, 3)[far]
+        for settings in ((), [at("laser.heavy_tails", inverse_nu=0.3)], [at("laser.crosstalk", probability=0.1)])
+    )
+    assert tails - plain < 4.0
+    assert bursts - plain > 10.0
+
+
+def test_readings_of_something_else_pull_no_scan_away(tmp_path):
+    """What is metres off is off by no error of a pose; the first fit of a scan must not give way to it."""
+    assembly = _assembly(tmp_path)
+    statistics = Statistics(assembly, ScanNoise(0.002, 0.001, 1e-4, 1.0))
+    error = 0.001 * np.random.default_rng(2).standard_normal(assembly.residual.shape)
+    wild = error.copy()
+    wild[:, 300:340] += 2.0
+    left = statistics._leftover(wild)[0]
+    assert np.nanmedian(np.abs(np.delete(left, np.s_[300:340], axis=1))) < 1.0
+    every = assembly.first.valid
+    assembly.residual = np.where(every, wild, np.nan)
+    settled = assembly.settle((0.002, 0.001))
+    assert settled.beam_noise.valid.sum() > 0.9 * np.delete(every, np.s_[300:340], axis=1).sum()
+
+
+def test_what_errors_of_the_poses_move_is_no_reading_of_something_else(tmp_path):
+    """A heading that errs moves what an oblique beam reads by a hundred deviations, and all of it can be fitted."""
+    assembly = _assembly(tmp_path)
+    statistics = Statistics(assembly, ScanNoise(0.002, 0.005, 1e-4, 1.0))
+    turned = 0.015 * np.nan_to_num(assembly.poses[:, :, 2])
+    assert np.abs(turned / assembly.first.sd)[assembly.geometry].max() > 30
+    left = statistics._leftover(turned)[0]
+    assert np.nanmax(np.abs(left)) < 1.5
+
+
+def test_how_few_steep_readings_scatter_is_known_for_them():
+    """Noise of a footprint grows with the tangent; walls are seen steeply by one beam in fifty."""
+    rng = np.random.default_rng(6)
+    steep = np.radians(np.where(rng.random((200, 300)) < 0.02, rng.uniform(65, 75, (200, 300)), 40.0))
+    steep = np.where(steep < np.radians(60), np.radians(rng.uniform(0, 50, steep.shape)), steep)
+    ranges = rng.uniform(1.0, 2.5, steep.shape)
+    sd = np.hypot(0.002, 0.0007 * ranges * np.tan(steep))
+    first = BeamNoise(np.full(steep.shape, 0.002), 0.0, np.ones(steep.shape, dtype=bool))
+    seen = SimpleNamespace(ranges=ranges, incidence=steep)
+    left = sd * rng.standard_normal(sd.shape)
+    layout = Layout(np.arange(200.0), np.zeros(200, dtype=int), np.full(200, -1))
+    found = estimate_reading_noise(first, first, lambda _: left, seen, layout, 0.001).sd
+    assert np.sqrt(np.mean((sd / found)[steep > np.radians(65)] ** 2)) == pytest.approx(1.0, abs=0.1)
+
+
+def test_scans_at_a_jump_of_the_rates_say_nothing_about_the_scatter(tmp_path):
+    assembly = _assembly(tmp_path)
+    before = assembly.smooth_rows(len(assembly.hats))
+    jumped = before[len(before) // 2]
+    assembly.kinked[assembly.shots.run[jumped]][assembly.hats[jumped].rows] = True
+    left = assembly.smooth_rows(len(assembly.hats))
+    assert jumped not in left
+    assert len(left) >= len(before) - 3, "its neighbours rest on some of its poses, and no others do"
+    assert len(assembly.thinned(left).shots.stamps) == len(left)
+
+
+def test_readings_between_two_sides_are_told_from_sides_and_slopes():
+    sides = np.array([[2.0] * 8 + [1.0] * 8])
+    assert not _mixed(sides).any()
+    one = sides.copy()
+    one[0, 8] = 1.4
+    assert np.flatnonzero(_mixed(one)[0]).tolist() == [8 - 3]
+    both = one.copy()
+    both[0, 7] = 1.7
+    assert np.flatnonzero(_mixed(both)[0]).tolist() == [7 - 3, 8 - 3]
+    assert not _mixed(np.linspace(1.0, 3.0, 16)[np.newaxis]).any(), "a slope is no jump"
+    one[0, 6] = np.nan
+    assert not _mixed(one).any(), "nobody knows whether that side goes on"
+
+
+def test_a_narrow_face_that_stays_is_no_mixed_reading():
+    """From one place a face is read alike scan by scan; from another place, or a drive, alike means nothing."""
+    readings = np.tile([1.0] * 5 + [1.4] + [2.0] * 6, (6, 1))
+    readings[3:, 5] = [1.3, 1.7, 1.4]
+    stand = np.array([0, 0, 0, 1, 1, 1])
+    assert _mixed(readings)[:, 2].all()
+    assert _lasting(readings, stand)[:, 2].tolist() == [True, True, True, False, False, False]
+    assert not _lasting(readings, np.full(6, -1)).any()
+
+
+def test_what_came_while_another_was_fitted_ill_goes_when_that_is_mended():
+    simulate = _Linear(
+        {"laser.quantisation.step": (30.0,) * 4 + (0.0,), "laser.beam_correlation.rho": (0.0,) * 4 + (4.0,)}
+    )
+    truth = at("laser.quantisation", step=0.01)
+    stale = at("laser.beam_correlation", rho=0.001)
+    search = ScatterSearch(ScatterFit(simulate, simulate([truth], 5), (), frozenset({truth.id, stale.id})))
+    pieces = [
+        ScatterPiece(effects.by_id(truth.id), truth, ("step",), 1.0, 700.0),
+        ScatterPiece(effects.by_id(stale.id), stale, ("rho",), 1.0, 53.0),
+    ]
+    assert [piece.setting.id for piece in search._polished(pieces)] == [truth.id]
+
+
+def _pieces(*pieces):
+    return [ScatterPiece(effects.by_id(setting.id), setting, free, 1.0, nats) for setting, free, nats in pieces]
+
+
+def test_a_probability_is_that_in_the_company_found_last():
+    """What has next to nothing to do beside the others is gone, however certain it was when it came."""
+    simulate = _Linear(
+        {
+            "laser.quantisation.step": (3.0, 3.0, 3.0, 3.0, 0.0),
+            "laser.incidence_noise.gain": (2.9, 3.1, 3.0, 3.0, 0.4),
+            "laser.beam_correlation.rho": (0.0, 0.0, 0.0, 0.0, 4.0),
+        }
+    )
+    truth = [at("laser.quantisation", step=0.01), at("laser.beam_correlation", rho=0.3)]
+    stale = at("laser.incidence_noise", gain=0.01)
+    ids = frozenset({stale.id, *(each.id for each in truth)})
+    search = ScatterSearch(ScatterFit(simulate, simulate(truth, 5), (), ids))
+    pieces = _pieces((truth[0], ("step",), 90.0), (truth[1], ("rho",), 60.0), (stale, ("gain",), 66.0))
+    weighed = {piece.setting.id: piece.p for piece in search._reweighed(pieces)}
+    assert weighed["laser.incidence_noise"] < 0.5
+    assert weighed["laser.quantisation"] > 0.99
+    assert {piece.setting.id for piece in search._certain(pieces)} == {setting.id for setting in truth}
+
+
+def test_what_bent_before_its_company_was_known_begins_anew():
+    """Lost oblique beams did what noise does: beside the noise they are lost anywhere."""
+    simulate = _Linear(
+        {
+            "laser.dropout.probability": (9.0, 9.0, 0.0, 0.0, 0.0),
+            "laser.dropout.oblique": (0.0, -2.0, 4.0, 4.0, 0.0),
+            "laser.incidence_noise.gain": (0.0, 0.0, 4.0, 4.0, 0.0),
+        }
+    )
+    truth = [at("laser.dropout", probability=0.05), at("laser.incidence_noise", gain=0.5)]
+    fit = ScatterFit(simulate, simulate(truth, 5), (), frozenset(each.id for each in truth))
+    bent = at("laser.dropout", probability=0.03, oblique=0.1)
+    pieces = _pieces((bent, ("probability", "oblique"), 90.0), (truth[1], ("gain",), 60.0))
+    lost, noise = ScatterSearch(fit)._straightened(list(fit.pushes()), pieces)
+    assert lost.free == ("probability",)
+    assert lost.setting.parameters["oblique"] == 0.0
+    assert lost.setting.parameters["probability"] == pytest.approx(0.05, rel=0.1)
+    assert noise is pieces[1]
+
+
+@pytest.mark.parametrize("grid", [0.001, 0.012])
+def test_scans_of_one_stand_on_a_coarse_grid_say_less_than_as_many_independent_ones(grid):
+    scans, beams, noise = 20, 4000, 0.0025
+    rng = np.random.default_rng(3)
+    walls = rng.uniform(1.0, 2.0, beams)
+    readings = grid * np.rint((walls + noise * rng.standard_normal((scans, beams))) / grid)
+    error = readings - walls
+    sd = np.full((scans, 1), error.std())
+    one, other = (
+        Layout(np.arange(scans) * 0.1, np.zeros(scans, dtype=int), np.full(scans, stand)) for stand in (0, -1)
+    )
+    factor = _repeated(grid_step(readings), np.full((scans, 1), noise), sd, one)
+    assert np.sqrt(scans) * error.mean(axis=0).std() / error.std() == pytest.approx(float(factor[0, 0]), rel=0.08)
+    assert (factor[0, 0] > 1.3) == (grid > 0.01)
+    assert (_repeated(grid, np.full((scans, 1), noise), sd, other) == 1.0).all(), "under way every scan is rounded anew"
+
+
+@pytest.mark.parametrize("step", [0.001, 0.0118])
+def test_the_step_of_a_grid_is_known_whatever_is_read_of_something_else(step):
+    rng = np.random.default_rng(4)
+    walls = rng.uniform(1.0, 3.0, 20000)
+    walls[::50] = rng.uniform(0.1, 3.9, 400)
+    readings = np.round(step * np.rint(walls / step), 3)
+    readings[::77] = np.nan
+    assert _spacing(readings) == pytest.approx(step, rel=0.01)
+    assert _spacing(np.full(3, np.nan)) == 0.001

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""When what is outside the catalogue is told: drives held out confirm it, by density or by where the chair comes to."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+import unknown_effects as hidden
+
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.heldout.materiality import simulates_nearer
+from kurumaisu.critic.judge import explain_unknown
+from kurumaisu.critic.values.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
+from kurumaisu.params import shipped
+
+LOST = LogDensityGain(1.0, 0.9, -0.1, -0.2, 0.1)
+
+
+def gain(low):
+    """Return a gain that lost in density, and may be nearer along the way by `low` metres at least."""
+    rmse = RmseGain(0.15, 0.12, 0.03, low, 0.05, "m")
+    return Gain(LOST, {}, {"dx": ChannelGain(LOST, rmse), "dtheta": ChannelGain(LOST)})
+
+
+@pytest.mark.parametrize(
+    ("channels", "low", "near"),
+    [(("dx",), 0.01, True), (("dx", "dtheta"), 0.01, True), (("dx",), -0.01, False), (("dx", "dy"), 0.01, False)],
+)
+def test_surprises_do_not_hide_that_the_chair_is_simulated_nearer(channels, low, near):
+    """In one direction, and in none farther off."""
+    worse = ChannelGain(LOST, RmseGain(0.1, 0.15, -0.05, -0.06, -0.04, "m"))
+    one = gain(low)
+    assert simulates_nearer(replace(one, channels={**one.channels, "dy": worse}), channels) is near
+
+
+@pytest.mark.parametrize(("hi", "moved", "near"), [(-0.05, -0.1, False), (-0.05, 0.1, True), (0.1, -0.1, True)])
+def test_what_loses_density_for_sure_and_misses_the_place_as_well_is_not_nearer(hi, moved, near):
+    path = {"position after 2 s": RmseGain(0.9, 0.9 - moved, moved, moved - 0.2, moved + 0.2, "m")}
+    lost = replace(gain(0.01), log_density_per_sample=replace(LOST, hi90=hi), rmse=path)
+    assert simulates_nearer(lost, ("dx",)) is near
+
+
+def test_what_is_not_known_confirms_nothing():
+    assert not simulates_nearer(None, ("dx",))
+    assert not simulates_nearer(gain(0.01), ("dtheta",))
+    assert not simulates_nearer(gain(0.01), ("dy",))
+
+
+@pytest.mark.parametrize(("winner", "nats"), [("a curve", 5.0), (None, 62.0)])
+def test_evidence_is_over_nothing_where_an_effect_may_be_it_as_well(winner, nats):
+    """What lies between a curve and an effect that explain as much is no evidence that neither acts."""
+    fit = object()
+    best = SimpleNamespace(fit=fit, belief=SimpleNamespace(nats=40.0))
+    rivalry = SimpleNamespace(rivals=(best,), lead=5.0, winner=winner)
+    found = SimpleNamespace(nats={fit: 22.0}.__getitem__)
+    assert explain_unknown._nats(found, SimpleNamespace(rivalry=rivalry)) == nats
+
+
+@pytest.mark.parametrize(("least", "verdict"), [(50.0, "unknown"), (1e9, "none")])
+def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, least, verdict):
+    """Nothing is extended by what did not hold, and no curve is certain."""
+    recording = hidden.make(hidden.KINDS["carpet edge"], 30.0, 1003, seconds=30.0, runs=2).recording
+    monkeypatch.setattr(explain_unknown, "confirmed", lambda worth, nats, free: False)
+    monkeypatch.setattr(explain_unknown, "simulates_nearer", lambda worth, channels: False)
+    monkeypatch.setattr(explain_unknown, "NO_NOISE", least)
+    found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None)
+    assert (found.verdict.verdict, found.verdict.causes) == (verdict, ())
+    assert not any(setting.id.startswith("smooth") for setting in found.settings)
+    assert all(one.p <= 0.5 for one in found.verdict.unknown)
+    assert bool(found.verdict.unknown) == ("Held-out data do not confirm this: it is not" in found.story.headline)
