@@ -26,9 +26,15 @@ class Ear:
             self._errors.append(f"{message.name}: {message.msg}")
 
     def topic(self, name: str, patience: str) -> bool:
-        """Tell whether a message comes on a topic within so many seconds."""
+        """Tell whether a message comes on a topic within so many seconds; TOPIC@NODE: from a node of that name."""
         came = threading.Event()
-        subscriber = rospy.Subscriber(name, rospy.AnyMsg, lambda _: came.set())
+        name, _, node = name.partition("@")
+
+        def hear(message: rospy.AnyMsg) -> None:
+            if node in message._connection_header["callerid"]:
+                came.set()
+
+        subscriber = rospy.Subscriber(name, rospy.AnyMsg, hear)
         heard = came.wait(float(patience))
         subscriber.unregister()
         return heard

@@ -52,7 +52,7 @@ class Step:
     """A command of a scene, found by a pattern: it ends by itself, unless something is said of when it is ready."""
 
     pattern: str
-    topic: str = ""  # ready when something comes on it
+    topic: str = ""  # ready when something comes on it; TOPIC@NODE: from a node of that name
     says: str = ""  # ready when its output has this
     makes: str = ""  # ready when this file is there
     stays: bool = False  # goes on until an End or the end of the scene; else it is interrupted when it is ready
@@ -85,13 +85,11 @@ SCENES: tuple[tuple[Step | End, ...], ...] = (
         Step(r"rosservice call /mapping_node/save_map"),
         End(r"slam\.launch save:="),
         Step(r"slam\.launch start_map:=", topic="/map"),
-        Step(r"slam\.launch$", topic="/map"),
-        Step(r"localization\.launch .*start:=false", topic="/particlecloud"),
         Step(r"localization\.launch .*initial_pose", topic="/amcl_pose"),
         Step(r"rosrun kurumaisu map_server", topic="/map", stays=True),
         Step(r"rosrun kurumaisu map_saver"),
         End(r"rosrun kurumaisu map_server"),
-        Step(r"critic watch", topic="/diagnostics"),
+        Step(r"critic watch", topic="/diagnostics@critic"),
         Step(r"critic experiment"),
         Step(r"dynparam set /sim_node/live \"\{"),
         Step(r"rostopic echo -n 1 /sim_node/effects"),
@@ -102,10 +100,8 @@ SCENES: tuple[tuple[Step | End, ...], ...] = (
         Step(r"kurumaisu map RECORDING"),
         Step(r"kurumaisu view RECORDING$", says="http://"),
         Step(r"replay\.launch bag:=\S+$", topic="/odom"),
-        Step(r"replay\.launch .*base:=recorded slam:=true", topic="/map"),
     ),
     (Step(r"sim\.launch laser:=driver", topic="/scan"),),
-    (Step(r"roslaunch kurumaisu sim\.launch$", topic="/scan"),),
     (Step(r"stageros\.launch", topic="/base_scan"),),
     (Step(r"round\.launch", topic="/scan"),),
     (Step(r"experiment\.launch", topic="/scan"),),

@@ -16,7 +16,7 @@ from typing import Any
 
 from docs_pages import ROOT, SCENES, Command, End, Step, filled_in
 
-PATIENCE = 120.0  # [s] for anything to come about: a busy machine may take a while
+PATIENCE = 300.0  # [s] for anything to come about: a busy machine may take a while
 DRIVE = 10.0  # [s] of simulated time
 FAULTS = re.compile(r"\[ ?(ERROR|FATAL)\]|Traceback|has died!")  # in what a program or launch file prints
 
@@ -192,7 +192,6 @@ class Reader:
             return
         self._logs += 1
         log = self.folder / f"out/{self._logs}.log"
-        self._ready = None
         one = Running(text, self.folder, self._environment, log)
         running[step.pattern] = one
         try:

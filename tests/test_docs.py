@@ -3,6 +3,7 @@
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -63,11 +64,11 @@ def read():
     programs = []
     for text in texts:
         if bench := re.match(r"scripts/bench (.*)", text):
-            programs.append(["module", "kurumaisu.bench", *bench[1].split()])
+            programs.append(["module", "kurumaisu.bench", *shlex.split(bench[1])])
         elif module := re.match(r"scripts/run python3? -m (.*)", text):
-            programs.append(["module", *module[1].split()])
+            programs.append(["module", *shlex.split(module[1])])
         else:
-            name, *arguments = re.sub(r"^scripts/run rosrun kurumaisu ", "", text).split()
+            name, *arguments = shlex.split(re.sub(r"^scripts/run rosrun kurumaisu ", "", text))
             programs.append(["path", str(ROOT / "scripts" / name), *arguments])
     done = subprocess.run(
         [sys.executable, "-c", READ_ARGUMENTS],
