@@ -131,7 +131,7 @@ HOURS = """
 import sys, numpy as np
 from pathlib import Path
 from kurumaisu.critic import portion, sanity
-from kurumaisu.critic.reading import read_recording
+from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.params import load_model, shipped
 folder = Path(sys.argv[1])
 folder.mkdir()
