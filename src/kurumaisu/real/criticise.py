@@ -19,7 +19,7 @@ from kurumaisu.types import FloatArray
 
 
 def recording(folder: Path, runs: Mapping[str, Mapping[str, FloatArray]], **meta: object) -> Path:
-    """Write runs of tables, as critic.arrays takes them, with meta.yaml, and return their folder.
+    """Write runs of tables, as critic.app.arrays takes them, with meta.yaml, and return their folder.
 
     Raise Error naming a table that is misshapen.
     """

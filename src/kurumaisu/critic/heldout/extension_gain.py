@@ -40,14 +40,14 @@ def with_gains(
 ) -> Criticism:
     """Return a criticism with what its extension gains on scans held out and, if asked for, downstream in SLAM."""
     progress("measuring the gain on held-out scans")
-    criticism = with_laser_gain(criticism, recording, extension)
+    criticism = with_scan_gain(criticism, recording, extension)
     if slam:
         progress("running SLAM with both models")
         criticism = with_slam(criticism, recording, extension)
     return criticism
 
 
-def with_laser_gain(criticism: Criticism, recording: Recording, extension: Extension) -> Criticism:
+def with_scan_gain(criticism: Criticism, recording: Recording, extension: Extension) -> Criticism:
     """Return a criticism with the gain of what its settings for the laser do."""
     measured = scan_gain.measure(recording, criticism.model, extension.forecast, extension.scans)
     if measured is None:

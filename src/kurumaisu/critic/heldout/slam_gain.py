@@ -83,10 +83,10 @@ def _compared(recording: Recording, run: Run, model: Model, refit: Refit) -> Dow
         blocks = [_blocks(side, i) for side in sides]
         gains.append(rmse_gain(blocks[0], blocks[1], unit))
     gain = SlamGain(run.name, len(sides[0].times), *gains)
-    return Downstream(words(gain), gain, sides[0].truth[:, :2], sides[0].poses[:, :2], sides[1].poses[:, :2])
+    return Downstream(sentence(gain), gain, sides[0].truth[:, :2], sides[0].poses[:, :2], sides[1].poses[:, :2])
 
 
-def words(gain: SlamGain) -> str:
+def sentence(gain: SlamGain) -> str:
     """Return in a sentence what SLAM gains."""
     p, h = gain.position, gain.heading
     text = (

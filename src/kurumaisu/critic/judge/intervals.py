@@ -59,7 +59,7 @@ def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
 def _doubt(problem: Problem, fit: Fit, columns: FloatArray) -> FloatArray:
     """Return, per column (n, k), what other forms of the causes may shift it by, in standard deviations.
 
-    Nobody can refuse a form that differs by FORM of the signal; what it does is like the signal, and is taken for
+    Nobody can refuse a form that differs by FORM_ERROR of the signal; what it does is like the signal, and is taken for
     other sizes of what does the like.
     """
     out = np.zeros(columns.shape[1])

@@ -71,7 +71,7 @@ class Paths:
         return path
 
     def _run(self, drive: Drive, settings: Sequence[EffectSetting]) -> FloatArray:
-        return replay.seen(replace(drive, times=self._times), self._model, settings)
+        return replay.measured_poses(replace(drive, times=self._times), self._model, settings)
 
     def _of(self, path: FloatArray, times: FloatArray) -> FloatArray:
         return geometry.interpolate(self._times, path, times)

@@ -63,17 +63,17 @@ class ScanModel:
 def expected(shots: Shots, settings: Sequence[EffectSetting]) -> Expected:
     """Return what shots are to read with these effects, and what makes them scatter."""
     settings = without_random(shots, settings)
-    return seen_from(shots, settings, looks(shots, settings))
+    return expected_from(shots, settings, shifted_hits(shots, settings))
 
 
-def looks(shots: Shots, settings: Sequence[EffectSetting]) -> list[BeamHits]:
+def shifted_hits(shots: Shots, settings: Sequence[EffectSetting]) -> list[BeamHits]:
     """Return what the beams meet, and what they would from poses that are moved back and forth, along each axis."""
     seen = hits_of(shots, settings, 0)
     moves = [sign * size * np.eye(3)[i] for i, size in enumerate(_MOVE) for sign in (-1.0, 1.0)]
     return [seen, *(hits_of(shots, settings, 0, shift=move, like=seen) for move in moves)]
 
 
-def seen_from(shots: Shots, settings: Sequence[EffectSetting], around: Sequence[BeamHits]) -> Expected:
+def expected_from(shots: Shots, settings: Sequence[EffectSetting], around: Sequence[BeamHits]) -> Expected:
     """Return what expected does; settings: without what is drawn; around: of looks with the same settings."""
     seen = around[0]
     mean = predict(shots, settings, seen, 0)

@@ -111,7 +111,7 @@ def fit_parameters(
     slopes = [_slope(assembly, forms, at, each) for each in free]
     sds = np.hypot(sds, _doubt(assembly, normal, free, (slopes, guessed, signals)) * sds)
     drawn = {i: others[forms[i].id] for i in guessed if forms[i].id in others}
-    left = left - _instead(
+    left = left - _other_curves(
         assembly, normal, (free, slopes, block), (drawn, dict(zip(guessed, signals, strict=True))), left
     )
     out: list[dict[str, float]] = [{} for _ in forms]
@@ -174,9 +174,9 @@ def _doubt(
 ) -> FloatArray:
     """Return what other forms of what acts may shift each parameter by, in standard deviations.
 
-    Nobody can refuse a form that differs by FORM of what the effect does. At which range or angle a size counts is the
-    form's choice, so its own size is in doubt by all of it; what only shapes it, a wavelength say, by the share that
-    goes one of the ways in which a form may differ; of others, what is like their own marks passes for them.
+    Nobody can refuse a form that differs by FORM_ERROR of what the effect does. At which range or angle a size counts
+    is the form's choice, so its own size is in doubt by all of it; what only shapes it, a wavelength say, by the share
+    that goes one of the ways in which a form may differ; of others, what is like their own marks passes for them.
     parts: how the mean follows each parameter, which effects are empirical, and what these do.
     """
     slopes, guessed, signals = parts
@@ -191,7 +191,7 @@ def _doubt(
     return np.asarray(FORM_ERROR * np.sqrt(share @ norms[count:] ** 2))
 
 
-def _instead(
+def _other_curves(
     assembly: Assembly,
     normal: NormalEquations,
     fitted: tuple[Sequence[_Free], Sequence[FloatArray], FloatArray],

@@ -100,9 +100,9 @@ class _JointGram:
             block = self._winner
             if block is not None and name != block.free.id:
                 drawn.append((self._own[block.free.id], block.evidence.prior))
-            gram = _without(self._gram, drawn)
+            gram = _families_integrated(self._gram, drawn)
             rest = self._columns([form.id for form in self._fit.forms if form.id != name])
-            own, b = _left(gram, self._own[name], rest)
+            own, b = _without_span(gram, self._own[name], rest)
             if block is not None and name == block.free.id:
                 nats = curve_evidence(own, b, block.free.priors).nats
             else:
@@ -129,13 +129,13 @@ class _JointGram:
         raise KeyError(name)
 
 
-def _without(gram: FloatArray, drawn: Sequence[tuple[IntArray, FloatArray]]) -> FloatArray:
+def _families_integrated(gram: FloatArray, drawn: Sequence[tuple[IntArray, FloatArray]]) -> FloatArray:
     if not drawn:
         return gram
     return integrated_out(gram, np.concatenate([at for at, _ in drawn]), block_diag(*(prior for _, prior in drawn)))
 
 
-def _left(gram: FloatArray, own: IntArray, rest: IntArray) -> tuple[FloatArray, FloatArray]:
+def _without_span(gram: FloatArray, own: IntArray, rest: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return gram and target of some columns without what others could take up."""
     inner, b = gram[np.ix_(own, own)], gram[own, -1]
     if not len(rest):
