@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Puts the parts together.
+// Puts the parts together. A new panel is a class in panels/, its elements and its modulepreload line in index.html, its
+// name among the tabs there, and one line here. It gets the scene (what the server has said, and when that changed),
+// permit (what may be commanded) and ask (which commands); panels/body.js is a short one.
 
 import {Playback} from "./panels/playback.js";
 import {BodyPanel} from "./panels/body.js";
