@@ -134,7 +134,12 @@ class Reader:
             self._processes.append(subprocess.Popen(["rosmaster", "--core", "-p", str(port)], **quiet))
             ear = [sys.executable, str(ROOT / "tests/docs_listener.py")]
             self._ear = subprocess.Popen(
-                ear, env=self._environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=(self.folder / "out/ear.log").open("w"), text=True
+                ear,
+                env=self._environment,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=(self.folder / "out/ear.log").open("w"),
+                text=True,
             )
             self._processes.append(self._ear)
             assert self._ear.stdout is not None

@@ -18,7 +18,7 @@ from typing import Any
 
 import yaml
 
-from kurumaisu.bench.faults.base.peers import Event, Graph, Peer, end, until
+from kurumaisu.bench.faults.base.peers import Commander, Event, Graph, end, until
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.bench.rigs.guard import Change, ChipRig, Rig, changed
 from kurumaisu.errors import Error
@@ -72,14 +72,14 @@ class BrokenCalls:
         return count
 
 
-class Stage:
+class Chain:
     """The whole chain. What is done with it begins with drive()."""
 
     def __init__(self, folder: Path, setup: Setup, stack: contextlib.ExitStack) -> None:
         """Start master, commander, board and guard. The stack ends them."""
         self._stack, self._folder = stack, folder
         self.graph = Graph(stack)
-        self.peer = Peer(self.graph, folder / "peer.log")
+        self.peer = Commander(self.graph, folder / "peer.log")
         self.calls = BrokenCalls(folder / "calls") if setup.broken else None
         self.environment = self.calls.environment if self.calls else {}
         rig = ChipRig if setup.chip else Rig
@@ -127,9 +127,9 @@ class Stage:
         end(self.peer.process)
         self.peer = self.another_peer()
 
-    def another_peer(self) -> Peer:
+    def another_peer(self) -> Commander:
         """Return one more commander."""
-        return Peer(self.graph, self._folder / "peer.log")
+        return Commander(self.graph, self._folder / "peer.log")
 
     def start_node(self, changes: Mapping[str, Any] | None = None) -> subprocess.Popen[str]:
         """Start base_node afresh, with some parameters changed; its output goes to a log."""
@@ -247,8 +247,8 @@ class Stage:
 
 
 @contextlib.contextmanager
-def stage(folder: Path, setup: Setup) -> Iterator[Stage]:
+def running_chain(folder: Path, setup: Setup) -> Iterator[Chain]:
     """Build a stage; nothing of it is left in the end."""
     folder.mkdir(parents=True)
     with contextlib.ExitStack() as stack:
-        yield Stage(folder, setup, stack)
+        yield Chain(folder, setup, stack)
