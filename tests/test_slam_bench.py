@@ -86,7 +86,7 @@ def test_a_driver_reads_the_log_that_is_written(drive, tmp_path):
         "  writeDoubles(to, out);\n  printCosts(0.5, log);\n}\n"
     )
     program = tmp_path / "echo"
-    drivers = peers._DRIVERS
+    drivers = peers.DRIVERS
     subprocess.run(["g++", "-std=c++17", f"-I{drivers}", str(tmp_path / "echo.cpp"), "-o", str(program)], check=True)
     peer = peers.Peer(program, tmp_path)
     run, poses = peer.run(log, {})
