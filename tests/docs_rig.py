@@ -21,7 +21,7 @@ DRIVE = 10.0  # [s] of simulated time
 FAULTS = re.compile(r"\[ ?(ERROR|FATAL)\]|Traceback|has died!")  # in what a program or launch file prints
 
 
-class Failed(Exception):
+class CommandError(Exception):
     """A command did not do what its page says."""
 
 
@@ -46,14 +46,19 @@ class Running:
         return self._log.read_text(encoding="utf-8", errors="replace")
 
     def wait(self, condition: Callable[[], object], what: str) -> None:
-        """Return when the condition holds. Raise Failed if the process ends before, or it takes too long."""
+        """Return when the condition holds. Raise CommandError if the process ends before, or it takes too long."""
         deadline = time.monotonic() + PATIENCE
         while not condition():
             if self.process.poll() is not None:
-                raise Failed(f"ended with {self.process.returncode} before {what}:\n{self.output[-3000:]}")
+                raise CommandError(f"ended with {self.process.returncode} before {what}:\n{self.output[-3000:]}")
             if time.monotonic() > deadline:
-                raise Failed(f"not within {PATIENCE:g} s: {what}\n{self.output[-3000:]}")
+                raise CommandError(f"not within {PATIENCE:g} s: {what}\n{self.output[-3000:]}")
             time.sleep(0.05)
+
+    def kill(self) -> None:
+        """End it at once, with all that it started."""
+        os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
 
     def interrupt(self) -> None:
         """End it as Ctrl-C does, and look at what it said."""
@@ -62,11 +67,10 @@ class Running:
         try:
             self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
-            os.killpg(self.process.pid, signal.SIGKILL)
-            self.process.wait()
-            raise Failed(f"did not end after Ctrl-C:\n{self.output[-3000:]}") from None
+            self.kill()
+            raise CommandError(f"did not end after Ctrl-C:\n{self.output[-3000:]}") from None
         if FAULTS.search(self.output):
-            raise Failed(f"said:\n{self.output[-3000:]}")
+            raise CommandError(f"said:\n{self.output[-3000:]}")
 
 
 class Reader:
@@ -132,9 +136,13 @@ class Reader:
             self._environment |= {"ROS_MASTER_URI": f"http://localhost:{port}", "ROS_HOSTNAME": "localhost"}
             quiet = {"env": self._environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
             self._processes.append(subprocess.Popen(["rosmaster", "--core", "-p", str(port)], **quiet))
-            ear = [sys.executable, str(ROOT / "tests/docs_listener.py")]
             self._ear = subprocess.Popen(
-                ear, env=self._environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=(self.folder / "out/ear.log").open("w"), text=True
+                [sys.executable, str(ROOT / "tests/docs_listener.py")],
+                env=self._environment,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                text=True,
             )
             self._processes.append(self._ear)
             assert self._ear.stdout is not None
@@ -173,7 +181,7 @@ class Reader:
             act()
             errors = self._ask("errors")
             problem = f"nodes logged: {errors}" if errors else None
-        except (Failed, subprocess.TimeoutExpired) as error:
+        except (CommandError, subprocess.TimeoutExpired) as error:
             problem = str(error)
         self._told[text] = self._told.get(text) or problem
 
@@ -188,7 +196,7 @@ class Reader:
             done = self.run(text)
             said = done.stdout + done.stderr
             if done.returncode not in step.codes or FAULTS.search(said):
-                raise Failed(f"exit code {done.returncode}:\n{said[-3000:]}")
+                raise CommandError(f"exit code {done.returncode}:\n{said[-3000:]}")
             return
         self._logs += 1
         log = self.folder / f"out/{self._logs}.log"
@@ -196,15 +204,15 @@ class Reader:
         running[step.pattern] = one
         try:
             if step.topic and not self._ask("topic", step.topic, str(PATIENCE)):
-                raise Failed(f"nothing on {step.topic} within {PATIENCE:g} s:\n{one.output[-3000:]}")
+                raise CommandError(f"nothing on {step.topic} within {PATIENCE:g} s:\n{one.output[-3000:]}")
             if step.says:
                 one.wait(lambda: step.says in one.output, f"it says {step.says}")
             if step.makes:
                 one.wait((self.folder / step.makes).exists, f"{step.makes} is there")
             if step.drives:
                 self._watch_drive()
-        except Failed:
-            running.pop(step.pattern).process.kill()
+        except CommandError:
+            running.pop(step.pattern).kill()
             raise
         if not step.stays:
             running.pop(step.pattern).interrupt()
@@ -213,4 +221,4 @@ class Reader:
         """See the chair drive: it moves, and hits nothing."""
         seen = self._ask("drive", str(DRIVE), str(PATIENCE))
         if seen["seconds"] < DRIVE or seen["way"] < 0.3 or seen["turn"] < 1.0 or seen["hits"]:
-            raise Failed(f"the drive: {seen}")
+            raise CommandError(f"the drive: {seen}")
