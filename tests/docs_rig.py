@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs the commands of docs_pages.py, each scene once, in a folder that looks like the source tree."""
 
+import contextlib
 import json
 import os
 import re
@@ -57,8 +58,17 @@ class Running:
 
     def kill(self) -> None:
         """End it at once, with all that it started."""
-        os.killpg(self.process.pid, signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
+
+    def finish(self) -> int:
+        """Wait for its end and return its exit code. Raise CommandError if it takes too long."""
+        try:
+            return self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            raise CommandError(f"did not end within {PATIENCE:g} s:\n{self.output[-3000:]}") from None
 
     def interrupt(self) -> None:
         """End it as Ctrl-C does, and look at what it said."""
@@ -101,17 +111,10 @@ class Reader:
             self._play(scene)
         return self._told[text]
 
-    def run(self, text: str) -> subprocess.CompletedProcess[str]:
-        """Run something to its end."""
-        return subprocess.run(
-            ["bash", "-c", text],
-            cwd=self.folder,
-            env=self._environment,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-        )
+    def start(self, text: str) -> Running:
+        """Type something."""
+        self._logs += 1
+        return Running(text, self.folder, self._environment, self.folder / f"out/{self._logs}.log")
 
     def _scratch(self) -> None:
         """Make the folder: links to the source tree, and a scripts/run that knows that it is in the environment."""
@@ -181,7 +184,7 @@ class Reader:
             act()
             errors = self._ask("errors")
             problem = f"nodes logged: {errors}" if errors else None
-        except (CommandError, subprocess.TimeoutExpired) as error:
+        except CommandError as error:
             problem = str(error)
         self._told[text] = self._told.get(text) or problem
 
@@ -193,15 +196,11 @@ class Reader:
 
     def _do(self, step: Step, text: str, running: dict[str, Running]) -> None:
         if step.ends:
-            done = self.run(text)
-            said = done.stdout + done.stderr
-            if done.returncode not in step.codes or FAULTS.search(said):
-                raise CommandError(f"exit code {done.returncode}:\n{said[-3000:]}")
+            one = self.start(text)
+            if (code := one.finish()) not in step.codes or FAULTS.search(one.output):
+                raise CommandError(f"exit code {code}:\n{one.output[-3000:]}")
             return
-        self._logs += 1
-        log = self.folder / f"out/{self._logs}.log"
-        one = Running(text, self.folder, self._environment, log)
-        running[step.pattern] = one
+        one = running[step.pattern] = self.start(text)
         try:
             if step.topic and not self._ask("topic", step.topic, str(PATIENCE)):
                 raise CommandError(f"nothing on {step.topic} within {PATIENCE:g} s:\n{one.output[-3000:]}")

@@ -100,8 +100,8 @@ def test_a_snippet_runs(page, line, text, reader):
         reader.outcome(next(c for c in COMMANDS if "record.launch" in c.text))  # which makes it
     snippet = reader.folder / f"out/{page.stem}_{line}.py"
     snippet.write_text(filled_in(text, reader.folder))
-    done = reader.run(f"{sys.executable} {snippet}")
-    assert not done.returncode, done.stderr
+    running = reader.start(f"{sys.executable} {snippet}")
+    assert running.finish() == 0, running.output
 
 
 def anchors(page: Path) -> set[str]:
