@@ -90,13 +90,16 @@ class Reader:
         self.folder = folder
         self._commands = commands
         self._told: dict[str, str | None] = {}  # by the command as it is run: what is wrong with it
-        self._logs = 0
         self._processes: list[subprocess.Popen[Any]] = []
+        self._started: list[Running] = []
         self._scratch()
         self._environment = os.environ | {"ROS_HOME": str(folder / "ros"), "PYTHONDONTWRITEBYTECODE": "1"}
         self._ear: subprocess.Popen[str] | None = None
 
     def close(self) -> None:
+        for one in self._started:
+            if one.process.poll() is None:
+                one.kill()
         for process in reversed(self._processes):
             process.terminate()
             process.wait()
@@ -113,8 +116,9 @@ class Reader:
 
     def start(self, text: str) -> Running:
         """Type something."""
-        self._logs += 1
-        return Running(text, self.folder, self._environment, self.folder / f"out/{self._logs}.log")
+        log = self.folder / f"out/{len(self._started) + 1}.log"
+        self._started.append(Running(text, self.folder, self._environment, log))
+        return self._started[-1]
 
     def _scratch(self) -> None:
         """Make the folder: links to the source tree, and a scripts/run that knows that it is in the environment."""
