@@ -7,6 +7,7 @@ import math
 import sys
 import threading
 import time
+from itertools import pairwise
 
 import rospy
 from nav_msgs.msg import Odometry
@@ -64,8 +65,8 @@ class Ear:
         turns = [2 * math.atan2(p.pose.pose.orientation.z, p.pose.pose.orientation.w) for p in poses]
         return {
             "seconds": passed(),
-            "way": sum(math.dist(a, b) for a, b in zip(places, places[1:], strict=False)),
-            "turn": sum(abs(math.remainder(b - a, math.tau)) for a, b in zip(turns, turns[1:], strict=False)),
+            "way": sum(math.dist(a, b) for a, b in pairwise(places)),
+            "turn": sum(abs(math.remainder(b - a, math.tau)) for a, b in pairwise(turns)),
             "hits": float(sum(hits)),
         }
 

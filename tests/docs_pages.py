@@ -85,7 +85,7 @@ SCENES: tuple[tuple[Step | End, ...], ...] = (
         Step(r"rosservice call /mapping_node/save_map"),
         End(r"slam\.launch save:="),
         Step(r"slam\.launch start_map:=", topic="/map"),
-        Step(r"localization\.launch .*initial_pose", topic="/amcl_pose"),
+        Step(r"localization\.launch .*initial_pose", topic="/diagnostics@localization_node"),
         Step(r"rosrun kurumaisu map_server", topic="/map", stays=True),
         Step(r"rosrun kurumaisu map_saver"),
         End(r"rosrun kurumaisu map_server"),

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs the commands of docs_pages.py, each scene once, in a folder that looks like the source tree."""
 
+import contextlib
 import json
 import os
 import re
@@ -21,7 +22,7 @@ DRIVE = 10.0  # [s] of simulated time
 FAULTS = re.compile(r"\[ ?(ERROR|FATAL)\]|Traceback|has died!")  # in what a program or launch file prints
 
 
-class Failed(Exception):
+class CommandError(Exception):
     """A command did not do what its page says."""
 
 
@@ -46,14 +47,28 @@ class Running:
         return self._log.read_text(encoding="utf-8", errors="replace")
 
     def wait(self, condition: Callable[[], object], what: str) -> None:
-        """Return when the condition holds. Raise Failed if the process ends before, or it takes too long."""
+        """Return when the condition holds. Raise CommandError if the process ends before, or it takes too long."""
         deadline = time.monotonic() + PATIENCE
         while not condition():
             if self.process.poll() is not None:
-                raise Failed(f"ended with {self.process.returncode} before {what}:\n{self.output[-3000:]}")
+                raise CommandError(f"ended with {self.process.returncode} before {what}:\n{self.output[-3000:]}")
             if time.monotonic() > deadline:
-                raise Failed(f"not within {PATIENCE:g} s: {what}\n{self.output[-3000:]}")
+                raise CommandError(f"not within {PATIENCE:g} s: {what}\n{self.output[-3000:]}")
             time.sleep(0.05)
+
+    def kill(self) -> None:
+        """End it at once, with all that it started."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+
+    def finish(self) -> int:
+        """Wait for its end and return its exit code. Raise CommandError if it takes too long."""
+        try:
+            return self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            raise CommandError(f"did not end within {PATIENCE:g} s:\n{self.output[-3000:]}") from None
 
     def interrupt(self) -> None:
         """End it as Ctrl-C does, and look at what it said."""
@@ -62,11 +77,10 @@ class Running:
         try:
             self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
-            os.killpg(self.process.pid, signal.SIGKILL)
-            self.process.wait()
-            raise Failed(f"did not end after Ctrl-C:\n{self.output[-3000:]}") from None
+            self.kill()
+            raise CommandError(f"did not end after Ctrl-C:\n{self.output[-3000:]}") from None
         if FAULTS.search(self.output):
-            raise Failed(f"said:\n{self.output[-3000:]}")
+            raise CommandError(f"said:\n{self.output[-3000:]}")
 
 
 class Reader:
@@ -76,13 +90,16 @@ class Reader:
         self.folder = folder
         self._commands = commands
         self._told: dict[str, str | None] = {}  # by the command as it is run: what is wrong with it
-        self._logs = 0
         self._processes: list[subprocess.Popen[Any]] = []
+        self._started: list[Running] = []
         self._scratch()
         self._environment = os.environ | {"ROS_HOME": str(folder / "ros"), "PYTHONDONTWRITEBYTECODE": "1"}
         self._ear: subprocess.Popen[str] | None = None
 
     def close(self) -> None:
+        for one in self._started:
+            if one.process.poll() is None:
+                one.kill()
         for process in reversed(self._processes):
             process.terminate()
             process.wait()
@@ -97,17 +114,11 @@ class Reader:
             self._play(scene)
         return self._told[text]
 
-    def run(self, text: str) -> subprocess.CompletedProcess[str]:
-        """Run something to its end."""
-        return subprocess.run(
-            ["bash", "-c", text],
-            cwd=self.folder,
-            env=self._environment,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-        )
+    def start(self, text: str) -> Running:
+        """Type something."""
+        log = self.folder / f"out/{len(self._started) + 1}.log"
+        self._started.append(Running(text, self.folder, self._environment, log))
+        return self._started[-1]
 
     def _scratch(self) -> None:
         """Make the folder: links to the source tree, and a scripts/run that knows that it is in the environment."""
@@ -132,13 +143,12 @@ class Reader:
             self._environment |= {"ROS_MASTER_URI": f"http://localhost:{port}", "ROS_HOSTNAME": "localhost"}
             quiet = {"env": self._environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
             self._processes.append(subprocess.Popen(["rosmaster", "--core", "-p", str(port)], **quiet))
-            ear = [sys.executable, str(ROOT / "tests/docs_listener.py")]
             self._ear = subprocess.Popen(
-                ear,
+                [sys.executable, str(ROOT / "tests/docs_listener.py")],
                 env=self._environment,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                stderr=(self.folder / "out/ear.log").open("w"),
+                stderr=subprocess.DEVNULL,
                 text=True,
             )
             self._processes.append(self._ear)
@@ -178,7 +188,7 @@ class Reader:
             act()
             errors = self._ask("errors")
             problem = f"nodes logged: {errors}" if errors else None
-        except (Failed, subprocess.TimeoutExpired) as error:
+        except CommandError as error:
             problem = str(error)
         self._told[text] = self._told.get(text) or problem
 
@@ -190,26 +200,22 @@ class Reader:
 
     def _do(self, step: Step, text: str, running: dict[str, Running]) -> None:
         if step.ends:
-            done = self.run(text)
-            said = done.stdout + done.stderr
-            if done.returncode not in step.codes or FAULTS.search(said):
-                raise Failed(f"exit code {done.returncode}:\n{said[-3000:]}")
+            one = self.start(text)
+            if (code := one.finish()) not in step.codes or FAULTS.search(one.output):
+                raise CommandError(f"exit code {code}:\n{one.output[-3000:]}")
             return
-        self._logs += 1
-        log = self.folder / f"out/{self._logs}.log"
-        one = Running(text, self.folder, self._environment, log)
-        running[step.pattern] = one
+        one = running[step.pattern] = self.start(text)
         try:
             if step.topic and not self._ask("topic", step.topic, str(PATIENCE)):
-                raise Failed(f"nothing on {step.topic} within {PATIENCE:g} s:\n{one.output[-3000:]}")
+                raise CommandError(f"nothing on {step.topic} within {PATIENCE:g} s:\n{one.output[-3000:]}")
             if step.says:
                 one.wait(lambda: step.says in one.output, f"it says {step.says}")
             if step.makes:
                 one.wait((self.folder / step.makes).exists, f"{step.makes} is there")
             if step.drives:
                 self._watch_drive()
-        except Failed:
-            running.pop(step.pattern).process.kill()
+        except CommandError:
+            running.pop(step.pattern).kill()
             raise
         if not step.stays:
             running.pop(step.pattern).interrupt()
@@ -218,4 +224,4 @@ class Reader:
         """See the chair drive: it moves, and hits nothing."""
         seen = self._ask("drive", str(DRIVE), str(PATIENCE))
         if seen["seconds"] < DRIVE or seen["way"] < 0.3 or seen["turn"] < 1.0 or seen["hits"]:
-            raise Failed(f"the drive: {seen}")
+            raise CommandError(f"the drive: {seen}")
