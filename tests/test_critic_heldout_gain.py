@@ -155,7 +155,7 @@ def test_a_fault_of_the_laser_gains_on_scans_held_out_and_a_wrong_one_loses(tmp_
 
 def test_a_fit_to_other_scans_finds_the_size(tmp_path):
     data = scanned(tmp_path, "laser.scale", 0.01, 3, scans=40)
-    shots = scan_gain.joined(scan_gain.Places(data, MODEL, None).trained())
+    shots = scan_gain.joined(scan_gain.ScanPoses(data, MODEL, None).trained())
     (again,) = scan_gain.refit(shots, (EffectSetting("laser.scale", {"scale": 0.02}),))
     assert again.parameters["scale"] == pytest.approx(0.01, abs=0.002)
 

@@ -237,7 +237,7 @@ def test_wrong_data_are_refused_unless_they_are_of_what_is_not_looked_at():
 def test_a_drive_of_bends_to_one_side_only_is_told_to_mix():
     v = np.tile([0.2, -0.2, 0.4, -0.4, 0.6, -0.6], 6)
     found = identify.identify(recording(driven(v, v)), OPTIONS, silent)
-    assert any("go together" in words for words in found.warnings)
+    assert any("are correlated" in words for words in found.warnings)
 
 
 def test_a_straight_law_without_any_noise_is_straight():
@@ -246,7 +246,7 @@ def test_a_straight_law_without_any_noise_is_straight():
     run = bench.make(replace(bench.CASES[0], sd_v=1e-12, sd_w=1e-12, pose_sd=0.0), rng)
     found = identify.identify(recording(run), OPTIONS, silent)
     assert not found.refused
-    assert not any("no straight line" in words for words in found.warnings)
+    assert not any("is not straight" in words for words in found.warnings)
 
 
 def test_a_bent_law_is_told():
@@ -254,7 +254,7 @@ def test_a_bent_law_is_told():
     bent = run.voltage.values.copy()
     bent[:, 0] += 0.8 * np.sign(bent[:, 0]) * (np.abs(run.voltage.values[:, 2]) - 0.4) ** 2
     found = identify.identify(recording(replace(run, voltage=replace(run.voltage, values=bent))), OPTIONS, silent)
-    assert any("translation.positive is no straight line" in words for words in found.warnings)
+    assert any("translation.positive is not straight" in words for words in found.warnings)
     straight = identify.identify(recording(run), OPTIONS, silent)
     assert not any("straight" in words for words in straight.warnings)
 

@@ -156,8 +156,8 @@ def test_the_wall_ends_where_it_ends():
     [
         ({"turned": 0.06}, "place_0: the wall is turned by 3.3 degrees"),
         ({"count": 10}, "place_0: 10 scans at 1 m, 20 are needed"),
-        ({"gate": 0.9}, "no readings straight ahead at 1 m: they lie beyond the sensor's gate"),
-        ({"half_width": 0.05}, "at 1 m 12 of 29 beams ahead miss readings"),
+        ({"gate": 0.9}, "no readings straight ahead at 1 m: they lie beyond the sensor's limits"),
+        ({"half_width": 0.05}, "at 1 m 12 of 29 beams ahead lack readings"),
     ],
 )
 def test_a_wall_that_says_nothing_is_refused(how, words):

@@ -45,10 +45,10 @@ subscribes to:
   speed_cap         [m/s] at most
   imu               if odometry/imu/use is true
 publishes:
-  voltages          what is put out
-  cmd_vel_out       the command that is left of what was asked for
+  voltages          the output
+  cmd_vel_out       the command after all limits
   odom, /tf
-  active_input      who drives
+  active_input      the input that drives
   /diagnostics
 services:
   ~e_stop, ~reset   stop, and release the stop

@@ -30,7 +30,7 @@ using std_srvs::Trigger;
 
 constexpr const char* kHelp = R"(usage: laser_node
 
-The driver of a Hokuyo URG or UTM laser scanner, in the place of urg_node.
+The driver of a Hokuyo URG or UTM laser scanner. Replaces urg_node.
 laser.launch starts it:
 roslaunch kurumaisu laser.launch serial_port:=/dev/ttyACM0
 
@@ -40,7 +40,7 @@ publishes:
   /diagnostics
 services:
   update_laser_status     publish laser_status again
-  ~restart                open the port anew
+  ~restart                open the port again
   ~self_test              likewise, and wait for three good scans
 parameters:
   launch/laser_node.yaml, which the node reads itself. The sensor is at

@@ -33,13 +33,13 @@ using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
 constexpr const char* kHelp = R"(usage: localization_node
 
-Say where the chair is in a known map, from scans and odometry; in the place of
+Estimate the chair's pose in a known map, from scans and odometry. Replaces
 amcl. localization.launch starts it:
 roslaunch kurumaisu localization.launch map:=FILE.yaml
 
 subscribes to:
   scan
-  /tf, /tf_static          odom -> base_link, and where the laser is
+  /tf, /tf_static          odom -> base_link, and base_link -> laser
   odom                     its covariance
   map                      or, with use_map_topic false, the service static_map
   initialpose              where the chair is
@@ -50,7 +50,7 @@ publishes:
   /diagnostics             also how well the scan fits the map
 services:
   global_localization      the chair may be anywhere in the map
-  request_nomotion_update  use the next scan, though the chair stands
+  request_nomotion_update  use the next scan even if the chair stands
   set_map                  another map
 parameters:
   launch/localization_node.yaml. model: launch/md100.yaml

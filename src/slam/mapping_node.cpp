@@ -31,12 +31,12 @@ using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
 constexpr const char* kHelp = R"(usage: mapping_node
 
-Make a map from scans and odometry, and say where the chair is in it; in the
-place of slam_gmapping. slam.launch starts it: roslaunch kurumaisu slam.launch
+Make a map from scans and odometry, and estimate the chair's pose in it. Replaces
+slam_gmapping. slam.launch starts it: roslaunch kurumaisu slam.launch
 
 subscribes to:
   scan
-  /tf, /tf_static              odom -> base_link, and where the laser is
+  /tf, /tf_static              odom -> base_link, and base_link -> laser
 publishes:
   map, map_metadata
   trajectory, particlecloud
@@ -48,11 +48,11 @@ publishes:
 services:
   dynamic_map                  the map
   ~save_map                    write it: .pgm, .yaml, .simplemap
-  ~pause, ~resume              use no scans for a while
-  ~reset                       begin anew
+  ~pause, ~resume              stop using scans, and continue
+  ~reset                       start again
 parameters:
   launch/mapping_node.yaml, which the node reads itself; also slam_gmapping's
-  start_map: a .simplemap to go on from, or static_map for the service's map
+  start_map: a .simplemap to continue, or static_map for the service's map
 
 More: docs/mapping.md
 )";

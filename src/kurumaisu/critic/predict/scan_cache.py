@@ -8,12 +8,12 @@ from collections.abc import Hashable, Sequence
 from kurumaisu import effects
 from kurumaisu.critic.predict.scan import Expected, looks, seen_from, without_random
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import IntArray
 
 _MOST = 24  # models whose expectations are kept: 3 MB each for 60 scans
 _PLACES = 2  # likewise of what beams meet: 18 MB
-Settings = tuple[EffectSetting, ...]
 
 
 class Expectations:

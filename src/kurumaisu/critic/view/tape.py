@@ -106,7 +106,7 @@ class Showing:
         except Error as error:
             notes.append(Note("info", f"not simulated: {one_line(error)}"))
         if tracks:
-            told = f"simulated drives begin anew at the measured pose every {RESTART:g} s, as in the report"
+            told = f"simulated drives restart at the measured pose every {RESTART:g} s, as in the report"
             notes.append(Note("info", told))
         return tracks
 

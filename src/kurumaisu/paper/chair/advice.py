@@ -36,9 +36,9 @@ def plan(options: Options) -> list[str]:
         "  critic experiment held_out --file launch/paper/held_out.yaml --bag ~/test.bag",
         "By hand, robot.launch's joystick, while `calibrate record train.bag` watches and says what is missing; then",
         "  the same again as test.bag, by another way:",
-        f"  hold the stick still for {hold:g} s and more, its voltages within {o.steady:g} V, then another position;",
+        f"  hold the stick still for {hold:g} s or more, its voltages within {o.steady:g} V, then another position;",
         f"  at least {o.least_blocks} times each ahead, backwards, left and right, slow ones and fast ones;",
-        "  do not turn the same way whenever you go fast: the two voltages must not go together.",
+        "  do not always turn the same way at high speed: the two voltages must not be correlated.",
         "Needed: the topics voltages and ground_truth (or scan and odom: the particle filter finds the way).",
         "Then: calibrate drive train.bag --test test.bag --out DIR",
         "",
@@ -47,7 +47,7 @@ def plan(options: Options) -> list[str]:
         "  not in order; a bag each, named so that they sort as their distances are given:",
         "  rosbag record -O a.bag --duration 6 scan",
         "Then: calibrate laser a.bag b.bag c.bag d.bag e.bag --distances 1 0.2 4 0.5 2 --out DIR",
-        "  Every other scan is held out; what the tape was off, only a wall put up again can show: --test f.bag ...",
+        "  Every other scan is held out; an error of the tape shows only on a wall set up again: --test f.bag ...",
         "Whether near walls are noisier by range or by incidence: the same bags in a folder with their poses and world",
         "  (docs/recording.md), beams from straight ahead to 70 degrees, so no nearer than 0.2 m to a board of 1 m:",
         "  paper conjecture DIR --distances 1 0.2 4 0.5 2 --out OUT",
@@ -64,7 +64,7 @@ def missing(runs: Sequence[Run], options: Options) -> list[str]:
     words = [why for axis in law.axes_of(samples) for why in _of_axis(law.fit_axis(axis, samples, quick))]
     mixed = correlations(samples).drive
     if abs(mixed) > options.drive.mixed:
-        words.append(f"the voltages go together (correlation {mixed:+.2f}): turn the other way, too, at such speeds")
+        words.append(f"the voltages are correlated ({mixed:+.2f}): turn the other way, too, at such speeds")
     return words
 
 

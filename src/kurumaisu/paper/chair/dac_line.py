@@ -45,10 +45,10 @@ def read_log(path: Path, offset: float) -> FloatArray:
         try:
             nanoseconds, *volts = int(words[0]), *(float(word) for word in words[2:5])
         except ValueError as error:
-            raise Error(f"{path}:{number}: is no line of virtual_dac's log: {line}") from error
+            raise Error(f"{path}:{number}: is not a line of virtual_dac's log: {line}") from error
         rows.append((1e-9 * nanoseconds + offset, *volts))
     if not rows:
-        raise Error(f"{path}: the D/A converter was told nothing")
+        raise Error(f"{path}: the D/A converter got no voltages")
     return np.array(rows)
 
 

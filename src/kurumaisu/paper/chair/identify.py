@@ -70,18 +70,18 @@ def _warnings(fits: Sequence[AxisFit], found: Correlations, options: Options) ->
     words = []
     if abs(found.drive) > options.drive.mixed:
         words.append(
-            f"V_f and V_s of this drive go together (correlation {found.drive:+.2f}): it cannot tell whether V_f turns "
+            f"V_f and V_s of this drive are correlated ({found.drive:+.2f}): it cannot tell whether V_f turns "
             "the chair, or V_s drives it"
         )
     for fit in fits:
         for side, branch in fit.branches().items():
             if not branch.refused and abs(branch.curvature) > options.drive.bent:
                 words.append(
-                    f"{fit.name}.{side} is no straight line: its square term is {branch.curvature:+.1f} standard errors"
+                    f"{fit.name}.{side} is not straight: its square term is {branch.curvature:+.1f} standard errors"
                 )
         if not fit.refused and fit.overlap:
             words.append(
-                f"{fit.name}: both branches answer to voltages around 0, as (2) as printed: base_node does not start "
+                f"{fit.name}: both branches cover voltages around 0, as in (2) as printed: base_node does not start "
                 "with such a law as `custom`"
             )
     return words

@@ -37,7 +37,7 @@ def figures_drive(
     (out / "equations_1_2.txt").write_text("\n".join(told) + "\n", encoding="utf-8")
     kept = set(keep)
     if any(why.split(":")[0] not in kept for why in found.refused):
-        print("no law is written: a refused branch is taken from the model with --keep")
+        print("no law is written: --keep takes a refused branch from the model")
         return 1
     where = ", ".join(path.name for path in recordings) or f"a simulated drive on {chair.name}, seed {seed}"
     laws = law_file.settled(model, found.fits, keep)
@@ -51,7 +51,7 @@ def provenance(where: str, found: identify.Identification, level: float) -> list
     """Return the comments at the head of a model file that was found."""
     return [
         f"The law `custom` was identified from {where}; errors in both variables, robust.",
-        f"Behind each branch: its {100 * level:.0f} % interval by block bootstrap, and the rates that it was found at.",
+        f"After each branch: its {100 * level:.0f} % interval by block bootstrap, and the rates that it was fitted at.",
         f"Reference pose: {found.source}. {int(found.samples.steady.sum())} steady samples.",
         *(f"NOTE: {words}" for words in found.warnings),
     ]

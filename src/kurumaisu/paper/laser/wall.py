@@ -85,7 +85,7 @@ def _turned(place: Place, options: Wall) -> float:
     points = place.points[:, near].mean(axis=0)
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < 3:
-        why = "they lie beyond the sensor's gate" if np.isinf(place.ranges[:, near]).any() else "there are none"
+        why = "they lie beyond the sensor's limits" if np.isinf(place.ranges[:, near]).any() else "there are none"
         raise Error(f"no readings straight ahead at {place.distance:g} m: {why}")
     slope = np.polyfit(points[:, 1], points[:, 0], 1)[0]
     return float(np.arctan(-slope))
@@ -110,7 +110,7 @@ def ahead_of(place: Place, options: Wall) -> Ahead:
     readings = place.ranges[:, near]
     whole = np.isfinite(readings).all(axis=0)
     if whole.sum() < 0.9 * near.sum():
-        raise Error(f"at {place.distance:g} m {near.sum() - whole.sum()} of {near.sum()} beams ahead miss readings")
+        raise Error(f"at {place.distance:g} m {near.sum() - whole.sum()} of {near.sum()} beams ahead lack readings")
     readings = readings[:, whole]
     true = place.distance / np.cos(place.bearings[near][whole] - place.turned)
     flat = on_wall(place, options)[:, 0]

@@ -28,10 +28,10 @@ topics. It begins when the chair stands; Ctrl-C stops it.
 
 subscribes to:
   ground_truth, odom  where the chair is
-  active_input        who drives: it stops when somebody else does
+  active_input        the input that drives: on any other the experiment stops
   collision
 publishes:
-  experiment_vel      commands for base_node; of a sweep voltages
+  experiment_vel      commands for base_node; a sweep sends voltages instead
 parameters:
   launch/experiment_node.yaml, by --settings
 

@@ -14,7 +14,7 @@ from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, write_map
 from kurumaisu.ros.maps.messages import GridMessage, map_of
 
 _HELP = """
-Save the next map that comes, as an image and its YAML file, and end.
+Save the next map as an image and its YAML file, and end.
 
 subscribes to:
   map  nav_msgs/OccupancyGrid

@@ -27,7 +27,7 @@ services:
   static_map         the map
   change_map         serve another one: a file, file:// or package://
 parameters:
-  frame_id           of the map; else that of launch/map_server.yaml
+  frame_id           of the map (default: launch/map_server.yaml)
 """
 
 

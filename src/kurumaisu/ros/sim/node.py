@@ -43,13 +43,13 @@ publishes:
   ground_truth        where the chair is
   collision           whether it touched something since the last message
   /clock, /tf_static
-  ~effects            what is wrong with chair, laser and world at the moment
+  ~effects            the effects that are on
   ~world, ~view       what a page draws
   and each further sensor's readings, under the sensor's name
 services:
   reset, seed         back to the start, with the same or another seed
-  pause, step, speed  hold the time, go on by one step, go faster or slower
-  set_pose            put a model elsewhere
+  pause, step, speed  pause, advance one step, run faster or slower
+  set_pose            move a model
   save, load          the whole state, to a file and back
 parameters:
   launch/sim_node.yaml, and the arguments of launch/sim.launch

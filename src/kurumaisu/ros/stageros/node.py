@@ -29,19 +29,19 @@ With several robots the names below begin with /robot_0/, /robot_1/, ...
 
 subscribes to:
   cmd_vel                     drives a robot
-  cmd_pose, cmd_pose_stamped  put it elsewhere
+  cmd_pose, cmd_pose_stamped  move it to a pose
 publishes:
   odom, base_pose_ground_truth
   base_scan                   of a robot with several lasers: /base_scan_0, ...
-  image, depth, camera_info   while somebody listens
+  image, depth, camera_info   while something subscribes
   /clock, /tf
   ~world, ~view               what a page draws
   base_sonar, collision, bumper, fiducials: see launch/stageros.yaml
 services:
   reset_positions             all back to the start, as in stage_ros
-  ~reset, ~seed               likewise, with the same or another seed
-  ~pause, ~step, ~speed       hold the time, go on by one step, change the speed
-  ~set_pose, ~spawn, ~delete  put a model elsewhere, add one, remove one
+  ~reset, ~seed               the same, with the same or another seed
+  ~pause, ~step, ~speed       pause, advance one step, change the speed
+  ~set_pose, ~spawn, ~delete  move a model, add one, remove one
   ~save, ~load                the whole state, to a file and back
 parameters:
   launch/stageros.yaml, which the node reads itself

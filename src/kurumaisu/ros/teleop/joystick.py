@@ -20,7 +20,7 @@ Publish what a joystick at /dev/input does. Debian has no joy_node.
 publishes:
   joy     sensor_msgs/Joy
 parameters:
-  device  as evdev has it: /dev/input/by-id/...-event-joystick
+  device  of evdev: /dev/input/by-id/...-event-joystick
   others  launch/joystick.yaml, which the node reads itself
 
 More: docs/robot.md

@@ -19,21 +19,21 @@ _HELP = """
 Serve a page that shows a simulation or a robot in the browser, and print its
 address. viewer.launch starts it: roslaunch kurumaisu viewer.launch
 
-It listens only while somebody looks.
+It subscribes only while a page is open.
 
 subscribes to:
   sim_node/world, sim_node/view, sim_node/effects
   stageros/world, stageros/view
   scan, tf, /clock                   of a robot
   odom, voltages, cmd_vel_out, active_input, diagnostics
-  map, particlecloud, amcl_pose      of who maps or localises
+  map, particlecloud, amcl_pose      of mapping or localization
   /rosout                            warnings
 publishes, if the page may command:
   viewer_vel                         commands for base_node; stageros: cmd_vel
   initialpose
 services:
-  ~new_token                         a new address for who may command
-  ~clients                           who looks
+  ~new_token                         a new address, which allows commands
+  ~clients                           the pages that are open
 parameters:
   launch/viewer.yaml, and the arguments of launch/viewer.launch
 

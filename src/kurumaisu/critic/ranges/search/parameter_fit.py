@@ -20,7 +20,7 @@ from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.signals.effect_columns import Form
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, beam_family
-from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
+from kurumaisu.critic.values.policy import FORM_ERROR, FORM_WAYS
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
@@ -32,7 +32,6 @@ STRONG = 1.0  # rms of what acts, in sds of single readings, from which scans ar
 _STEP = 0.05  # of a finite difference, in units of the larger of a parameter and its scale
 _SHAPE = 1.0  # prior sd of what only shapes an effect, in the same units
 _SIZE = 100.0  # and of its size
-_WAYS = 4  # in which a form may differ, of which one passes for another effect's size
 
 
 @dataclass(frozen=True)
@@ -188,7 +187,7 @@ def _doubt(
     count = len(free)
     alike = (gram / np.outer(norms, norms))[:count, count:]
     own = np.array([[each.index == i for i in guessed] for each in free])
-    share = np.where(own, alike**2 + (1 - alike**2) / _WAYS, alike**2 / _WAYS)
+    share = np.where(own, alike**2 + (1 - alike**2) / FORM_WAYS, alike**2 / FORM_WAYS)
     return np.asarray(FORM_ERROR * np.sqrt(share @ norms[count:] ** 2))
 
 
