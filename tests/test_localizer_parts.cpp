@@ -13,6 +13,8 @@
 #include "slam/pose.h"
 #include "slam/sensor.h"
 
+namespace test_localizer_parts {
+
 namespace k = kurumaisu;
 
 namespace {
@@ -326,7 +328,4 @@ TEST(Motion, ProcessNoiseIsThatOfAnOrnsteinUhlenbeckProcess) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_localizer_parts

@@ -15,6 +15,8 @@
 #include "base/yaw_rate.h"
 #include "base_drive.h"
 
+namespace test_odometry {
+
 namespace k = kurumaisu;
 
 namespace {
@@ -287,7 +289,4 @@ TEST(Placing, WhileItMovesCountsTheWayUpToThen) {
               1e-9);  // heading's variance is 1
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_odometry

@@ -10,6 +10,8 @@
 
 #include "slam/messages.h"
 
+namespace test_scan_queue {
+
 namespace k = kurumaisu;
 
 namespace {
@@ -107,7 +109,4 @@ TEST_F(ScanQueue, AFullQueueLosesItsOldest) {
   EXPECT_EQ(queue_.next()->stamp, ros::Time(103));
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_scan_queue

@@ -13,6 +13,8 @@
 #include "slam/pose.h"
 #include "slam_room.h"
 
+namespace test_slam {
+
 namespace k = kurumaisu;
 
 namespace {
@@ -245,7 +247,4 @@ TEST(Settings, CountsAreWhole) {
                std::invalid_argument);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_slam
