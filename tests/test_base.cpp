@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "base/odometry.h"
+#include "base/odometry/odometry.h"
 
 namespace test_base {
 

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "base/settings.h"
+#include "base/node/settings.h"
 #include "base_values.h"
 
 namespace test_base_settings {

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "localizer_drive.h"
-#include "slam/localization_report.h"
+#include "slam/localization/report.h"
 
 namespace test_localizer_faults {
 

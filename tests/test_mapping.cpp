@@ -8,7 +8,7 @@
 
 #include "mapper_values.h"
 #include "mapping_drive.h"
-#include "slam/mapping_report.h"
+#include "slam/mapping/report.h"
 
 namespace test_mapping {
 

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "base/drive.h"
-#include "base/gyro.h"
-#include "base/odometry.h"
+#include "base/odometry/gyro.h"
+#include "base/odometry/odometry.h"
 #include "base/odometry_report.h"
-#include "base/reckoning.h"
-#include "base/yaw_rate.h"
+#include "base/odometry/reckoning.h"
+#include "base/odometry/yaw_rate.h"
 #include "base_drive.h"
 
 namespace test_odometry {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "slam/messages.h"
+#include "slam/nodes/messages.h"
 
 namespace test_scan_queue {
 

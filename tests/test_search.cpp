@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "slam/search.h"
+#include "slam/localization/search.h"
 #include "slam_room.h"
 
 namespace test_search {

@@ -13,7 +13,7 @@
 #include "base/estop.h"
 #include "base/limiter.h"
 #include "base/outlet.h"
-#include "base/reckoning.h"
+#include "base/odometry/reckoning.h"
 #include "base/speed_cap.h"
 
 namespace kurumaisu {

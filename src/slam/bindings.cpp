@@ -9,9 +9,9 @@
 #include <stdexcept>
 
 #include "slam/localizer_bindings.h"
-#include "slam/mapper.h"
-#include "slam/pose.h"
-#include "slam/rawlog.h"
+#include "slam/mapping/mapper.h"
+#include "slam/basics/pose.h"
+#include "slam/mapping/rawlog.h"
 
 namespace py = pybind11;
 namespace k = kurumaisu;
