@@ -7,10 +7,10 @@
 #include <random>
 #include <stdexcept>
 
+#include "slam/basics/pose.h"
 #include "slam/localization/doubt.h"
 #include "slam/localization/field.h"
 #include "slam/localization/motion.h"
-#include "slam/basics/pose.h"
 #include "slam/localization/sensor.h"
 
 namespace test_localizer_parts {

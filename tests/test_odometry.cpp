@@ -10,9 +10,9 @@
 #include "base/drive.h"
 #include "base/odometry/gyro.h"
 #include "base/odometry/odometry.h"
-#include "base/odometry_report.h"
 #include "base/odometry/reckoning.h"
 #include "base/odometry/yaw_rate.h"
+#include "base/odometry_report.h"
 #include "base_drive.h"
 
 namespace test_odometry {

@@ -9,8 +9,8 @@
 #include <thread>
 
 #include "mapper_values.h"
-#include "slam/mapping/mapper.h"
 #include "slam/basics/pose.h"
+#include "slam/mapping/mapper.h"
 #include "slam_room.h"
 
 namespace test_slam {

@@ -8,9 +8,9 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "slam/basics/pose.h"
 #include "slam/localizer_bindings.h"
 #include "slam/mapping/mapper.h"
-#include "slam/basics/pose.h"
 #include "slam/mapping/rawlog.h"
 
 namespace py = pybind11;

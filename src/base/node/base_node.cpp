@@ -10,18 +10,18 @@
 #include <memory>
 #include <stdexcept>
 
-#include "base/node/command_input.h"
-#include "base/node/diagnostics_output.h"
 #include "base/guard_dac.h"
 #include "base/last_word.h"
+#include "base/node/command_input.h"
+#include "base/node/diagnostics_output.h"
 #include "base/node/limits_server.h"
 #include "base/node/master_watch.h"
 #include "base/node/odometry_input.h"
 #include "base/node/odometry_output.h"
-#include "base/report.h"
 #include "base/node/settings.h"
 #include "base/node/stop_request.h"
 #include "base/node/topic_dac.h"
+#include "base/report.h"
 #include "guard/crash.h"
 #include "guard/realtime.h"
 

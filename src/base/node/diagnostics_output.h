@@ -8,9 +8,9 @@
 
 #include "base/drive.h"
 #include "base/guard_dac.h"
+#include "base/node/settings.h"
 #include "base/odometry_report.h"
 #include "base/report.h"
-#include "base/node/settings.h"
 
 namespace kurumaisu {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "base/node/dac_settings.h"
 #include "base/drive.h"
+#include "base/node/dac_settings.h"
 #include "base/node/odometry_settings.h"
 #include "params.h"
 

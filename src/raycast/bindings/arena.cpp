@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // kurumaisu._core.Arena. Arrays are checked here for shape and kind, and by the arena for what they say.
+#include "raycast/arena.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -9,7 +11,6 @@
 #include <vector>
 
 #include "bindings.h"
-#include "raycast/arena.h"
 #include "raycast/bindings/arrays.h"
 #include "raycast/bindings/beam_arrays.h"
 #include "raycast/bindings/mover_arrays.h"

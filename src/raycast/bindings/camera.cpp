@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The camera's part of kurumaisu._core.
+#include "raycast/camera/camera.h"
+
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
 #include <string>
 
 #include "bindings.h"
-#include "raycast/camera/camera.h"
 
 namespace kurumaisu {
 namespace py = pybind11;

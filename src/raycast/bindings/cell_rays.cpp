@@ -6,8 +6,8 @@
 
 #include "bindings.h"
 #include "raycast/bindings/beam_arrays.h"
-#include "raycast/cells/rays.h"
 #include "raycast/bindings/outline_arrays.h"
+#include "raycast/cells/rays.h"
 
 namespace kurumaisu {
 namespace {

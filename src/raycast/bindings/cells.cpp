@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // kurumaisu._core.Cells. Arrays are checked here for shape and kind, and by Cells for what they say.
+#include "raycast/cells/cells.h"
+
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -7,7 +9,6 @@
 
 #include "bindings.h"
 #include "raycast/bindings/arrays.h"
-#include "raycast/cells/cells.h"
 #include "raycast/bindings/mover_arrays.h"
 #include "raycast/bindings/outline_arrays.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // kurumaisu._core: ray casting. Vectorised over numpy arrays.
-#include "bindings.h"
+#include "raycast/scene.h"
 
 #include <pybind11/stl.h>
 
@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "raycast/scene.h"
+#include "bindings.h"
 
 namespace kurumaisu {
 namespace py = pybind11;

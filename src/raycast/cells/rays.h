@@ -8,8 +8,8 @@
 
 #include "raycast/beams.h"
 #include "raycast/cells/drawing.h"
-#include "raycast/pool.h"
 #include "raycast/cells/regions.h"
+#include "raycast/pool.h"
 #include "raycast/sight.h"
 
 namespace kurumaisu {

@@ -8,8 +8,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "raycast/cells/ray.h"
 #include "raycast/cells/drawing.h"
+#include "raycast/cells/ray.h"
 
 namespace kurumaisu {
 

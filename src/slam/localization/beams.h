@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "model/laser_error.h"
-#include "slam/localization/settings.h"
 #include "slam/basics/scan.h"
+#include "slam/localization/settings.h"
 
 namespace kurumaisu {
 

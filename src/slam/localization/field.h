@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "slam/mapping/mapper.h"
+#include "slam/basics/occupancy.h"
 
 namespace kurumaisu {
 

@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "slam/basics/pose.h"
 #include "slam/localization/doubt.h"
 #include "slam/localization/finder.h"
 #include "slam/localization/places.h"
-#include "slam/basics/pose.h"
 #include "slam/localization/vague.h"
 
 namespace kurumaisu {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "model/laser_error.h"
-#include "slam/mapping/mapper.h"
+#include "slam/basics/occupancy.h"
 #include "slam/localization/motion.h"
 
 namespace kurumaisu {

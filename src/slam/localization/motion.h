@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "model/rate_noise.h"
-#include "slam/localization/settings.h"
 #include "slam/localization/particles.h"
+#include "slam/localization/settings.h"
 
 namespace kurumaisu {
 

@@ -5,8 +5,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "slam/localization/field.h"
 #include "slam/basics/gaussian.h"
+#include "slam/localization/field.h"
 
 namespace kurumaisu {
 

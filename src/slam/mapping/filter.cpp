@@ -14,9 +14,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slam/basics/pose.h"
 #include "slam/mapping/grid.h"
 #include "slam/mapping/observation.h"
-#include "slam/basics/pose.h"
 
 namespace kurumaisu {
 namespace {

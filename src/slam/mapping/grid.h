@@ -4,7 +4,7 @@
 
 #include <mrpt/maps/COccupancyGridMap2D.h>
 
-#include "slam/mapping/mapper.h"
+#include "slam/basics/occupancy.h"
 
 namespace kurumaisu {
 

@@ -8,12 +8,12 @@
 #include <stdexcept>
 #include <string>
 
+#include "slam/basics/percent.h"
+#include "slam/basics/pose.h"
+#include "slam/localization/motion.h"
 #include "slam/mapping/extent.h"
 #include "slam/mapping/filter.h"
 #include "slam/mapping/matcher.h"
-#include "slam/localization/motion.h"
-#include "slam/basics/percent.h"
-#include "slam/basics/pose.h"
 #include "slam/mapping/slip.h"
 #include "slam/mapping/start.h"
 

@@ -11,8 +11,8 @@
 
 #include "slam/basics/gaussian.h"
 #include "slam/basics/occupancy.h"
-#include "slam/mapping/saved_map.h"
 #include "slam/basics/scan.h"
+#include "slam/mapping/saved_map.h"
 #include "slam/mapping/settings.h"
 
 namespace kurumaisu {

@@ -17,8 +17,8 @@
 #include <optional>
 #include <stdexcept>
 
-#include "slam/mapping/observation.h"
 #include "slam/basics/pose.h"
+#include "slam/mapping/observation.h"
 
 namespace kurumaisu {
 namespace {

@@ -8,8 +8,8 @@
 
 #include <stdexcept>
 
-#include "slam/mapping/observation.h"
 #include "slam/basics/pose.h"
+#include "slam/mapping/observation.h"
 #include "slam/mapping/rawlog.h"
 #include "slam/mapping/whole_file.h"
 

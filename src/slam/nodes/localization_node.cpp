@@ -17,10 +17,10 @@
 #include <optional>
 #include <utility>
 
-#include "slam/nodes/localization_settings.h"
-#include "slam/localization/report.h"
-#include "slam/nodes/messages.h"
 #include "slam/basics/pose.h"
+#include "slam/localization/report.h"
+#include "slam/nodes/localization_settings.h"
+#include "slam/nodes/messages.h"
 #include "slam/nodes/scan_feed.h"
 
 namespace k = kurumaisu;

@@ -13,13 +13,13 @@
 #include <optional>
 #include <utility>
 
+#include "slam/basics/pose.h"
 #include "slam/mapping/mapper.h"
-#include "slam/nodes/mapping_parameters.h"
-#include "slam/nodes/mapping_output.h"
 #include "slam/mapping/report.h"
+#include "slam/nodes/mapping_output.h"
+#include "slam/nodes/mapping_parameters.h"
 #include "slam/nodes/mapping_settings.h"
 #include "slam/nodes/messages.h"
-#include "slam/basics/pose.h"
 #include "slam/nodes/scan_feed.h"
 
 namespace k = kurumaisu;

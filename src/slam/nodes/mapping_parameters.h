@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "slam/nodes/gmapping_names.h"
+#include "slam/mapping/gmapping_names.h"
 #include "yaml.h"
 
 namespace kurumaisu {

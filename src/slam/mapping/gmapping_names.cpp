@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "slam/nodes/gmapping_names.h"
+#include "slam/mapping/gmapping_names.h"
 
 namespace kurumaisu {
 namespace {
