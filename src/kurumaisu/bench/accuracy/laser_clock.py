@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _simulator() -> str:
     """Return the path of the program that tests/CMakeLists.txt builds."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / "lib/kurumaisu/laser_clock_sim"
+        path = Path(prefix) / "share/kurumaisu/tests/laser_clock_sim"
         if path.exists():
             return str(path)
     raise Error("laser_clock_sim: is not built: it comes with the tests (target test_laser_clock_sim)")
