@@ -72,7 +72,7 @@ class Inputs:
 
     @cached_property
     def built(self) -> str:
-        """Hash of the programs and libraries, as they are when this is asked for first."""
+        """Hash of all programs and libraries, as they are when this is asked for first."""
         made = (path for path in DEVEL.rglob("*") if path.suffix in ("", ".so") and not path.is_symlink())
         return sources.content_hash(path for path in made if path.is_file())
 
@@ -85,12 +85,20 @@ class Inputs:
     def of_pytest(self, test: Path) -> str:
         """Return the state of what a file of pytest depends on."""
         reached = closure(test, TESTS / "conftest.py")
-        own = "\n".join(path.read_text() for path in reached if path.is_relative_to(TESTS))
+        own = "\n".join(_text(path) for path in reached if path.is_relative_to(TESTS))
         if _WHOLE_TREE.search(own):
             reached |= self.tree
         if _PAGES.search(own):
             reached |= set(self.files)
-        return self.state(reached | self.data, self.built, self.recordings)
+        if _WHOLE_TREE.search(own):
+            return self.state(reached | self.data, self.built, self.recordings)
+        modules = [
+            path
+            for name in ("_core", "_slam")
+            if any(name in _text(path) for path in reached if path.suffix == ".py")
+            for path in DEVEL.rglob(f"{name}.*.so")
+        ]
+        return self.state(reached | self.data | with_libraries(*modules), self.recordings)
 
     def of_rostest(self, test: Path) -> str:
         """Return the state of what a rostest depends on: the whole package, of the tests its own."""
@@ -101,7 +109,17 @@ class Inputs:
 
     def of_program(self, program: Path) -> str:
         """Return the state of what a program of gtest depends on."""
-        return self.state(self.data | ({program} if program.exists() else set()), self.built, self.recordings)
+        others = {path for path in program.parents[1].rglob("*") if path.is_file() and not path.suffix}
+        return self.state(self.data | others | with_libraries(program), self.recordings)
+
+
+def with_libraries(*programs: Path) -> set[Path]:
+    """Return programs or libraries, and the libraries of this tree that they are linked with."""
+    there = {path for path in programs if path.exists()}
+    listed = (
+        subprocess.run(["ldd", *map(str, there)], check=False, capture_output=True, text=True).stdout if there else ""
+    )
+    return there | {Path(name) for name in re.findall(r"=> (\S+)", listed) if Path(name).is_relative_to(DEVEL)}
 
 
 def waits(test: Path) -> bool:
@@ -130,7 +148,8 @@ def _imported(path: Path) -> frozenset[Path]:
     text = _text(path)
     names = set(_DOTTED.findall(text))
     for base, some in _FROM.findall(text):
-        names.update([base, *(f"{base}.{name}" for name in re.findall(r"\w+", some))])
+        stem = base if base.endswith(".") else f"{base}."
+        names.update([base, *(stem + name for name in re.findall(r"\w+", some))])
     for several in _IMPORT.findall(text):
         names.update(part.split()[0] for part in several.split(",") if part.strip())
     found = {file for name in names for file in _files(_absolute(name, path))}

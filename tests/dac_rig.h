@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "dac/open.h"
-#include "dac/virtual_board.h"
+#include "dac/virtual/board.h"
 
 namespace kurumaisu::dac {
 

@@ -14,7 +14,7 @@ from kurumaisu.srv import SetPose, SetPoseRequest
 from nav_msgs.msg import Odometry
 
 from kurumaisu import geometry
-from kurumaisu.driving import Driver, load_route
+from kurumaisu.driving import RouteFollower, load_route
 from kurumaisu.params import shipped
 from kurumaisu.ros.testing.nodes import Commander, Topic, deviation, pose_of, wait_for
 
@@ -59,7 +59,7 @@ class LocalizationInTheSimulator(unittest.TestCase):
 
     def drive(self, metres):
         """Follow the round for so many metres."""
-        driver = Driver(load_route(shipped("launch/round.yaml")))
+        driver = RouteFollower(load_route(shipped("launch/round.yaml")))
         way, last = 0.0, pose_of(self.truth.last)
         seen = self.truth.last
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "slam/localizer.h"
+#include "slam/localization/localizer.h"
 #include "slam_room.h"
 
 namespace room::localizing {

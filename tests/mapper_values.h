@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "slam/settings.h"
+#include "slam/mapping/settings.h"
 
 namespace room {
 

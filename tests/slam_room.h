@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "slam/mapper.h"
-#include "slam/pose.h"
+#include "slam/basics/pose.h"
+#include "slam/mapping/mapper.h"
 
 namespace room {
 

@@ -10,6 +10,8 @@
 #include "base/last_word.h"
 #include "base_drive.h"
 
+namespace test_arbiter {
+
 namespace k = kurumaisu;
 using namespace kurumaisu::test;  // NOLINT(google-build-using-namespace)
 
@@ -191,7 +193,4 @@ TEST(LastWordDeathTest, ATerminateSaysItAndAborts) {
       "neutral");
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_arbiter

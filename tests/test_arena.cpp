@@ -19,6 +19,8 @@
 #include "raycast/layers.h"
 #include "raycast/pool.h"
 
+namespace test_arena {
+
 namespace k = kurumaisu;
 
 namespace {
@@ -179,7 +181,4 @@ TEST(Arena, ABodyMayBeNamedTwiceInAMove) {
   EXPECT_DOUBLE_EQ(returned, 1.0);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_arena

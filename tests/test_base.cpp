@@ -9,7 +9,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "base/odometry.h"
+#include "base/odometry/odometry.h"
+
+namespace test_base {
 
 namespace k = kurumaisu;
 
@@ -106,7 +108,4 @@ TEST(Odometry, TimeMustGoForward) {
   for (const double dt : {0.0, -0.1, kNan}) EXPECT_THROW(odometry.advance(0.1, 0, dt), std::invalid_argument);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_base

@@ -10,6 +10,8 @@
 #include "base/report.h"
 #include "base_drive.h"
 
+namespace test_base_drive {
+
 namespace k = kurumaisu;
 using namespace kurumaisu::test;  // NOLINT(google-build-using-namespace)
 
@@ -248,7 +250,4 @@ TEST_F(DriveTest, ARefusedCommandWarnsOnce) {
   EXPECT_FALSE(k::reportCommands(chair.drive, k::tally(chair.drive)).warning);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_base_drive

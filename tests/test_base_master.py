@@ -10,7 +10,7 @@ from itertools import pairwise
 import pytest
 import yaml
 
-from kurumaisu.bench.faults.base.peers import Graph, Peer, until
+from kurumaisu.bench.faults.base.peers import Commander, Graph, until
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.params import shipped
 
@@ -33,7 +33,7 @@ class Chair:
             values[name] = yaml.safe_load(shipped(f"launch/{file}.yaml").read_text())
         self.graph.set_parameter(NODE, values)
         self.base = self.graph.run([program("base_node")], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        self.peer = Peer(self.graph, self.log)
+        self.peer = Commander(self.graph, self.log)
 
     def set_off(self):
         self.peer.say(0.0, 0.0)
@@ -80,7 +80,7 @@ def test_a_master_that_dies_brakes_and_another_one_ends_it(chair):
 
 
 def test_with_its_commander_gone_too_it_stops_at_the_command_s_timeout(chair):
-    listener = Peer(chair.graph, chair.log)
+    listener = Commander(chair.graph, chair.log)
     chair.set_off()
     listener.wait("voltages", lambda event: event["v"] == V)
     chair.graph.kill_master()

@@ -9,8 +9,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "base/settings.h"
+#include "base/node/settings.h"
 #include "base_values.h"
+
+namespace test_base_settings {
 
 namespace k = kurumaisu;
 using namespace parameters;  // NOLINT: a test
@@ -282,7 +284,4 @@ TEST(BaseSettings, GarbageOnTheParameterServerIsRefusedOrHarmless) {
   EXPECT_GT(refused, 2000);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_base_settings

@@ -8,6 +8,8 @@
 #include "base/report.h"
 #include "base_drive.h"
 
+namespace test_base_stops {
+
 namespace k = kurumaisu;
 using namespace kurumaisu::test;  // NOLINT(google-build-using-namespace)
 
@@ -160,7 +162,4 @@ TEST_F(RideTest, ACapSlowsDownByTheRampAndForgetsItself) {
   EXPECT_EQ(chair.dac.last().v, 1.0);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_base_stops

@@ -22,7 +22,9 @@ def test_without_a_name_each_is_listed_with_a_line_of_what_it_measures(capsys):
     assert all(len(line.split(maxsplit=1)[1]) > 30 for line in lines)
 
 
-@pytest.mark.parametrize(("name", "words"), [("simm", "the nearest: sim"), ("table", "without a name lists them")])
+@pytest.mark.parametrize(
+    ("name", "words"), [("simm", "did you mean sim?"), ("table", f"there are {len(__main__.MODULES)}: scripts/bench")]
+)
 def test_a_name_that_is_none(name, words, capsys):
     assert __main__.main([name]) == 2
     assert words in capsys.readouterr().err

@@ -107,7 +107,7 @@ def test_two_sets_that_lead_to_each_other_come_to_an_end(judged):
     ],
 )
 def test_a_fit_that_first_values_beat_is_stuck(start, better):
-    """The best values are 1 and 0.2; the fit stuck at 0.5 and 0.2, as on a wrong tooth of a comb.
+    """The best values are 1 and 0.2; the fit stuck at 0.5 and 0.2, as on a wrong peak.
 
     Where first values are those of a part of the set, the rest stays as it was fitted.
     """

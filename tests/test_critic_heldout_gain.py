@@ -23,7 +23,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import prepare, split
 from kurumaisu.critic.heldout import drive_gain, scan_gain, slam_gain
 from kurumaisu.critic.heldout.corrected_scans import corrected
-from kurumaisu.critic.heldout.extension_gain import Extension, with_laser_gain, with_slam
+from kurumaisu.critic.heldout.extension_gain import Extension, with_scan_gain, with_slam
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import (
@@ -155,7 +155,7 @@ def test_a_fault_of_the_laser_gains_on_scans_held_out_and_a_wrong_one_loses(tmp_
 
 def test_a_fit_to_other_scans_finds_the_size(tmp_path):
     data = scanned(tmp_path, "laser.scale", 0.01, 3, scans=40)
-    shots = scan_gain.joined(scan_gain.Places(data, MODEL, None).trained())
+    shots = scan_gain.joined(scan_gain.ScanPoses(data, MODEL, None).trained())
     (again,) = scan_gain.refit(shots, (EffectSetting("laser.scale", {"scale": 0.02}),))
     assert again.parameters["scale"] == pytest.approx(0.01, abs=0.002)
 
@@ -217,13 +217,13 @@ def test_a_laser_alone_gives_the_overall_gain(tmp_path):
     data = scanned(tmp_path, "laser.scale", 0.01, 1, scans=12)
     right = (EffectSetting("laser.scale", {"scale": 0.01}),)
     alone = replace(bare(), verdict=Verdict("none"))
-    out = with_laser_gain(alone, data, Extension(None, right, lambda _: ()))
+    out = with_scan_gain(alone, data, Extension(None, right, lambda _: ()))
     whole = out.verdict.gain
     assert whole.log_density_per_sample == whole.channels["range"].log_density_per_sample
     assert "nats per reading" in out.story.details[-1]
-    beside = with_laser_gain(bare(), data, Extension(None, right, lambda _: ()))
+    beside = with_scan_gain(bare(), data, Extension(None, right, lambda _: ()))
     assert beside.verdict.gain.log_density_per_sample == NONE
-    assert with_laser_gain(alone, data, Extension(None, (), lambda _: ())) == alone
+    assert with_scan_gain(alone, data, Extension(None, (), lambda _: ())) == alone
 
 
 def test_a_verdict_of_before_is_still_read(tmp_path):

@@ -73,7 +73,7 @@ def test_the_form_of_one_cause_is_in_doubt_for_what_looks_like_it_only():
     assert wider("base.gain_v") == pytest.approx(1.0, abs=0.05)
 
 
-def test_the_steps_of_a_converter_may_be_those_of_another_tooth():
+def test_the_steps_of_a_converter_may_be_those_of_another_peak():
     """The likelihood has many peaks: one is told by its curvature to parts per million, and its neighbour fits, too."""
     name = "base.dac_quantisation"
     problem, _ = fitted([name], {name: {"size": 0.012, "cut": 0.0}}, "other", seed=5)
@@ -91,7 +91,7 @@ def test_an_interval_ends_at_the_bound():
 
 
 def test_beside_the_steps_of_a_converter_a_size_has_room_on_both_sides():
-    """Where its step goes with another size, it goes off its tooth at once: that is no end of the other's interval."""
+    """Where its step goes with another size, it goes off its peak at once: that is no end of the other's interval."""
     hidden = {
         "base.dac_quantisation": {"size": 0.045, "cut": 0.0},
         "base.slope": {"size": 0.024, "bearing": 2.5},

@@ -15,7 +15,7 @@ from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.ranges.signals.effect_columns import Form
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
 from kurumaisu.critic.unknown.curves import CurveEvidence
-from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
+from kurumaisu.critic.values.policy import FORM_ERROR
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

@@ -34,7 +34,7 @@ def test_where_scans_are_criticised_makes_no_difference(alone, monkeypatch, work
     monkeypatch.setattr(module, "_MANY", 10)
     monkeypatch.setattr(module.os, "sched_getaffinity", lambda _: {0, 1})
     monkeypatch.setattr(module, "Worker", lambda: asked.append(worker) or worker())
-    with module.criticise_aside(data, MODEL, MD100, None) as scans_say:
+    with module.criticise_in_own_process(data, MODEL, MD100, None) as scans_say:
         found = scans_say(here.append)
     assert asked == [worker]
     assert bool(here) == (worker is Dying)

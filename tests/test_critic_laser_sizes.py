@@ -10,7 +10,8 @@ from laser_scene import recording
 
 from kurumaisu.critic.judge.merge import with_scans
 from kurumaisu.critic.judge.scan_estimates import another_map
-from kurumaisu.critic.judge.scan_verdict import _spread_of, criticise_scans
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.judge.scatter_verdict import _spread_of
 from kurumaisu.critic.ranges.scans.beams import gather
 from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock, compare_blocks
 from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormSearch
@@ -21,9 +22,9 @@ from kurumaisu.critic.ranges.search.parameter_fit import fit_parameters
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
 from kurumaisu.critic.unknown.curves import CurveEvidence
-from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.policy import FORM_ERROR
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.effects import Parameter

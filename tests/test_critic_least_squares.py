@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Least squares where one parameter has a comb of likely values, whose slope leads nowhere."""
+"""Least squares where one parameter has many likely values, whose slope leads nowhere."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ TOOTH = 0.5
 
 
 class Tooth:
-    """The smooth size should be 1; the rough one sits on its tooth, a very narrow one, but its slope says otherwise."""
+    """The smooth size should be 1; the rough one sits on its peak, a very narrow one, but its slope says otherwise."""
 
     def residual(self, terms, values):
         off = [value - TOOTH for term, value in zip(terms, values, strict=True) if term.rough]

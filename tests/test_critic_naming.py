@@ -33,7 +33,8 @@ from kurumaisu.critic.unknown.beyond_catalogue import Beyond, undecided
 from kurumaisu.critic.unknown.comparison import CurveComparison
 from kurumaisu.critic.unknown.curves import CurveEvidence
 from kurumaisu.critic.unknown.designs import Designs
-from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR, EffectLikeness
+from kurumaisu.critic.unknown.effect_likeness import EffectLikeness
+from kurumaisu.critic.values.policy import FORM_ERROR
 from kurumaisu.critic.values.verdict import Gain, LogDensityGain
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -336,7 +337,7 @@ def test_another_form_is_tried_without_what_stood_in_for_it():
         (False, {"a": 0.0358}, False),
     ],
 )
-def test_a_comb_is_fitted_once_from_each_tooth_it_may_be_on(rough, start, again):
+def test_a_step_is_fitted_once_from_each_peak_it_may_be_on(rough, start, again):
     """No fit goes from a step of 18.4 mV to one of 35.8 mV, and before one it may look worse."""
     terms = Term("a", OFFSET, 0.0, rough=rough), Term("b", OFFSET, 0.0)
     fit = SimpleNamespace(candidates=frozenset("a"), terms=terms, values=[0.0184, 0.1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parameters with a comb of likely values, and inputs that change between two points of the replay's grid."""
+"""Parameters with many likely values, and inputs that change between two points of the replay's grid."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def problem_with(form, step, seed, cut=0.0, design="rich"):
 
 
 @pytest.mark.parametrize(("form", "phase"), [("plain", 0.0), ("other", 0.5)])
-def test_a_converters_step_is_found_among_all_its_teeth(form, phase):
+def test_a_converters_step_is_found_among_all_its_peaks(form, phase):
     problem = problem_with(form, 0.0367, 1)
     best = max((problem.fit_candidates([c], {}) for c in problem.candidates), key=lambda fit: fit.score)
     assert best.start[STEP, "step"] == pytest.approx(0.0367, rel=3e-3)
@@ -49,14 +49,14 @@ def test_a_converters_step_is_found_among_all_its_teeth(form, phase):
 
 @pytest.mark.parametrize("step", [0.0156, 0.0391])
 def test_what_a_converter_cuts_off_is_found_in_drives_by_a_stick(step):
-    """A stick has hundreds of voltages: teeth are narrow, and hidden by the mean that is lost at any size."""
+    """A stick has hundreds of voltages: peaks are narrow, and hidden by the mean that is lost at any size."""
     problem = problem_with("other", step, 3, cut=1.0, design="stick")
     best = max((problem.fit_candidates([c], {}) for c in problem.candidates), key=lambda fit: fit.score)
     assert best.start[STEP, "step"] == pytest.approx(step, rel=5e-3)
     assert (best.start[STEP, "phase"], best.start[STEP, "cut"]) == (0.5, 1.0)
 
 
-def test_without_steps_no_tooth_is_worth_its_cost():
+def test_without_steps_no_peak_is_worth_its_cost():
     problem = problem_with("plain", 0.0, 2)
     nothing = problem.fit_candidates((), {}).score
     fits = [problem.fit_candidates([candidate], {}) for candidate in problem.candidates]
@@ -65,7 +65,7 @@ def test_without_steps_no_tooth_is_worth_its_cost():
 
 
 def test_steps_are_found_although_smooth_effects_together_draw_their_mean():
-    """Beside all of them no tooth stands out; beside the lag alone, one does."""
+    """Beside all of them no peak stands out; beside the lag alone, one does."""
     case = make(Ask("pair"), 17110)
     smooth = ("lag_w", "curvature_w", "dead_zone_w", "dac_zero_s", "gain_w", "cross_w_to_v")
     ids = frozenset((STEP, *(f"base.{name}" for name in smooth)))
@@ -76,7 +76,7 @@ def test_steps_are_found_although_smooth_effects_together_draw_their_mean():
 
 
 @pytest.mark.parametrize(("step", "gain", "hopeless"), [(0.0367, 0.0, False), (0.02, 0.3, True)])
-def test_a_comb_is_not_fitted_alone_where_something_else_explains_far_more(step, gain, hopeless):
+def test_a_step_is_not_fitted_alone_where_something_else_explains_far_more(step, gain, hopeless):
     faults = [BASE[STEP].fault({"size": step, "cut": 0.0}, "plain"), BASE["base.gain_w"].fault({"size": gain}, "plain")]
     problem = problem_of(5, faults, {STEP, "base.gain_w"})
     empty, fits = problem.fit_candidates((), {}), {one: problem.fit_candidates([one], {}) for one in problem.candidates}
@@ -115,7 +115,7 @@ def test_a_ramp_shorter_than_a_step_begins_when_its_command_does(start):
 
 
 def test_a_top_speed_that_only_the_fastest_drives_meet_is_found():
-    """Half of the sizes of a comb with even steps would have no such drive, the others half of all drives."""
+    """Half of the sizes of a grid with even steps would have no such drive, the others half of all drives."""
     drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(4), seconds=40.0, rate=10.0)
     top = 0.97 * max(float(np.abs(setting.command[:, 1]).max()) for setting in drives.settings)
     fault = BASE["base.saturation"].fault({"size": 1 - top, "axis": 0.0, "top_v": 1.0, "top_w": 1.0}, "plain")
@@ -201,13 +201,13 @@ def steps_beside(step, cut, **others):
     return problem, rough + [one for one in problem.candidates if one.id != STEP and one.usual]
 
 
-def test_a_fit_goes_on_to_the_likeliest_tooth_close_by():
+def test_a_fit_goes_on_to_the_likeliest_peak_close_by():
     problem, chosen = steps_beside(0.02726, 1.0, gain_v=0.05, cross_w_to_v=-0.1)
     near, true = (problem.fit_candidates(chosen, {(STEP, "step"): 0.02726 * off}) for off in (0.998, 1.0))
     assert near.log_likelihood > true.log_likelihood - 0.5
 
 
-def test_a_tooth_is_sought_anew_beside_what_was_found_since():
+def test_a_peak_is_sought_anew_beside_what_was_found_since():
     problem, chosen = steps_beside(0.0523, 1.0, cross_v_to_w=0.03, cross_w_to_v=-0.06)
     stuck = problem.fit_candidates(chosen, {(STEP, "step"): 0.06})
     assert stuck.start[STEP, "step"] != pytest.approx(0.0523, rel=5e-3)

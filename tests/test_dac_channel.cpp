@@ -13,6 +13,8 @@
 #include "dac/channel.h"
 #include "dac/template.h"
 
+namespace test_dac_channel {
+
 namespace d = kurumaisu::dac;
 
 namespace {
@@ -184,7 +186,4 @@ TEST(DacTemplate, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(d::Template("", Kind::kPlain).plain(), "");
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_dac_channel

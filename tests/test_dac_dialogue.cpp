@@ -13,6 +13,8 @@
 #include "dac/converter.h"
 #include "dac/dialogue.h"
 
+namespace test_dac_dialogue {
+
 namespace d = kurumaisu::dac;
 namespace s = kurumaisu::serial;
 
@@ -180,7 +182,4 @@ TEST(DacDialogue, MessagesShowControlCharacters) {
   EXPECT_EQ(d::readable(std::string("A\r\0\xff~", 5)), R"("A\x0D\x00\xFF~")");
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_dac_dialogue

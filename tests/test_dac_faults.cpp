@@ -11,6 +11,8 @@
 #include "dac_rig.h"
 #include "steady.h"
 
+namespace test_dac_faults {
+
 namespace d = kurumaisu::dac;
 using d::complaint;
 using d::has;
@@ -265,7 +267,4 @@ TEST(DacFaults, NotANumberIsRefusedAndNothingIsSent) {
   EXPECT_EQ(rig.board.commands(), 2U);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_dac_faults

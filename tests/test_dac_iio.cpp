@@ -11,6 +11,8 @@
 
 #include "dac_rig.h"
 
+namespace test_dac_iio {
+
 namespace d = kurumaisu::dac;
 namespace fs = std::filesystem;
 using d::complaint;
@@ -211,7 +213,4 @@ TEST(DacIio, AnOffsetShiftsTheCodes) {
   EXPECT_EQ(tree.raw(2), "2056\n");
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_dac_iio

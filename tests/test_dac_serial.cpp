@@ -13,6 +13,8 @@
 
 #include "dac_rig.h"
 
+namespace test_dac_serial {
+
 namespace d = kurumaisu::dac;
 using d::Rig;
 
@@ -205,7 +207,4 @@ TEST(DacSerial, SuccessIsTrueUnderFaultsInABurst) {
   rideThroughFaults(alike, 1, 0);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_dac_serial

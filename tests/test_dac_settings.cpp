@@ -11,6 +11,8 @@
 #include "dac_rig.h"
 #include "yaml.h"
 
+namespace test_dac_settings {
+
 namespace k = kurumaisu;
 namespace d = kurumaisu::dac;
 using d::complaint;
@@ -242,7 +244,4 @@ TEST(DacSettings, RefusesWhatIsWrongInAnIioDevice) {
   }
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_dac_settings

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from kurumaisu._core import integrate
-from kurumaisu.driving import Driver, Route, load_route
+from kurumaisu.driving import Route, RouteFollower, load_route
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.sim.chair.joystick import joystick
@@ -14,7 +14,7 @@ ROUTE = Route(np.array([[2.0, 0.0], [2.0, 2.0], [-1.0, 2.0]]), 0.5, 0.8, 1.5, 0.
 
 
 def follow(route, pose, seconds):
-    driver, path = Driver(route), [np.array(pose)]
+    driver, path = RouteFollower(route), [np.array(pose)]
     for _ in range(round(seconds / 0.05)):
         v, w = driver.command(path[-1])
         path.append(integrate(np.array([v]), np.array([w]), np.array([0.05]), list(path[-1]))[-1])
@@ -31,7 +31,7 @@ def test_every_waypoint_is_passed_from_any_heading(heading):
 
 
 def test_limits_of_the_route_hold():
-    driver = Driver(ROUTE)
+    driver = RouteFollower(ROUTE)
     for heading in np.linspace(-np.pi, np.pi, 41):
         v, w = driver.command(np.array([0.0, 0.0, heading]))
         assert 0.0 <= v <= ROUTE.speed

@@ -10,7 +10,7 @@ import yaml
 from kurumaisu import experiments, settings
 from kurumaisu.errors import Error
 from kurumaisu.experiments import Box, Phase, Place, base_limits, load_script, nominal_path, obstructed, samples
-from kurumaisu.experiments.supervisor import Stage, Supervisor, read_care
+from kurumaisu.experiments.supervisor import Progress, Supervisor, read_care
 from kurumaisu.experiments.visit import Visit
 from kurumaisu.params import load_model, shipped
 from kurumaisu.world import load_world
@@ -158,7 +158,7 @@ def stopped(run, why):
     """Assert that zero is published for a while, then nothing."""
     said = run.go(3.0)
     assert run.supervisor.outcome == why
-    assert run.supervisor.stage is Stage.ENDED
+    assert run.supervisor.stage is Progress.ENDED
     assert not said[:, 1:].any()
     assert CARE.stop_time - 0.12 < said[-1, 0] - said[0, 0] <= CARE.stop_time
     assert len(run.go(1.0)) == 0
@@ -173,7 +173,7 @@ def test_it_publishes_the_script_at_a_steady_rate_then_zero_then_nothing(run):
     lead = round(CARE.lead_time * CARE.rate)
     assert not said[:lead, 1:].any()  # who has not let go is not obeyed
     assert said[lead : lead + len(expected), 1:] == pytest.approx(expected[:, 1:])
-    assert run.supervisor.stage is Stage.ENDED
+    assert run.supervisor.stage is Progress.ENDED
     assert run.supervisor.outcome == ""
 
 
@@ -223,9 +223,9 @@ def test_the_box_is_seen_from_where_it_began(tmp_path):
     for i in range(200):
         supervisor.see("ground_truth", 0.01 * i, begin)
         supervisor.tick(0.01 * i)
-    assert supervisor.stage is Stage.RUNNING
+    assert supervisor.stage is Progress.RUNNING
     supervisor.see("ground_truth", 2.0, np.array([5.0, 6.9, np.pi / 2]))
-    assert supervisor.stage is Stage.RUNNING
+    assert supervisor.stage is Progress.RUNNING
     supervisor.see("ground_truth", 2.0, np.array([5.6, 5.0, np.pi / 2]))
     assert supervisor.outcome == "the chair left the box of the experiment"
 
@@ -233,7 +233,7 @@ def test_the_box_is_seen_from_where_it_began(tmp_path):
 def test_nothing_is_published_while_time_stands(run):
     run.go(2.0)
     assert all(run.supervisor.tick(run.now) is None for _ in range(1000))
-    assert run.supervisor.stage is Stage.RUNNING
+    assert run.supervisor.stage is Progress.RUNNING
     assert run.go(0.1)[0, 1] > 0
 
 

@@ -40,7 +40,7 @@ def test_a_log_that_is_cut_off(tmp_path):
 
 
 def test_a_target_that_fails_is_shown(monkeypatch, tmp_path, capsys):
-    program = tmp_path / "lib/kurumaisu/fuzz_scip"
+    program = tmp_path / "share/kurumaisu/tests/fuzz_scip"
     program.parent.mkdir(parents=True)
     program.write_text(
         "#!/bin/sh\necho '#7 NEW cov: 3 ft: 4 corp: 2/9b' >&2\necho FUZZ: a scan that was not sent >&2\nexit 77\n"

@@ -10,6 +10,8 @@
 #include "guard/guard.h"
 #include "guarding.h"
 
+namespace test_guard {
+
 using namespace guarding;  // NOLINT: a test
 
 namespace {
@@ -320,7 +322,4 @@ TEST(GuardRandom, ArmedAndMovingOnlyAfterNeutralAndByRecentMessages) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_guard

@@ -10,6 +10,8 @@
 #include "guard/socket.h"
 #include "steady.h"
 
+namespace test_guard_dac {
+
 namespace k = kurumaisu;
 namespace g = kurumaisu::guard;
 
@@ -108,7 +110,4 @@ TEST(GuardReport, SaysWhatIsWrong) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_guard_dac

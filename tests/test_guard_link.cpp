@@ -16,6 +16,8 @@
 #include "guard/socket.h"
 #include "guard_process.h"
 
+namespace test_guard_link {
+
 using namespace guarding;  // NOLINT: a test
 
 namespace {
@@ -86,7 +88,4 @@ TEST(GuardClient, WithoutAGuardItDoesNotWait) {
   EXPECT_EQ(client.status().volts.translation, 0);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_guard_link

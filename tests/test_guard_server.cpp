@@ -12,6 +12,8 @@
 #include "guard/socket.h"
 #include "guard_process.h"
 
+namespace test_guard_server {
+
 using namespace guarding;  // NOLINT: a test
 
 TEST_F(GuardProcess, WritesNeutralAndReferenceFirstAndAllTheTimeWithoutAClient) {
@@ -270,7 +272,4 @@ TEST_F(GuardProcess, TellsSystemdThatItIsReadyAndAlive) {
   }
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_guard_server

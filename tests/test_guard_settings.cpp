@@ -13,6 +13,8 @@
 
 #include "guard/settings.h"
 
+namespace test_guard_settings {
+
 namespace g = kurumaisu::guard;
 namespace fs = std::filesystem;
 
@@ -87,7 +89,4 @@ TEST(GuardSettings, WhatIsWrongIsNamed) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_guard_settings

@@ -9,12 +9,12 @@ import pytest
 from kurumaisu.bench.hidden import Ask, make, names_of
 from kurumaisu.bench.hidden.base.catalogue import BASE
 from kurumaisu.bench.hidden.base.recordings import Scale, draw_drives, gates
-from kurumaisu.bench.hidden.base.sizing import left_beside, size_for
+from kurumaisu.bench.hidden.base.sizing import left_after_rivals, size_for
 from kurumaisu.bench.hidden.base.whitening import Path, Whitener, deviation
 from kurumaisu.bench.hidden.generator.drives import rich
 from kurumaisu.bench.hidden.generator.motion import STEP, Setting, drive, integrate
 from kurumaisu.bench.hidden.generator.noise import REGIMES, Colour, Regime, draw_rates, draw_reference
-from kurumaisu.bench.hidden.unknown.forms import STRANGE_BASE
+from kurumaisu.bench.hidden.unknown.forms import UNKNOWN_BASE
 from kurumaisu.errors import Error
 
 WITHOUT = ("base.sign", "base.steering_law", "base.process_noise")  # a size to choose, or a mean
@@ -210,7 +210,7 @@ def test_z_left_beside_a_rival_is_the_projection():
     signal, columns = rng.standard_normal(50), rng.standard_normal((50, 2))
     q = np.linalg.qr(columns)[0]
     left = np.sqrt(signal @ signal - ((q.T @ signal) ** 2).sum())
-    assert left_beside(signal, {"rival": columns})["rival"] == pytest.approx(left)
+    assert left_after_rivals(signal, {"rival": columns})["rival"] == pytest.approx(left)
 
 
 def test_an_exact_pair_is_known_as_such():
@@ -241,7 +241,7 @@ def test_what_follows_the_pose_follows_the_one_that_the_chair_has(name, sizes, l
     noise = draw_rates(REGIMES["usual"], round(63.0 / STEP), np.random.default_rng(3))
     command = rich(60.0, np.random.default_rng(4))
     setting = Setting(command, np.zeros(3), np.arange(0.0, 61.0, 0.1), noise)
-    nominal, rates = drive(setting, ())[1], drive(setting, [STRANGE_BASE[name].fault(sizes, "plain")])[1]
+    nominal, rates = drive(setting, ())[1], drive(setting, [UNKNOWN_BASE[name].fault(sizes, "plain")])[1]
     path = integrate(rates)
     middle = 0.5 * (path[:-1] + path[1:])
     assert np.abs(path - integrate(nominal)).max() > 0.5

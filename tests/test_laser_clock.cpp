@@ -11,6 +11,8 @@
 #include "laser/clock.h"
 #include "laser_clock_sim.h"
 
+namespace test_laser_clock {
+
 namespace l = kurumaisu::laser;
 namespace sim = laser_clock_sim;
 
@@ -340,7 +342,4 @@ TEST(DeviceClockOfTheHost, IsNotTrustedForLongOrAfterAPowerFailure) {
   }
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_laser_clock

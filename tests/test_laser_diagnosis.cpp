@@ -7,6 +7,8 @@
 
 #include "laser/diagnosis.h"
 
+namespace test_laser_diagnosis {
+
 namespace k = kurumaisu::laser;
 
 namespace {
@@ -139,7 +141,4 @@ TEST(Rhythm, CountsIntervalsOfTheWindow) {
   EXPECT_DOUBLE_EQ(rhythm.rate(1.5).value(), 2.0);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_laser_diagnosis

@@ -9,6 +9,8 @@
 
 #include "laser_watched.h"
 
+namespace test_laser_driver {
+
 using namespace watching;  // NOLINT: a test
 
 TEST(Driver, AddsLittleLatency) {
@@ -177,7 +179,4 @@ TEST(Driver, WaitsForSettingsThatFitTheSensor) {
   EXPECT_TRUE(watched.await(2, kLong));
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_laser_driver

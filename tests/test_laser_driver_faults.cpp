@@ -8,6 +8,8 @@
 
 #include "laser_watched.h"
 
+namespace test_laser_driver_faults {
+
 using namespace watching;  // NOLINT: a test
 
 namespace {
@@ -145,7 +147,4 @@ TEST(Driver, TellsWhySensorsRefuse) {
   }
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_laser_driver_faults

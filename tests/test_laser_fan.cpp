@@ -11,6 +11,8 @@
 
 #include "laser/fan.h"
 
+namespace test_laser_fan {
+
 namespace l = kurumaisu::laser;
 namespace s = kurumaisu::scip;
 
@@ -175,11 +177,6 @@ TEST(Fan, RefusesWhatCannotBeAndNamesIt) {
   EXPECT_EQ(refusal({-3.1416, 3.1416, 99, 9, true}), "none");
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
-
 TEST(Fan, AUtm30lxSaysOneWhereNothingIs) {
   const l::Fan fan(kUtm, kAll);
   for (int code = 0; code < 23; ++code) {
@@ -188,3 +185,5 @@ TEST(Fan, AUtm30lxSaysOneWhereNothingIs) {
   }
   EXPECT_EQ(fan.convert(of(fan, 65533), 0).ranges[0], kInfinity);
 }
+
+}  // namespace test_laser_fan

@@ -19,6 +19,8 @@
 #include "laser/urg.h"
 #include "laser_peer.h"
 
+namespace test_laser_link {
+
 namespace l = kurumaisu::laser;
 namespace scip = kurumaisu::scip;
 using namespace kurumaisu::test;  // NOLINT(google-build-using-namespace)
@@ -369,7 +371,4 @@ TEST_F(DriverTest, ACutAnywhereCostsNoMoreThanThatScan) {
   EXPECT_EQ(driver->status().counts.reconnects, 0U);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_laser_link

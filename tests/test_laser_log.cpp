@@ -22,6 +22,8 @@
 #include "scip/scan.h"
 #include "scip/sensor.h"
 
+namespace test_laser_log {
+
 namespace l = kurumaisu::laser;
 namespace s = kurumaisu::scip;
 namespace fs = std::filesystem;
@@ -208,7 +210,4 @@ TEST_F(LaserLogTest, TheGapIsReported) {
   EXPECT_EQ(rotations[3].clock - rotations[2].clock, 400U);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_laser_log

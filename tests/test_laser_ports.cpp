@@ -15,6 +15,8 @@
 #include "laser/tty.h"
 #include "laser_peer.h"
 
+namespace test_laser_ports {
+
 namespace l = kurumaisu::laser;
 using namespace kurumaisu::test;  // NOLINT(google-build-using-namespace)
 
@@ -134,7 +136,4 @@ TEST(Tcp, TellsOfClosingAndOfAResetWithoutASignal) {
   EXPECT_TRUE(has(problem([] { l::Tcp("sensor.local", 10940, 1, kGoOn); }), "sensor.local"));
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_laser_ports

@@ -11,12 +11,14 @@
 #include "laser/settings.h"
 #include "laser/shipped.h"
 
+namespace test_laser_settings {
+
 namespace k = kurumaisu::laser;
 using Value = XmlRpc::XmlRpcValue;
 
 namespace {
 
-const std::string kShipped = SHIPPED;  // launch/laser_node.yaml of the source tree
+const std::string kShipped = SHIPPED "/laser_node.yaml";
 
 k::NodeSettings read(const Value& given) { return k::readSettings(k::loadShipped(kShipped), given, "/n"); }
 
@@ -169,7 +171,4 @@ TEST(LaserSettings, ShippedFileIsNamedWhereItIsWrong) {
       contains(complaint([] { k::loadShipped("/nowhere/laser_node.yaml"); }), "/nowhere/laser_node.yaml"));
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_laser_settings

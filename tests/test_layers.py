@@ -74,13 +74,13 @@ PYTHON_RULES = [
 CPP_RULES = [
     Rule(
         r"(?!.*_node\.cpp|kurumaisu/bench/drivers/|.*/messages\.(cpp|h)|params\.h"
-        r"|base/((command|odometry|diagnostics)_(in|out)put|limits_server|master_watch|stop_request|topic_dac)\.(cpp|h)"
-        r"|slam/((mapping_output|scan_feed)\.(cpp|h)|mapping_node_parameters\.h))",
+        r"|base/node/((command|odometry|diagnostics)_(in|out)put|limits_server|master_watch|stop_request|topic_dac)\.(cpp|h)"
+        r"|slam/nodes/((mapping_output|scan_feed)\.(cpp|h)|mapping_parameters\.h))",
         ROS_CPP,
         "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, params.h, and peers of benchmarks",
     ),
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
-    Rule(r"(?!.*bindings\.(cpp|h))", r"<pybind11/", "pybind11 only in bindings"),
+    Rule(r"(?!.*bindings(\.(cpp|h)|/))", r"<pybind11/", "pybind11 only in bindings"),
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
     Rule(r"follow/", r'"(?!follow/|bindings\.h)', "following rests on nothing"),
     Rule(r"scip/", r'"(?!scip/)', "the protocol rests on nothing"),
@@ -95,7 +95,7 @@ CPP_RULES = [
     ),
     Rule(r"serial/", rf'"(?!serial/|{SHARED})', "a port rests on nothing"),
     # a virtual board is plugged in and out as a virtual sensor is
-    Rule(r"dac/(?!virtual_)", rf'"(?!dac/|serial/|yaml\.h|{SHARED})', "what moves the chair rests on the port only"),
+    Rule(r"dac/(?!virtual/)", rf'"(?!dac/|serial/|yaml\.h|{SHARED})', "what moves the chair rests on the port only"),
     Rule(r"(kalman|raycast)/", r'"(?!model/|kalman/|raycast/|bindings\.h)', "numerics rest on the equations at most"),
 ]
 
@@ -271,7 +271,7 @@ PLANTED = {
     "src/base/t.cpp": "# include  <mrpt/random.h>",
     "src/slam/u.cpp": "#include <kurumaisu/Voltages.h>",
     "src/raycast/v.h": "#include <pybind11/numpy.h>",
-    "src/model/w.h": '#include "slam/mapper.h"',
+    "src/model/w.h": '#include "slam/mapping/mapper.h"',
     "src/kalman/x.cpp": '#include "base/drive.h"',
     "scripts/y": "#!/usr/bin/env python3\n" + "pass\n" * 15,
 }
@@ -291,7 +291,7 @@ ALLOWED = {
     "src/kurumaisu/critic/b.py": "import rosbags\nfrom kurumaisu import effects\neffects.ALL, effects.base.Rate",
     "src/kurumaisu/critic/c.py": "from kurumaisu.effects import Context\nfrom kurumaisu.sim.plant import Plant",
     "src/kurumaisu/sim/d.py": "import pymunk",
-    "src/base/base_node.cpp": "#include <ros/ros.h>",
+    "src/base/node/base_node.cpp": "#include <ros/ros.h>",
     "src/slam/e.cpp": '#include <mrpt/random.h>\n#include "model/unicycle.h"',
     "scripts/f": "#!/usr/bin/env bash\n" + "true\n" * 30,
 }

@@ -12,6 +12,8 @@
 
 #include "base/limiter.h"
 
+namespace test_limiter {
+
 namespace k = kurumaisu;
 
 namespace {
@@ -373,7 +375,4 @@ TEST(Limiter, LimitsLoweredOnTheWayAreComeToByRamps) {
   EXPECT_NEAR(v.back().rate * w.back().rate, 0.1, 1e-9);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_limiter

@@ -4,6 +4,8 @@
 
 #include "localizer_drive.h"
 
+namespace test_localizer {
+
 namespace k = kurumaisu;
 using namespace room::localizing;  // NOLINT: a test
 
@@ -85,7 +87,4 @@ TEST(Localizer, NoticesThatItWasCarriedAway) {
   EXPECT_LT(moments.back().off, 0.06);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_localizer

@@ -8,7 +8,9 @@
 #include <stdexcept>
 
 #include "localizer_drive.h"
-#include "slam/localization_report.h"
+#include "slam/localization/report.h"
+
+namespace test_localizer_faults {
 
 namespace k = kurumaisu;
 using namespace room::localizing;  // NOLINT: a test
@@ -200,7 +202,4 @@ TEST(LocalizationReport, SaysWhatIsWrong) {
   expect(2, "LOCALIZATION_LOST", [](auto&) {});
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_localizer_faults

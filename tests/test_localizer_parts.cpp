@@ -7,11 +7,13 @@
 #include <random>
 #include <stdexcept>
 
-#include "slam/doubt.h"
-#include "slam/field.h"
-#include "slam/motion.h"
-#include "slam/pose.h"
-#include "slam/sensor.h"
+#include "slam/basics/pose.h"
+#include "slam/localization/doubt.h"
+#include "slam/localization/field.h"
+#include "slam/localization/motion.h"
+#include "slam/localization/sensor.h"
+
+namespace test_localizer_parts {
 
 namespace k = kurumaisu;
 
@@ -326,7 +328,4 @@ TEST(Motion, ProcessNoiseIsThatOfAnOrnsteinUhlenbeckProcess) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_localizer_parts

@@ -8,7 +8,9 @@
 
 #include "mapper_values.h"
 #include "mapping_drive.h"
-#include "slam/mapping_report.h"
+#include "slam/mapping/report.h"
+
+namespace test_mapping {
 
 namespace k = kurumaisu;
 using namespace room::mapping;  // NOLINT: a test
@@ -219,7 +221,4 @@ TEST(MappingReport, SaysTheWorstFirst) {
   }
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_mapping

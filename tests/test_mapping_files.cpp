@@ -14,6 +14,8 @@
 #include "mapper_values.h"
 #include "mapping_drive.h"
 
+namespace test_mapping_files {
+
 namespace k = kurumaisu;
 using namespace room::mapping;  // NOLINT: a test
 
@@ -181,7 +183,4 @@ TEST_F(Files, WhatCannotBeWrittenIsNamedAndTheOldFileStays) {
   EXPECT_EQ(contents(folder_ + "/map.pgm"), "old");
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_mapping_files

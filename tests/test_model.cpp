@@ -10,6 +10,8 @@
 #include "model/unicycle.h"
 #include "model/voltage_law.h"
 
+namespace test_model {
+
 namespace k = kurumaisu;
 
 namespace {
@@ -229,7 +231,4 @@ TEST(LaserError, SenselessErrorsAreRefused) {
   broken(&k::LaserError::range_max, 0.06);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_model

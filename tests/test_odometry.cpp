@@ -8,12 +8,14 @@
 #include <vector>
 
 #include "base/drive.h"
-#include "base/gyro.h"
-#include "base/odometry.h"
+#include "base/odometry/gyro.h"
+#include "base/odometry/odometry.h"
+#include "base/odometry/reckoning.h"
+#include "base/odometry/yaw_rate.h"
 #include "base/odometry_report.h"
-#include "base/reckoning.h"
-#include "base/yaw_rate.h"
 #include "base_drive.h"
+
+namespace test_odometry {
 
 namespace k = kurumaisu;
 
@@ -287,7 +289,4 @@ TEST(Placing, WhileItMovesCountsTheWayUpToThen) {
               1e-9);  // heading's variance is 1
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_odometry

@@ -9,6 +9,8 @@
 
 #include "base/outlet.h"
 
+namespace test_outlet {
+
 namespace k = kurumaisu;
 
 namespace {
@@ -160,7 +162,4 @@ TEST(Validation, SaysWhatIsWrong) {
             "the band (-1, 0.1) V does not reach beyond the law's intercept 0.127906 V");
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_outlet

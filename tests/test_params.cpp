@@ -7,6 +7,8 @@
 
 #include "parameter_values.h"
 
+namespace test_params {
+
 namespace k = kurumaisu;
 using namespace parameters;  // NOLINT: a test
 
@@ -91,7 +93,4 @@ TEST(Section, WhatIsNotFiniteIsNoNumber) {
   }
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_params

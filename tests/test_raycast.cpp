@@ -9,6 +9,8 @@
 
 #include "raycast/scene.h"
 
+namespace test_raycast {
+
 namespace k = kurumaisu;
 
 namespace {
@@ -199,7 +201,4 @@ TEST(Scene, AFanIsItsBeams) {
   }
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_raycast

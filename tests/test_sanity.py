@@ -22,7 +22,7 @@ DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 @pytest.mark.parametrize("fault", wrong_data.SPOILT)
 def test_wrong_data_are_said_with_what_would_mend_them(fault):
-    assert any(wrong_data.SPOILT[fault][1] in line for line in sanity.said_of(fault, [41]))
+    assert any(wrong_data.SPOILT[fault][1] in line for line in sanity.findings_of(fault, [41]))
 
 
 def case(effect, size, style="joystick"):
@@ -34,13 +34,13 @@ def test_a_large_effect_is_not_wrong_data(effect):
     largest, signed, _ = drives.EFFECTS[effect]
     for sign in (-1, 1) if signed else (1,):
         tables = drives.make(case(effect, sign * largest), np.random.default_rng(3))
-        assert sanity.said_of_tables(tables, ["command", "voltage", "pose"], None) == []
+        assert sanity.findings_of_tables(tables, ["command", "voltage", "pose"], None) == []
 
 
 @pytest.mark.parametrize("style", drives.STYLES)
 def test_nothing_is_wrong_with_a_good_drive_of_any_style(style):
     tables = drives.make(case(None, 0.0, style), np.random.default_rng(4))
-    assert sanity.said_of_tables(tables, ["command", "voltage", "pose"], None) == []
+    assert sanity.findings_of_tables(tables, ["command", "voltage", "pose"], None) == []
 
 
 @pytest.mark.parametrize(("turns", "crossed", "swapped"), [(0.0, False, False), (0.5, False, False), (0.5, True, True)])
@@ -60,7 +60,7 @@ def test_poses_that_are_missing_are_not_late():
     tables = drives.make(case(None, 0.0), rng)
     kept = rng.random(len(tables["pose"])) < 0.6
     tables["pose"] = tables["pose"][kept]
-    assert sanity.said_of_tables(tables, ["command", "voltage", "pose"], None) == []
+    assert sanity.findings_of_tables(tables, ["command", "voltage", "pose"], None) == []
 
 
 def test_the_warthogs_poses_wait_and_the_rest_of_them_do_not():
@@ -90,17 +90,17 @@ QUICK = (
 @pytest.mark.parametrize("fault", QUICK)
 def test_wrong_scans_and_maps_are_said(fault):
     """Words may differ where two readings of the data fit alike; that something is wrong must be said."""
-    assert sanity.said_of(fault, [52])
+    assert sanity.findings_of(fault, [52])
 
 
 @pytest.mark.parametrize("seed", [53, 54, 74])
 def test_a_map_of_which_a_part_is_right_is_said_where_a_quarter_of_it_is_seen_to_be_wrong(seed):
-    assert sanity.said_of("map before the house was rebuilt", [seed])
+    assert sanity.findings_of("map before the house was rebuilt", [seed])
 
 
 @pytest.mark.parametrize("seed", [61, 62])
 def test_good_scans_are_not_wrong(seed):
-    assert sanity.said_of("with scans", [seed]) == []
+    assert sanity.findings_of("with scans", [seed]) == []
 
 
 def exact_drive():
@@ -117,7 +117,7 @@ def exact_drive():
 
 
 def test_a_robot_that_rests_under_an_exact_reference_is_not_wrong():
-    assert sanity.said_of_tables(exact_drive(), ["command", "pose"], None) == []
+    assert sanity.findings_of_tables(exact_drive(), ["command", "pose"], None) == []
 
 
 def test_poses_that_are_held_while_it_moves_are_said_beside_rests():
@@ -125,7 +125,7 @@ def test_poses_that_are_held_while_it_moves_are_said_beside_rests():
     poses = tables["pose"]
     again = np.flatnonzero(np.random.default_rng(2).random(len(poses) - 1) < 0.15) + 1
     tables["pose"][again, 1:] = poses[again - 1, 1:]
-    assert any("duplicate rows" in line for line in sanity.said_of_tables(tables, ["command", "pose"], None))
+    assert any("duplicate rows" in line for line in sanity.findings_of_tables(tables, ["command", "pose"], None))
 
 
 def test_the_lag_of_white_noise_behind_itself_is_found():
@@ -198,4 +198,4 @@ def test_readings_that_are_cut_off_say_nothing_about_the_map(fault):
     sight = wrong_scans.SPOILT[fault][0](sight, rng) if fault else sight
     cut = np.nanquantile(sight.scans[:, 1:], 0.35)
     sight = replace(sight, scans=np.column_stack([sight.scans[:, 0], np.minimum(sight.scans[:, 1:], cut)]))
-    assert bool(sanity.said_of_tables(tables, ["command", "pose"], sight)) == bool(fault)
+    assert bool(sanity.findings_of_tables(tables, ["command", "pose"], sight)) == bool(fault)

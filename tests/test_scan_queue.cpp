@@ -8,7 +8,9 @@
 #include <cmath>
 #include <limits>
 
-#include "slam/messages.h"
+#include "slam/nodes/messages.h"
+
+namespace test_scan_queue {
 
 namespace k = kurumaisu;
 
@@ -107,7 +109,4 @@ TEST_F(ScanQueue, AFullQueueLosesItsOldest) {
   EXPECT_EQ(queue_.next()->stamp, ros::Time(103));
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_scan_queue

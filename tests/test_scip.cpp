@@ -15,6 +15,8 @@
 #include "scip/sensor.h"
 #include "scip_frames.h"
 
+namespace test_scip {
+
 namespace s = kurumaisu::scip;
 
 namespace {
@@ -175,7 +177,4 @@ TEST(ScipSensor, ParametersThatContradictEachOther) {
   EXPECT_EQ(s::parameters(parametersWith({{"AMIN", "0"}, {"AMAX", "1023"}})).last, 1023);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_scip

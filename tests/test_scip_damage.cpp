@@ -16,6 +16,8 @@
 #include "scip/scan.h"
 #include "scip_frames.h"
 
+namespace test_scip_damage {
+
 namespace s = kurumaisu::scip;
 using frames::Scan;
 
@@ -264,7 +266,4 @@ TEST(ScipDamage, NeitherNoiseNorFloodTakesMoreThanLinearTime) {
   }
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_scip_damage

@@ -9,6 +9,8 @@
 #include "scip/message.h"
 #include "scip_frames.h"
 
+namespace test_scip_stream {
+
 namespace s = kurumaisu::scip;
 
 namespace {
@@ -141,7 +143,4 @@ TEST(ScipStream, ForgettingStartsAnew) {
   EXPECT_EQ(assembler.next().value().first_byte, 2.0);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_scip_stream

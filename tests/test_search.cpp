@@ -4,8 +4,10 @@
 
 #include <algorithm>
 
-#include "slam/search.h"
+#include "slam/localization/search.h"
 #include "slam_room.h"
+
+namespace test_search {
 
 namespace k = kurumaisu;
 
@@ -140,7 +142,4 @@ TEST(Search, AMapOfOneCellIsSearched) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_search

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from kurumaisu.sim.sensors.battery import GRAVITY, Battery, BatterySettings, Load
+from kurumaisu.sim.sensors.battery import Battery, BatterySettings, Load
+from kurumaisu.sim.sensors.imu import STANDARD_GRAVITY
 from kurumaisu.types import FloatArray
 
 LOAD = Load(mass=120, inertia=15, idle=30, rolling=0.02, scrubbing=8, efficiency=0.7, recovery=0.4)
@@ -36,7 +37,7 @@ def test_voltage_times_current_is_the_power_asked_for(v: float, w: float, before
 
 def test_power_is_the_work_of_forces() -> None:
     np.testing.assert_allclose(LOAD.power(REST, REST), 30)
-    steady = 0.02 * 120 * GRAVITY * 0.5
+    steady = 0.02 * 120 * STANDARD_GRAVITY * 0.5
     np.testing.assert_allclose(LOAD.power(speeds((0.5, 0, 0)), REST), 30 + steady / 0.7)
     np.testing.assert_allclose(LOAD.power(speeds((-0.5, 0, 0)), REST), 30 + steady / 0.7)
     np.testing.assert_allclose(LOAD.power(speeds((0.5, 0, 0)), speeds((1, 0, 0))), 30 + (steady + 60) / 0.7)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2, kstest
 
-from kurumaisu.sim.sensors.imu import GRAVITY, Imu, ImuSettings
+from kurumaisu.sim.sensors.imu import STANDARD_GRAVITY, Imu, ImuSettings
 from kurumaisu.sim.sensors.inertial_error import InertialError, InertialErrorSettings
 from kurumaisu.types import FloatArray
 
@@ -125,7 +125,7 @@ def test_force_is_the_second_derivative_of_the_path_of_the_unit(
 
     acceleration = (velocity(h) - velocity(-h)) / (2 * h)
     c, s = math.cos(mount[2]), math.sin(mount[2])
-    expected = [c * acceleration[0] + s * acceleration[1], c * acceleration[1] - s * acceleration[0], GRAVITY]
+    expected = [c * acceleration[0] + s * acceleration[1], c * acceleration[1] - s * acceleration[0], STANDARD_GRAVITY]
     np.testing.assert_allclose(reading.acceleration[0], expected, atol=1e-6)
     np.testing.assert_allclose(reading.angular_velocity[0], [0, 0, v[2]], atol=1e-12)
 
@@ -133,7 +133,7 @@ def test_force_is_the_second_derivative_of_the_path_of_the_unit(
 def test_a_circle_at_constant_speed_is_pulled_to_its_centre() -> None:
     v = np.array([[0.5, 0.0, 0.8]])
     reading = ideal((0.0, 0.0, 0.0), v).read(v, 0.01, np.random.default_rng(8))
-    np.testing.assert_allclose(reading.acceleration, [[0, 0.4, GRAVITY]])
+    np.testing.assert_allclose(reading.acceleration, [[0, 0.4, STANDARD_GRAVITY]])
     assert reading.heading is None
 
 

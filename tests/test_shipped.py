@@ -7,6 +7,7 @@ Run twice: in the devel space, and by .ci/install_space.bash in the install spac
 import importlib
 import os
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,7 @@ YAMLS = sorted((SHARE / "launch").glob("*.yaml"))
 LAUNCHES = sorted((SHARE / "launch").glob("*.launch"))
 WORLDS = sorted((SHARE / "worlds").glob("*.world"))
 SOURCE_TREE_TOOLS = {"bench", "demo", "real", "run", "setup", "test"}  # they build or need the source tree
+CONFIGURATIONS = {"Base.cfg", "Laser.cfg"}  # dynamic_reconfigure runs them when this package is built
 
 # The strict readers of private parameters, by node type. Nodes in C++ read theirs when they start: rostests.
 READERS = {
@@ -189,8 +191,38 @@ def test_scripts_are_installed_or_executable():
     assert {name for name in there if os.access(TREE / "scripts" / name, os.X_OK)} == SOURCE_TREE_TOOLS
 
 
-def test_test_nodes_are_installed():
+def test_test_nodes_are_where_rostest_looks():
     """Found in the source tree, a test node would run with the python on the path, which may not be the right one."""
     cmake = (TREE / "tests/CMakeLists.txt").read_text()
-    installed = re.findall(r"(\w+_test\.py)", "".join(re.findall(r"catkin_install_python\([^)]*\)", cmake)))
-    assert sorted(installed) == sorted(path.name for path in (TREE / "tests").glob("*_test.py"))
+    made = re.findall(r"(\w+_test\.py)", "".join(re.findall(r"foreach\(node[^)]*\)", cmake)))
+    assert sorted(made) == sorted(path.name for path in (TREE / "tests").glob("*_test.py"))
+
+
+def completed(tmp_path):
+    """Return the programs that rosrun kurumaisu offers for completion, as Debian's bash completion finds them."""
+    # by links, for it leaves out what is in hidden folders, as the source tree's workspace is
+    (prefix,) = [path for path in os.environ["CMAKE_PREFIX_PATH"].split(":") if Path(path, "lib/kurumaisu").exists()]
+    (tmp_path / "space").symlink_to(prefix)
+    (tmp_path / "packages").mkdir()
+    (tmp_path / "packages/kurumaisu").symlink_to(SHARE)
+    package = tmp_path / ("packages" if (SHARE / "src").exists() else "space/share")
+    script = """
+        source /usr/share/bash-completion/completions/rosbash
+        COMP_WORDS=(rosrun kurumaisu "") COMP_CWORD=2
+        _roscomplete_exe
+        printf '%s\n' "${COMPREPLY[@]}"
+        """
+    environment = os.environ | {"CMAKE_PREFIX_PATH": f"{tmp_path}/space", "ROS_PACKAGE_PATH": str(package)}
+    run = subprocess.run(["bash", "-c", script], check=True, capture_output=True, text=True, env=environment)
+    return set(run.stdout.split())
+
+
+def test_completion_offers_what_a_user_starts(tmp_path):
+    """A page or a launch file names each program, so no test node is among them; all that pages start are there."""
+    offered = completed(tmp_path)
+    pages = [path for pattern in ("*.md", "docs/*.md", "launch/*.launch") for path in TREE.glob(pattern)]
+    text = "\n".join(path.read_text() for path in pages)
+    named = set(re.findall(r"[\w-]+", text))
+    started = set(re.findall(r"rosrun kurumaisu ([\w-]+)", text))
+    assert offered - CONFIGURATIONS - named == set()
+    assert started - offered == set()

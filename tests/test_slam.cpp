@@ -9,9 +9,11 @@
 #include <thread>
 
 #include "mapper_values.h"
-#include "slam/mapper.h"
-#include "slam/pose.h"
+#include "slam/basics/pose.h"
+#include "slam/mapping/mapper.h"
 #include "slam_room.h"
+
+namespace test_slam {
 
 namespace k = kurumaisu;
 
@@ -245,7 +247,4 @@ TEST(Settings, CountsAreWhole) {
                std::invalid_argument);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_slam

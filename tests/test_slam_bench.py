@@ -11,7 +11,7 @@ from kurumaisu import slam
 from kurumaisu.bench.slam import peers
 from kurumaisu.bench.slam.office import Bound
 from kurumaisu.bench.slam.ours import ours
-from kurumaisu.bench.slam.random_drives import Ways, roam
+from kurumaisu.bench.slam.random_drives import Ways, random_drive
 from kurumaisu.bench.slam.sharpness import sharpness
 from kurumaisu.errors import Error
 from kurumaisu.geometry import between, compose, wrap
@@ -25,7 +25,7 @@ BUILDING = shipped("worlds/maps/building.yaml")
 
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory):
-    return roam(read_map(BUILDING), tmp_path_factory.mktemp("world"), 7, 40.0)
+    return random_drive(read_map(BUILDING), tmp_path_factory.mktemp("world"), 7, 40.0)
 
 
 def test_a_roaming_chair_gets_about_and_its_walls_are_the_maps(drive):
@@ -52,7 +52,7 @@ def test_a_roaming_chair_gets_about_and_its_walls_are_the_maps(drive):
 
 def test_equal_seeds_roam_alike(tmp_path):
     grid = read_map(BUILDING)
-    one, other = (roam(grid, tmp_path, 3, 4.0) for _ in range(2))
+    one, other = (random_drive(grid, tmp_path, 3, 4.0) for _ in range(2))
     np.testing.assert_array_equal(one[0].ranges, other[0].ranges)
     np.testing.assert_array_equal(one[1], other[1])
 
@@ -86,7 +86,7 @@ def test_a_driver_reads_the_log_that_is_written(drive, tmp_path):
         "  writeDoubles(to, out);\n  printCosts(0.5, log);\n}\n"
     )
     program = tmp_path / "echo"
-    drivers = peers._DRIVERS
+    drivers = peers.DRIVERS
     subprocess.run(["g++", "-std=c++17", f"-I{drivers}", str(tmp_path / "echo.cpp"), "-o", str(program)], check=True)
     peer = peers.Peer(program, tmp_path)
     run, poses = peer.run(log, {})

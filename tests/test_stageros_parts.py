@@ -14,7 +14,7 @@ from kurumaisu.ros.stageros.names import Names
 from kurumaisu.ros.stageros.rates import Pace
 from kurumaisu.ros.stageros.saved_names import packed_names, unpacked_names
 from kurumaisu.ros.stageros.settings import read_settings
-from kurumaisu.ros.stageros.truth import Truth
+from kurumaisu.ros.stageros.truth import GroundTruth
 from kurumaisu.world.layout import family
 
 
@@ -56,7 +56,7 @@ def test_bumpers_and_finders_are_asked_of_the_simulator():
 
 
 def test_the_truth_is_as_in_stage_ros(tmp_path):
-    truth = Truth(0.1)
+    truth = GroundTruth(0.1)
     first, second = drive(simulator(tmp_path, ROOM + robot("", "0 0 0 90")), (0.5, 0, 1.0), 2)
     truth.take(first)
     ((pose, rates, stamp),) = truth.messages((3, 5))
@@ -70,7 +70,7 @@ def test_the_truth_is_as_in_stage_ros(tmp_path):
 
 
 def test_a_reference_has_its_own_place_and_time(tmp_path):
-    truth = Truth(0.1)
+    truth = GroundTruth(0.1)
     for seen in drive(simulator(tmp_path, robot()), (0.5, 0, 0), 20):
         poses = seen.poses[:, [0, 1, 3]] + [0.0, 0.3, 0.0]
         truth.take(replace(seen, reference=Reference(np.array([1.5 * seen.time]), poses, np.zeros((1, 3)))))

@@ -14,7 +14,7 @@ from sensor_msgs.msg import LaserScan
 
 from kurumaisu import slam
 from kurumaisu.bench.slam.models import without_mean_error
-from kurumaisu.bench.slam.random_drives import roam
+from kurumaisu.bench.slam.random_drives import random_drive
 from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap
 from kurumaisu.map_file import read_map
@@ -30,7 +30,7 @@ RAWLOG, SIMPLEMAP = "drive.rawlog", "map.simplemap"
 def made(tmp_path_factory):
     """A drive of 40 s, as it was driven and as written for MRPT, and our map of it: log, path, folder."""
     folder = tmp_path_factory.mktemp("stock")
-    raw, _ = roam(read_map(shipped("worlds/maps/building.yaml")), folder, 7, 40.0)
+    raw, _ = random_drive(read_map(shipped("worlds/maps/building.yaml")), folder, 7, 40.0)
     log = without_mean_error(raw, load_model(shipped("launch/md100.yaml")).laser.error)
     slam.write_rawlog(log, folder / RAWLOG)
     settings = slam.load_mapping_settings(shipped("launch/mapping_node.yaml"))

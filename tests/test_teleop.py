@@ -17,9 +17,9 @@ from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.settings import Section
 from kurumaisu.teleop import ALLOW, REST
-from kurumaisu.teleop.device import Axis, Joystick
+from kurumaisu.teleop.device import Joystick, JoystickAxis
 from kurumaisu.teleop.keys import DIRECTIONS, HELP, Keys, KeySettings, read_keys
-from kurumaisu.teleop.reader import Reader, open_device
+from kurumaisu.teleop.reader import JoystickReader, open_device
 from kurumaisu.teleop.stick import Stick, StickSettings, read_stick
 from kurumaisu.teleop.terminal import Terminal
 
@@ -199,7 +199,7 @@ Info = namedtuple("Info", "value min max flat")
 
 
 def test_axes_and_buttons_are_as_joy_node_has_them():
-    joystick = Joystick([Axis(1, -128, 127, 0), Axis(0, 0, 1000, 200)], [0x131, 0x130, 30], 0.1)
+    joystick = Joystick([JoystickAxis(1, -128, 127, 0), JoystickAxis(0, 0, 1000, 200)], [0x131, 0x130, 30], 0.1)
     assert (len(joystick.axes), len(joystick.buttons)) == (2, 2)  # key 30 is a letter
     for event, axes, buttons in [
         (Event(3, 0, 0), [1.0, 0.0], [0, 0]),  # left
@@ -244,7 +244,7 @@ class FakeDevice:
 
 def test_a_reader_starts_from_what_is_pressed_and_recovers_lost_events():
     device = FakeDevice(Event(1, 0x130, 1), Event(0, 3, 0))
-    reader = Reader(device, 0.0)
+    reader = JoystickReader(device, 0.0)
     assert reader.joystick.buttons == [0]
     reader.poll()
     assert reader.joystick.buttons == [1]
@@ -255,12 +255,12 @@ def test_a_reader_starts_from_what_is_pressed_and_recovers_lost_events():
 
 
 def test_a_device_that_is_gone_or_none_is_an_error(tmp_path):
-    reader = Reader(FakeDevice(OSError(ENODEV, "No such device")), 0.0)
+    reader = JoystickReader(FakeDevice(OSError(ENODEV, "No such device")), 0.0)
     with pytest.raises(Error, match="gone: No such device"):
         reader.poll()
     device = FakeDevice()
     device.capabilities = lambda: {1: [30]}  # a keyboard
     with pytest.raises(Error, match="not a joystick"):
-        Reader(device, 0.0)
+        JoystickReader(device, 0.0)
     with pytest.raises(Error, match="missing"):
         open_device(tmp_path / "missing")

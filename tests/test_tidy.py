@@ -44,6 +44,9 @@ def test_a_source_that_lacks_an_include_is_found_behind_another_that_has_it(tmp_
     monkeypatch.setattr(tidy, "LINKS", tmp_path)
     monkeypatch.setattr(tidy, "WHOLE", tmp_path / "whole")
     (tmp_path / "src").mkdir()
+    tidy.WHOLE.mkdir()
+    for folder in (tmp_path, tidy.WHOLE):
+        shutil.copy(sources.ROOT / ".clang-tidy", folder)
     has, lacks = tmp_path / "src/has.cpp", tmp_path / "src/lacks.cpp"
     has.write_text("#include <vector>\nstd::vector<int> one();\n")
     lacks.write_text("std::vector<int> other();\n")

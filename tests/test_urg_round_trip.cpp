@@ -17,6 +17,8 @@
 #include "virtual_urg/device.h"
 #include "virtual_urg/frames.h"
 
+namespace test_urg_round_trip {
+
 namespace s = kurumaisu::scip;
 namespace v = kurumaisu::virtual_urg;
 
@@ -244,7 +246,4 @@ TEST_P(UrgRoundTrip, CountedAndLeftOut) {
 
 INSTANTIATE_TEST_SUITE_P(Sensors, UrgRoundTrip, testing::Values("urg_04lx", "urg_04lx_ug01", "utm_30lx"));
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_urg_round_trip

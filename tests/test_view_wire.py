@@ -10,7 +10,7 @@ import rospy
 from kurumaisu.msg import View
 
 from kurumaisu.ros.view.fans import Looks
-from kurumaisu.ros.view.wire import Shape, ViewWire
+from kurumaisu.ros.view.wire import Lengths, ViewWire
 
 NS = 1_000_000_000
 
@@ -25,11 +25,11 @@ def packed(view):
 @pytest.mark.parametrize(
     "shape",
     [
-        Shape(3, 2, 2, 9, 9, 9),
-        Shape(3, 1, 2, 9, 0, 9),
-        Shape(3, 3, 0, 0, 0, 0),
-        Shape(0, 0, 1, 4, 4, 4),
-        Shape(0, 0, 0, 0, 0, 0),
+        Lengths(3, 2, 2, 9, 9, 9),
+        Lengths(3, 1, 2, 9, 0, 9),
+        Lengths(3, 3, 0, 0, 0, 0),
+        Lengths(0, 0, 1, 4, 4, 4),
+        Lengths(0, 0, 0, 0, 0, 0),
     ],
 )
 def test_as_genpy_has_it(frame, shape):

@@ -13,7 +13,7 @@ from stories import full_story, full_verdict
 from view_rig import Look, drive, meta, on_circle, room_ranges, stamp_of
 
 from kurumaisu.critic.data.csv_writer import write_csv_run
-from kurumaisu.critic.judge import explain
+from kurumaisu.critic.judge.overlays import overlays
 from kurumaisu.critic.report.page import write_report
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.view.tape import laid
@@ -122,7 +122,7 @@ def test_odometry_that_was_set_is_laid_anew():
 def test_the_simulated_drive_is_the_reports(two_runs):
     model = follow_commands(load_model(shipped("launch/md100.yaml")))
     run = drive("late", 5000.0)
-    (overlay,) = explain.overlays(Recording("r", (run,), ("late",)), model)
+    (overlay,) = overlays(Recording("r", (run,), ("late",)), model)
     with Look(two_runs) as look:
         start = look.at(5000.0, "late")
         assert start["poses"]["model"] == pytest.approx(start["truth"])

@@ -20,7 +20,7 @@ from tf2_msgs.msg import TFMessage
 from kurumaisu.params import load_model, shipped
 from kurumaisu.ros.viewer.maps import Maps
 from kurumaisu.ros.viewer.robot import Robot
-from kurumaisu.ros.viewer.topics import Transforms
+from kurumaisu.ros.viewer.topics import PlanarTransforms
 from kurumaisu.viewer import Hub
 
 
@@ -79,7 +79,7 @@ class Shown:
     def __init__(self, make: Any) -> None:
         self.hub = Hub()
         self._mailbox = self.hub.join(lambda: None)
-        self.transforms = Transforms()
+        self.transforms = PlanarTransforms()
         self.what = make(self.hub, self.transforms)
         self.transforms.open()
         self.what.open()

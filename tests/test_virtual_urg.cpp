@@ -11,6 +11,8 @@
 #include "virtual_sensor.h"
 #include "virtual_urg/frames.h"
 
+namespace test_virtual_urg {
+
 namespace s = kurumaisu::scip;
 namespace v = kurumaisu::virtual_urg;
 
@@ -326,7 +328,4 @@ TEST(VirtualUrg, SurvivesAnyBytesAndAnswersNoMoreThanItHears) {
   EXPECT_EQ(urg.ask("RS"), "RS\n00P\n\n");
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_virtual_urg

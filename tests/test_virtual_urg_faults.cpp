@@ -6,6 +6,8 @@
 
 #include "virtual_sensor.h"
 
+namespace test_virtual_urg_faults {
+
 namespace v = kurumaisu::virtual_urg;
 
 namespace {
@@ -186,7 +188,4 @@ TEST(VirtualUrgFaults, WhatTheServerDoes) {
   EXPECT_EQ(hole.device.counts().lost_input, 8U);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_virtual_urg_faults

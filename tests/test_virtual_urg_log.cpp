@@ -9,6 +9,8 @@
 #include "scip/scan.h"
 #include "virtual_sensor.h"
 
+namespace test_virtual_urg_log {
+
 namespace s = kurumaisu::scip;
 namespace v = kurumaisu::virtual_urg;
 
@@ -97,7 +99,4 @@ TEST(VirtualUrgLog, AnswersAsTheRealOneDidByteForByte) {
   EXPECT_EQ(scans, 121);
 }
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
+}  // namespace test_virtual_urg_log

@@ -2,6 +2,7 @@
 """check-world and export-world: what they find, and maps against a point-in-polygon oracle."""
 
 import re
+import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -189,9 +190,10 @@ def test_a_bad_world_is_said_with_its_place(tmp_path, capsys):
     assert "NAME=VALUE" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("option", ["--resolution=0", "--resolution=nan", "--height=99"])
-def test_export_refuses_what_makes_no_map(tmp_path, option, capsys):
-    assert export_world([str(shipped("worlds/room.world")), "-o", str(tmp_path), option]) == 2
+@pytest.mark.parametrize(("option", "code"), [("--resolution=0", 2), ("--resolution=nan", 2), ("--height=99", 1)])
+def test_export_refuses_what_makes_no_map(tmp_path, option, code, capsys):
+    with pytest.raises(SystemExit, match=str(code)):  # argparse's way, and what the script does
+        sys.exit(export_world([str(shipped("worlds/room.world")), "-o", str(tmp_path), option]))
     assert "export-world: " in capsys.readouterr().err
 
 

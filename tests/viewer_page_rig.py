@@ -17,7 +17,7 @@ from viewer_rig import BEAMS, CHAIR, HALF, Rig, room_ranges, viewer_settings, wo
 
 from kurumaisu import effects
 from kurumaisu.errors import Error
-from kurumaisu.viewer import Body, Fan, Group, Hub, Note, Outcome, Playback, Server, Value, World
+from kurumaisu.viewer import Body, Fan, Group, Hub, Note, Outcome, PlaybackState, Server, Value, World
 
 HOSTILE = "<img src=x onerror=alert(1)>"
 BAG = frozenset({"seek", "play", "rate"})
@@ -82,7 +82,7 @@ class PageRig(Rig):
         self.robots = robots
         self.contacts = {}
         self.rear = None  # [m] that a second ranger of the chair, which looks back, sees everywhere
-        self.playback = Playback(100.0, 100.0 + LONG, 100.0, 1.0, False) if others.get("mode") == "bag" else None
+        self.playback = PlaybackState(100.0, 100.0 + LONG, 100.0, 1.0, False) if others.get("mode") == "bag" else None
         super().__init__(hub, **others)
         hub.rig = self
         hub.world(crowd(robots))

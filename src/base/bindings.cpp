@@ -7,7 +7,7 @@
 #include <array>
 #include <stdexcept>
 
-#include "base/odometry.h"
+#include "base/odometry/odometry.h"
 
 namespace kurumaisu {
 namespace py = pybind11;

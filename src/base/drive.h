@@ -12,8 +12,8 @@
 #include "base/dac.h"
 #include "base/estop.h"
 #include "base/limiter.h"
+#include "base/odometry/reckoning.h"
 #include "base/outlet.h"
-#include "base/reckoning.h"
 #include "base/speed_cap.h"
 
 namespace kurumaisu {

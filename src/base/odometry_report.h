@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "base/reckoning.h"
+#include "base/odometry/reckoning.h"
 #include "base/report.h"
 
 namespace kurumaisu {

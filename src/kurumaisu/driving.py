@@ -47,7 +47,7 @@ def load_route(path: Path) -> Route:
     return read_route(settings.load(path))
 
 
-class Driver:
+class RouteFollower:
     """Goes through the waypoints of a route in order."""
 
     def __init__(self, route: Route) -> None:

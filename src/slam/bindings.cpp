@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "slam/basics/pose.h"
 #include "slam/localizer_bindings.h"
-#include "slam/mapper.h"
-#include "slam/pose.h"
-#include "slam/rawlog.h"
+#include "slam/mapping/mapper.h"
+#include "slam/mapping/rawlog.h"
 
 namespace py = pybind11;
 namespace k = kurumaisu;

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "slam/localizer.h"
+#include "slam/localization/localizer.h"
 
 namespace py = pybind11;
 

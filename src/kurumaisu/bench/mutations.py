@@ -91,7 +91,7 @@ class Copy:
 
 def main(arguments: Sequence[str]) -> int:
     """Run the benchmark. Return 1 if the tree cannot be built."""
-    parser = argparse.ArgumentParser(prog="bench mutations", description=__doc__)
+    parser = argparse.ArgumentParser(prog="scripts/bench mutations", description=__doc__)
     parser.add_argument("--tree", type=Path, default=Path.cwd(), help="whose src is changed (in a copy); default: here")
     parser.add_argument("--seed", type=int, default=30, help="of the places")
     parser.add_argument("--number", type=int, default=12, help="of mutations")
@@ -105,7 +105,7 @@ def main(arguments: Sequence[str]) -> int:
         return 0
     with tempfile.TemporaryDirectory(prefix="mutations") as folder:
         copy = copied(tree, Path(folder))
-        table = Table(f"Mutations of {tree.name}, seed {options.seed}", "caught by", "after [s]", "place and change")
+        table = Table("small mistakes in src/, one at a time", "caught by", "after [s]", "place and change")
         caught = 0
         for each in drawn:
             start = time.monotonic()
@@ -113,7 +113,7 @@ def main(arguments: Sequence[str]) -> int:
             by = judged(copy, each)
             caught += by is not None
             table.row(by or "nothing", time.monotonic() - start, str(each))
-    print(f"{caught} of {len(drawn)} caught, each within {options.limit:.0f} s")
+        table.note(f"{caught} of {len(drawn)} caught, each within {options.limit:.0f} s.")
     return 0
 
 

@@ -21,9 +21,9 @@ PATIENCE = 30.0  # [s] for a process to be ready, or to end
 def program(name: str) -> str:
     """Return the path of a program that the build made. Raise Error if it did not."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / "lib/kurumaisu" / name
-        if path.exists():
-            return str(path)
+        for folder in ("lib/kurumaisu", "share/kurumaisu/tests"):
+            if (path := Path(prefix) / folder / name).exists():
+                return str(path)
     raise Error(f"{name}: is not built (cmake --build .ws/build; what only benchmarks need comes with the tests)")
 
 

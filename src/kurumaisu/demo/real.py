@@ -7,10 +7,9 @@ from pathlib import Path
 
 from kurumaisu.critic.app import cli
 from kurumaisu.critic.app.job import Job
-
-SENA = Path("/usr/share/mrpt/datasets/2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog")
+from kurumaisu.real import sena
 
 
 def run(folder: Path, seed: int) -> None:
     """Print what the critic says of SENA's odometry. Raise Error where the log is not installed."""
-    cli.tell(Job(SENA, folder, seed=seed))
+    cli.tell(Job(sena.FOLDER / sena.LOG, folder, seed=seed))

@@ -29,7 +29,7 @@ _BY: Mapping[str, Callable[[Motion], FloatArray]] = {
 _MOVED = {"v": "v", "lateral": "u", "w": "w"}  # the rates of a motion by name
 
 
-class Channel(NamedTuple):
+class RateChannel(NamedTuple):
     """A rate that gets a curve added, times what `by` names, if anything; unit: of the curve."""
 
     unit: str
@@ -39,14 +39,14 @@ class Channel(NamedTuple):
 
 # What slips takes a share of a rate in either direction, what drags as much of any speed; a tyre without air bends the
 # way, however fast it is driven.
-CHANNELS: Mapping[str, Channel] = {
-    "v": Channel("m/s", "v"),
-    "lateral": Channel("m/s", "lateral"),
-    "w": Channel("rad/s", "w"),
-    "v_gain": Channel("1", "v", "v"),
-    "w_gain": Channel("1", "w", "w"),
-    "curvature": Channel("rad/m", "w", "v"),
-    "speed": Channel("m/s", "v", "direction"),
+CHANNELS: Mapping[str, RateChannel] = {
+    "v": RateChannel("m/s", "v"),
+    "lateral": RateChannel("m/s", "lateral"),
+    "w": RateChannel("rad/s", "w"),
+    "v_gain": RateChannel("1", "v", "v"),
+    "w_gain": RateChannel("1", "w", "w"),
+    "curvature": RateChannel("rad/m", "w", "v"),
+    "speed": RateChannel("m/s", "v", "direction"),
 }
 _ID = re.compile(rf"smooth\.({'|'.join(CHANNELS)})\.([A-Za-z][\w.]*)")
 _MOST = 64  # knots
@@ -116,7 +116,7 @@ class Smooth(Effect):
         return replace(motion, **moved)
 
 
-def factor(channel: Channel, motion: Motion) -> FloatArray:
+def factor(channel: RateChannel, motion: Motion) -> FloatArray:
     """Return by what a curve is multiplied before it is added to a channel's rate, (n,)."""
     return _BY[channel.by](motion)
 

@@ -62,7 +62,7 @@ class Rest:
         return 0.0 if self._anchor is None else abs(float(geometry.wrap(pose[2] - self._anchor[2])))
 
 
-class Stage(Enum):
+class Progress(Enum):
     """How far it has come."""
 
     WAITING = 1  # for the chair to stand; nothing is published
@@ -94,7 +94,7 @@ class Supervisor:
         self._begin = np.inf
         self._end = np.inf
         self._origin = np.zeros(3)
-        self.stage = Stage.WAITING
+        self.stage = Progress.WAITING
         self.outcome = ""
 
     @property
@@ -110,29 +110,29 @@ class Supervisor:
         if source != self._sources[0]:
             return
         self._rest.see(t, pose)
-        if self.stage is Stage.RUNNING and self._script.box.excess(geometry.between(self._origin, pose)) > 0:
+        if self.stage is Progress.RUNNING and self._script.box.excess(geometry.between(self._origin, pose)) > 0:
             self.stop("the chair left the box of the experiment")
 
     def stop(self, why: str) -> None:
         """Stop, if it runs; before it has begun, end."""
-        if self.stage in (Stage.WAITING, Stage.RUNNING):
+        if self.stage in (Progress.WAITING, Progress.RUNNING):
             self.outcome = why
             self._end = np.inf
-            self.stage = Stage.ENDED if self.stage is Stage.WAITING else Stage.STOPPING
+            self.stage = Progress.ENDED if self.stage is Progress.WAITING else Progress.STOPPING
 
     def tick(self, now: float) -> tuple[float, ...] | None:
         """Return what to publish at a time [s], or None for nothing: not due, time stands, not begun, or ended."""
         if now == self._last:
             return None
         self._watch_clock(now)
-        if self.stage is Stage.WAITING:
+        if self.stage is Progress.WAITING:
             self._wait(now)
-        elif self.stage is Stage.RUNNING:
+        elif self.stage is Progress.RUNNING:
             self._watch_poses(now)
-        if self.stage in (Stage.WAITING, Stage.ENDED) or now < self._due - _SAME:
+        if self.stage in (Progress.WAITING, Progress.ENDED) or now < self._due - _SAME:
             return None
         self._due = max(self._due + 1 / self._care.rate, now)
-        return self._stopping(now) if self.stage is Stage.STOPPING else self._row(now)
+        return self._stopping(now) if self.stage is Progress.STOPPING else self._row(now)
 
     def _watch_clock(self, now: float) -> None:
         if self._first is None:
@@ -145,7 +145,7 @@ class Supervisor:
         self._last = now
 
     def _leap(self, seconds: float) -> None:
-        if self.stage is Stage.RUNNING:
+        if self.stage is Progress.RUNNING:
             self.stop(f"time jumped by {seconds:.2f} s")
 
     def _wait(self, now: float) -> None:
@@ -156,7 +156,7 @@ class Supervisor:
             if why:
                 self.stop(why)
                 return
-            self._origin, self._begin, self._due, self.stage = origin, now + self._care.lead_time, now, Stage.RUNNING
+            self._origin, self._begin, self._due, self.stage = origin, now + self._care.lead_time, now, Progress.RUNNING
         elif self._first is not None and now - self._first > self._care.patience:
             lost = absent or self._lost(now)
             self.stop(f"no poses on {', '.join(lost)}" if lost else "the chair does not stand")
@@ -183,6 +183,6 @@ class Supervisor:
     def _stopping(self, now: float) -> tuple[float, ...] | None:
         self._end = min(self._end, now + self._care.stop_time)
         if now >= self._end - _SAME:
-            self.stage = Stage.ENDED
+            self.stage = Progress.ENDED
             return None
         return self.rest

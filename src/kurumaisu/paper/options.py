@@ -22,7 +22,7 @@ class Bootstrap:
 
 
 @dataclass(frozen=True)
-class Drive:
+class DriveOptions:
     """How a drive is cut into samples, and what determines a coefficient."""
 
     window: float
@@ -57,23 +57,25 @@ class Wall:
 
 
 @dataclass(frozen=True)
-class Options:
+class PaperOptions:
     """All of it."""
 
-    drive: Drive
+    drive: DriveOptions
     wall: Wall
     bootstrap: Bootstrap
 
 
-def load_options(path: Path | None = None) -> Options:
+def load_options(path: Path | None = None) -> PaperOptions:
     """Read a file of settings, or the package's own. Raise Error naming file and key."""
     top = settings.load(shipped(FILE) if path is None else path)
-    options = Options(_drive(top.section("drive")), _wall(top.section("wall")), _bootstrap(top.section("bootstrap")))
+    options = PaperOptions(
+        _drive(top.section("drive")), _wall(top.section("wall")), _bootstrap(top.section("bootstrap"))
+    )
     top.end()
     return options
 
 
-def _drive(section: settings.Section) -> Drive:
+def _drive(section: settings.Section) -> DriveOptions:
     counts = {name: section.integer(name, at_least=3) for name in ("poses", "least_blocks")}
     names = (
         "window",
@@ -88,7 +90,7 @@ def _drive(section: settings.Section) -> Drive:
         "mixed",
         "better",
     )
-    drive = Drive(**counts, **{name: section.number(name, above=0) for name in names})  # type: ignore[arg-type]
+    drive = DriveOptions(**counts, **{name: section.number(name, above=0) for name in names})  # type: ignore[arg-type]
     section.end()
     return drive
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import FloatArray
 
 _ROUNDS = 8  # of reweighting against outliers
@@ -44,7 +45,7 @@ def robust(columns: FloatArray, y: FloatArray) -> FloatArray:
     for _ in range(_ROUNDS):
         at = np.linalg.lstsq(columns * weight[:, None], y * weight, rcond=None)[0]
         left = y - columns @ at
-        scale = max(1.4826 * float(np.median(np.abs(left))), 1e-6)
+        scale = max(SIGMA_PER_MAD * float(np.median(np.abs(left))), 1e-6)
         weight = 1 / np.sqrt(1 + (left / (2 * scale)) ** 2)
     return at
 

@@ -19,7 +19,7 @@ from kurumaisu.types import FloatArray
 
 
 def recording(folder: Path, runs: Mapping[str, Mapping[str, FloatArray]], **meta: object) -> Path:
-    """Write runs of tables, as critic.arrays takes them, with meta.yaml, and return their folder.
+    """Write runs of tables, as critic.app.arrays takes them, with meta.yaml, and return their folder.
 
     Raise Error naming a table that is misshapen.
     """
@@ -29,7 +29,7 @@ def recording(folder: Path, runs: Mapping[str, Mapping[str, FloatArray]], **meta
     return folder
 
 
-def ask(path: Path, output: Path, title: str) -> Verdict | None:
+def criticise(path: Path, output: Path, title: str) -> Verdict | None:
     """Print what the critic says of a recording under a title, and return it; None where it refuses, which is said."""
     print(f"\n## The critic: {title}")
     try:

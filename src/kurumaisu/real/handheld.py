@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.critic.data.reading import read_recording
-from kurumaisu.real.criticise import ask, there
+from kurumaisu.real.criticise import criticise, there
 
 
 def run(data: Path, output: Path) -> None:
@@ -22,4 +22,4 @@ def run(data: Path, output: Path) -> None:
     print(f"{np.isnan(scan.values).mean():.1%} of the readings are invalid")
     print(f"from scan to scan the median beam changes by {1e3 * np.median(change):.0f} mm: it is carried about")
     print(f"stillest second: {1e3 * np.convolve(change, np.ones(10) / 10, 'valid').min():.1f} mm from scan to scan")
-    ask(bag, output, "scans alone, moving")
+    criticise(bag, output, "scans alone, moving")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.real.by_hand import best_shift, least_squares, range_flow, robust
-from kurumaisu.real.criticise import ask, recording, there
+from kurumaisu.real.criticise import criticise, recording, there
 from kurumaisu.types import FloatArray
 
 RADIUS, TRACK = 0.077, 0.330  # [m] of the wheels, between them: as its own reader has them
@@ -76,7 +76,7 @@ def run(data: Path, output: Path) -> None:
     mount = {"x": AHEAD, "y": 0.0, "yaw": 0.0, "angle_min": ANGLE_MIN, "angle_increment": INCREMENT, "beams": BEAMS}
     for name, factor in READINGS.items():
         folder = recording(output / name, {"drive": {"odom": odometry(log, factor), "scan": scan}}, laser=mount)
-        ask(folder, output / name, f"ticks read as {factor:g} of the plain way")
+        criticise(folder, output / name, f"ticks read as {factor:g} of the plain way")
 
 
 def _against_scans(log: Log, ahead: FloatArray, turn: FloatArray) -> list[str]:

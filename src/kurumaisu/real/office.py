@@ -10,7 +10,7 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.real.by_hand import least_squares
-from kurumaisu.real.criticise import ask, there
+from kurumaisu.real.criticise import criticise, there
 
 _SPAN = 2.0  # [s]
 
@@ -30,4 +30,4 @@ def run(data: Path, output: Path) -> None:
         around = least_squares(asked[:, [2, 0]], moved[:, 2])
         print(f"way ahead over odometry: {ahead.told(0)}; left {1e3 * ahead.rms:.0f} mm")
         print(f"turn over odometry: {around.told(0)}, and {around.told(1)} rad per metre; left {around.rms:.4f} rad")
-        ask(bag, output / name, name)
+        criticise(bag, output / name, name)

@@ -9,7 +9,8 @@ import numpy as np
 
 from kurumaisu import geometry
 from kurumaisu.critic.data.reading import read_recording
-from kurumaisu.real.criticise import ask, there
+from kurumaisu.real.criticise import criticise, there
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import FloatArray
 
 FOLDER = Path("/usr/share/mrpt/datasets")
@@ -33,7 +34,7 @@ def run(data: Path, output: Path, log: str = LOG) -> None:
     )
     heading = wall_headings(drive.scan.values, laser.angle_min + laser.angle_increment * np.arange(laser.beams))
     print(_against_walls(heading, drive.odom.values[:, 2]))
-    ask(path, output, "odometry against its own scans")
+    criticise(path, output, "odometry against its own scans")
 
 
 def wall_headings(ranges: FloatArray, angles: FloatArray) -> FloatArray:
@@ -63,7 +64,7 @@ def _against_walls(walls: FloatArray, odom: FloatArray) -> str:
     made = float(odom[known[-10:]].mean() - odom[known[:10]].mean())
     if abs(made) < np.pi:
         return f"walls against odometry: {np.degrees(made):+.0f} deg of turning are too little for it"
-    steps = 1.4826 * float(np.median(np.abs(np.diff(drift))))
+    steps = SIGMA_PER_MAD * float(np.median(np.abs(np.diff(drift))))
     return (
         f"heading of odometry less that of walls, {len(known)} scans: {np.degrees(last - first):+.1f} deg by the end, "
         f"while it says {np.degrees(made):+.0f} deg: turns are {1 - (last - first) / made:.3f} of what it says "

@@ -9,7 +9,7 @@ import numpy as np
 
 from kurumaisu.real import urg_log
 from kurumaisu.real.by_hand import least_squares
-from kurumaisu.real.criticise import ask, recording, there
+from kurumaisu.real.criticise import criticise, recording, there
 from kurumaisu.types import FloatArray
 
 STILL = 34  # scans before somebody moves the sensor
@@ -46,7 +46,7 @@ def run(data: Path, output: Path) -> None:
         "angle_increment": INCREMENT,
         "beams": scan.shape[1] - 1,
     }
-    ask(recording(output / "still", {"still": {"scan": scan}}, laser=mount), output, "scans of a still scene")
+    criticise(recording(output / "still", {"still": {"scan": scan}}, laser=mount), output, "scans of a still scene")
 
 
 def repeatability(readings: FloatArray) -> list[str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.real.by_hand import least_squares
-from kurumaisu.real.criticise import ask, recording, there
+from kurumaisu.real.criticise import criticise, recording, there
 from kurumaisu.types import BoolArray, FloatArray
 
 RADIUS = 0.30  # [m] of the wheels, nominal; what it really is, is asked
@@ -139,7 +139,7 @@ def run(data: Path, output: Path) -> None:
         print(f"poses, {words} ({len(some)}): late by {quantiles} s (quantiles .05 .25 .5 .75 .95 1)")
     print(f"driven by a person, 134-218 s: {wheels_against_ground(log, 134.0, 218.0)[2]}")
     print(f"driven by commands, 405-430 s: {wheels_against_ground(log, 405.0, 430.0)[2]}")
-    ask(_wheels(log, output / "wheels"), output / "wheels", "wheels against the ground")
+    criticise(_wheels(log, output / "wheels"), output / "wheels", "wheels against the ground")
 
 
 def _wheels(log: Log, folder: Path) -> Path:

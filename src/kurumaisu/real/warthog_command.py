@@ -9,7 +9,7 @@ import numpy as np
 
 from kurumaisu.real import warthog
 from kurumaisu.real.by_hand import step_response
-from kurumaisu.real.criticise import ask, recording
+from kurumaisu.real.criticise import criticise, recording
 from kurumaisu.types import FloatArray
 
 # [s] in which commands count, and the wheels follow; 298-302 s they count, too, but the wheels rest.
@@ -27,7 +27,7 @@ def run(data: Path, output: Path) -> None:
         for name, asked, seen in (("v", log.v, wheels[:, 4]), ("w", log.w, wheels[:, 5])):
             gain, tau, delay, rms = step_response(log.t[part], asked[part], seen[part])
             print(f"{start:g}-{end:g} s, {name}: gain {gain:.3f}, lag {tau:.2f} s, delay {delay:.2f} s, rms {rms:.3f}")
-    ask(_command(log, wheels, output / "command"), output / "command", "command against the wheels")
+    criticise(_command(log, wheels, output / "command"), output / "command", "command against the wheels")
 
 
 def _command(log: warthog.Log, wheels: FloatArray, folder: Path) -> Path:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulator, without ROS."""
+"""The simulator, without ROS: robots of a world file, the chair, its plant, and how both behave."""
 
 from kurumaisu.sim.options import Options, load_options
 from kurumaisu.sim.rangers.scans import Scan

@@ -24,6 +24,10 @@ _PLAIN = {
 }
 _OURS = ("kurumaisu.world.model", "kurumaisu.sim.robots.population", "kurumaisu.sim.rangers.scans")
 _SENSORS = "kurumaisu.sim.sensors."
+_MOVED = {  # where classes are whose modules had these names when a state was saved
+    "kurumaisu.sim.population": "kurumaisu.sim.robots.population",
+    "kurumaisu.sim.scans": "kurumaisu.sim.rangers.scans",
+}
 
 
 def pack(state: dict[str, Any]) -> bytes:
@@ -78,6 +82,7 @@ class _Reader(pickle.Unpickler):
     """Makes plain values and the classes of a state, nothing else."""
 
     def find_class(self, module: str, name: str) -> Any:
+        module = _MOVED.get(module, module)
         if (module, name) in _PLAIN or module in _OURS or module.startswith(_SENSORS):
             return super().find_class(module, name)
         raise pickle.UnpicklingError(f"{module}.{name} is not part of a state")

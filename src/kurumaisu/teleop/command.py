@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Command:
+class HandCommand:
     """v forward [m/s], w to the left [rad/s]; held: somebody holds the dead-man; drives: and wants to drive himself."""
 
     v: float
@@ -16,5 +16,5 @@ class Command:
     drives: bool = True
 
 
-REST = Command(0.0, 0.0, held=False, drives=False)
-ALLOW = Command(0.0, 0.0, held=True, drives=False)  # others may drive
+REST = HandCommand(0.0, 0.0, held=False, drives=False)
+ALLOW = HandCommand(0.0, 0.0, held=True, drives=False)  # others may drive

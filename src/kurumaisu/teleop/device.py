@@ -21,7 +21,7 @@ class Event(Protocol):
 
 
 @dataclass(frozen=True)
-class Axis:
+class JoystickAxis:
     """The code of an axis and its ends, as the kernel says; flat: around the middle, that counts as the middle."""
 
     code: int
@@ -33,7 +33,7 @@ class Axis:
 class Joystick:
     """Axes from -1 to 1, left, up and forward positive, and buttons 0 or 1, as the events have made them."""
 
-    def __init__(self, axes: Sequence[Axis], buttons: Iterable[int], dead_zone: float) -> None:
+    def __init__(self, axes: Sequence[JoystickAxis], buttons: Iterable[int], dead_zone: float) -> None:
         """Take what the device has; dead_zone [1]: at least so much of a way counts as the middle."""
         self._axes = sorted((a for a in axes if a.code < _LAST_AXIS and a.high > a.low), key=lambda axis: axis.code)
         codes = sorted(code for code in buttons if code >= _FIRST_BUTTON)
@@ -64,7 +64,7 @@ class Joystick:
             if axis.code == code:
                 self.axes[i] = self._scaled(axis, value)
 
-    def _scaled(self, axis: Axis, value: int) -> float:
+    def _scaled(self, axis: JoystickAxis, value: int) -> float:
         half = (axis.high - axis.low) / 2
         place = min(max((value - axis.low) / half - 1, -1.0), 1.0)
         dead = max(self._dead_zone, axis.flat / half)

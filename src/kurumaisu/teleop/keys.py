@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from kurumaisu.settings import Section
-from kurumaisu.teleop.command import REST, Command
+from kurumaisu.teleop.command import REST, HandCommand
 
 # as teleop_twist_keyboard has them: which way v, w go
 DIRECTIONS = {
@@ -70,9 +70,9 @@ class Keys:
         self._direction = DIRECTIONS.get(key)
         self._heard = t
 
-    def command(self, t: float) -> Command:
+    def command(self, t: float) -> HandCommand:
         """Return what holds at time t [s]. A clock that ran backwards is silence, too."""
         if self._direction is None or not 0 <= t - self._heard <= self._settings.timeout:
             self._direction = None
             return REST
-        return Command(self.v * self._direction[0], self.w * self._direction[1], held=True)
+        return HandCommand(self.v * self._direction[0], self.w * self._direction[1], held=True)

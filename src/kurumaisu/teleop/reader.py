@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from kurumaisu.errors import Error
-from kurumaisu.teleop.device import Axis, Event, Joystick
+from kurumaisu.teleop.device import Event, Joystick, JoystickAxis
 
 _KEY, _ABSOLUTE = 1, 3  # of linux/input-event-codes.h
 
@@ -43,14 +43,14 @@ def open_device(path: Path) -> Device:
     return device
 
 
-class Reader:
+class JoystickReader:
     """A device and what its axes and buttons are by now."""
 
     def __init__(self, device: Device, dead_zone: float) -> None:
         """Raise Error for a device without axes or buttons of a joystick."""
         self._device = device
         has = device.capabilities()
-        axes = [Axis(code, info.min, info.max, info.flat) for code, info in has.get(_ABSOLUTE, ())]
+        axes = [JoystickAxis(code, info.min, info.max, info.flat) for code, info in has.get(_ABSOLUTE, ())]
         self.joystick = Joystick(axes, has.get(_KEY, ()), dead_zone)
         if not self.joystick.axes or not self.joystick.buttons:
             raise Error("the device has no axes, or no buttons: it is not a joystick")

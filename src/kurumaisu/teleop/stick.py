@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kurumaisu.settings import Section
-from kurumaisu.teleop.command import ALLOW, REST, Command
+from kurumaisu.teleop.command import ALLOW, REST, HandCommand
 
 
 @dataclass(frozen=True)
@@ -58,13 +58,13 @@ class Stick:
         self.refused += command is None
         return command is not None
 
-    def command(self, t: float) -> Command:
+    def command(self, t: float) -> HandCommand:
         """Return what holds at time t [s]. A clock that ran backwards is silence, too."""
         if not 0 <= t - self._heard <= self._settings.timeout:
             self._command = REST
         return self._command
 
-    def _read(self, axes: Sequence[float], buttons: Sequence[int]) -> Command | None:
+    def _read(self, axes: Sequence[float], buttons: Sequence[int]) -> HandCommand | None:
         s = self._settings
         if max(s.axis_v, s.axis_w) >= len(axes) or max(s.dead_man, s.fast, s.allow) >= len(buttons):
             return None
@@ -74,4 +74,4 @@ class Stick:
         if not buttons[s.dead_man]:
             return ALLOW if s.allow >= 0 and buttons[s.allow] else REST
         factor = s.fast_factor if s.fast >= 0 and buttons[s.fast] else 1.0
-        return Command(factor * s.v * v, s.w * w, held=True)
+        return HandCommand(factor * s.v * v, s.w * w, held=True)

@@ -24,7 +24,7 @@ HEADERS = {
 }
 
 
-class Keys:
+class AccessTokens:
     """Tokens that are good once, and sessions that are good until the server ends."""
 
     def __init__(self) -> None:

@@ -16,8 +16,8 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from kurumaisu.errors import Error
 from kurumaisu.viewer import commands, protocol
-from kurumaisu.viewer.access import Keys
-from kurumaisu.viewer.commands import Command, Credential
+from kurumaisu.viewer.access import AccessTokens
+from kurumaisu.viewer.commands import Credential, Request
 from kurumaisu.viewer.hub import Hub, Mailbox, Payload
 from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
@@ -43,7 +43,12 @@ class Client:
     """Lives as long as its connection."""
 
     def __init__(
-        self, settings: ViewerSettings, hub: Hub, source: Source, keys: Keys | None, workers: Mapping[str, Executor]
+        self,
+        settings: ViewerSettings,
+        hub: Hub,
+        source: Source,
+        keys: AccessTokens | None,
+        workers: Mapping[str, Executor],
     ) -> None:
         """keys: None where nobody may command; workers: who does each urgent command, and under "" all others."""
         self._settings = settings
@@ -59,7 +64,7 @@ class Client:
         self._transport: asyncio.Transport | None = None
         self._news = asyncio.Event()
         self._asked = asyncio.Event()
-        self._waiting: deque[Command] = deque()
+        self._waiting: deque[Request] = deque()
         self._replies: deque[str] = deque()
         self._mailbox: Mailbox | None = None
         self._address, self._came = "", 0.0  # [s] of the loop
@@ -149,7 +154,7 @@ class Client:
                 await self._socket.close(code=WSCloseCode.POLICY_VIOLATION)
                 return
 
-    def _take(self, said: Command | Credential) -> None:
+    def _take(self, said: Request | Credential) -> None:
         if isinstance(said, Credential):
             self._let_in(said)
             return
@@ -166,7 +171,7 @@ class Client:
         self._waiting.append(said)
         self._asked.set()
 
-    def _overtake(self, newer: Command) -> None:
+    def _overtake(self, newer: Request) -> None:
         """Drop a pose that waits for its turn when a newer one of the same body comes, as while it is dragged."""
         if newer.name != "set_pose":
             return
@@ -198,7 +203,7 @@ class Client:
             while self._waiting:
                 await self._run(self._waiting.popleft())
 
-    def _run(self, command: Command) -> asyncio.Future[None]:
+    def _run(self, command: Request) -> asyncio.Future[None]:
         done = asyncio.get_running_loop().run_in_executor(
             self._workers[command.name if command.name in URGENT else ""], self._do, command
         )
@@ -208,7 +213,7 @@ class Client:
 
         return asyncio.ensure_future(answer())
 
-    def _do(self, command: Command) -> protocol.Reply:
+    def _do(self, command: Request) -> protocol.Reply:
         try:
             outcome = self._source.command(command.name, command.arguments)
         except Error as error:
@@ -232,7 +237,7 @@ class Client:
         )
 
 
-def _why_not(keys: Keys | None) -> str:
+def _why_not(keys: AccessTokens | None) -> str:
     if keys is None:
         return "this viewer is read-only: it was started without control"
     return "needs a token: open the address that the viewer printed, or ask it for a new one"

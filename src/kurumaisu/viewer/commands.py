@@ -16,7 +16,7 @@ _LARGEST_SEED = 2**32 - 1
 
 
 @dataclass(frozen=True)
-class Command:
+class Request:
     """A command with its arguments; id: what the client calls it."""
 
     id: int | str
@@ -84,7 +84,7 @@ COMMANDS: Mapping[str, _Kinds] = {
 _OPTIONAL: Mapping[str, _Kinds] = {"drive": {"body": _word}}
 
 
-def read(message: str) -> Command | Credential:
+def read(message: str) -> Request | Credential:
     """Return what a client has sent. Raise Error naming what is wrong with it."""
     try:
         content = json.loads(message, parse_constant=_refuse)
@@ -113,7 +113,7 @@ def number_of(message: str) -> int | str | None:
     return number if _is_id(number) else None
 
 
-def _command(content: dict[str, Any]) -> Command:
+def _command(content: dict[str, Any]) -> Request:
     number, name = content.pop("id", None), content.pop("name", None)
     if not _is_id(number):
         raise Error("id: must be an integer or a short text")
@@ -134,7 +134,7 @@ def _command(content: dict[str, Any]) -> Command:
             arguments[key] = check(content[key])
         except ValueError as error:
             raise Error(f"{name}: {key} {error}") from error
-    return Command(number, name, arguments)
+    return Request(number, name, arguments)
 
 
 def _is_id(number: Any) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from kurumaisu.errors import Error
 
-_ROUNDED = 1e-3  # [s] that a time may be off because a report wrote it so
+ROUNDED = 1e-3  # [s] that a time may be off because a report wrote it so
 SLOWEST, FASTEST = 0.01, 100.0  # recorded seconds per second
 
 
@@ -28,7 +28,7 @@ class PlayClock:
 
     def seek(self, t: float, now: float) -> None:
         """Go to a time, forward or back, playing on. Raise Error for one that is not on the line."""
-        if not self.begin - _ROUNDED <= t <= self.end + _ROUNDED:
+        if not self.begin - ROUNDED <= t <= self.end + ROUNDED:
             raise Error(f"seek: t must be {self.begin:.3f} to {self.end:.3f} s: {t:.3f}")
         self._t, self._since = min(max(t, self.begin), self.end), now
 

@@ -125,7 +125,7 @@ class Playback:
         if chair is not None:
             poses[CHAIR] = chair
         v, w = _pair(tape.rates, t) or (None, None)
-        playback = protocol.Playback(clock.begin, clock.end, t, clock.rate, clock.playing, tape.name, self._runs)
+        playback = protocol.PlaybackState(clock.begin, clock.end, t, clock.rate, clock.playing, tape.name, self._runs)
         return State(
             t=t - clock.begin,
             wall=time.time(),

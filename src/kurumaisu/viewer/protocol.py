@@ -102,7 +102,7 @@ class Note:
 
 
 @dataclass(frozen=True)
-class Playback:
+class PlaybackState:
     """Where a recording is: times [s] by the run's own clock, rate: recorded seconds per second; run: one of runs."""
 
     begin: float
@@ -142,7 +142,7 @@ class State:
     estop: bool | None = None
     recording: str | None = None
     notes: tuple[Note, ...] = ()
-    playback: Playback | None = None
+    playback: PlaybackState | None = None
     driver: str | None = None  # the input that drives
 
 
@@ -275,7 +275,7 @@ def _floats(values: ArrayLike) -> NDArray[np.float32]:
 def _plain(value: Any) -> Any:
     """Return a value as JSON can have it."""
     if dataclasses.is_dataclass(value):
-        names = _RENAMED if isinstance(value, Playback) else {}
+        names = _RENAMED if isinstance(value, PlaybackState) else {}
         return {names.get(name, name): _plain(inner) for name, inner in vars(value).items()}
     if isinstance(value, Mapping):
         return {str(key): _plain(inner) for key, inner in value.items()}

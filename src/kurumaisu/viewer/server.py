@@ -14,7 +14,7 @@ from aiohttp import web
 
 from kurumaisu.errors import Error
 from kurumaisu.viewer import access, files, report
-from kurumaisu.viewer.access import Keys
+from kurumaisu.viewer.access import AccessTokens
 from kurumaisu.viewer.client import URGENT, Account, Client
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.settings import ViewerSettings
@@ -37,7 +37,7 @@ class Server:
         self._hub = hub
         self._source = source
         self._control = control
-        self._keys = Keys()
+        self._keys = AccessTokens()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="viewer", daemon=True)
         # An urgent command waits for none that hangs; and one thread for it keeps the order in which they were said.

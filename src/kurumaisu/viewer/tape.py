@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.viewer.play_clock import ROUNDED
 from kurumaisu.viewer.protocol import Fan, Note, Pose
 
 _GAP = 1.0  # [s] between samples that nobody may fill in, unless the samples are always that far apart
-_ROUNDED = 1e-3  # [s] that a scan's time may be off because a report wrote it so
 _USUAL = 3.0  # usual distances of samples that are a gap
 
 
@@ -102,5 +102,5 @@ class Tape:
 
     def scan_at(self, t: float) -> int:
         """Return the number of the newest scan at t, -1 where there is none or it is long past."""
-        row = int(np.searchsorted(self.scan_times, t + _ROUNDED, side="right")) - 1
+        row = int(np.searchsorted(self.scan_times, t + ROUNDED, side="right")) - 1
         return row if row >= 0 and t - self.scan_times[row] <= _GAP else -1

@@ -12,7 +12,7 @@ from pathlib import Path
 from kurumaisu.errors import Error
 from kurumaisu.names import hint, nearest
 from kurumaisu.world.notes import Notes
-from kurumaisu.world.tokens import Kind, Source, Token, skip_line, tokenize
+from kurumaisu.world.tokens import Kind, SourceText, Token, skip_line, tokenize
 
 _MOST_BYTES = 2**26  # of one file
 _MOST_TOKENS = 1_000_000  # of a world with its includes; Stage's largest has 40 000
@@ -55,9 +55,9 @@ class Reader:
     used: set[str] = field(default_factory=set)
     tokens: list[Token] = field(default_factory=list)
     _open: int = 0  # brackets not closed yet
-    _sources: dict[Path, Source] = field(default_factory=dict)
+    _sources: dict[Path, SourceText] = field(default_factory=dict)
 
-    def read(self, text: Source | None = None) -> list[Token]:
+    def read(self, text: SourceText | None = None) -> list[Token]:
         """Return the tokens of all files in the order Stage sees them, the last being END; text: instead of the top's.
 
         Raise Error with the place.
@@ -71,7 +71,7 @@ class Reader:
             raise Error(f"{self.top}: has no parameter ${{{unused[0]}}}, for which a value was given; {near}")
         return self.tokens
 
-    def _splice(self, source: Source, depth: int) -> None:
+    def _splice(self, source: SourceText, depth: int) -> None:
         """Append the tokens of a source without its END."""
         tokens, append = tokenize(source), self.tokens.append
         while (token := next(tokens)).kind is not Kind.END:
@@ -104,13 +104,13 @@ class Reader:
             self.notes.add(include, f"what follows on the line of an include is not read, as in Stage: {rest}")
         return end
 
-    def _source(self, path: Path, asked: Token | None) -> Source:
+    def _source(self, path: Path, asked: Token | None) -> SourceText:
         """Return the text of a file with its parameters filled in."""
         if path not in self._sources:
             self._sources[path] = self._fill_in(self._read(path, asked))
         return self._sources[path]
 
-    def _read(self, path: Path, asked: Token | None) -> Source:
+    def _read(self, path: Path, asked: Token | None) -> SourceText:
         try:
             with path.open("rb") as file:
                 data = file.read(_MOST_BYTES + 1)
@@ -120,9 +120,9 @@ class Reader:
             raise asked.error(reason) if asked else Error(reason) from error
         if len(data) > _MOST_BYTES:
             raise Error(f"{path}: is larger than {_MOST_BYTES} bytes")
-        return Source(path, data.decode(errors="surrogateescape"))
+        return SourceText(path, data.decode(errors="surrogateescape"))
 
-    def _fill_in(self, source: Source) -> Source:
+    def _fill_in(self, source: SourceText) -> SourceText:
         if "${" not in source.text:
             return source
 
@@ -133,9 +133,9 @@ class Reader:
                 return _BRACES.sub(lambda inner: self._value(source, match.start() + inner.start(), inner[0]), match[0])
             return self._value(source, match.start(), match[0])
 
-        return Source(source.path, _COMMENT_OR_PARAMETER.sub(replace, source.text))
+        return SourceText(source.path, _COMMENT_OR_PARAMETER.sub(replace, source.text))
 
-    def _value(self, source: Source, at: int, text: str) -> str:
+    def _value(self, source: SourceText, at: int, text: str) -> str:
         """Return the value of a parameter written as text."""
         match = _PARAMETER.fullmatch(text)
         if match is None:

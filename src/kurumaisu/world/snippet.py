@@ -12,7 +12,7 @@ from kurumaisu.world.model import Model
 from kurumaisu.world.notes import Notes
 from kurumaisu.world.shapes import Shaper
 from kurumaisu.world.syntax import Macros, parse_more
-from kurumaisu.world.tokens import Source
+from kurumaisu.world.tokens import SourceText
 from kurumaisu.world.tree import Builder
 from kurumaisu.world.values import Units
 
@@ -45,7 +45,7 @@ def read_snippet(text: str, vocabulary: Vocabulary) -> Snippet:
     if len(text) > _MOST_CHARACTERS:
         raise Error(f"text: is longer than {_MOST_CHARACTERS} characters")
     top, notes = vocabulary.top, Notes()
-    source = Source(top.with_name("text"), text)
+    source = SourceText(top.with_name("text"), text)
     world = parse_more(source, top, vocabulary.macros, notes)
     for given in world.properties.values():
         raise given.name.error(f"{given.name.text} would be of the whole world; only models can be added to it")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from kurumaisu.world.files import Reader
 from kurumaisu.world.notes import Notes
-from kurumaisu.world.tokens import Kind, Source, Token
+from kurumaisu.world.tokens import Kind, SourceText, Token
 
 _DEEPEST = 100  # levels of entities in entities, and of macros of macros
 _MOST_STEPS = 2_000_000  # properties and entities read; the largest world of Stage's own comes to some ten thousand
@@ -67,7 +67,7 @@ def parse(top: Path, values: Mapping[str, str], notes: Notes) -> tuple[Entity, M
     return parser.world(0), Macros(tuple(tokens[:-1]), parser.macros)
 
 
-def parse_more(text: Source, top: Path, macros: Macros, notes: Notes) -> Entity:
+def parse_more(text: SourceText, top: Path, macros: Macros, notes: Notes) -> Entity:
     """Return the world entity of a text that knows the macros of a file at top. Raise Error with the place."""
     tokens = Reader(top, {}, notes).read(text)
     known = {name: replace(macro, template=None) for name, macro in macros.known.items()}
@@ -82,7 +82,7 @@ class _Parser:
         self._notes = notes
         self.macros = macros
         self._steps = 0
-        self._world = Entity("world", Token(Kind.WORD, "world", Source(top, tokens[-1].source.text), 0))
+        self._world = Entity("world", Token(Kind.WORD, "world", SourceText(top, tokens[-1].source.text), 0))
 
     def world(self, at: int) -> Entity:
         """Return the world entity of the tokens from a place on."""

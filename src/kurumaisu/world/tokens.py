@@ -33,7 +33,7 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class SourceText:
     """The text of one file; bytes that are not UTF-8 are in it as lone surrogates."""
 
     path: Path
@@ -63,7 +63,7 @@ class Token(NamedTuple):
 
     kind: Kind
     text: str
-    source: Source
+    source: SourceText
     at: int
 
     @property
@@ -103,7 +103,7 @@ _BLANK = re.compile(r"(?:[ \t]++|#[^\r\n]*+)*+")
 _KINDS = {kind.name: kind for kind in Kind}
 
 
-def tokenize(source: Source, at: int = 0) -> Iterator[Token]:
+def tokenize(source: SourceText, at: int = 0) -> Iterator[Token]:
     """Give the tokens of a file from an offset on, the last being END. Raise Error at what is no token."""
     text, scan = source.text, _TOKEN.match
     while True:
@@ -117,13 +117,13 @@ def tokenize(source: Source, at: int = 0) -> Iterator[Token]:
             return
 
 
-def skip_line(source: Source, at: int) -> int:
+def skip_line(source: SourceText, at: int) -> int:
     """Return the offset after the line end that follows an offset."""
     match = _LINE_END.search(source.text, at)
     return match.end() if match else len(source.text)
 
 
-def _not_a_token(source: Source, at: int) -> Error:
+def _not_a_token(source: SourceText, at: int) -> Error:
     blank = _BLANK.match(source.text, at)
     at = blank.end() if blank else at
     character = source.text[at]

@@ -20,7 +20,7 @@ from kurumaisu.world.notes import Notes
 from kurumaisu.world.shapes import Shaper
 from kurumaisu.world.snippet import Vocabulary
 from kurumaisu.world.syntax import NO_MACROS, Entity, Property, parse
-from kurumaisu.world.tokens import Kind, Source, Token
+from kurumaisu.world.tokens import Kind, SourceText, Token
 from kurumaisu.world.tree import Builder, global_poses
 from kurumaisu.world.values import Units, Values
 
@@ -110,7 +110,7 @@ def load_world(path: Path, *, image_extents: bool = False, values: Mapping[str, 
 
 def _map_alone(path: Path) -> Entity:
     """Return a world of one model that has a map for its bitmap."""
-    source = Source(path, "")
+    source = SourceText(path, "")
 
     def given(name: str, kind: Kind, *texts: str) -> Property:
         return Property(Token(Kind.WORD, name, source, 0), tuple(Token(kind, text, source, 0) for text in texts))

@@ -22,6 +22,7 @@ _WAYS = {
     "polled": "serial converter, 16 ms",
     "busy": "USB, a busy host",
 }
+_METHODS = {"envelope": "ours", "calibrated": "ours, calibrated", "arrival": "arrival", "mrpt": "MRPT"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     table = Table(title, "way, method", "bias", "sd", "worst", *(f"worst, {part}" for part in _PARTS))
     for way, method, *numbers in rows:
         errors = np.array(numbers, dtype=float).reshape(len(_PARTS) + 1, 3)  # bias, sd, worst in each part of a run
-        table.row(f"{_WAYS[way]}: {method}", *errors[-1], *errors[:-1, 2])
+        table.row(f"{_WAYS[way]}: {_METHODS[method]}", *errors[-1], *errors[:-1, 2])
     worst = {(way, method): float(numbers[-1]) for way, method, *numbers in rows}
     return int(any(worst[way, "envelope"] > min(worst[way, "arrival"], worst[way, "mrpt"]) for way in _WAYS))
 
@@ -48,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _simulator() -> str:
     """Return the path of the program that tests/CMakeLists.txt builds."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / "lib/kurumaisu/laser_clock_sim"
+        path = Path(prefix) / "share/kurumaisu/tests/laser_clock_sim"
         if path.exists():
             return str(path)
     raise Error("laser_clock_sim: is not built: it comes with the tests (target test_laser_clock_sim)")

@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for k, (name, (_, word)) in enumerate(faults.items()):
         if options.only not in name:
             continue
-        said = [said_of(name, [options.seed, k, i]) for i in range(options.draws)]
+        said = [findings_of(name, [options.seed, k, i]) for i in range(options.draws)]
         right = [any(word in line for line in lines) for lines in said]
         table.row(name, str(len(said)), share(sum(map(bool, said)), len(said), 3), share(sum(right), len(said), 3))
         kind = "wrong drives" if name in wrong_data.SPOILT else "wrong scans, map or laser"
@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if options.show and not right[i]:
                 print("   ", i, drives.draw(np.random.default_rng([options.seed, k, i]), easy=True), lines)
     for name in ("", "with scans") if options.good else ():
-        said = [said_of(name, [options.seed, 999 + bool(name), i]) for i in range(options.good)]
+        said = [findings_of(name, [options.seed, 999 + bool(name), i]) for i in range(options.good)]
         for i, lines in enumerate(said):
             if options.show and lines:
                 print("   ", i, drives.draw(np.random.default_rng([options.seed, 999 + bool(name), i])), lines)
@@ -64,7 +64,7 @@ def _sums(totals: dict[str, list[tuple[bool, bool]]], columns: Sequence[str], fa
         table.row(name, str(len(told)), shares[0], "-" if name.startswith("good") else shares[1])
 
 
-def said_of(fault: str, seed: Sequence[int]) -> list[str]:
+def findings_of(fault: str, seed: Sequence[int]) -> list[str]:
     """Return what is said of a drive with a fault, or with none: "", or "with scans"."""
     rng = np.random.default_rng(seed)
     case = drives.draw(rng, easy=fault in wrong_data.SPOILT)
@@ -82,10 +82,10 @@ def said_of(fault: str, seed: Sequence[int]) -> list[str]:
         sight = wrong_scans.look(tables, rng, off, float(rng.uniform(0.002, 0.02)))
         if fault in wrong_scans.SPOILT:
             sight = wrong_scans.SPOILT[fault][0](sight, rng)
-    return said_of_tables(tables, given, sight)
+    return findings_of_tables(tables, given, sight)
 
 
-def said_of_tables(tables: drives.Tables, given: Sequence[str], sight: wrong_scans.Sight | None) -> list[str]:
+def findings_of_tables(tables: drives.Tables, given: Sequence[str], sight: wrong_scans.Sight | None) -> list[str]:
     """Return what forbids a verdict, as reader and critic say it."""
     faults = Faults()
     run = run_of(tables, given, faults)

@@ -93,7 +93,7 @@ def _outcome(status: int, text: str, seconds: float) -> Outcome:
 def _program(target: str) -> Path:
     """Return the path of a target's program, which tests/CMakeLists.txt builds."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / f"lib/kurumaisu/fuzz_{target}"
+        path = Path(prefix) / f"share/kurumaisu/tests/fuzz_{target}"
         if path.exists():
             return path
     raise Error(f"fuzz_{target}: is not built: it comes with the tests (cmake --build .ws/build --target fuzz)")

@@ -11,6 +11,7 @@ from scipy.stats import norm
 
 from kurumaisu.bench.hidden.generator import laws
 from kurumaisu.critic.values.recording import Recording, Run
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import FloatArray
 
 _LEVEL = 0.01  # of false alarms that a test allows itself, over all its columns
@@ -93,7 +94,7 @@ def _rows(recording: Recording) -> Rows:
     """Return residuals and columns of all runs, each channel in units of its own spread."""
     parts = [_run(run) for run in recording.runs if run.pose is not None and run.command is not None]
     y = np.concatenate([part[0] for part in parts])
-    spread = 1.4826 * np.median(np.abs(y), axis=0) + 1e-9
+    spread = SIGMA_PER_MAD * np.median(np.abs(y), axis=0) + 1e-9
     columns = {name: np.concatenate([part[1][name] for part in parts]) / spread[:, None] for name in parts[0][1]}
     return Rows((y / spread).ravel(), {name: c.reshape(-1, c.shape[2]) for name, c in columns.items()})
 

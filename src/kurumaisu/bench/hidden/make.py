@@ -16,8 +16,8 @@ from kurumaisu.bench.hidden.generator.case import KINDS, Ask, Case, Truth
 from kurumaisu.bench.hidden.generator.rooms import draw_room, world_text
 from kurumaisu.bench.hidden.laser.cases import make_laser
 from kurumaisu.bench.hidden.laser.catalogue import LASER
-from kurumaisu.bench.hidden.unknown.cases import strange_base, strange_laser
-from kurumaisu.bench.hidden.unknown.forms import STRANGE_BASE, STRANGE_LASER
+from kurumaisu.bench.hidden.unknown.cases import make_unknown_base, make_unknown_laser
+from kurumaisu.bench.hidden.unknown.forms import UNKNOWN_BASE, UNKNOWN_LASER
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
 
@@ -32,8 +32,8 @@ def make(ask: Ask, seed: int, folder: Path | None = None) -> Case:
     if ask.kind == "wrong":
         return _make_wrong(ask, seed, folder, what)
     if ask.kind == "unknown":
-        laser = ask.ids[0] in STRANGE_LASER if ask.ids else ask.family == "laser"
-        return strange_laser(ask, seed, _given(folder, ask)) if laser else strange_base(ask, seed)
+        laser = ask.ids[0] in UNKNOWN_LASER if ask.ids else ask.family == "laser"
+        return make_unknown_laser(ask, seed, _given(folder, ask)) if laser else make_unknown_base(ask, seed)
     if ask.kind == "confounded":
         ask = _confounded(ask, what)
     if all(name in BASE for name in ask.ids) and (ask.ids or ask.family == "base"):
@@ -46,7 +46,7 @@ def names_of(kind: str, family: str) -> tuple[str, ...]:
     if kind == "wrong":
         return tuple(name for name, wrong in WRONG.items() if wrong.laser == (family == "laser"))
     if kind == "unknown":
-        return tuple(STRANGE_LASER if family == "laser" else STRANGE_BASE)
+        return tuple(UNKNOWN_LASER if family == "laser" else UNKNOWN_BASE)
     if kind == "confounded":
         return tuple(dict.fromkeys(name for name, _ in CONFOUNDED if (name in BASE) == (family == "base")))
     return tuple(LASER if family == "laser" else BASE)

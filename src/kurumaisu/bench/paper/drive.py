@@ -14,19 +14,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import lfilter
 
+from kurumaisu.bench.hidden.generator.laws import STEERING, TRANSLATION
 from kurumaisu.bench.table import Table, share
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.experiments import samples
 from kurumaisu.paper.chair import drive, law
 from kurumaisu.paper.chair.samples import samples_of
-from kurumaisu.paper.options import Options, load_options
+from kurumaisu.paper.options import PaperOptions, load_options
 from kurumaisu.types import FloatArray
 
 Line = tuple[float, float]  # slope, intercept
 Law = tuple[Line, Line]  # positive, negative
-TRANSLATION: Law = ((1.32402, 0.127906), (2.07369, -0.108783))
-STEERING: Law = ((-0.499211, 0.104181), (-0.469278, -0.169476))
-CORRECTED: Law = ((-0.499211, -0.104181), (-0.469278, 0.169476))
+_LEFT, _RIGHT = STEERING
+CORRECTED: Law = ((_LEFT[0], -_LEFT[1]), (_RIGHT[0], -_RIGHT[1]))
 _STEP = 0.001  # [s]
 _EVERY = 100  # steps between poses
 _TICK = 0.02  # [s] of commands
@@ -106,7 +106,7 @@ class Judged:
     refused: int
 
 
-def judge(case: Case, seed: int, options: Options) -> Judged:
+def judge(case: Case, seed: int, options: PaperOptions) -> Judged:
     """Return what the identification of one drive comes to."""
     rng = np.random.default_rng(seed)
     run = make(case, rng)

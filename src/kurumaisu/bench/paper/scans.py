@@ -20,7 +20,7 @@ from kurumaisu.critic.experiment.rehearse import manner
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.paper.chair import drive, identify
 from kurumaisu.paper.chair.law import BranchFit
-from kurumaisu.paper.options import Options, load_options
+from kurumaisu.paper.options import PaperOptions, load_options
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.world import load_world
@@ -88,7 +88,7 @@ def blind(recording: Recording) -> Recording:
     return replace(recording, truth=None, runs=tuple(replace(run, pose=None) for run in recording.runs))
 
 
-def judge(recording: Recording, factors: tuple[float, float], options: Options) -> Found:
+def judge(recording: Recording, factors: tuple[float, float], options: PaperOptions) -> Found:
     """Return what identification makes of a drive of recorded()."""
     found = identify.identify(recording, options, lambda _: None)
     model = load_model(shipped("launch/md100.yaml"))

@@ -12,14 +12,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kurumaisu.bench.hidden.generator.laws import LASER_OFFSET, LASER_SCALE, LASER_SIGMA
 from kurumaisu.bench.table import Table, share
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 from kurumaisu.paper.laser import law as laser_law
 from kurumaisu.paper.laser.wall import ahead_of, places_of
-from kurumaisu.paper.options import Options, load_options
+from kurumaisu.paper.options import PaperOptions, load_options
 from kurumaisu.params import load_model, shipped
 
-FOUR = (1.004587, 0.058826, 0.002334, -0.000488, 0.000199)  # equation (4): of mu, of sigma
+FOUR = (LASER_SCALE, LASER_OFFSET, *LASER_SIGMA)  # equation (4): of mu, of sigma
 RESOLUTION = 0.001  # [m]
 _STEP = 2 * np.pi / 1024  # [rad] between beams
 _BEAMS = 41  # to either side of straight ahead: 14 degrees
@@ -62,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(not good)
 
 
-def judge(case: Case, seed: int, options: Options) -> list[bool]:
+def judge(case: Case, seed: int, options: PaperOptions) -> list[bool]:
     """Return whether each coefficient's interval holds the truth, of one wall."""
     rng = np.random.default_rng(seed)
     distances = options.wall.distances

@@ -16,6 +16,7 @@ from kurumaisu import slam
 from kurumaisu._core import LaserError
 from kurumaisu.bench.slam.lost import carried_away, from_nowhere
 from kurumaisu.bench.slam.main import drive
+from kurumaisu.bench.slam.models import START_SD
 from kurumaisu.bench.slam.office_bags import office_logs
 from kurumaisu.bench.table import Table
 from kurumaisu.geometry import compose, wrap
@@ -32,8 +33,6 @@ from kurumaisu.params import load_model, shipped
 from kurumaisu.sim.settings import with_effects
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
-
-_OFF = np.array([0.1, 0.1, 0.05])  # [m, m, rad] deviation of the first pose from the truth
 
 
 @dataclass(frozen=True)
@@ -112,8 +111,8 @@ def _without_mean_error(each: Drive) -> Drive:
 def _follow(each: Drive, settings: LocalizerSettings, seed: int) -> tuple[float, ...]:
     """Return errors of position [m] (root mean square, largest) and heading [rad], scans sure and wrong, CPU [ms]."""
     localizer = make_localizer(settings, each.laser, each.grid, seed, each.process)
-    start = compose(each.truth[0], np.random.default_rng(seed).normal(0, _OFF))
-    localizer.set_pose(start.tolist(), np.diag(_OFF**2))
+    start = compose(each.truth[0], np.random.default_rng(seed).normal(0, START_SD))
+    localizer.set_pose(start.tolist(), np.diag(START_SD**2))
     begin = time.process_time()
     found = localize_scans(localizer, each.log)
     cpu = 1000 * (time.process_time() - begin) / len(each.log.times)

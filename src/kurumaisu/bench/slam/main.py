@@ -17,14 +17,14 @@ from kurumaisu._core import LaserError
 from kurumaisu.bench.slam import office
 from kurumaisu.bench.slam.drive import SimulatedDrive
 from kurumaisu.bench.slam.models import models
-from kurumaisu.bench.slam.new_drives import drives, fresh
+from kurumaisu.bench.slam.new_drives import drives, on_new_drives
 from kurumaisu.bench.slam.office import Judged
 from kurumaisu.bench.slam.office_bags import office_logs
 from kurumaisu.bench.slam.peers import Peer
 from kurumaisu.bench.slam.real import real, real_logs
 from kurumaisu.bench.slam.real_models import mapping_models
 from kurumaisu.bench.table import Table
-from kurumaisu.driving import Driver, load_route
+from kurumaisu.driving import RouteFollower, load_route
 from kurumaisu.localization import load_localizer_settings
 from kurumaisu.map_file import read_map
 from kurumaisu.params import load_model, shipped
@@ -106,7 +106,9 @@ def _fresh(options: argparse.Namespace) -> list[Judged]:
         grid = read_map(path)
         logs = drives(grid, options.fresh_seed, _DRIVES, _LONG)
         if options.only != "models":
-            judged += fresh(name, logs, grid, settings, error, options.fresh_seed, (options.starts, options.kidnaps))
+            judged += on_new_drives(
+                name, logs, grid, settings, error, options.fresh_seed, (options.starts, options.kidnaps)
+            )
         if options.only != "fresh":
             models(f"{name}, {_DRIVES} fresh drives: median (worst)", logs, grid, settings, error, process)
     return judged
@@ -136,7 +138,7 @@ def _building(seeds: int, seconds: float) -> None:
 def drive(world: World, seed: int, seconds: float) -> tuple[slam.ScanLog, FloatArray]:
     """Return the scans and odometry of the scripted round (or its first seconds), and the true poses (n, 3)."""
     simulated = SimulatedDrive(world, seed)
-    driver = Driver(load_route(shipped("launch/round.yaml")))
+    driver = RouteFollower(load_route(shipped("launch/round.yaml")))
     v = w = 0.0
     while simulated.observation.time < seconds and not driver.done:
         if simulated.due:

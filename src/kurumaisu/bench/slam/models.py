@@ -16,7 +16,7 @@ from kurumaisu.map_file import MapFile
 from kurumaisu.slam import ScanLog
 from kurumaisu.types import FloatArray
 
-_OFF = np.array([0.1, 0.1, 0.05])  # [m, m, rad] deviation of the first pose from the truth
+START_SD = np.array([0.1, 0.1, 0.05])  # [m, m, rad] deviation of the first pose from the truth
 _SETTLED = 20  # scans after which errors count
 _SURE = "tracking"
 
@@ -86,8 +86,8 @@ def _followed(
 ) -> tuple[float, float, float, float]:
     """Return errors of position [m] and heading [deg], the mean normalised error squared while sure, its share [%]."""
     localizer = make_localizer(settings, error, grid, seed, process)
-    start = compose(truth[0], np.random.default_rng(seed).normal(0, _OFF))
-    localizer.set_pose(start.tolist(), np.diag(_OFF**2))
+    start = compose(truth[0], np.random.default_rng(seed).normal(0, START_SD))
+    localizer.set_pose(start.tolist(), np.diag(START_SD**2))
     found = localize_scans(localizer, log)
     off = found.poses - truth
     off[:, 2] = wrap(off[:, 2])

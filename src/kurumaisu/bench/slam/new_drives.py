@@ -12,7 +12,7 @@ from kurumaisu._core import LaserError
 from kurumaisu.bench.slam.lost import Found, Logs, carried_away, from_nowhere
 from kurumaisu.bench.slam.models import without_mean_error
 from kurumaisu.bench.slam.office import Judged
-from kurumaisu.bench.slam.random_drives import roam
+from kurumaisu.bench.slam.random_drives import random_drive
 from kurumaisu.bench.table import Table
 from kurumaisu.localization import Localizer, LocalizerSettings, make_localizer
 from kurumaisu.map_file import MapFile
@@ -24,10 +24,10 @@ _RIGHT = 0.8  # share at least
 def drives(grid: MapFile, seed: int, count: int, seconds: float) -> Logs:
     """Return logs, readings as they are, and their truth: drives to random places of a map, of seeds from one on."""
     with tempfile.TemporaryDirectory() as folder:
-        return [roam(grid, Path(folder), seed + i, seconds) for i in range(count)]
+        return [random_drive(grid, Path(folder), seed + i, seconds) for i in range(count)]
 
 
-def fresh(
+def on_new_drives(
     name: str,
     logs: Logs,
     grid: MapFile,

@@ -13,6 +13,7 @@ import numpy as np
 from kurumaisu import slam_score
 from kurumaisu.bench.peers import Run
 from kurumaisu.bench.slam import peers
+from kurumaisu.bench.slam.models import START_SD
 from kurumaisu.bench.slam.ours import ours
 from kurumaisu.bench.table import Table
 from kurumaisu.geometry import compose
@@ -23,7 +24,6 @@ from kurumaisu.params import load_model, shipped
 from kurumaisu.slam import ScanLog
 from kurumaisu.types import FloatArray
 
-_OFF = np.array([0.1, 0.1, 0.05])  # [m, m, rad] deviation of the first pose from the truth
 _WALL = 65  # [%]
 
 Logs = Sequence[tuple[str, ScanLog, FloatArray]]
@@ -151,7 +151,7 @@ def localisation(
             assert peer is not None
             rows = []
             for seed in range(1, seeds + 1):
-                run, poses = peers.amcl(peer, log, grid, theirs, _start(truth, seed), _OFF, seed)
+                run, poses = peers.amcl(peer, log, grid, theirs, _start(truth, seed), START_SD, seed)
                 rows.append((*_off(poses, truth), 1000 * run.cpu / len(log.times), run.memory))
             table.row(f"{name}, {manner}", *_cells(np.array(rows)))
             compared.append(f"{manner} {np.median(np.array(rows)[:, 0]):.3g}")
@@ -160,7 +160,7 @@ def localisation(
 
 
 def _start(truth: FloatArray, seed: int) -> FloatArray:
-    return compose(truth[0], np.random.default_rng(seed).normal(0, _OFF))
+    return compose(truth[0], np.random.default_rng(seed).normal(0, START_SD))
 
 
 def _followed(
@@ -168,7 +168,7 @@ def _followed(
 ) -> tuple[float, float, float]:
     error = load_model(shipped("launch/md100.yaml")).laser.error
     localizer = make_localizer(settings, error, grid, seed)
-    localizer.set_pose(_start(truth, seed).tolist(), np.diag(_OFF**2))
+    localizer.set_pose(_start(truth, seed).tolist(), np.diag(START_SD**2))
     begin = time.process_time()
     found = localize_scans(localizer, log)
     cpu = 1000 * (time.process_time() - begin) / len(log.times)

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from kurumaisu import slam
 from kurumaisu.bench.slam.drive import SimulatedDrive
-from kurumaisu.driving import Driver, Route
+from kurumaisu.driving import Route, RouteFollower
 from kurumaisu.errors import Error
 from kurumaisu.map_file import MapFile
 from kurumaisu.params import shipped
@@ -102,7 +102,7 @@ def world_of(grid: MapFile, start: FloatArray, heading: float, folder: Path) -> 
     return load_world(folder / "map.world")
 
 
-def roam(grid: MapFile, folder: Path, seed: int, seconds: float) -> tuple[slam.ScanLog, FloatArray]:
+def random_drive(grid: MapFile, folder: Path, seed: int, seconds: float) -> tuple[slam.ScanLog, FloatArray]:
     """Return scans and odometry of commands of a drive to random places, and the true poses (n, 3) at the scans."""
     ways, rng = Ways(grid), np.random.default_rng(seed)
     start = ways.place(rng)
@@ -118,7 +118,7 @@ def _first_heading(way: FloatArray, start: FloatArray) -> float:
 def _drive(
     drive: SimulatedDrive, ways: Ways, rng: np.random.Generator, seconds: float
 ) -> tuple[slam.ScanLog, FloatArray]:
-    driver, there, since = Driver(_route(np.zeros((0, 2)))), drive.observation.pose, 0.0
+    driver, there, since = RouteFollower(_route(np.zeros((0, 2)))), drive.observation.pose, 0.0
     v = w = 0.0
     while drive.observation.time < seconds:
         now, pose = drive.observation.time, drive.observation.pose
@@ -126,7 +126,7 @@ def _drive(
         if np.hypot(*(pose - there)[:2]) > 0.3:
             there, since = pose, now
         if driver.done or stuck > _STUCK + _BACK:
-            driver, since = Driver(_route(ways.way(pose[:2], rng))), now
+            driver, since = RouteFollower(_route(ways.way(pose[:2], rng))), now
         if drive.due:
             v, w = driver.command(pose) if stuck < _STUCK else (-0.3, 0.0)
         drive.step(v, w)

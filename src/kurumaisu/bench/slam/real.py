@@ -15,11 +15,11 @@ from kurumaisu.bench.slam.ours import ours
 from kurumaisu.bench.slam.sharpness import sharpness
 from kurumaisu.bench.table import Table
 from kurumaisu.maps import Grid, draw_map
-from kurumaisu.real import mines
+from kurumaisu.real import mines, sena
 from kurumaisu.slam import ScanLog
 from kurumaisu.types import FloatArray
 
-SENA = Path("/usr/share/mrpt/datasets/2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog")
+SENA = sena.FOLDER / sena.LOG
 _URG_RANGE = 5.6  # [m]
 _TURN = 0.1 / 1024  # [s] from beam to beam
 _LATE = 0.2  # [s] that its scans come late, as scripts/real mines finds by hand

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The base channel: measured increments of the pose, and the same run simulated."""
+"""The base channel: a run's inputs and measured increments (drive.py), and the same run simulated (replay.py)."""

@@ -78,13 +78,13 @@ def odometry(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> t
 
 def path(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return the simulated reference at its times, (m + 1, 3), starting at the first measured pose."""
-    at = seen(drive, model, settings)
+    at = measured_poses(drive, model, settings)
     return geometry.compose(drive.poses[0], geometry.between(at[0], at))
 
 
 def increments(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return the simulated body increments between the reference's times, (m, 3)."""
-    at = seen(drive, model, settings)
+    at = measured_poses(drive, model, settings)
     return geometry.between(at[:-1], at[1:])
 
 
@@ -112,7 +112,7 @@ class Increments:
         return found
 
 
-def seen(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
+def measured_poses(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     """Return what the reference measures of the simulated chair at its times, (m + 1, 3), in a frame of its own."""
     chair, motion = _driven(drive, model, settings)
     poses = plant.path(motion, np.zeros(3))

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -11,14 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kurumaisu.critic.base.drive import driven
+from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 
 if TYPE_CHECKING:  # loading MRPT takes a third of a second, which a recording with reference poses need not pay
     from kurumaisu.slam import MappingResult, ScanLog
-
-Progress = Callable[[str], None]
 
 
 def with_reference(recording: Recording, seed: int, progress: Progress) -> Recording:

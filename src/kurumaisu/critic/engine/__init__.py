@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The search over sets of effects on the drives: fits, evidence, posterior, and what cannot be told apart."""
+"""Which effects act on the drives, by a search over sets (search.py); the evidence of a set is in evidence.py."""

@@ -15,7 +15,7 @@ from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 Key = tuple[str, str]  # id and parameter
-_SHOWS = 3.0  # whitened norm from which a parameter can be seen at all
+SHOWS = 3.0  # whitened norm from which a parameter can be seen at all
 _TYPICAL = 8.0  # whitened norm of the step by which a parameter is judged
 _NEAR = 0.4  # of the log of the norm
 _TRIALS = 12
@@ -163,7 +163,7 @@ def _typical_step(term: Term, norm: Callable[[float], float]) -> float | None:
             return sign * step
         if shown < _TYPICAL:
             if step >= largest:
-                return sign * step if shown >= _SHOWS else None
+                return sign * step if shown >= SHOWS else None
             low = step
         else:
             high = step

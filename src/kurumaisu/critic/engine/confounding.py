@@ -8,15 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from kurumaisu.critic.engine.evidence import Fit
+from kurumaisu.critic.values.policy import MEMBER, NAMED
 from kurumaisu.types import FloatArray
 
-NAMED = 0.9  # posterior from which a cause is named
 _MOST = 7  # members of a set: more may be a chance leaving that everything explains a little
-_CHANCE = 1e-3  # posterior of nothing in its place below which a set may have more members
-RIVAL = 0.05  # posterior from which an effect counts as a rival of another
-# The same from which it is a member of a set, which has to hold the truth in 95 cases of 100: of several that each may
-# be left out, one acts more often than one of them by itself.
-MEMBER = 0.02
+_NOT_BY_CHANCE = 1e-3  # posterior of nothing in its place below which a set may have more members
 _LEFT_OUT = 0.05  # posterior of all that a set may be without
 _RATHER = 3.0  # ratio of odds from which one effect acts in the place of another rather than beside it
 _AS_GOOD = 2.0  # [nat] by which what explains as much may explain less: the truth itself does once in 44, by chance
@@ -111,7 +107,7 @@ def _needed(posterior: SetPosterior, group: set[str]) -> bool:
     """Tell whether it is no chance leaving that a group explains: what has none of it is out of the question."""
     rest = posterior.ranked[0].ids - group
     without = (w for w, fit in zip(posterior.weights, posterior.ranked, strict=True) if fit.ids <= rest)
-    return bool(sum(without) < _CHANCE)
+    return bool(sum(without) < _NOT_BY_CHANCE)
 
 
 def _alone(posterior: SetPosterior, name: str) -> set[str]:

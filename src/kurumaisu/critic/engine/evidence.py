@@ -355,5 +355,5 @@ def _step_cost(terms: Sequence[Term], solution: least_squares.Solution, loud: Se
 
 
 def _shape_cost(term: Term, solution: least_squares.Solution, i: int) -> float:
-    """Return the cost of a shape, whose prior is normal about its null with its scale; see solve for its misfit."""
+    """Return the cost of a shape, whose prior is normal about its null with its scale; least_squares has its misfit."""
     return float(np.log(np.hypot(1.0, term.parameter.scale / solution.sds[i])))

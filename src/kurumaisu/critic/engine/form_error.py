@@ -8,10 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.params import EffectSetting
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.types import FloatArray
-
-Settings = tuple[EffectSetting, ...]
 
 
 @dataclass(frozen=True)

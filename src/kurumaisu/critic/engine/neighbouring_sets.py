@@ -89,7 +89,7 @@ def _step_sets(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Eff
 
     Smooth effects that draw the mean of its steps together leave no peak that stands out beside all of them.
     """
-    parts = [(part, *_left(problem, part)) for part in screen.parts()]
+    parts = [(part, *_guess_values(problem, part)) for part in screen.parts()]
     for other in problem.candidates if parts else ():
         if not other.rough or other in fit.candidates:
             continue
@@ -103,7 +103,7 @@ def _step_sets(problem: Problem, screen: Screen, fit: Fit) -> Iterator[tuple[Eff
             yield frozenset(each for each in part.chosen if each.id != other.id) | {other}, begin
 
 
-def _left(problem: Problem, part: ScreenedSet) -> tuple[tuple[Term, ...], FloatArray, float]:
+def _guess_values(problem: Problem, part: ScreenedSet) -> tuple[tuple[Term, ...], FloatArray, float]:
     """Return the terms and values of a guess, and its log likelihood when simulated."""
     ordered = sorted(part.chosen, key=lambda candidate: candidate.id)
     terms = tuple(term for candidate in ordered for term in candidate.terms)

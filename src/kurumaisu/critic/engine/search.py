@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic.engine import confounding
 from kurumaisu.critic.engine.catalogue import Key
 from kurumaisu.critic.engine.confounding import SetPosterior, confounded
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
@@ -17,8 +16,8 @@ from kurumaisu.critic.engine.linear_screening import Screen, ScreenedSet
 from kurumaisu.critic.engine.neighbouring_sets import CLOSE, EffectSet, neighbouring_sets
 from kurumaisu.critic.engine.refit import other_step_size, start_is_better
 from kurumaisu.critic.engine.swapped_sets import swapped_sets
+from kurumaisu.critic.values.policy import NAMED, RIVAL
 
-NAMED, RIVAL = confounding.NAMED, confounding.RIVAL
 _REFITS = 10  # sets refitted after each scan
 _FEWER = 4  # of fewer effects than the best set has, besides
 _LINE_ERROR = 0.05  # share of what a set explains by which lines may be off for one effect that does what two do

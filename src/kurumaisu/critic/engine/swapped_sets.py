@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from kurumaisu.critic.engine.catalogue import Candidate, Key
-from kurumaisu.critic.engine.confounding import MEMBER
 from kurumaisu.critic.engine.evidence import Fit, log_posterior
+from kurumaisu.critic.values.policy import MEMBER
 
 _MOST = 8  # sets that are tried, the likeliest first: of a long recording, each takes a second
 

@@ -9,18 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic.engine import coarsened_posterior, search
+from kurumaisu.critic.engine import coarsened_posterior
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.experiment import design
 from kurumaisu.critic.experiment.design import Explanation
 from kurumaisu.critic.values.digits import odds
+from kurumaisu.critic.values.policy import RIVAL
 from kurumaisu.critic.values.verdict import NextExperiment
 from kurumaisu.experiments import Script, names, shipped_script
 from kurumaisu.types import FloatArray
 
 DECIDED = 12.0  # [nat] more than that between two explanations decides nothing more
-_TOLD = 4  # ids in a sentence; the verdict has them all
+LISTED_IDS = 4  # ids in a sentence; the verdict has them all
 _RIVALS = 6  # explanations that are compared, at most
 
 
@@ -84,13 +85,13 @@ def remaining(found: SearchResult) -> tuple[list[Fit], FloatArray]:
         if fit.ids not in best or log > best[fit.ids][0]:
             best[fit.ids] = (log, fit)
     ranked = sorted(best.values(), key=lambda pair: -pair[0])[:_RIVALS]
-    kept = [(log, fit) for log, fit in ranked if log >= ranked[0][0] + np.log(search.RIVAL)]
+    kept = [(log, fit) for log, fit in ranked if log >= ranked[0][0] + np.log(RIVAL)]
     logs = np.array([log for log, _ in kept])
     return [fit for _, fit in kept], np.exp(logs - logsumexp(logs))
 
 
 def _listed(ids: Sequence[str]) -> str:
-    told = [*ids[:_TOLD], f"{len(ids) - _TOLD} more"] if len(ids) > _TOLD + 1 else list(ids)
+    told = [*ids[:LISTED_IDS], f"{len(ids) - LISTED_IDS} more"] if len(ids) > LISTED_IDS + 1 else list(ids)
     return " or ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
 
 

@@ -18,10 +18,10 @@ from kurumaisu.critic.values.verdict import ChannelGain, Gain, LogDensityGain, R
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-CHANNELS = {"dx": "m", "dy": "m", "dtheta": "rad"}
+INCREMENT_CHANNELS = {"dx": "m", "dy": "m", "dtheta": "rad"}
 HORIZONS = (2.0, 5.0, 20.0)  # [s] over which the path is predicted from the inputs alone
-_PARTS = 4  # of a single run, of which each is held out in turn
-_BLOCK = 5.0  # [s] resampled as a whole: at least ten time constants of the usual process noise
+PARTS = 4  # of a single run, of which each is held out in turn
+BLOCK = 5.0  # [s] resampled as a whole: at least ten time constants of the usual process noise
 _DRAWS = 2000
 _GAP = 1.0  # [s] between poses, beyond which poses are withheld
 
@@ -57,7 +57,7 @@ def folds(train: Sequence[Drive], test: Sequence[Drive]) -> list[Fold]:
     """
     if test:
         return [Fold(tuple(train), tuple(test))]
-    parts = list(train) if len(train) > 1 else split(train[0], _PARTS)
+    parts = list(train) if len(train) > 1 else split(train[0], PARTS)
     if len(parts) < 2:
         return []
     return [Fold(tuple(parts[:i] + parts[i + 1 :]), (parts[i],)) for i in range(len(parts))]
@@ -101,7 +101,7 @@ def measure(model: Model, splits: Sequence[Fold], refit: Refit, baseline: Noise,
             log_density_gain(*_columns(density, slice(i, i + 1))),
             rmse_gain(*_columns(near, slice(i, i + 1)), unit) if near[0] else None,
         )
-        for i, (name, unit) in enumerate(CHANNELS.items())
+        for i, (name, unit) in enumerate(INCREMENT_CHANNELS.items())
     }
     return Gain(log_density_gain(*_columns(density, slice(0, 3))), rmse, channels)
 
@@ -143,8 +143,8 @@ def _surprise(innovations: FloatArray, columns: FloatArray) -> FloatArray:
 
 
 def _blocks(drive: Drive, values: FloatArray) -> list[FloatArray]:
-    """Return per-increment values cut into blocks of _BLOCK seconds."""
-    index = ((drive.times[1:] - drive.times[0]) // _BLOCK).astype(int)
+    """Return per-increment values cut into blocks of BLOCK seconds."""
+    index = ((drive.times[1:] - drive.times[0]) // BLOCK).astype(int)
     return [values[index == i] for i in np.unique(index)]
 
 
@@ -156,7 +156,7 @@ def _open_loop(drive: Drive, model: Model, settings: Sequence[EffectSetting], ho
     measured = geometry.between(drive.poses[starts], drive.poses[ends])
     squares = np.square(predicted - measured)
     squares[:, 2] = np.square(geometry.wrap(predicted[:, 2] - measured[:, 2]))
-    index = ((drive.times[starts] - drive.times[0]) // max(_BLOCK, horizon)).astype(int)
+    index = ((drive.times[starts] - drive.times[0]) // max(BLOCK, horizon)).astype(int)
     return [squares[index == i] for i in np.unique(index)]
 
 

@@ -9,25 +9,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.heldout.drive_gain import log_density_gain, rmse_gain
+from kurumaisu.critic.heldout.drive_gain import PARTS, log_density_gain, rmse_gain
 from kurumaisu.critic.predict.motion import Forecast
-from kurumaisu.critic.predict.scan import Expected, Joint, ScanModel, scattered
+from kurumaisu.critic.predict.scan import OUTLIER, Expected, Joint, ScanModel, scattered
 from kurumaisu.critic.predict.scan_cache import Expectations
 from kurumaisu.critic.predict.scan_poses import ScanPoses, chosen, joined
 from kurumaisu.critic.ranges.scans.beams import Shots, why_not_usable
 from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.critic.values.verdict import ChannelGain
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-CHANNEL = "range"
+RANGE_CHANNEL = "range"
 _SCANS = 60  # of test runs
-_PARTS = 4  # of a single run, of which each is held out in turn
 _BLOCK = 5  # scans resampled as a whole: neighbours share the errors of their poses
-_OUTLIER = 5.0  # deviations
 _STEP = 0.05  # of a parameter, as a share of its distance from the null, to see what it does
 _VAGUE = 1.0  # sd of a parameter before it is fitted again, as a share of the same
-Settings = tuple[EffectSetting, ...]
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def _side(split: Split, settings: Settings, truth: tuple[float, float] | None) -
     what = split.known.rows(settings, split.test)
     error = measured[split.test] - what.mean
     with np.errstate(invalid="ignore"):
-        counts = what.place & (np.abs(error / trained.of(what)[1]) < _OUTLIER)
+        counts = what.place & (np.abs(error / trained.of(what)[1]) < OUTLIER)
     return _Side(trained, what, error, counts)
 
 
@@ -103,7 +101,7 @@ def _splits(recording: Recording, model: Model, forecast: Forecast | None) -> It
     known = Expectations(joined(parts))
     rows = np.arange(len(known.shots.stamps))
     if len(parts) == 1:
-        cuts = [part for part in np.array_split(rows, _PARTS) if len(part)]
+        cuts = [part for part in np.array_split(rows, PARTS) if len(part)]
     else:
         cuts = np.split(rows, np.cumsum([len(part.stamps) for part in parts[:-1]]))
     for test in cuts:
@@ -133,7 +131,7 @@ def _refit(known: Expectations, rows: IntArray, settings: Settings) -> Settings:
         return settings
     error = measured - base.mean
     sd = scattered(base, measured, settings, None).of(base)[1]
-    use = base.place & (np.abs(np.nan_to_num(error / sd, nan=np.inf)) < _OUTLIER)
+    use = base.place & (np.abs(np.nan_to_num(error / sd, nan=np.inf)) < OUTLIER)
     keys, columns, sizes = [], [], []
     for key, size, change in changes:
         column = change[use] / sd[use]

@@ -15,7 +15,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import Drive, driven, prepare_all
 from kurumaisu.critic.heldout.corrected_scans import Corrected, corrected
-from kurumaisu.critic.heldout.drive_gain import rmse_gain
+from kurumaisu.critic.heldout.drive_gain import BLOCK, rmse_gain
 from kurumaisu.critic.ranges.scans.beams import laser_of
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import SlamGain
@@ -30,10 +30,8 @@ FEWEST = 50  # scans of which a path is made
 _MOST = 400  # scans, at 4 to 8 ms each
 _LEAST_APART = 0.15  # [s] between them, where there are more than that
 _GAP = 0.5  # [s] between poses over which the reference is not interpolated
-_BLOCK = 5.0  # [s] resampled as a whole
 _SEEDS = (1, 2)  # of the particle filter: its path is drawn
-Settings = Sequence[EffectSetting]
-Refit = Callable[[str], Settings]  # what extends the model, fitted without the run of this name
+Refit = Callable[[str], Sequence[EffectSetting]]  # what extends the model, fitted without the run of this name
 
 
 @dataclass(frozen=True)
@@ -85,10 +83,10 @@ def _compared(recording: Recording, run: Run, model: Model, refit: Refit) -> Dow
         blocks = [_blocks(side, i) for side in sides]
         gains.append(rmse_gain(blocks[0], blocks[1], unit))
     gain = SlamGain(run.name, len(sides[0].times), *gains)
-    return Downstream(words(gain), gain, sides[0].truth[:, :2], sides[0].poses[:, :2], sides[1].poses[:, :2])
+    return Downstream(sentence(gain), gain, sides[0].truth[:, :2], sides[0].poses[:, :2], sides[1].poses[:, :2])
 
 
-def words(gain: SlamGain) -> str:
+def sentence(gain: SlamGain) -> str:
     """Return in a sentence what SLAM gains."""
     p, h = gain.position, gain.heading
     text = (
@@ -139,7 +137,7 @@ def _rows(run: Run) -> list[int]:
     return out
 
 
-def _log(run: Run, model: Model, settings: Settings, scans: Corrected) -> ScanLog:
+def _log(run: Run, model: Model, settings: Sequence[EffectSetting], scans: Corrected) -> ScanLog:
     slam = import_module("kurumaisu.slam")
     drive = with_covariates_but_place(prepare_all(run, model, float(scans.stamps[-1]) + 1.0), run)
     times, poses = replay.odometry(_begun(drive), model, settings)
@@ -174,5 +172,5 @@ def _mapped(log: ScanLog, reference: Series) -> _Path:
 
 
 def _blocks(side: _Path, column: int) -> list[FloatArray]:
-    index = ((side.times - side.times[0]) // _BLOCK).astype(int)
+    index = ((side.times - side.times[0]) // BLOCK).astype(int)
     return [side.squares[:, index == i, column].ravel() for i in np.unique(index)]

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Here a probability becomes a word: findings of drives and scans become one verdict and the story of the report."""
+"""Here a probability becomes a word: drive_verdict.py and explain.py for the drives, scan_verdict.py for the scans."""

@@ -17,6 +17,7 @@ from kurumaisu.critic.noise import base_noise
 from kurumaisu.critic.predict import parameter_doubt
 from kurumaisu.critic.unknown import beyond_catalogue, comparison, joint_fit
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve
+from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.prior import odds
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.params import EffectSetting, Model
@@ -146,7 +147,7 @@ def with_curve_odds(found: search.SearchResult, p: dict[str, float]) -> search.S
 
     What a curve draws speaks for its effect, which may decide what the effects alone left open: then it is no set.
     """
-    still_open = (group for group in found.confounded if all(p[name] < search.NAMED for name in group))
+    still_open = (group for group in found.confounded if all(p[name] < NAMED for name in group))
     return replace(found, p=p, confounded=tuple(still_open))
 
 

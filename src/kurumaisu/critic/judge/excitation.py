@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine.catalogue import Term, catalogue
+from kurumaisu.critic.engine.catalogue import SHOWS, Term, catalogue
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment import design
 from kurumaisu.critic.experiment.proposal import DECIDED
@@ -20,7 +20,6 @@ from kurumaisu.critic.values.verdict import NextExperiment
 from kurumaisu.experiments import Script
 from kurumaisu.params import Model
 
-_SHOWS = 3.0  # whitened norm from which an effect of the usual size can be seen at all
 _FEW = 0.5  # share of the catalogue below which what could be seen is too little to say that nothing is missing
 _REST = 1e-3  # [m/s], [rad/s] inputs below are none
 _SHORT = 15.0  # [s] in all: too little to tell effects from noise
@@ -86,7 +85,7 @@ def _supplier(model: Model, scripts: Sequence[Script], wanted: Sequence[str]) ->
     for script in scripts:
         if design.possible(script, model):
             sizes = _sizes(Problem([design.planned(script, model, ())], model, base_noise.START, ()), terms)
-            shown = tuple(name for name in wanted if sizes[name] >= _SHOWS)
+            shown = tuple(name for name in wanted if sizes[name] >= SHOWS)
             nats = float(np.mean([min(0.5 * sizes[name] ** 2, DECIDED) for name in wanted]))
             options.append((len(shown), -script.seconds, NextExperiment(script.name, script.seconds, nats, shown)))
     best = max(options, key=lambda option: option[:2], default=None)

@@ -4,21 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import scipy
 
-from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.covariates import with_covariates
-from kurumaisu.critic.base.drive import Drive, prepare
-from kurumaisu.critic.base.restarted_path import PICTURE, RESTART, restarted_path
-from kurumaisu.critic.engine import search, uncertain_effects
+from kurumaisu.critic.base.drive import Drive
+from kurumaisu.critic.engine import uncertain_effects
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
-from kurumaisu.critic.heldout.drive_gain import CHANNELS
+from kurumaisu.critic.heldout.drive_gain import INCREMENT_CHANNELS
 from kurumaisu.critic.heldout.materiality import (
     FELT,
     MATERIAL,
@@ -31,14 +27,14 @@ from kurumaisu.critic.heldout.materiality import (
 from kurumaisu.critic.judge import intervals, misfit, sentences
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
+from kurumaisu.critic.judge.overlays import overlays
 from kurumaisu.critic.values.criticism import Criticism
-from kurumaisu.critic.values.recording import Recording, Run
-from kurumaisu.critic.values.story import Misfit, NoiseParameter, Overlay, Story
+from kurumaisu.critic.values.policy import NAMED
+from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.story import Misfit, NoiseParameter, Story
 from kurumaisu.critic.values.verdict import Cause, Estimate, Gain, Kind, Verdict
 from kurumaisu.critic.values.version import version
-from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model
-from kurumaisu.types import FloatArray
 
 # At usual rates, from which growing noise is named: alone, where less is no matter, and beside something else, which in
 # another form than ours leaves residuals that grow with the rates, too.
@@ -82,58 +78,79 @@ def criticism(
     proposal: Proposal,
 ) -> Criticism:
     """Return the criticism after a search; gain: the gain on held-out drives, None when nothing was found."""
-    problem, found, growth = made.problem, made.found, made.growth
-    best = found.best
-    shares = {name: share_of_way(problem, best.settings, _without(best, name)) for name in sorted(best.ids)}
-    nats = found.nats(best)
-    # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
-    held = confirmed(gain, nats) or (nats >= NO_NOISE and simulates_nearer(gain, tuple(CHANNELS)))
-    gains = found.enough and (held or made.untested)
-    felt = {name: share_of_noise(problem, best.settings, _without(best, name)) for name in shares}
-    matters = {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
-    told = tuple(group for group in found.confounded if not best.ids & set(group) or matters & set(group))
-    if nats >= NO_NOISE and matters and not (told or matters & set(found.named)):
-        told = (_open(found),)
-    found = replace(found, confounded=told)
-    kind = _kind(found, matters)
+    problem = made.problem
+    held, shares, matters = _materiality(made, gain)
+    found = replace(made.found, confounded=_told_sets(made.found, matters))
     fitted = {
-        name: uncertain_effects.widened_intervals(found, name, intervals.estimates(problem, best, name))
-        for name in sorted(best.ids)
+        name: uncertain_effects.widened_intervals(found, name, intervals.estimates(problem, found.best, name))
+        for name in sorted(found.best.ids)
     }
     causes = tuple(_cause(problem, found, name, fitted[name]) for name in found.named if name in matters)
-    # Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
-    asked = problem.ids is None or process_noise(problem).id in problem.ids
-    least = _GROWTH_BESIDE if made.something else _GROWTH_ALONE
-    sure = growth.p >= search.NAMED and growth.noise.growth >= least
-    if asked and sure and all(drive.source != "odom" for drive in drives):
-        kind, causes = "named", (*causes, Cause(process_noise(problem).id, growth.p, {}, growth.gain_nats))
-    settings = best.settings if kind in ("named", "confounded") else ()
+    growth = _growing_noise(made, drives)
+    kind = _kind(found, matters) if growth is None else "named"
+    settings = found.best.settings if kind in ("named", "confounded") else ()
     verdict = Verdict(
         kind,
-        causes=causes,
+        causes=causes if growth is None else (*causes, growth),
         confounded=found.confounded if kind != "none" else (),
         problems=recording.problems,
         next_experiment=proposal.experiment,
         gain=gain,
     )
+    details = sentences.details(problem, found, drives, fitted, shares, matters)
     story = Story(
         recording=recording.name,
         model=problem.model.name,
         headline=sentences.headline(verdict, found, matters, shares),
-        details=(
-            *sentences.details(problem, found, drives, fitted, shares, matters),
-            *((sentences.UNTESTED,) if matters and not held else ()),
-        ),
+        details=(*details, *((sentences.UNTESTED,) if matters and not held else ())),
         pose_source=_pose_source(recording),
         provenance=_provenance(recording),
         overlays=overlays(recording, problem.model, settings or None),
         misfits=_misfits(problem, found),
         rivals=sentences.rivals(found),
         noise=_noise(problem),
-        unexplained=(*sentences.suspects(found), *misfit.remaining(problem, best)),
+        unexplained=(*sentences.suspects(found), *misfit.remaining(problem, found.best)),
         next_drive=proposal.sentence,
     )
     return Criticism(verdict, story, problem.model, (*settings, process_noise(problem)))
+
+
+def _materiality(made: Decision, gain: Gain | None) -> tuple[bool, dict[str, float], set[str]]:
+    """Return whether held-out drives confirm what was found, how far each effect moves the chair, and which matter."""
+    problem, best = made.problem, made.found.best
+    nats = made.found.nats(best)
+    # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
+    held = confirmed(gain, nats) or (nats >= NO_NOISE and simulates_nearer(gain, tuple(INCREMENT_CHANNELS)))
+    gains = made.found.enough and (held or made.untested)
+    others = {name: _without(best, name) for name in sorted(best.ids)}
+    shares = {name: share_of_way(problem, best.settings, rest) for name, rest in others.items()}
+    felt = {name: share_of_noise(problem, best.settings, rest) for name, rest in others.items()}
+    return held, shares, {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
+
+
+def _told_sets(found: SearchResult, matters: set[str]) -> tuple[tuple[str, ...], ...]:
+    """Return the sets of which one effect acts, of those that matter; the best one where something must act."""
+    best = found.best.ids
+    told = tuple(group for group in found.confounded if not best & set(group) or matters & set(group))
+    if found.nats(found.best) >= NO_NOISE and matters and not (told or matters & set(found.named)):
+        return (_open(found),)
+    return told
+
+
+def _growing_noise(made: Decision, drives: Sequence[Drive]) -> Cause | None:
+    """Return the noise of the rates as a cause, where it grows with them for sure.
+
+    Odometry as input is itself measured, and errs more the faster the robot moves: no finding about the robot.
+    """
+    problem, growth = made.problem, made.growth
+    name = process_noise(problem).id
+    least = _GROWTH_BESIDE if made.something else _GROWTH_ALONE
+    sure = growth.p >= NAMED and growth.noise.growth >= least
+    if (problem.ids is not None and name not in problem.ids) or not sure:
+        return None
+    if any(drive.source == "odom" for drive in drives):
+        return None
+    return Cause(name, growth.p, {}, growth.gain_nats)
 
 
 def _without(fit: Fit, name: str) -> tuple[EffectSetting, ...]:
@@ -194,37 +211,6 @@ def _misfits(problem: Problem, found: SearchResult) -> tuple[Misfit, ...]:
     return misfit.figures(problem, fit.settings, sorted(fit.ids))
 
 
-def overlays(
-    recording: Recording, model: Model, settings: Sequence[EffectSetting] | None = None
-) -> tuple[Overlay, ...]:
-    """Return a picture of every run that is whole enough for one; settings: what extends the model, if anything."""
-    drawn = []
-    for run in recording.runs:
-        with suppress(Error):
-            drawn.append(_overlay(run, model, settings, held_out=run.name in recording.test))
-    return tuple(drawn)
-
-
-def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *, held_out: bool) -> Overlay:
-    drive = with_covariates(prepare(run, model, PICTURE), run)
-    baseline, off = _restarted(drive, replay.path(drive, model, ()))
-    extended, off_extended = None, None
-    if settings is not None:
-        extended, off_extended = _restarted(drive, replay.path(drive, model, settings))
-    path = drive.poses[:, :2]
-    return Overlay(drive.name, path, baseline, extended, held_out, RESTART, off, off_extended, drive.times)
-
-
-def _restarted(drive: Drive, path: FloatArray) -> tuple[FloatArray, float | None]:
-    """Return a simulated path (n, 2) in pieces that begin at measured poses, nan between, and how far off they end."""
-    pieces, off = [], []
-    for rows, poses in restarted_path(drive, path):
-        pieces += [poses[:, :2], np.full((1, 2), np.nan)]
-        if drive.times[rows][-1] - drive.times[rows][0] > RESTART / 2:
-            off.append(np.sum((poses[-1] - drive.poses[rows][-1])[:2] ** 2))
-    return np.concatenate(pieces)[:-1], float(np.sqrt(np.mean(off))) if off else None
-
-
 def _pose_source(recording: Recording) -> str:
     return "; ".join(dict.fromkeys(run.pose_source for run in recording.runs))
 
@@ -233,6 +219,6 @@ def _provenance(recording: Recording) -> dict[str, str]:
     return {
         "runs fitted": ", ".join(recording.train),
         "runs held out": ", ".join(recording.test) or "each in turn",
-        "least probability of a named cause": f"{search.NAMED:g}",
+        "least probability of a named cause": f"{NAMED:g}",
         "kurumaisu, numpy, scipy": f"{version()}, {np.__version__}, {scipy.__version__}",
     }

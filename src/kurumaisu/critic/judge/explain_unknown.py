@@ -29,6 +29,7 @@ from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
 from kurumaisu.critic.judge.misfit import moments
+from kurumaisu.critic.judge.overlays import overlays
 from kurumaisu.critic.unknown import sentences, shapes
 from kurumaisu.critic.unknown.beyond_catalogue import Beyond
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve, fit_with_curve
@@ -70,7 +71,7 @@ def criticism(
         beside.story,
         headline=sentences.headline(extension),
         details=(words, *beside.story.details),
-        overlays=explain.overlays(recording, problem.model, extension.settings),
+        overlays=overlays(recording, problem.model, extension.settings),
         misfits=(figure(problem, extension), *(beside.story.misfits if fit.ids else ())),
         rivals=tuple(_rivals(found, beyond)),
     )
@@ -140,7 +141,7 @@ def figure(problem: Problem, extension: FitWithCurve) -> Misfit:
     at = shapes.grid(extension)
     mean, sd = shapes.band(extension, at)
     return Misfit(
-        channel=sentences.CHANNELS[extension.curve.channel],
+        channel=sentences.CHANNEL_NAMES[extension.curve.channel],
         unit=sentences.unit_of(extension.curve),
         covariate_name=covariate,
         covariate_unit=unit,

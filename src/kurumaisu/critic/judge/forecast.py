@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.noise.base_noise import Noise
-from kurumaisu.critic.predict.motion import Forecast, Settings
+from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.predict.parameter_doubt import about_curve, about_fit
+from kurumaisu.critic.values.settings import Settings
 
 
 def forecast_of(made: Decision, settings: Settings, baseline: Noise) -> Forecast:

@@ -33,7 +33,7 @@ def confirmed_part(
         return made, gain
     smaller = [fit for fit in found.fits if fit.ids and set(found.named) <= fit.ids < found.best.ids]
     for fit in smaller[:_TRIED]:
-        other = _with(made, fit)
+        other = _with_best(made, fit)
         gained = measure(other)
         if confirmed(gained, found.nats(fit)):
             return other, gained
@@ -76,7 +76,7 @@ def _without_curves(made: Decision, gain: Gain, measure: Callable[[Decision], Ga
     return (other, gained) if confirmed(gained, other.found.nats(other.found.best)) else (made, gain)
 
 
-def _with(made: Decision, fit: Fit) -> Decision:
+def _with_best(made: Decision, fit: Fit) -> Decision:
     """Return the decision with another set as the best, and the sets of rivals that its effects are in."""
     found = made.found
     fits = (fit, *(other for other in found.fits if other is not fit))

@@ -12,12 +12,12 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout.materiality import HORIZON, spans
-from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR, signal_of
+from kurumaisu.critic.unknown.effect_likeness import signal_of
+from kurumaisu.critic.values.policy import FORM_ERROR, FORM_WAYS
 from kurumaisu.critic.values.verdict import NORMAL90, Estimate
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
-_WAYS = 4  # in which a form may differ, of which one passes for another size
 _TRIES = 6  # residuals per end of an interval
 _NEAR = 0.05  # of NORMAL90, by which an end may be off
 _FARTHER = 3.0  # times as far as tried before, at most: a flat likelihood does not say how far it goes
@@ -59,7 +59,7 @@ def estimates(problem: Problem, fit: Fit, name: str) -> dict[str, Estimate]:
 def _doubt(problem: Problem, fit: Fit, columns: FloatArray) -> FloatArray:
     """Return, per column (n, k), what other forms of the causes may shift it by, in standard deviations.
 
-    Nobody can refuse a form that differs by FORM of the signal; what it does is like the signal, and is taken for
+    Nobody can refuse a form that differs by FORM_ERROR of the signal; what it does is like the signal, and is taken for
     other sizes of what does the like.
     """
     out = np.zeros(columns.shape[1])
@@ -67,7 +67,8 @@ def _doubt(problem: Problem, fit: Fit, columns: FloatArray) -> FloatArray:
         if effects.by_id(name).empirical:
             signal = signal_of(problem, fit, name)
             norms = np.linalg.norm(columns, axis=0) * np.linalg.norm(signal)
-            out += FORM_ERROR**2 * float(signal @ signal) / _WAYS * (columns.T @ signal / np.maximum(norms, 1e-12)) ** 2
+            power = FORM_ERROR**2 * float(signal @ signal)
+            out += power / FORM_WAYS * (columns.T @ signal / np.maximum(norms, 1e-12)) ** 2
     return np.asarray(np.sqrt(out))
 
 

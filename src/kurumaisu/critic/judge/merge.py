@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from kurumaisu.critic.experiment.proposal import LISTED_IDS
 from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
@@ -12,7 +13,6 @@ from kurumaisu.critic.values.verdict import Kind, Verdict
 
 _NOTHING_SAID = "none"
 _PLACES = {"hit x": "x of the walls", "hit y": "y of the walls"}
-_TOLD = 4  # ids in a sentence; the verdict has them all
 
 
 def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
@@ -67,7 +67,7 @@ def _with_drive(criticism: Criticism, finding: LaserFinding) -> Criticism:
     drive = finding.next_experiment
     if drive is None or criticism.verdict.next_experiment is not None:
         return criticism
-    first, more = ", ".join(drive.separates[:_TOLD]), len(drive.separates) - _TOLD
+    first, more = ", ".join(drive.separates[:LISTED_IDS]), len(drive.separates) - LISTED_IDS
     listed = f"{first} and {more} more" if more > 0 else first
     sentence = f"critic experiment {drive.id} ({drive.seconds:.0f} s). Its scans tell {listed} from similar effects."
     return replace(

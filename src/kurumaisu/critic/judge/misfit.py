@@ -23,7 +23,7 @@ _CLEARLY = 0.15  # of that share, by which another covariate must be better than
 _NOTEWORTHY = 4.0  # standard errors from which a remaining correlation is said
 
 # Increments as rates, in the order of their columns, with their units.
-CHANNELS = {"v": ("forward speed", "m/s"), "lateral": ("sideways speed", "m/s"), "w": ("yaw rate", "rad/s")}
+RATE_CHANNELS = {"v": ("forward speed", "m/s"), "lateral": ("sideways speed", "m/s"), "w": ("yaw rate", "rad/s")}
 _UNITS = {Follows.V: "m/s", Follows.W: "rad/s"}
 _UNITS |= {Follows.V_CHANGE: f"m/s in {_CHANGE:g} s", Follows.W_CHANGE: f"rad/s in {_CHANGE:g} s"}
 
@@ -82,7 +82,7 @@ def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[ef
     # The channel in which the effect stands out most from what is left when it is in.
     left = residual - added
     channel = int(np.argmax(np.mean(added**2, axis=0) / np.maximum(left.var(axis=0), 1e-12)))
-    name, unit = list(CHANNELS.values())[channel]
+    name, unit = list(RATE_CHANNELS.values())[channel]
     over = _followed(_covariates(problem.drives), effect.follows.value, added[:, channel])
     x = over.values if over is not None else added[:, channel]
     curve = bins(x, added[:, channel], 1)

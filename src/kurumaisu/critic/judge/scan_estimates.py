@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.engine.search import NAMED
 from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
 from kurumaisu.critic.ranges.search.normal_equations import NormalEquations
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect
+from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.verdict import NORMAL90, Cause, Estimate
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray

@@ -92,11 +92,11 @@ def _distinguishable(planned: tuple[list[Form], FloatArray], wanted: Sequence[st
         own = by_id[name]
         others = [by_id[other] for other in wanted if other != name] or [[]]
         first = own[len(own) // 2].start if own else -1
-        out.append([_left(gram, first, each) if own else 0.0 for each in others])
+        out.append([_unexplained(gram, first, each) if own else 0.0 for each in others])
     return np.array(out)
 
 
-def _left(gram: FloatArray, at: int, forms: Sequence[Form]) -> float:
+def _unexplained(gram: FloatArray, at: int, forms: Sequence[Form]) -> float:
     """Return half the square of what the likest of some forms leaves of a column."""
     whole = float(gram[at, at])
     rest = [whole]

@@ -3,51 +3,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu import effects
 from kurumaisu.critic.base.replay import extend
-from kurumaisu.critic.engine.search import NAMED, RIVAL
 from kurumaisu.critic.judge.clock_drift import without_double_delay
 from kurumaisu.critic.judge.scan_estimates import another_map, estimates_of, of_block, with_scatter
 from kurumaisu.critic.judge.scan_experiment import every_id, supplying_experiment
 from kurumaisu.critic.judge.scan_shortcomings import shortcomings
+from kurumaisu.critic.judge.scatter_verdict import MeanFit, material, open_set, scatter_effects
 from kurumaisu.critic.judge.unknown_readings import unknowns
 from kurumaisu.critic.ranges.scans import repeatability
 from kurumaisu.critic.ranges.scans.beams import gather, why_not_usable
-from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
-from kurumaisu.critic.ranges.search import block_evidence
-from kurumaisu.critic.ranges.search import misfits as pictures
 from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merged
 from kurumaisu.critic.ranges.search.dominant_effect import dominant_effect, with_dominant
-from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormSearch
+from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior, FormSearch
 from kurumaisu.critic.ranges.search.large_effect import large_effect
 from kurumaisu.critic.ranges.search.mean_effects import MeanEffects, gain_of, mean_effects, refitted, settled
-from kurumaisu.critic.ranges.search.misfits import misfits, noise_rows
+from kurumaisu.critic.ranges.search.misfits import alternatives, misfits, noise_rows
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
-from kurumaisu.critic.scatter.common_offset import beyond_own_offset, own_sd, with_common_offset
-from kurumaisu.critic.scatter.scatter_fit import ScatterFit
-from kurumaisu.critic.scatter.scatter_search import ScatterEffect, ScatterSearch
-from kurumaisu.critic.scatter.simulation import ScatterSimulator
-from kurumaisu.critic.scatter.statistics import Statistics
-from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
+from kurumaisu.critic.scatter.common_offset import own_sd
+from kurumaisu.critic.scatter.scatter_search import ScatterEffect
 from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
+from kurumaisu.critic.values.policy import NAMED
+from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
-from kurumaisu.critic.values.story import Comparison
 from kurumaisu.critic.values.verdict import Cause, NextExperiment
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
-# Share of what single readings scatter by, from which it matters that whole scans are off together: what neighbours
-# have in common beyond the simplest equation for it moves the mean of a scan as well.
-_HEARD = 0.06
-_SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
-Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What is asked of the scans; ids: the effects that may be named, None for all."""
+
+    recording: Recording
+    model: Model
+    progress: Progress
+    ids: frozenset[str] | None
+
+    def beside(self, setting: EffectSetting) -> LaserFinding:
+        """Return what the scans say with an effect in the model."""
+        self.progress(f"laser: looking for more effects, with {setting.id} in the model")
+        return criticise_scans(self.recording, extend(self.model, [setting]), self.progress, self.ids)
 
 
 def criticise_scans(
@@ -61,62 +64,89 @@ def criticise_scans(
     if why is not None:
         drive = supplying_experiment(model, every_id(), recording.truth) if recording.world is not None else None
         return LaserFinding(refused=why, details=repeatability.sentences(recording, model), next_experiment=drive)
-
-    def rest_with(setting: EffectSetting) -> LaserFinding:
-        progress(f"laser: looking for more effects, with {setting.id} in the model")
-        return criticise_scans(recording, extend(model, [setting]), progress, ids)
-
+    question = _Question(recording, model, progress, ids)
     progress("laser: predicting the scans")
     assembly = Assembly(gather(recording, model), ids)
     progress("laser: estimating the noise")
     normal = assembly.settle(recording.truth)
-    far = large_effect(assembly.shots, ids)
-    if far is not None:
-        form = next(form for form in assembly.forms if form.id == far.id)
-        (placed,) = fit_parameters(assembly, normal, [form], [far], None, {}, recording.truth).settings
-        evidence = (1.0, FormSearch([form], normal.gram).run().best.log_likelihood)
-        return _with_rest(assembly, normal, placed, evidence, rest_with(placed[0]))
+    if (far := large_effect(assembly.shots, ids)) is not None:
+        return _large_effect_first(question, assembly, normal, far)
     progress("laser: comparing effects")
-    found = FormSearch(assembly.forms, normal.gram).run()
-    if found.best.forms:
-        assembly.refine(found.best.forms, normal.beam_noise, normal.wary)
-        shaped = [form for form in assembly.forms if form.start in {each.start for each in found.best.forms}]
-        normal = assembly.settle(recording.truth, shaped)
-        found = FormSearch(assembly.forms, normal.gram).run()
-    normal = assembly.full(normal)
+    normal, found = _searched(assembly, normal, recording.truth)
     made = mean_effects(assembly, normal, found)
-    if (wrong := another_map(made.winner, normal, float(assembly.displaced.readings.mean()))) is not None:
+    if (wrong := another_map(made.winner, normal, float(assembly.map_change.readings.mean()))) is not None:
         return LaserFinding(wrong=wrong)
     made = made.without_spurious(assembly, normal)
     progress("laser: fitting the effects found")
     fit = refitted(assembly, normal, made, recording.truth)
-    lead = dominant_effect(assembly, normal, made.fit, fit)
-    certain = lead is not None and made.found.p[lead.id] >= NAMED
-    if lead is not None and certain and all(own.id != lead.id for own in model.effects):
-        placed = next(each for each in fit.settings if each[0] is lead)
-        evidence = (min(made.found.p[lead.id], 1.0), gain_of(made, lead.id))
-        return _with_rest(assembly, normal, placed, evidence, rest_with(placed[0]))
+    if (lead := _certain_lead(model, assembly, normal, made, fit)) is not None:
+        return _lead_first(question, assembly, normal, made, lead)
     made, fit = settled(assembly, normal, made, fit, recording.truth)
-    progress("laser: comparing effects on the scatter")
-    away = 0.0 if made.winner is None else block_evidence.wall_error(made.winner, normal.gram)
-    scatter, comparison = (
-        ([], ()) if fit.assembly.strange else _scatter(assembly, fit, ids, strange=made.curve, away=away)
-    )
-    own = own_sd(model.effects)
-    if not made.curve and not fit.assembly.strange:
-        seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, own)
-        scatter = with_common_offset(scatter, seen, fit.normal.scan_noise, recording, ids)
-        scatter = beyond_own_offset(scatter, FORM_ERROR * _spread_of(assembly, normal, made), own)
-    heard = beyond_own_offset(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])), own)
-    finding = without_double_delay(_finding(assembly, normal, made, fit, heard), assembly.shots.stamps)
+    return _with_scatter(question, MeanFit(assembly, normal, made, fit))
+
+
+def _large_effect_first(
+    question: _Question, assembly: Assembly, normal: NormalEquations, far: EffectSetting
+) -> LaserFinding:
+    """Return the finding where an effect is too large for lines to lead to it: it is placed, then the rest is seen."""
+    form = next(form for form in assembly.forms if form.id == far.id)
+    (placed,) = fit_parameters(assembly, normal, [form], [far], None, {}, question.recording.truth).settings
+    evidence = (1.0, FormSearch([form], normal.gram).run().best.log_likelihood)
+    return _with_rest(assembly, normal, placed, evidence, question.beside(placed[0]))
+
+
+def _searched(
+    assembly: Assembly, normal: NormalEquations, truth: tuple[float, float] | None
+) -> tuple[NormalEquations, FormPosterior]:
+    """Return the normal equations and what acts by them, shapes refined between those of the grid."""
+    found = FormSearch(assembly.forms, normal.gram).run()
+    if found.best.forms:
+        assembly.refine(found.best.forms, normal.beam_noise, normal.wary)
+        shaped = [form for form in assembly.forms if form.start in {each.start for each in found.best.forms}]
+        normal = assembly.settle(truth, shaped)
+        found = FormSearch(assembly.forms, normal.gram).run()
+    return assembly.full(normal), found
+
+
+def _certain_lead(
+    model: Model, assembly: Assembly, normal: NormalEquations, made: MeanEffects, fit: ParameterFit
+) -> tuple[EffectSetting, dict[str, float]] | None:
+    """Return the effect beside which nothing else can be seen until it is in place, with its sds; None without one."""
+    lead = dominant_effect(assembly, normal, made.fit, fit)
+    if lead is None or made.found.p[lead.id] < NAMED or any(own.id == lead.id for own in model.effects):
+        return None
+    return next(each for each in fit.settings if each[0] is lead)
+
+
+def _lead_first(
+    question: _Question,
+    assembly: Assembly,
+    normal: NormalEquations,
+    made: MeanEffects,
+    lead: tuple[EffectSetting, dict[str, float]],
+) -> LaserFinding:
+    """Return the finding with that effect, and the rest as it is seen beside it."""
+    name = lead[0].id
+    evidence = (min(made.found.p[name], 1.0), gain_of(made, name))
+    return _with_rest(assembly, normal, lead, evidence, question.beside(lead[0]))
+
+
+def _with_scatter(question: _Question, mean: MeanFit) -> LaserFinding:
+    """Return the finding of what acts on the mean and on the scatter, with what the report shows of it."""
+    question.progress("laser: comparing effects on the scatter")
+    assembly, normal, made = mean.assembly, mean.normal, mean.made
+    own = own_sd(question.model.effects)
+    scatter, comparison = scatter_effects(mean, question.recording, question.ids, own)
+    heard = material(scatter, normal, own)
+    finding = without_double_delay(_finding(assembly, normal, made, mean.fit, heard), assembly.shots.stamps)
     slight = tuple(each.setting.id for each in scatter if each not in heard)
     words = tuple(
         f"{name}: detectable, but too small to matter, compared with the scatter of single readings." for name in slight
     )
     finding = replace(finding, small=(*finding.small, *slight), details=(*finding.details, *words))
-    finding = replace(finding, next_experiment=_next(finding, assembly, recording, model))
+    finding = replace(finding, next_experiment=_next(finding, assembly, question.recording, question.model))
     shown = misfits(assembly, normal, made.parts())
-    return replace(finding, pictures=Pictures(shown, pictures.alternatives(made.found), noise_rows(normal), comparison))
+    return replace(finding, pictures=Pictures(shown, alternatives(made.found), noise_rows(normal), comparison))
 
 
 def _with_rest(
@@ -143,29 +173,6 @@ def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model
     if not open_ids and not shortcomings(assembly):
         return None
     return supplying_experiment(model, open_ids or every_id(), recording.truth)
-
-
-def _scatter(
-    assembly: Assembly, fit: ParameterFit, ids: frozenset[str] | None, *, strange: bool, away: float
-) -> tuple[list[ScatterEffect], tuple[Comparison, ...]]:
-    """Return the effects on how readings scatter about the best fit of their mean, and what they mend.
-
-    strange: something that is in no catalogue acts on the mean. A curve misses steps and edges of it, nobody can say
-    how far, so that errors about it say nothing of scatter. away [m]: by how far ends of walls may be elsewhere.
-    """
-    rows = fit.assembly.smooth_rows(_SCATTERED)
-    few = fit.assembly.thinned(rows)
-    few.geometry &= usable_beams(few.shots, few.marks.seen, few.marks.base, away)
-    statistics = Statistics(few, fit.normal.scan_noise)
-    means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
-    means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
-    measured = few.shots.measured
-    seen = statistics.of(measured, np.where(np.isfinite(measured), fit.left[rows], np.nan))
-    heard = ~statistics.of_errors() | (not strange)
-    simulate = ScatterSimulator(few, statistics, fit.missed[rows])
-    search = ScatterSearch(ScatterFit(simulate, seen, sorted(means), ids, heard))
-    found = search.run()
-    return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
 
 def _finding(
@@ -198,16 +205,8 @@ def _finding(
     small = tuple(name for name in sizes if name not in matters and p.get(name, 0.0) >= NAMED)
     details = (_noise_sentences(assembly, normal), *shortcomings(assembly), *_sentences(sizes, small))
     causes, added = with_scatter(causes, settings, scatter)
-    confounded += tuple(group for group in map(_set_of, scatter) if group)
+    confounded += tuple(group for group in map(open_set, scatter) if group)
     return LaserFinding(causes, confounded, unknown, added, details, small=small)
-
-
-def _set_of(scatter: ScatterEffect) -> tuple[str, ...]:
-    """Return the effects of which one makes readings scatter so, where it is not certain which."""
-    every = {scatter.setting.id: scatter.p, **scatter.rivals}
-    group = tuple(sorted(name for name, p in every.items() if p >= RIVAL or name == scatter.setting.id))
-    certain = len(group) > 1 and sum(every[name] for name in group) >= NAMED
-    return group if certain and scatter.p < NAMED else ()
 
 
 def _confused(assembly: Assembly, normal: NormalEquations, made: MeanEffects, causes: Sequence[Cause]) -> Groups:
@@ -252,15 +251,3 @@ def size_of(change: FloatArray) -> float:
     """Return how far [m] an effect moves the readings that it moves: of dark walls, say, not divided by all."""
     power = change.astype(float) ** 2
     return float(np.sqrt(np.sum(power**2) / max(float(np.sum(power)), 1e-300)))
-
-
-def _spread_of(assembly: Assembly, normal: NormalEquations, made: MeanEffects) -> float:
-    """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others.
-
-    In the curves that some of it may follow instead no scans are off together.
-    """
-    valid, blocks = normal.beam_noise.valid, {free.id for free in assembly.free}
-    parts = [part for part in made.parts() if part.id in blocks or effects.by_id(part.id).empirical]
-    parts = [part for part in parts if part.id not in made.others]
-    moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in parts]
-    return float(np.std(sum(moved))) if moved else 0.0

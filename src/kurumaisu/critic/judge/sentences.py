@@ -14,6 +14,7 @@ from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.heldout.materiality import HORIZON, MATERIAL
 from kurumaisu.critic.values.digits import quantities, with_interval
+from kurumaisu.critic.values.policy import NAMED, RIVAL
 from kurumaisu.critic.values.story import Alternative
 from kurumaisu.critic.values.verdict import Cause, Estimate, Verdict, grouped
 
@@ -46,7 +47,7 @@ def headline(verdict: Verdict, found: SearchResult, matters: set[str], shares: d
         return f"No effect matters: {listed} is detectable, but too small to improve the simulation."
     # Nothing is near where nothing of the base was looked for.
     nearest = max(found.p, key=lambda name: found.p[name], default=None)
-    if nearest is not None and found.p[nearest] >= search.RIVAL:
+    if nearest is not None and found.p[nearest] >= RIVAL:
         return f"No effect can be named: noise explains these drives as well. The nearest suspect is {nearest}."
     return "These drives show no effect that the model lacks."
 
@@ -112,12 +113,12 @@ def _weight(name: str, found: SearchResult, shares: dict[str, float], matters: s
         return ": detectable, but too small to matter" if small else ": not confirmed on held-out data"
     if any(name in group for group in found.confounded):
         return ": a similar effect may act instead"
-    return "" if found.p[name] >= search.NAMED else ": not certain enough to be named"
+    return "" if found.p[name] >= NAMED else ": not certain enough to be named"
 
 
 def suspects(found: SearchResult) -> tuple[str, ...]:
     """Return a sentence on the effects that may act, for all that these drives show."""
-    some = sorted((name for name in found.p if search.RIVAL <= found.p[name] < search.NAMED), key=lambda n: -found.p[n])
+    some = sorted((name for name in found.p if RIVAL <= found.p[name] < NAMED), key=lambda n: -found.p[n])
     if not some:
         return ()
     listed = ", ".join(f"{name} (p = {found.p[name]:.2f})" for name in some)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How reference and motion err at random, estimated on every recording: base_noise.py has the noise of the poses."""
+"""How reference and motion err at random, estimated on every recording: the noise of the poses is in base_noise.py."""

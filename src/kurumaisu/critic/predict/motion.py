@@ -17,10 +17,10 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.critic.base.drive import POSE_INTERVAL, Drive
 from kurumaisu.critic.noise.base_noise import Noise, whitened
-from kurumaisu.params import EffectSetting, Model
+from kurumaisu.critic.values.settings import Settings
+from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
-Settings = tuple[EffectSetting, ...]
 _SAME = 1e-6  # [s] within which a stamp is meant
 _MEMORY = 6.0  # time constants of the noise that are looked back on
 _LEAST_MEMORY = 5.0  # [s]

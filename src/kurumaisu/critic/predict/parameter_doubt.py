@@ -12,10 +12,10 @@ from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Fit, Problem, covariance
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
-Settings = tuple[EffectSetting, ...]
 _SLIGHT = 1e-3  # share of the largest direction's whitened size below which one does not count
 
 

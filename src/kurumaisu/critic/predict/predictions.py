@@ -18,15 +18,15 @@ from kurumaisu.critic.predict.scan_poses import ScanPoses
 from kurumaisu.critic.ranges.scans.beams import why_not_usable
 from kurumaisu.critic.values.prediction import Prediction
 from kurumaisu.critic.values.recording import Recording, Run
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.errors import Error
-from kurumaisu.params import EffectSetting, Model
+from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
 COLUMNS = ("run", "channel", "t0", "t1", "beam", "mean", "sd")
-CHANNELS = ("dx", "dy", "dtheta")
+MOTION_CHANNELS = ("dx", "dy", "dtheta")
 RANGE = "range"
 FILE = "prediction.csv"
-Settings = tuple[EffectSetting, ...]
 
 
 def asked(recording: Recording) -> tuple[Run, ...]:
@@ -115,5 +115,5 @@ def write_predictions(path: Path, predictions: Sequence[Prediction]) -> None:
 
 def _rows(one: Prediction) -> Iterator[tuple[str | float | int, ...]]:
     for i, (mean, sd) in enumerate(zip(one.means.tolist(), one.sds.tolist(), strict=True)):
-        channel, beam = (RANGE, i) if one.is_scan else (CHANNELS[i], "")
+        channel, beam = (RANGE, i) if one.is_scan else (MOTION_CHANNELS[i], "")
         yield one.run, channel, repr(one.t0), repr(one.t1), beam, f"{mean:.9g}", f"{sd:.6g}"

@@ -14,7 +14,6 @@ from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-Settings = Sequence[EffectSetting]
 _PLACE = ("x", "y", "heading")  # that a drive knows of itself, from its poses
 _PASSES = 2  # of a path that depends on where it leads
 _NOTHING = 1e-9  # [m], [rad]
@@ -23,7 +22,9 @@ _NOTHING = 1e-9  # [m], [rad]
 class Paths:
     """Paths by a model and by others that it might as well be, all on the same inputs."""
 
-    def __init__(self, drive: Drive, model: Model, settings: Settings, others: Sequence[Settings]) -> None:
+    def __init__(
+        self, drive: Drive, model: Model, settings: Sequence[EffectSetting], others: Sequence[Sequence[EffectSetting]]
+    ) -> None:
         """Take others: settings that each lie one standard deviation from those given, independently."""
         self._model, self._settings = model, settings
         drive = drive if len(drive.poses) else drive.seen_at(np.array([drive.start]), np.zeros((1, 3)))
@@ -69,8 +70,8 @@ class Paths:
             poses = poses + np.array([0.0, 0.0, there[0, 2] - poses[0, 2]])  # the heading that leads to the last one
         return path
 
-    def _run(self, drive: Drive, settings: Settings) -> FloatArray:
-        return replay.seen(replace(drive, times=self._times), self._model, settings)
+    def _run(self, drive: Drive, settings: Sequence[EffectSetting]) -> FloatArray:
+        return replay.measured_poses(replace(drive, times=self._times), self._model, settings)
 
     def _of(self, path: FloatArray, times: FloatArray) -> FloatArray:
         return geometry.interpolate(self._times, path, times)

@@ -12,6 +12,7 @@ from scipy.optimize import minimize
 from kurumaisu import effects
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, hits_of, predict, thin
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
+from kurumaisu.critic.values.robust import MAD
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -20,12 +21,11 @@ _START = (1.0, 0.005, 0.005, 3e-4)  # factor on the laser's own deviation; pose 
 _SPREAD = (0.4, 1.5, 1.5, 1.5)
 _KNOWN = (0.4, 0.5, 0.5, 1.5)
 _MOVE = np.array([0.006, 0.006, 0.006])  # [m, m, rad] by which poses are moved to see what their errors do
-_OUTLIER = 5.0  # deviations from which a reading does not say how wide the others scatter
+OUTLIER = 5.0  # deviations from which a reading does not say how wide the others scatter
 _PROBE = 2  # scans on which it is tried what is drawn
 _CAP = 6.0  # deviations that an outlier counts as
 _FEWEST = 50  # readings
 _LEAST = 1e-4  # [m]
-Settings = Sequence[EffectSetting]
 
 
 @dataclass(frozen=True)
@@ -60,20 +60,20 @@ class ScanModel:
         return what.mean, np.where(np.isfinite(what.mean), np.maximum(sd, _LEAST), np.nan)
 
 
-def expected(shots: Shots, settings: Settings) -> Expected:
+def expected(shots: Shots, settings: Sequence[EffectSetting]) -> Expected:
     """Return what shots are to read with these effects, and what makes them scatter."""
     settings = without_random(shots, settings)
-    return seen_from(shots, settings, looks(shots, settings))
+    return expected_from(shots, settings, shifted_hits(shots, settings))
 
 
-def looks(shots: Shots, settings: Settings) -> list[BeamHits]:
+def shifted_hits(shots: Shots, settings: Sequence[EffectSetting]) -> list[BeamHits]:
     """Return what the beams meet, and what they would from poses that are moved back and forth, along each axis."""
     seen = hits_of(shots, settings, 0)
     moves = [sign * size * np.eye(3)[i] for i, size in enumerate(_MOVE) for sign in (-1.0, 1.0)]
     return [seen, *(hits_of(shots, settings, 0, shift=move, like=seen) for move in moves)]
 
 
-def seen_from(shots: Shots, settings: Settings, around: Sequence[BeamHits]) -> Expected:
+def expected_from(shots: Shots, settings: Sequence[EffectSetting], around: Sequence[BeamHits]) -> Expected:
     """Return what expected does; settings: without what is drawn; around: of looks with the same settings."""
     seen = around[0]
     mean = predict(shots, settings, seen, 0)
@@ -91,7 +91,7 @@ def seen_from(shots: Shots, settings: Settings, around: Sequence[BeamHits]) -> E
     return Expected(mean, parts, shared, usable_beams(shots, seen, np.nan_to_num(mean)))
 
 
-def without_random(shots: Shots, settings: Settings) -> Settings:
+def without_random(shots: Shots, settings: Sequence[EffectSetting]) -> Sequence[EffectSetting]:
     """Return the effects without those of their parameters whose mark on the mean is drawn: nobody can expect it."""
     few, out = thin(shots, _PROBE), list(settings)
     for i, setting in enumerate(settings):
@@ -106,12 +106,12 @@ def without_random(shots: Shots, settings: Settings) -> Settings:
     return tuple(out)
 
 
-def _steady(shots: Shots, settings: Settings) -> bool:
+def _steady(shots: Shots, settings: Sequence[EffectSetting]) -> bool:
     drawn = [predict(shots, settings, hits_of(shots, settings, seed), seed) for seed in (0, 1)]
     return np.array_equal(drawn[0], drawn[1], equal_nan=True)
 
 
-def fit_scatter(shots: Shots, settings: Settings, truth: tuple[float, float] | None) -> ScanModel:
+def fit_scatter(shots: Shots, settings: Sequence[EffectSetting], truth: tuple[float, float] | None) -> ScanModel:
     """Return a model of readings whose scatter is that of measured ones; truth: known sd of the reference's poses."""
     what = expected(shots, settings)
     return scattered(what, shots.measured, tuple(settings), truth)
@@ -130,7 +130,7 @@ def scattered(
     for _ in range(2):
         z = error / ScanModel(settings, factors, (1.0, 1.0)).of(what)[1]
         middle = float(np.median(np.abs(z[inside]))) if inside.any() else 1.0
-        near = inside & (np.abs(np.nan_to_num(z)) < _OUTLIER * 1.4826 * max(middle, 0.1))
+        near = inside & (np.abs(np.nan_to_num(z)) < OUTLIER * MAD * max(middle, 0.1))
         if near.sum() < _FEWEST:
             break
         factors = _factors(Joint(what, error, near), start, np.array(_SPREAD if truth is None else _KNOWN))

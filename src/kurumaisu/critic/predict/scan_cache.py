@@ -6,14 +6,14 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 
 from kurumaisu import effects
-from kurumaisu.critic.predict.scan import Expected, looks, seen_from, without_random
+from kurumaisu.critic.predict.scan import Expected, expected_from, shifted_hits, without_random
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import IntArray
 
 _MOST = 24  # models whose expectations are kept: 3 MB each for 60 scans
 _PLACES = 2  # likewise of what beams meet: 18 MB
-Settings = tuple[EffectSetting, ...]
 
 
 class Expectations:
@@ -34,7 +34,7 @@ class Expectations:
         plain = self._plain[asked]
         key = _key(plain)
         if key not in self._known:
-            found = seen_from(self.shots, plain, self._seen(plain))
+            found = expected_from(self.shots, plain, self._seen(plain))
             _forget(self._known, _MOST)
             self._known[key] = found
         return self._known[key]
@@ -49,7 +49,7 @@ class Expectations:
         placing = [each for each in settings if each.id in self._own or not _reads(each.id)]
         key = _key(placing)
         if key not in self._looks:
-            around = looks(self.shots, settings)
+            around = shifted_hits(self.shots, settings)
             _forget(self._looks, _PLACES)
             self._looks[key] = around
         return self._looks[key]

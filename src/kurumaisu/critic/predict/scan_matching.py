@@ -8,20 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.predict.scan import ScanModel, expected, fit_scatter
+from kurumaisu.critic.predict.scan import OUTLIER, ScanModel, expected, fit_scatter
 from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
 from kurumaisu.critic.ranges.scans.beams import Shots, Track, some_scans
 from kurumaisu.critic.values.recording import Run
-from kurumaisu.params import EffectSetting
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.types import FloatArray, IntArray
 
 _REACH = 0.45  # [s] for which an error of the pose lasts
 _WITHIN = 0.5  # [m], [rad] that the chair may have moved meanwhile
 _MOST = 3  # scans that are looked back on
-_OUTLIER = 5.0  # deviations
 _SHARES = (0.0, 0.5, 1.0)  # of the correction that are tried
 _FEWEST = 10  # scans to try them on
-Settings = tuple[EffectSetting, ...]
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ def _density(model: ScanModel, shots: Shots) -> float:
     means, sds = model.predict(shots)
     z = (shots.measured - means) / sds
     use = np.isfinite(z)
-    return -float(np.mean(0.5 * np.minimum(z[use] ** 2, _OUTLIER**2) + np.log(sds[use])))
+    return -float(np.mean(0.5 * np.minimum(z[use] ** 2, OUTLIER**2) + np.log(sds[use])))
 
 
 def pose_errors(shots: Shots, run: Run, zero: float, model: ScanModel) -> dict[int, FloatArray]:
@@ -119,7 +117,7 @@ def _errors(shots: Shots, owner: IntArray, model: ScanModel) -> dict[int, FloatA
     what = expected(shots, model.settings)
     left, sd = shots.measured - what.mean, model.of(what)[1]
     with np.errstate(invalid="ignore"):
-        use = what.place & (np.abs(left / sd) < _OUTLIER)
+        use = what.place & (np.abs(left / sd) < OUTLIER)
     plausible = np.maximum(model.factors[[1, 1, 2, 3]], 1e-6)
     out = {}
     for k in np.unique(owner).tolist():

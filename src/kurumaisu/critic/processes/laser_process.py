@@ -21,7 +21,7 @@ Tell = Callable[[str], None]
 
 
 @contextmanager
-def criticise_aside(
+def criticise_in_own_process(
     recording: Recording, model: Model, model_file: Path, ids: frozenset[str] | None
 ) -> Iterator[Callable[[Tell], LaserFinding]]:
     """Give a function that returns what the scans say, which may have been found out meanwhile.

@@ -142,7 +142,7 @@ def _against(
     if pose is None:
         return words
     times = rows.repeats(pose, rates[1])
-    words += [rows.held(times)] if times > _REPEATS or _SOME_TWICE[0] < times < _SOME_TWICE[1] else []
+    words += [rows.repeats_problem(times)] if times > _REPEATS or _SOME_TWICE[0] < times < _SOME_TWICE[1] else []
     for check in (
         rows.frozen(pose, *rates),
         rows.coarse(pose, rates[1]),

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu.critic.values.recording import Series
+from kurumaisu.critic.values.robust import third_difference_sd
 from kurumaisu.types import FloatArray
 
 _APART = 0.5  # [s] between the poses whose course is compared with their heading
 _LEVER = 0.15  # [m] a marker may be off the axle by about this: slower turns in place say nothing about the course
 _AGREES = 0.85  # resultant length from which course and heading agree [1]
-_WIN = 15.0  # nats by which another reading of the heading must win
+WIN = 15.0  # nats by which another reading of the heading must win
 _OFF = np.radians(15.0)  # a heading that is off by less than this may be a real misalignment
 _TURNS = {
     1.0: "",
@@ -100,7 +101,7 @@ def _windows(pose: Series) -> tuple[FloatArray, FloatArray, FloatArray] | None:
 
 def _clearly(agreement: float, plain: float, number: float) -> bool:
     gain = number * np.log((1.02 - plain) / (1.02 - agreement))
-    return agreement > _AGREES and plain < _AGREES and gain > _WIN
+    return agreement > _AGREES and plain < _AGREES and gain > WIN
 
 
 def _independent(weight: FloatArray) -> float:
@@ -109,8 +110,7 @@ def _independent(weight: FloatArray) -> float:
 
 def position_noise(pose: Series) -> float:
     """Return a robust sd of the positions' fast noise [m], from third differences."""
-    third = np.diff(pose.values[:, :2], n=3, axis=0)
-    return float(1.4826 * np.median(np.abs(third)) / np.sqrt(20)) if len(third) else 0.0
+    return float(third_difference_sd(pose.values[:, :2], None)) if len(pose.values) > 3 else 0.0
 
 
 def _thinned(pose: Series) -> tuple[FloatArray, FloatArray, FloatArray]:

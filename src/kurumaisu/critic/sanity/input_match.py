@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kurumaisu.critic.sanity.headings import WIN
 from kurumaisu.critic.sanity.rates import SPAN, STEP, Rates, ShiftCorrelation, shift_correlation
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -23,7 +24,6 @@ _SCALE = 0.05  # clocks may differ by this share
 _PIECES = 240.0  # [s] of a drive that are compared
 _FEWEST_TURNS = 12  # changes of the input below which nearly any pace of the clocks would do
 _PIECE = 100.0  # [s] of the drive that the scales are tried on
-_WIN = 15.0  # nats by which another reading of the data must win
 _ALIKE = 0.7  # least correlation of a reading that is said
 _LEAST = (0.02, 0.02)  # [m/s], [rad/s] sd of an input below which it says nothing
 _PLAIN = (0.2, 5.0)  # factors between asked and driven that the catalogue explains, unless they are a unit's
@@ -69,12 +69,12 @@ def compare(asked: Rates, driven: Rates, name: str) -> Match:
     possible = (lags >= -STEP / 2) & (lags <= _LATE)
     base = float(straight[possible].max(initial=0.0))
     words = []
-    swapped = float(crossed[possible].max(initial=0.0)) > base + _WIN and _is_swap(pairs, crossed, possible)
+    swapped = float(crossed[possible].max(initial=0.0)) > base + WIN and _is_swap(pairs, crossed, possible)
     total = crossed if swapped else straight
     at = int(np.argmax(np.where(possible, total, -1.0)))
     best = int(np.argmax(total))
     strong = _strongest(pairs, best, swapped) > _ALIKE
-    if not _EARLY - drift < lags[best] < _LATE + drift and total[best] > total[at] + _WIN and strong:
+    if not _EARLY - drift < lags[best] < _LATE + drift and total[best] > total[at] + WIN and strong:
         words.append(
             _shift_words(name, float(lags[best]), _strongest(pairs, best, swapped), _strongest(pairs, at, swapped))
         )
@@ -115,7 +115,7 @@ def _strongest(pairs: list[list[ShiftCorrelation]], at: int, swapped: bool) -> f
 def _is_swap(pairs: list[list[ShiftCorrelation]], crossed: FloatArray, possible: BoolArray) -> bool:
     """Whether the other channel explains one well, and its own neither: a chair that veers follows both."""
     at = int(np.argmax(np.where(possible, crossed, -1.0)))
-    follows = [pairs[i][i].nats[possible].max(initial=0.0) > pairs[i][1 - i].nats[at] + _WIN for i in range(2)]
+    follows = [pairs[i][i].nats[possible].max(initial=0.0) > pairs[i][1 - i].nats[at] + WIN for i in range(2)]
     return _strongest(pairs, at, swapped=True) > _ALIKE and not any(follows)
 
 
@@ -158,7 +158,7 @@ def _scale_words(asked: Rates, driven: Rates, name: str, base: float) -> list[st
         alike = float(max(abs(one.correlation[k]) for one in found))
         if total[k] > best[0] and alike > _ALIKE + 0.1:
             best = float(total[k]), float(scale), alike
-    if best[0] < base + 2 * _WIN:
+    if best[0] < base + 2 * WIN:
         return []
     return [
         f"clocks run at different speeds: {name} and motion agree if the clock of the motion runs "
@@ -211,7 +211,7 @@ def sign_and_unit(match: Match, number: float, name: str) -> list[str]:
 
 
 def _sure(correlation: float, number: float) -> bool:
-    return bool(-0.5 * number * np.log1p(-min(correlation**2, 0.9999)) > _WIN / 2)
+    return bool(-0.5 * number * np.log1p(-min(correlation**2, 0.9999)) > WIN / 2)
 
 
 def _time_words(factor: float, name: str) -> str:

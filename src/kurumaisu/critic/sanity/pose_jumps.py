@@ -7,6 +7,7 @@ import numpy as np
 
 from kurumaisu.critic.sanity.headings import position_noise
 from kurumaisu.critic.values.recording import Series
+from kurumaisu.critic.values.robust import third_difference_sd
 from kurumaisu.types import FloatArray
 
 _FAR = 10.0  # robust sd of the reference that a jump exceeds
@@ -16,7 +17,7 @@ _HALF = 0.4  # [rad] from half a turn
 _LONG = 1.15  # of the way that the robot makes between poses at its fastest, from which a step is no drive
 _CHANCE = 5.0  # sd of a position by which noise alone may lengthen a step: 3.5 of the difference of two
 _LATE = 1.0  # [s] after which a chair has done what it was asked for
-_PAUSE = 5.0  # [s] without a pose after which nobody knows how far the robot was driven, or carried
+PAUSE = 5.0  # [s] without a pose after which nobody knows how far the robot was driven, or carried
 
 
 def problems(pose: Series, command: Series | None = None) -> list[str]:
@@ -48,9 +49,9 @@ def _heading(pose: Series) -> str | None:
     theta, dt = pose.values[:, 2], np.diff(pose.t)
     step = np.diff(theta)
     usual = float(np.quantile(np.abs(step) / dt, 0.95)) * np.maximum(dt, float(np.median(dt)))
-    noise = 1.4826 * float(np.median(np.abs(np.diff(theta, n=3)))) / np.sqrt(20)
+    noise = float(third_difference_sd(theta))
     large = np.abs(step) > np.maximum(np.maximum(2 * usual, 1.5 * _FAR * noise), _TURN)
-    odd = np.flatnonzero(large & (dt < _PAUSE))
+    odd = np.flatnonzero(large & (dt < PAUSE))
     odd = np.array([i for i in odd if i >= 4 and _lasts(theta, int(i))], dtype=int)
     if not len(odd) or float(np.median(usual)) > _TURN:
         return None
@@ -90,7 +91,7 @@ def jumps(pose: Series, slack: float = 1.0, command: Series | None = None) -> tu
     far = np.hypot(*step.T) > np.maximum(_LONG * most, most + _CHANCE * noise)
     lasting: list[int] = []
     single: list[int] = []
-    for i in np.flatnonzero((odd > np.maximum(limit, 1e-6)) & far & (dt < _PAUSE)):
+    for i in np.flatnonzero((odd > np.maximum(limit, 1e-6)) & far & (dt < PAUSE)):
         before = np.median(beside[max(0, i - 3) : i + 1], axis=0)
         after = np.median(beside[i + 1 : i + 5], axis=0)
         here = lasting if np.hypot(*(after - before)) > 0.6 * odd[i] and len(xy) - i > 5 and i >= 4 else single

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu.critic.sanity.headings import position_noise
-from kurumaisu.critic.sanity.pose_jumps import fresh
+from kurumaisu.critic.sanity.pose_jumps import PAUSE, fresh
 from kurumaisu.critic.sanity.rows import MOVING
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.types import BoolArray, FloatArray
@@ -15,7 +15,6 @@ _AROUND = 1.5  # [s] to either side that tell the speed, but
 _HALF = 8  # intervals at least
 _LEAST = 40  # intervals while driving
 _CLEAR = 3.0  # sd of the positions' noise that a usual interval's way exceeds
-_PAUSE = 5.0  # [s] without a pose after which nobody knows the speed
 _JITTER = 0.05  # [s] rms of a stamp's error, from which it is more than rows written on a grid
 _TRUE = 0.7  # of the stamps' variation that the way follows, below which
 _SURE = 4.0  # standard errors away from it the stamps are wrong
@@ -75,7 +74,7 @@ def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray] 
     time, gone = (np.convolve(each, around, mode="same") for each in (dt, way))
     speed = gone / time
     driving = speed * time / len(around) > _CLEAR * position_noise(pose)
-    driving &= np.convolve((dt > _PAUSE) | rests, around, mode="same") == 0
+    driving &= np.convolve((dt > PAUSE) | rests, around, mode="same") == 0
     driving[:half] = driving[-half:] = False
     if driving.sum() < _LEAST:
         return None

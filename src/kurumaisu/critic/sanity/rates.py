@@ -14,7 +14,7 @@ from kurumaisu.types import FloatArray
 
 STEP = 0.1  # [s] of the grid
 SPAN = 1.0  # [s] over which rates are averaged: what lags and a noisy reference do to them is then small
-# An input holds beyond its last row for as long as that [s]; see checks.LONGEST_HOLD.
+# An input holds beyond its last row for as long as that [s]; see consistency.LONGEST_HOLD.
 _HOLD = 60.0
 
 

@@ -67,7 +67,7 @@ def repeats(pose: Series, driven: Rates) -> float:
     return float(1 / (1 - min(still[moving].mean(), 0.99)))
 
 
-def held(times: float) -> str:
+def repeats_problem(times: float) -> str:
     """Return the words for poses that repeat so many times."""
     how = f"each {times:.2g} times on average" if times >= 2 else f"{1 - 1 / times:.0%} of them"
     return f"duplicate rows: poses repeat under new times, {how}, while the robot moves: keep the first"

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Here it is decided which effects change how readings scatter, by statistics of simulated and measured scans."""
+"""Here it is decided which effects change how readings scatter, mixed pixels among them (statistics.py)."""

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.special import expit
 
 from kurumaisu import effects
-from kurumaisu.critic.engine.search import NAMED, RIVAL
 from kurumaisu.critic.ranges.noise.scan_noise import CommonMode, ScanNoise
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect
+from kurumaisu.critic.values.policy import NAMED, RIVAL
 from kurumaisu.critic.values.prior import log_prior
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import NORMAL90

@@ -16,6 +16,7 @@ from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.unknown.comparison import CurveComparison, compare, no_curves
 from kurumaisu.critic.unknown.curves import Design, null_evidence, without_own_span
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve, fit_with_curve
+from kurumaisu.critic.values.policy import NAMED
 
 _ALARM = 0.01  # share of null draws with as much evidence above which a curve is not believed
 _NEVER = float(np.log(1e3 / 1e-7))  # [nat] that no draw has of the curves, of which there are hundreds
@@ -81,10 +82,10 @@ def judge(problem: Problem, found: SearchResult, progress: Callable[[str], None]
 
 def undecided(found: SearchResult, rivalry: CurveComparison) -> bool:
     """Tell whether something acts for sure, but it may as well be a curve as any effect of the best set."""
-    if not found.best.ids or found.confounded or not rivalry.rivals or rivalry.p_nothing > 1 - search.NAMED:
+    if not found.best.ids or found.confounded or not rivalry.rivals or rivalry.p_nothing > 1 - NAMED:
         return False
     surest = max(rivalry.p_effects[name] for name in found.best.ids)
-    return surest < search.NAMED <= surest + sum(rivalry.p.values())
+    return surest < NAMED <= surest + sum(rivalry.p.values())
 
 
 def _holds(problem: Problem, found: SearchResult, extension: FitWithCurve, behind: float) -> bool:

@@ -18,6 +18,7 @@ from kurumaisu.critic.unknown.designs import Designs
 from kurumaisu.critic.unknown.effect_likeness import EffectLikeness
 from kurumaisu.critic.unknown.fine_curves import fine_curves
 from kurumaisu.critic.unknown.step_curves import gains_over_own_rate, step_curves
+from kurumaisu.critic.values.prior import UNKNOWN_ODDS
 from kurumaisu.types import FloatArray
 
 # [nat] by which a curve must beat the best set of the catalogue, as many times more as evidence beside that is doubted
@@ -26,7 +27,6 @@ _BEYOND = 3.0
 # asked besides.
 _OVER_NOTHING = 1.0
 _BEHIND = 10.0  # [nat] behind the best set from which a curve that draws several of its effects speaks for them
-_ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
 _SHARE = 0.002  # posterior, as far as it is believed, from which it is asked which effect a curve draws
 _FITS = 10  # sets of the catalogue beside which curves are tried
 _JUMPING = 0.2  # share of what is outside the catalogue that jumps
@@ -87,7 +87,7 @@ def compare(problem: Problem, found: SearchResult, also: frozenset[Candidate] = 
     rivals = sorted(_with_curves(problem, designs, _tried(bare, also)), key=lambda rival: -rival.log_posterior)
     if not rivals:
         return no_curves(found)
-    plain = np.array([score + np.log1p(-_ODDS) for _, score in bare])
+    plain = np.array([score + np.log1p(-UNKNOWN_ODDS) for _, score in bare])
     total = logsumexp(np.concatenate([plain, [rival.log_posterior for rival in rivals]]))
     acting = [(float(w), fit.ids) for (fit, _), w in zip(bare, plain, strict=True)]
     likeness, ceiling = EffectLikeness(problem, found.best, designs), float(plain.max())
@@ -145,7 +145,7 @@ def _with_curves(problem: Problem, designs: Designs, fits: Sequence[tuple[Fit, f
         design = designs.about(fit)
         if design not in grams:
             grams[design] = [_gram(design.columns[:, curve.columns]) for curve in design.curves]
-        share = float(np.log(_ODDS / max(len(design.curves), 1)))
+        share = float(np.log(UNKNOWN_ODDS / max(len(design.curves), 1)))
         y, own = own_span(problem, fit)
         beside: list[SetWithCurve] = []
         # Of columns without what the fit can take up: normal equations, of which only a little changes with the fit.

@@ -20,7 +20,7 @@ from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.unknown.bases import Basis, bases
-from kurumaisu.critic.unknown.offset import CHANNELS, constant_offset
+from kurumaisu.critic.unknown.offset import OFFSET_CHANNELS, constant_offset
 from kurumaisu.critic.unknown.periods import wave_period
 from kurumaisu.critic.values.prior import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.params import EffectSetting, Model
@@ -74,7 +74,7 @@ class Design:
                     self.curves.append(Curve(channel, basis, slice(at, at + basis.size)))
                     at += basis.size
         end = max((float(drive.times[-1] - drive.start) for drive in problem.drives), default=0.0)
-        for channel in CHANNELS if self.curves else ():
+        for channel in OFFSET_CHANNELS if self.curves else ():
             if effects.smooth_id(channel, effects.MOVING) not in taken:
                 self.curves.append(Curve(channel, constant_offset(end), slice(at, at + 1)))
                 at += 1

@@ -13,11 +13,11 @@ from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, columns, own_span
 from kurumaisu.critic.unknown.designs import Designs
 from kurumaisu.critic.unknown.step_curves import StepCurve
+from kurumaisu.critic.values.policy import FORM_ERROR
 from kurumaisu.types import FloatArray
 
 _ALIKE = 0.9  # correlation of signals from which a curve draws an effect; noise alone bends a curve by as much
 _CHANCE = 3.0  # [nat] that a level more and the best of many places explain of noise
-FORM_ERROR = 0.15  # share of its signal by which a chair's fault may differ from the catalogue's equation for it
 
 
 class EffectLikeness:

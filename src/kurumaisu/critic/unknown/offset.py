@@ -14,7 +14,11 @@ from kurumaisu import effects
 from kurumaisu.critic.unknown.bases import FINER, Basis
 from kurumaisu.types import FloatArray
 
-CHANNELS = ("v", "lateral", "w")  # a share of a rate that is off by as much everywhere is a gain of the catalogue
+OFFSET_CHANNELS = (
+    "v",
+    "lateral",
+    "w",
+)  # a share of a rate that is off by as much everywhere is a gain of the catalogue
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from kurumaisu.critic.unknown.joint_fit import FitWithCurve
 from kurumaisu.critic.unknown.shapes import Shape, grid, shape_of
 
 # How a reader calls them, and their units.
-CHANNELS = {
+CHANNEL_NAMES = {
     "v": "forward speed",
     "lateral": "sideways speed",
     "w": "yaw rate",
@@ -91,14 +91,14 @@ def shape(extension: FitWithCurve, *, intervals: bool = True) -> str:
 
 def headline(extension: FitWithCurve) -> str:
     """Return the finding in one sentence."""
-    name = covariate(extension.curve)[1]
+    channel_name, name = CHANNEL_NAMES[extension.curve.channel], covariate(extension.curve)[1]
     if extension.curve.basis.covariate == effects.MOVING:
         return (
-            f"No effect in the catalogue explains the error of the {CHANNELS[extension.curve.channel]}. "
+            f"No effect in the catalogue explains the error of the {channel_name}. "
             f"It follows no known quantity: {shape(extension, intervals=False)}."
         )
     return (
-        f"No effect in the catalogue explains the error of the {CHANNELS[extension.curve.channel]}. It follows the "
+        f"No effect in the catalogue explains the error of the {channel_name}. It follows the "
         f"{name}: {shape(extension, intervals=False)}."
     )
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What passes between the rooms: recording, verdict, story; what is believed before the data (prior.py)."""
+"""What passes between the rooms: recording, verdict, story. The prior of an effect is in prior.py."""

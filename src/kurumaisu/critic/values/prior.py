@@ -92,3 +92,6 @@ def _log_mean_density(z: float, x: FloatArray, dimensions: int) -> FloatArray:
     if dimensions == 1:
         return np.asarray(np.logaddexp(-0.5 * (z - x) ** 2, -0.5 * (z + x) ** 2) - np.log(2))
     return np.asarray(-0.5 * (z - x) ** 2 + np.log(i0e(z * x)))
+
+
+UNKNOWN_ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it

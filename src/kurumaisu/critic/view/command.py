@@ -25,8 +25,8 @@ from kurumaisu.world import load_world
 _EPILOG = """\
 examples:
   view drive.bag                           one drive
-  view drives/ --report criticism          with what the critic found: the report
-                                           leads to moments and places
+  view drives/ --report criticism          with the critic's report, which leads
+                                           to moments and places
   view drives/ --runs 'monday_*' --port 0  some drives, at any free port
 
 Open the address that is printed: it holds the right to move the recording,

@@ -12,7 +12,7 @@ from kurumaisu.paper.chair import law
 from kurumaisu.paper.chair.correlation import correlations
 from kurumaisu.paper.chair.law import AxisFit
 from kurumaisu.paper.chair.samples import samples_of
-from kurumaisu.paper.options import Options
+from kurumaisu.paper.options import PaperOptions
 
 _QUICK = 99  # resamples, while it is being recorded
 WAYS = {
@@ -23,7 +23,7 @@ WAYS = {
 }
 
 
-def plan(options: Options) -> list[str]:
+def plan(options: PaperOptions) -> list[str]:
     """Return which drive to do."""
     o = options.drive
     hold = o.settle + o.window
@@ -54,7 +54,7 @@ def plan(options: Options) -> list[str]:
     ]
 
 
-def missing(runs: Sequence[Run], options: Options) -> list[str]:
+def missing(runs: Sequence[Run], options: PaperOptions) -> list[str]:
     """Return what a drive that is being recorded does not determine yet; empty: enough, and all of it."""
     quick = replace(options, bootstrap=replace(options.bootstrap, resamples=_QUICK))
     try:

@@ -28,7 +28,7 @@ def uneven(model: Model) -> Model:
     return with_effects(model, shipped("launch/uneven_floor.yaml"))
 
 
-class Track:
+class SimulatedTrack:
     """A simulated chair on which drives are recorded."""
 
     def __init__(self, model: Model, name: str = IDENTIFICATION) -> None:
@@ -44,7 +44,7 @@ class Track:
 
 def recorded(model: Model, name: str, seed: int) -> Recording:
     """Return one drive of launch/paper on a chair. Raise Error when it leaves the box."""
-    return Track(model, name).record(seed)
+    return SimulatedTrack(model, name).record(seed)
 
 
 def model_of(path: Path | None) -> Path:

@@ -15,7 +15,7 @@ from kurumaisu.paper.chair import figures, law
 from kurumaisu.paper.chair.correlation import Correlations, correlations
 from kurumaisu.paper.chair.law import AxisFit, BranchFit
 from kurumaisu.paper.chair.samples import Samples, samples_of
-from kurumaisu.paper.options import Options
+from kurumaisu.paper.options import PaperOptions
 from kurumaisu.params import Model
 
 # What was commanded is not looked at: what the D/A put out counts.
@@ -40,7 +40,7 @@ class Identification:
         return [why for fit in self.fits for why in fit.refused]
 
 
-def identify(recording: Recording, options: Options, progress: Progress) -> Identification:
+def identify(recording: Recording, options: PaperOptions, progress: Progress) -> Identification:
     """Return what a recording says; the reference pose is the particle filter's where none was measured.
 
     Raise Error when it has no voltages, no way to a pose, or is wrong data, as the critic's reader says.
@@ -66,7 +66,7 @@ def identify(recording: Recording, options: Options, progress: Progress) -> Iden
     )
 
 
-def _warnings(fits: Sequence[AxisFit], found: Correlations, options: Options) -> list[str]:
+def _warnings(fits: Sequence[AxisFit], found: Correlations, options: PaperOptions) -> list[str]:
     words = []
     if abs(found.drive) > options.drive.mixed:
         words.append(

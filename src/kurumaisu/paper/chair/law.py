@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from kurumaisu._core import AxisLaw, Branch
 from kurumaisu.paper.chair import coloured_noise, lines
 from kurumaisu.paper.chair.samples import Samples
-from kurumaisu.paper.options import Bootstrap, Options
+from kurumaisu.paper.options import Bootstrap, PaperOptions
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 SIDES = {"positive": 1.0, "negative": -1.0}
@@ -32,7 +32,7 @@ class Axis:
     sd: FloatArray
     unit: str
 
-    def rest_level(self, options: Options) -> float:
+    def rest_level(self, options: PaperOptions) -> float:
         """Return the rate below which a sample may be one at rest: what samples at neutral, and the reference, scatter.
 
         At neutral the chair stands, equations (1) and (2).
@@ -125,7 +125,7 @@ def overlaps(law: AxisLaw) -> bool:
     return bool(sign * law.positive.intercept < 0 or sign * law.negative.intercept > 0)
 
 
-def fit_axis(axis: Axis, samples: Samples, options: Options) -> AxisFit:
+def fit_axis(axis: Axis, samples: Samples, options: PaperOptions) -> AxisFit:
     """Return the law of an axis; each side is fitted, or refused, for itself."""
     rng = np.random.default_rng(options.bootstrap.seed)
     sides = [_on_side(axis, samples, side, options) for side in SIDES.values()]
@@ -134,7 +134,7 @@ def fit_axis(axis: Axis, samples: Samples, options: Options) -> AxisFit:
     return AxisFit(axis.name, axis.unit, *fits)
 
 
-def _widening(axis: Axis, samples: Samples, sides: Sequence[BoolArray], options: Options) -> list[FloatArray]:
+def _widening(axis: Axis, samples: Samples, sides: Sequence[BoolArray], options: PaperOptions) -> list[FloatArray]:
     """Return for each side by how much noise that outlasts a block widens slope and intercept, as variances (2,)."""
     lined = [on if _spread(axis, on, options) else np.zeros_like(on) for on in sides]
     used = np.logical_or(*lined)
@@ -163,7 +163,7 @@ def _influence(volts: FloatArray, line: lines.Lines) -> FloatArray:
     return np.stack([of_a, of_b + line.intercept * of_a])  # intercept = -b / a, and b = -intercept / slope
 
 
-def _on_side(axis: Axis, samples: Samples, side: float, options: Options) -> BoolArray:
+def _on_side(axis: Axis, samples: Samples, side: float, options: PaperOptions) -> BoolArray:
     """Return which samples are steady and move to a side.
 
     By what the reference saw: on a chair whose dead zone is wider than its model's, a command is no motion. But not
@@ -183,17 +183,17 @@ def _on_side(axis: Axis, samples: Samples, side: float, options: Options) -> Boo
     return np.asarray(on)
 
 
-def _spread(axis: Axis, on: BoolArray, options: Options) -> bool:
+def _spread(axis: Axis, on: BoolArray, options: PaperOptions) -> bool:
     """Return whether there are voltages enough for a line."""
     return bool(on.any()) and bool(np.ptp(axis.volts[on]) >= options.drive.steady)
 
 
-def _line(axis: Axis, on: BoolArray, options: Options) -> lines.Lines:
+def _line(axis: Axis, on: BoolArray, options: PaperOptions) -> lines.Lines:
     return lines.robust(axis.rate[on], axis.volts[on], np.ones(int(on.sum())), options.drive.voltage_sd)
 
 
 def _fit_branch(
-    axis: Axis, samples: Samples, on: BoolArray, wider: FloatArray, options: Options, rng: np.random.Generator
+    axis: Axis, samples: Samples, on: BoolArray, wider: FloatArray, options: PaperOptions, rng: np.random.Generator
 ) -> BranchFit:
     rate, volts, block = axis.rate[on], axis.volts[on], samples.block[on]
     blocks = len(np.unique(block))
@@ -245,7 +245,7 @@ def interval(value: float, drawn: FloatArray, blocks: int, wider: float, options
     return Coefficient(value, value - half, value + half)
 
 
-def _refusal(slope: Coefficient, intercept: Coefficient, rate: FloatArray, unit: str, options: Options) -> str:
+def _refusal(slope: Coefficient, intercept: Coefficient, rate: FloatArray, unit: str, options: PaperOptions) -> str:
     size = np.abs(rate)
     seen = f"rates from {size.min():.2f} to {size.max():.2f} {unit}, {len(rate)} samples"
     if not slope.half <= options.drive.widest_slope * abs(slope.value):

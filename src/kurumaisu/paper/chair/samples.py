@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
-from kurumaisu.paper.options import Drive
+from kurumaisu.paper.options import DriveOptions
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 
@@ -45,7 +45,7 @@ class Samples:
         return Samples(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
 
 
-def samples_of(runs: Sequence[Run], truth: tuple[float, float] | None, options: Drive) -> Samples:
+def samples_of(runs: Sequence[Run], truth: tuple[float, float] | None, options: DriveOptions) -> Samples:
     """Return the samples of drives.
 
     truth: sd of position [m] and heading [rad] of the reference, None where unknown: then what the poses scatter about
@@ -96,7 +96,7 @@ def _scatter(rows: Sequence[_Row]) -> tuple[float, float]:
     return float(position), float(heading)
 
 
-def _windows(run: Run, options: Drive) -> list[_Row]:
+def _windows(run: Run, options: DriveOptions) -> list[_Row]:
     pose, voltage = run.pose, run.voltage
     if pose is None or voltage is None:
         raise Error(
@@ -112,7 +112,7 @@ def _windows(run: Run, options: Drive) -> list[_Row]:
     return _in_blocks(rows, options)
 
 
-def _in_blocks(rows: Sequence[_Row], options: Drive) -> list[_Row]:
+def _in_blocks(rows: Sequence[_Row], options: DriveOptions) -> list[_Row]:
     """Return rows with their blocks: stretches of steady voltages, long ones in parts of options.block."""
     found: list[_Row] = []
     block, begin = 0, -np.inf
@@ -124,7 +124,7 @@ def _in_blocks(rows: Sequence[_Row], options: Drive) -> list[_Row]:
     return found
 
 
-def _row(t: FloatArray, poses: FloatArray, voltage: Series, options: Drive) -> _Row:
+def _row(t: FloatArray, poses: FloatArray, voltage: Series, options: DriveOptions) -> _Row:
     """Return v and w by least squares, and the mean of the voltages with the weights that these give to each moment."""
     about = t - t.mean()
     slope = about / (about @ about)  # slope @ y is the slope of y

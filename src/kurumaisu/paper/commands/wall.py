@@ -15,7 +15,7 @@ from kurumaisu.paper.laser import conjecture, figures, law_file, wall_experiment
 from kurumaisu.paper.laser import law as laser_law
 from kurumaisu.paper.laser.law import NAMES, Agreement, LaserLaw
 from kurumaisu.paper.laser.wall import Ahead, ahead_of, places_of
-from kurumaisu.paper.options import Options, load_options
+from kurumaisu.paper.options import PaperOptions, load_options
 from kurumaisu.params import load_model
 from kurumaisu.riddles import figure9, lab
 
@@ -51,7 +51,7 @@ def figures_wall_of(
     return 0
 
 
-def bench(model: Path, options: Options, out: Path) -> Path:
+def bench(model: Path, options: PaperOptions, out: Path) -> Path:
     """Write the bench's model file into a folder, and return its path."""
     path = out / "bench.yaml"
     drawing.write(path, "")
@@ -60,7 +60,7 @@ def bench(model: Path, options: Options, out: Path) -> Path:
 
 
 def fit(
-    recording: Recording, distances: Sequence[float], model: Path, tape_sd: float, options: Options, out: Path
+    recording: Recording, distances: Sequence[float], model: Path, tape_sd: float, options: PaperOptions, out: Path
 ) -> tuple[LaserLaw, list[Ahead]]:
     """Return equation (4) of a recording and what it is made of; draw figures 7, 8 and 9."""
     if recording.invalid:
@@ -76,7 +76,7 @@ def fit(
     return law, ahead
 
 
-def judged(ahead: Sequence[Ahead], model: Path, options: Options) -> list[Agreement]:
+def judged(ahead: Sequence[Ahead], model: Path, options: PaperOptions) -> list[Agreement]:
     """Return how each distance agrees with the model's (4)."""
     error: LaserError = load_model(model).laser.error
     resolution = wall_experiment.resolution(model)

@@ -18,7 +18,7 @@ from kurumaisu.critic.values.recording import Recording
 from kurumaisu.paper.laser import law as laser_law
 from kurumaisu.paper.laser.law import LaserLaw
 from kurumaisu.paper.laser.wall import ahead_of, places_of
-from kurumaisu.paper.options import Options
+from kurumaisu.paper.options import PaperOptions
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.riddles import lab
 
@@ -28,7 +28,7 @@ _NORMAL, _GROWTH = (0.0020, -0.0002, 0.00015), 0.25
 
 
 def answer(
-    recording: Recording, distances: Sequence[float], model: Model, resolution: float, options: Options
+    recording: Recording, distances: Sequence[float], model: Model, resolution: float, options: PaperOptions
 ) -> lab.Answer:
     """Return which of range and incidence the critic names, of scans with the map of their wall.
 
@@ -52,7 +52,7 @@ def _error(law: LaserLaw, model: Model, resolution: float) -> LaserError:
     )
 
 
-def tell(seed: int, resolution: float, options: Options) -> Iterator[str]:
+def tell(seed: int, resolution: float, options: PaperOptions) -> Iterator[str]:
     """Yield what the board says of data made either way, line by line."""
     yield ""
     yield "the board again, all its beams held against the law that its beams straight ahead have:"

@@ -11,11 +11,11 @@ import numpy as np
 from kurumaisu._core import LaserError
 from kurumaisu.paper import drawing
 from kurumaisu.paper.laser.law import NAMES, Agreement, LaserLaw
-from kurumaisu.paper.laser.wall import Ahead, Place
+from kurumaisu.paper.laser.wall import Ahead, WallScans
 from kurumaisu.types import FloatArray
 
 
-def scan(path: Path, place: Place) -> None:
+def scan(path: Path, place: WallScans) -> None:
     """Write figure 7: one scan in Cartesian coordinates; its data beside it."""
     points = place.points[0]
     there = np.isfinite(points).all(axis=1)
@@ -56,7 +56,7 @@ def against_distance(path: Path, places: Sequence[Ahead], law: LaserLaw, paper: 
             axis.legend()
 
 
-def setting(path: Path, places: Sequence[Place], walls: FloatArray) -> None:
+def setting(path: Path, places: Sequence[WallScans], walls: FloatArray) -> None:
     """Write figure 11: the simulated wall and the laser at each distance; beside it one scan from each, x stretched.
 
     walls: (m, 4) [m], x, y of both ends, seen from the middle of the wall's face. The scans' data go beside the file.

@@ -16,7 +16,7 @@ from kurumaisu.types import FloatArray
 
 
 @dataclass(frozen=True)
-class Place:
+class WallScans:
     """Scans at one distance [m] of a wall.
 
     ranges: (scans, beams) [m], nan and inf where there is no reading; bearings (beams,) [rad] from straight ahead;
@@ -53,7 +53,7 @@ class Ahead:
     flat_sd: float
 
 
-def places_of(recording: Recording, distances: Sequence[float], laser: Laser, options: Wall) -> list[Place]:
+def places_of(recording: Recording, distances: Sequence[float], laser: Laser, options: Wall) -> list[WallScans]:
     """Return the places of a recording: a run with scans for each distance [m], in the order of their names.
 
     laser: the model's, for a recording that does not state its fan. Raise Error naming the run and what is wrong.
@@ -65,21 +65,21 @@ def places_of(recording: Recording, distances: Sequence[float], laser: Laser, op
     return [_place(recording, run, d, laser, options) for run, d in zip(runs, distances, strict=True)]
 
 
-def _place(recording: Recording, run: Run, distance: float, laser: Laser, options: Wall) -> Place:
+def _place(recording: Recording, run: Run, distance: float, laser: Laser, options: Wall) -> WallScans:
     assert run.scan is not None
     fan = run.fan or recording.laser or laser
     ranges = run.scan.values
     if len(ranges) < options.least_scans:
         raise Error(f"{run.name}: {len(ranges)} scans at {distance:g} m, {options.least_scans} are needed")
     bearings = fan.angle_min + fan.angle_increment * np.arange(ranges.shape[1])
-    place = Place(distance, ranges, bearings, 0.0)
+    place = WallScans(distance, ranges, bearings, 0.0)
     turned = _turned(place, options)
     if abs(turned) > options.square:
         raise Error(f"{run.name}: the wall is turned by {np.degrees(turned):.1f} degrees; put it square to the laser")
-    return Place(distance, ranges, bearings, turned)
+    return WallScans(distance, ranges, bearings, turned)
 
 
-def _turned(place: Place, options: Wall) -> float:
+def _turned(place: WallScans, options: Wall) -> float:
     """Return the direction of the wall's normal [rad] by a line through the points about straight ahead."""
     near = np.abs(place.bearings) < 2 * options.ahead
     points = place.points[:, near].mean(axis=0)
@@ -91,7 +91,7 @@ def _turned(place: Place, options: Wall) -> float:
     return float(np.arctan(-slope))
 
 
-def on_wall(place: Place, options: Wall) -> FloatArray:
+def on_wall(place: WallScans, options: Wall) -> FloatArray:
     """Return the points on the wall, (n, 2) [m]: those connected to straight ahead, at the wall's distance."""
     points = place.points
     middle = float(np.nanmedian(points[:, np.abs(place.bearings) < options.ahead, 0]))
@@ -104,7 +104,7 @@ def on_wall(place: Place, options: Wall) -> FloatArray:
     return np.asarray(points[:, first:last].reshape(-1, 2))
 
 
-def ahead_of(place: Place, options: Wall) -> Ahead:
+def ahead_of(place: WallScans, options: Wall) -> Ahead:
     """Return mean and standard deviation at a distance. Raise Error where beams ahead have no readings."""
     near = np.abs(place.bearings) < options.ahead
     readings = place.ranges[:, near]

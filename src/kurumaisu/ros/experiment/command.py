@@ -19,7 +19,7 @@ from kurumaisu.experiments.supervisor import read_care
 from kurumaisu.params import load_model, shipped
 from kurumaisu.ros.experiment.drive import run_drive
 from kurumaisu.ros.experiment.places import run_places
-from kurumaisu.ros.experiment.surroundings import Ground
+from kurumaisu.ros.experiment.surroundings import ExperimentSpace
 from kurumaisu.ros.graph import wait_until_gone
 
 _HELP = """
@@ -65,7 +65,7 @@ def _run(script: Script, options: argparse.Namespace) -> str:
     model = load_model(options.model)
     stop = _Stop()
     try:
-        ground = Ground(script, model.chassis, care, options.world)
+        ground = ExperimentSpace(script, model.chassis, care, options.world)
         print(f"experiment: {options.name}: {script.seconds:.0f} s; Ctrl-C stops it", file=sys.stderr, flush=True)
         if script.kind == "places":
             return run_places(script, care, ground, stop, options.bag)

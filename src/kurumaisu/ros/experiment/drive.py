@@ -17,10 +17,10 @@ from std_msgs.msg import Bool, String
 
 from kurumaisu.errors import Error
 from kurumaisu.experiments import Script, base_limits
-from kurumaisu.experiments.supervisor import Care, Stage, Supervisor
+from kurumaisu.experiments.supervisor import Care, Progress, Supervisor
 from kurumaisu.msg import Voltages
 from kurumaisu.params import Model
-from kurumaisu.ros.experiment.surroundings import Ground
+from kurumaisu.ros.experiment.surroundings import ExperimentSpace
 from kurumaisu.ros.graph import hearers, publishers
 from kurumaisu.ros.recorder import Recorder
 from kurumaisu.ros.rotation import planar
@@ -34,7 +34,7 @@ _LATE = 3.0  # [s] of wall time after Ctrl-C for zero to be published; time may 
 
 
 def run_drive(
-    script: Script, care: Care, model: Model, ground: Ground, stop: Callable[[], bool], bag: Path | None
+    script: Script, care: Care, model: Model, ground: ExperimentSpace, stop: Callable[[], bool], bag: Path | None
 ) -> str:
     """Return why it was stopped, '' when it is done. Raise Error when it is refused."""
     topic = care.command_topic if script.kind == "drive" else VOLTAGE
@@ -63,7 +63,7 @@ def _check_limits(script: Script) -> None:
 class _Driver:
     """Between a supervisor and the topics."""
 
-    def __init__(self, script: Script, care: Care, model: Model, ground: Ground, topic: str) -> None:
+    def __init__(self, script: Script, care: Care, model: Model, ground: ExperimentSpace, topic: str) -> None:
         self._supervisor = Supervisor(script, care, ground.sources(), ground.refusal)
         self._lock = threading.Lock()  # over the supervisor, whom ROS's threads tell what they hear
         self._reference = model.reference_voltage
@@ -79,7 +79,7 @@ class _Driver:
     def run(self, stop: Callable[[], bool]) -> str:
         """Publish until the supervisor has ended; return its outcome."""
         deadline = np.inf
-        while self._supervisor.stage is not Stage.ENDED and time.monotonic() < deadline:
+        while self._supervisor.stage is not Progress.ENDED and time.monotonic() < deadline:
             if stop() and deadline == np.inf:
                 deadline = time.monotonic() + _LATE
                 self._stop("interrupted")
@@ -88,7 +88,7 @@ class _Driver:
             if said is not None:
                 self._publish(said)
             time.sleep(_GLANCE)
-        if self._supervisor.stage is not Stage.ENDED:  # time stands: zero for when it goes on
+        if self._supervisor.stage is not Progress.ENDED:  # time stands: zero for when it goes on
             self._publish(self._supervisor.rest)
             time.sleep(_LEAVE)
         return self._supervisor.outcome

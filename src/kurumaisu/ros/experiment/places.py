@@ -16,7 +16,7 @@ from kurumaisu.errors import Error
 from kurumaisu.experiments import Script
 from kurumaisu.experiments.supervisor import Care, Rest
 from kurumaisu.experiments.visit import Visit
-from kurumaisu.ros.experiment.surroundings import TRUTH, Ground
+from kurumaisu.ros.experiment.surroundings import TRUTH, ExperimentSpace
 from kurumaisu.ros.recorder import Recorder
 from kurumaisu.ros.rotation import planar, quaternion_of
 from kurumaisu.srv import SetPose
@@ -26,7 +26,9 @@ _RECORDED = ("scan", "ground_truth")
 _GLANCE = 0.01  # [s] of wall time
 
 
-def run_places(script: Script, care: Care, ground: Ground, stop: Callable[[], bool], folder: Path | None) -> str:
+def run_places(
+    script: Script, care: Care, ground: ExperimentSpace, stop: Callable[[], bool], folder: Path | None
+) -> str:
     """Return why it was stopped, '' when it is done; one bag per place. Raise Error when it is refused."""
     if ground.sources()[0] != TRUTH:
         raise Error(f"no node publishes {TRUTH}: the places are measured from the start of the chair")

@@ -18,7 +18,7 @@ from kurumaisu.world import load_world
 TRUTH, ODOM = "ground_truth", "odom"
 
 
-class Ground:
+class ExperimentSpace:
     """The ROS graph, and the walls of a world if there is one."""
 
     def __init__(self, script: Script, chassis: Chassis, care: Care, world: str | None) -> None:

@@ -22,7 +22,7 @@ from kurumaisu.paper.chair import dac_line
 from kurumaisu.paper.chair.dac_line import Point
 from kurumaisu.paper.laser import wall_experiment
 from kurumaisu.paper.model_file import ModelFile
-from kurumaisu.paper.options import Options
+from kurumaisu.paper.options import PaperOptions
 from kurumaisu.params import shipped
 
 _TAIL = 15  # lines of the log shown after a failure
@@ -82,7 +82,7 @@ def drive(model: Path, file: str, bag: Path, *, seed: int, speed: float) -> None
     launch(["identification.launch", *arguments], bag.with_suffix(".log"), 600.0)
 
 
-def wall(model: Path, options: Options, folder: Path, *, seed: int, speed: float) -> None:
+def wall(model: Path, options: PaperOptions, folder: Path, *, seed: int, speed: float) -> None:
     """Record the simulated board through laser_node and the virtual URG into FOLDER/scans, a bag a distance."""
     wall_experiment.write_model(model, options.wall, folder / "bench.yaml")
     wall_experiment.write_script(options.wall, folder / "wall.yaml")

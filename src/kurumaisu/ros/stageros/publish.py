@@ -13,9 +13,9 @@ from kurumaisu.ros.stageros.camera import Cameras
 from kurumaisu.ros.stageros.names import Names
 from kurumaisu.ros.stageros.plan import RobotPlan
 from kurumaisu.ros.stageros.rates import Pace
-from kurumaisu.ros.stageros.robot import Ears, RobotTopics, Timing, transform_of
+from kurumaisu.ros.stageros.robot import CommandListener, RobotTopics, Timing, transform_of
 from kurumaisu.ros.stageros.settings import StagerosSettings
-from kurumaisu.ros.stageros.truth import Truth
+from kurumaisu.ros.stageros.truth import GroundTruth
 from kurumaisu.ros.wire import ClockWire, Stamp, TransformsWire, planar
 from kurumaisu.sim.robots.observation import Observation
 from kurumaisu.types import FloatArray
@@ -24,7 +24,7 @@ from kurumaisu.world.model import Model
 _TF_DEPTH = 100  # as of tf2_ros
 
 
-class Transforms:
+class TransformTopic:
     """odom -> base_footprint -> base_link -> sensors of all robots, in one message on /tf."""
 
     def __init__(self, settings: StagerosSettings) -> None:
@@ -63,17 +63,17 @@ class Transforms:
 class Publisher:
     """The topics of a world."""
 
-    def __init__(self, settings: StagerosSettings, interval: float, ears: Callable[[Names], Ears]) -> None:
+    def __init__(self, settings: StagerosSettings, interval: float, ears: Callable[[Names], CommandListener]) -> None:
         """Advertise; interval [s]: of the steps; ears: what listens to the commands for a robot of these names."""
         self._settings = settings
         self._pace = Pace(settings.rates, interval)
         self._interval = interval
         self._ears = ears
-        self._transforms = Transforms(settings) if settings.publish_tf else None
+        self._transforms = TransformTopic(settings) if settings.publish_tf else None
         self._cameras = Cameras(settings, self._pace, self._transforms.outlet if self._transforms else None)
         self._robots: list[RobotTopics] = []
         self._clock, self._clock_wire = Outlet("/clock", Clock, DEPTH), ClockWire()
-        self._truth = Truth(interval)
+        self._truth = GroundTruth(interval)
         self._kinds: dict[str, Callable[[Observation, Stamp], None]] = {
             "odom": self._publish_odometry,
             "base_pose_ground_truth": self._publish_truth,

@@ -18,7 +18,7 @@ _ROUNDING = 1e-6  # steps; of a division
 
 
 @dataclass(frozen=True)
-class Rates:
+class PublishRates:
     """How often something is published [Hz]; 0: in every step.
 
     kinds: for each of KINDS; sensors: by a topic's name without its first slash, or by its last part alone.
@@ -28,11 +28,11 @@ class Rates:
     sensors: Mapping[str, float]
 
 
-def read_rates(section: Section) -> Rates:
+def read_rates(section: Section) -> PublishRates:
     """Return the rates of a section. Raise Error naming the key."""
     sensors = section.section("sensors")
     by_name = {name.lstrip("/"): sensors.number(name, at_least=0) for name in sensors.names()}
-    rates = Rates({kind: section.number(kind, at_least=0) for kind in KINDS}, by_name)
+    rates = PublishRates({kind: section.number(kind, at_least=0) for kind in KINDS}, by_name)
     section.end()
     return rates
 
@@ -40,7 +40,7 @@ def read_rates(section: Section) -> Rates:
 class Pace:
     """Says what is due in a step."""
 
-    def __init__(self, rates: Rates, interval: float) -> None:
+    def __init__(self, rates: PublishRates, interval: float) -> None:
         """Note the length of the world's steps [s]. Raise Error for a rate that does not divide that of the steps."""
         self._kinds = {kind: _steps(kind, rate, interval) for kind, rate in rates.kinds.items()}
         self._sensors = {name: _steps(f"sensors.{name}", rate, interval) for name, rate in rates.sensors.items()}

@@ -33,7 +33,7 @@ class Timing:
 
 
 @dataclass(frozen=True)
-class Ears:
+class CommandListener:
     """What is called with a robot's cmd_vel and its cmd_pose."""
 
     twist: Callable[[Twist], None]
@@ -120,7 +120,12 @@ class RobotTopics:
     """Everything of one robot but cameras."""
 
     def __init__(
-        self, plan: RobotPlan, settings: StagerosSettings, pace: Pace, timing: Callable[[int], Timing], hear: Ears
+        self,
+        plan: RobotPlan,
+        settings: StagerosSettings,
+        pace: Pace,
+        timing: Callable[[int], Timing],
+        hear: CommandListener,
     ) -> None:
         """timing: of a scan that is published every so many steps."""
         names, frames = plan.names, settings.frames

@@ -20,7 +20,7 @@ from kurumaisu.ros.stageros.added_models import is_text, renumbered
 from kurumaisu.ros.stageros.names import Names, names_of, names_of_another
 from kurumaisu.ros.stageros.plan import plan_world
 from kurumaisu.ros.stageros.publish import Publisher
-from kurumaisu.ros.stageros.robot import Ears
+from kurumaisu.ros.stageros.robot import CommandListener
 from kurumaisu.ros.stageros.saved_names import packed_names, unpacked_names
 from kurumaisu.ros.stageros.settings import StagerosSettings
 from kurumaisu.ros.view.fans import FleetFans
@@ -100,8 +100,8 @@ class Session:
         rows = self._simulator.machinery.robot_rows.tolist()
         return {rows[row]: rospy.resolve_name(names.topic("cmd_vel")) for names, row in self._rows.items()}
 
-    def _ears(self, names: Names) -> Ears:
-        return Ears(partial(self.hear, names), partial(self.carry, names))
+    def _ears(self, names: Names) -> CommandListener:
+        return CommandListener(partial(self.hear, names), partial(self.carry, names))
 
     def _obey(self) -> None:
         """Heed what has been heard since the last step."""

@@ -10,7 +10,7 @@ from kurumaisu import settings
 from kurumaisu.errors import Error
 from kurumaisu.names import nearest
 from kurumaisu.params import shipped
-from kurumaisu.ros.stageros.rates import Rates, read_rates
+from kurumaisu.ros.stageros.rates import PublishRates, read_rates
 from kurumaisu.settings import Section
 from kurumaisu.sim.options import Options, read_options
 
@@ -47,7 +47,7 @@ class StagerosSettings:
     sonar_as_range: bool
     publish_collision: bool
     publish_devices: tuple[str, ...]  # types of models: bumper, fiducial
-    rates: Rates
+    rates: PublishRates
     view_rate: float
     headless_rate: float
     seed: int

@@ -21,7 +21,7 @@ class _Seen:
     fast: list[float]
 
 
-class Truth:
+class GroundTruth:
     """Poses, and their change since the step before in the world's axes."""
 
     def __init__(self, interval: float) -> None:

@@ -17,7 +17,7 @@ from kurumaisu import program, settings
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.settings import Section
-from kurumaisu.teleop import REST, Command
+from kurumaisu.teleop import REST, HandCommand
 
 _LAST_WORDS = 10  # of rest, or of a dead-man that was let go, in case one is not heard
 
@@ -50,7 +50,7 @@ class Hand:
         self._dead_man = rospy.Publisher("dead_man", Bool, queue_size=1, tcp_nodelay=True)
         self._last_words = {"commands": 0, "dead_man": 0}
 
-    def say(self, command: Command) -> None:
+    def say(self, command: HandCommand) -> None:
         """Publish one command; to be called at the rate."""
         if self._speaks("dead_man", command.held):
             self._dead_man.publish(Bool(command.held))

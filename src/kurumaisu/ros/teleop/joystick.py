@@ -12,7 +12,7 @@ from sensor_msgs.msg import Joy
 from kurumaisu.errors import Error
 from kurumaisu.ros.teleop.common import Ending, overlaid, run
 from kurumaisu.settings import Section
-from kurumaisu.teleop.reader import Reader, open_device
+from kurumaisu.teleop.reader import JoystickReader, open_device
 
 _HELP = """
 Publish what a joystick at /dev/input does. Debian has no joy_node.
@@ -52,7 +52,7 @@ def _serve(ending: Ending) -> None:
     publisher = rospy.Publisher("joy", Joy, queue_size=1, tcp_nodelay=True)
     while not ending.asked.is_set():
         try:
-            reader = Reader(open_device(known.device), known.dead_zone)
+            reader = JoystickReader(open_device(known.device), known.dead_zone)
         except Error as error:
             rospy.logwarn_throttle(10.0, f"JOYSTICK_AWAY: {known.device}: {error}")
             ending.asked.wait(known.retry)
@@ -62,7 +62,7 @@ def _serve(ending: Ending) -> None:
 
 
 def _publish_while_here(
-    reader: Reader, publisher: rospy.Publisher, device: Path, period: float, ending: Ending
+    reader: JoystickReader, publisher: rospy.Publisher, device: Path, period: float, ending: Ending
 ) -> None:
     try:
         while not ending.asked.is_set():

@@ -35,7 +35,7 @@ _lock = threading.Lock()
 def main() -> None:
     """Obey until the input ends."""
     rospy.init_node("peer", anonymous=True, disable_signals=True)
-    peer = Peer()
+    peer = PeerProcess()
     rospy.Subscriber("voltages", Voltages, _tell_voltages, queue_size=None, tcp_nodelay=True)
     rospy.Subscriber("odom", Odometry, _tell_odometry, queue_size=None, tcp_nodelay=True)
     rospy.Subscriber("active_input", String, lambda m: _tell("active", name=m.data), queue_size=None)
@@ -67,7 +67,7 @@ def _tell_diagnostics(array: DiagnosticArray) -> None:
         _tell("diagnostics", name=status.name, level=status.level, message=status.message, values=values)
 
 
-class Peer:
+class PeerProcess:
     """Who obeys the orders."""
 
     def __init__(self) -> None:

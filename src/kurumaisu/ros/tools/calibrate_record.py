@@ -17,7 +17,7 @@ from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper.chair import advice
-from kurumaisu.paper.options import Options
+from kurumaisu.paper.options import PaperOptions
 from kurumaisu.ros.recorder import Recorder
 from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.types import FloatArray
@@ -27,7 +27,7 @@ _GLANCE = 0.05  # [s] of wall time
 _ROWS = 10**6  # of a topic at most, the newest: hours
 
 
-class Heard:
+class Received:
     """What came so far: poses of ground_truth, of odom where there is none; voltages."""
 
     def __init__(self) -> None:
@@ -77,7 +77,7 @@ def _table(rows: list[tuple[float, ...]]) -> FloatArray:
     return np.array(rows, dtype=np.float64)
 
 
-def record(bag: Path, options: Options, every: float, split: int) -> int:
+def record(bag: Path, options: PaperOptions, every: float, split: int) -> int:
     """Record until nothing is missing, or Ctrl-C; return 0, or 1 when something is. Raise Error as Recorder does."""
     if not rosgraph.is_master_online():
         raise Error(f"no ROS master at {rosgraph.get_master_uri()}: start robot.launch, or sim.launch, first")
@@ -85,7 +85,7 @@ def record(bag: Path, options: Options, every: float, split: int) -> int:
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    heard = Heard()
+    heard = Received()
     recorder = Recorder(bag, _TOPICS, split=split)
     said: list[str] = []
     missing = ["nothing was heard yet"]
@@ -109,14 +109,14 @@ def record(bag: Path, options: Options, every: float, split: int) -> int:
     return int(bool(missing))
 
 
-def _look(heard: Heard, options: Options) -> list[str]:
+def _look(heard: Received, options: PaperOptions) -> list[str]:
     run = heard.run()
     if run is None:
         return ["no voltages, or no poses on ground_truth or odom"]
     return advice.missing([run], options)
 
 
-def _tell(missing: list[str], heard: Heard) -> None:
+def _tell(missing: list[str], heard: Received) -> None:
     reference = "" if heard.measured else " (judged by odom, without ground_truth; the particle filter decides later)"
     print(f"\nstill missing{reference}:" if missing else "\nnothing is missing", flush=True)
     for words in missing:

@@ -11,7 +11,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
 from kurumaisu import program, settings
-from kurumaisu.driving import Driver, Route, read_route
+from kurumaisu.driving import Route, RouteFollower, read_route
 from kurumaisu.errors import Error, one_line
 from kurumaisu.ros.rotation import planar
 
@@ -35,7 +35,7 @@ class WaypointNode:
         self.finished = threading.Event()
         self.late = False
         self._route = route
-        self._driver = Driver(route)
+        self._driver = RouteFollower(route)
         self._start: float | None = None
         self._heard: float | None = None
         self._end: float | None = None

@@ -17,7 +17,7 @@ from kurumaisu.geometry import PLANAR
 from kurumaisu.msg import View
 from kurumaisu.ros.outlet import Outlet
 from kurumaisu.ros.view.fans import Fans, Looks
-from kurumaisu.ros.view.wire import Shape, ViewWire
+from kurumaisu.ros.view.wire import Lengths, ViewWire
 from kurumaisu.sim.robots.machinery import Machinery
 from kurumaisu.sim.robots.scenery import Piece, bounds, scenery
 from kurumaisu.types import IntArray
@@ -51,7 +51,7 @@ class ViewTopics:
         self._offered = 0.0  # [s] likewise
         self._late: deque[tuple[float, int]] = deque(maxlen=_OF_LATE)
         self._sent: IntArray | None = None  # stamps of the scans that were
-        self._wires: dict[Shape, ViewWire] = {}
+        self._wires: dict[Lengths, ViewWire] = {}
         self._looked = False  # somebody did, when last asked
         self._stalled = b""  # as of the last step
         self._contacts = np.zeros(0, dtype=np.uint32)
@@ -130,10 +130,10 @@ class ViewTopics:
         """Return what has room for this, made once: shapes change with the world only."""
         bodies, robots = len(machinery.stalled), len(machinery.robots)
         if looks is None:
-            shape = Shape(bodies, robots, 0, 0, 0, 0)
+            shape = Lengths(bodies, robots, 0, 0, 0, 0)
         else:
             truths = 0 if looks.truths is None else len(looks.truths)
-            shape = Shape(bodies, robots, len(looks.stamps), len(looks.ranges), truths, len(looks.intensities))
+            shape = Lengths(bodies, robots, len(looks.stamps), len(looks.ranges), truths, len(looks.intensities))
         if shape not in self._wires:
             self._wires[shape] = ViewWire(self._frame, shape)
         return self._wires[shape]

@@ -16,7 +16,7 @@ _WORD = "<u4"  # of the lengths in front of what varies
 
 
 @dataclass(frozen=True)
-class Shape:
+class Lengths:
     """How long the parts are; truths and intensities: beams, or 0 if there are none."""
 
     bodies: int
@@ -33,7 +33,7 @@ class ViewWire:
     data: with the word of TCPROS in front that says how many bytes follow.
     """
 
-    def __init__(self, frame: str, shape: Shape) -> None:
+    def __init__(self, frame: str, shape: Lengths) -> None:
         """frame: of the header."""
         name = frame.encode()
         arrays = {

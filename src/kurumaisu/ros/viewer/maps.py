@@ -16,7 +16,7 @@ from PIL import Image
 from kurumaisu.geometry import compose
 from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE
 from kurumaisu.ros.rotation import planar
-from kurumaisu.ros.viewer.topics import Alignment, Newest, Transforms
+from kurumaisu.ros.viewer.topics import Alignment, Newest, PlanarTransforms
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.protocol import Estimate
@@ -29,7 +29,7 @@ _POSE = 7  # float64 of a geometry_msgs/Pose
 class Maps:
     """Shows a map and where a robot believes to be in it."""
 
-    def __init__(self, hub: Hub, transforms: Transforms, map_frame: str, base_frame: str) -> None:
+    def __init__(self, hub: Hub, transforms: PlanarTransforms, map_frame: str, base_frame: str) -> None:
         self._hub = hub
         self._transforms = transforms
         self._frames = map_frame, base_frame

@@ -16,7 +16,7 @@ _MOST = 5
 _LONGEST = 300  # characters of one
 
 
-class Notes:
+class RosoutNotes:
     """Warnings and errors of /rosout, each for a while; one that comes again is not another one."""
 
     def __init__(self, seconds: float) -> None:

@@ -11,7 +11,7 @@ from sensor_msgs.msg import LaserScan
 
 from kurumaisu.geometry import compose, interpolate
 from kurumaisu.params import Model
-from kurumaisu.ros.viewer.topics import Newest, Now, Transforms
+from kurumaisu.ros.viewer.topics import Newest, Now, PlanarTransforms
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.protocol import Body, Fan, Ranger, World
@@ -24,7 +24,7 @@ _REMEMBERED = 90  # poses: 3 s at 30 Hz
 class Robot:
     """Puts the footprint into the hub, and tells of the moment."""
 
-    def __init__(self, hub: Hub, model: Model, transforms: Transforms, frames: tuple[str, str, str]) -> None:
+    def __init__(self, hub: Hub, model: Model, transforms: PlanarTransforms, frames: tuple[str, str, str]) -> None:
         """frames: map, odom and base; without a map the world is odom's."""
         self._hub = hub
         self._transforms = transforms

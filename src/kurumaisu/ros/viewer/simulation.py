@@ -27,7 +27,7 @@ from kurumaisu.viewer.source import Outcome
 ABILITIES = frozenset({"pause", "step", "speed", "reset", "seed", "set_pose"})
 
 
-class Simulation:
+class SimulationSource:
     """Puts the world into the hub, and tells of the moment."""
 
     def __init__(self, hub: Hub, node: str, services: str) -> None:

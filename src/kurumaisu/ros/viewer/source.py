@@ -19,13 +19,13 @@ from kurumaisu.ros.viewer import effects, simulation
 from kurumaisu.ros.viewer.chair import Chair
 from kurumaisu.ros.viewer.effects import EffectSwitches
 from kurumaisu.ros.viewer.maps import Maps
-from kurumaisu.ros.viewer.notes import Notes
+from kurumaisu.ros.viewer.notes import RosoutNotes
 from kurumaisu.ros.viewer.record import BagRecorder
 from kurumaisu.ros.viewer.robot import Robot
 from kurumaisu.ros.viewer.settings import NONE, NodeSettings
-from kurumaisu.ros.viewer.simulation import Simulation
+from kurumaisu.ros.viewer.simulation import SimulationSource
 from kurumaisu.ros.viewer.stick import Sticks
-from kurumaisu.ros.viewer.topics import Alignment, Transforms
+from kurumaisu.ros.viewer.topics import Alignment, PlanarTransforms
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.protocol import State
@@ -44,16 +44,16 @@ class RosSource:
         simulator, model = settings.simulator, load_model(settings.model)
         self.mode = "robot" if simulator == NONE else "sim"
         self.title = model.name if simulator != "stageros" else simulator
-        self._transforms = Transforms()
-        self._scene: Simulation | Robot
+        self._transforms = PlanarTransforms()
+        self._scene: SimulationSource | Robot
         if simulator == NONE:
             self._scene = Robot(hub, model, self._transforms, settings.frames)
         else:
-            self._scene = Simulation(hub, simulator, _PREFIX[simulator])
+            self._scene = SimulationSource(hub, simulator, _PREFIX[simulator])
         self._chair = None if settings.base == NONE else Chair(settings.base)
         self._effects = EffectSwitches(hub, simulator, settings.model) if simulator == "sim_node" else None
         self._maps = Maps(hub, self._transforms, settings.frames[0], settings.frames[2])
-        self._notes = Notes(settings.notes)
+        self._notes = RosoutNotes(settings.notes)
         self._bags = BagRecorder(settings.bags)
         self._start = Alignment()  # of the odometry
         self._run: int | None = None
@@ -113,7 +113,7 @@ class RosSource:
                 return self._bags.record(**arguments)
             case "initial_pose" if self._initial is not None:
                 return self._guess(**arguments)
-            case _ if isinstance(self._scene, Simulation):
+            case _ if isinstance(self._scene, SimulationSource):
                 return self._scene.command(name, dict(arguments))
         raise Error(f"{name}: cannot be done here")
 
@@ -123,7 +123,7 @@ class RosSource:
             able.add("drive")
         if self._chair is not None:
             able.add("estop")
-        if isinstance(self._scene, Simulation):
+        if isinstance(self._scene, SimulationSource):
             able |= simulation.ABILITIES
         if self._effects is not None:
             able |= effects.ABILITIES
@@ -145,7 +145,7 @@ class RosSource:
         if moment is None:
             return
         parts, scans = moment
-        if isinstance(self._scene, Simulation):
+        if isinstance(self._scene, SimulationSource):
             self._transforms.listen(self._maps.there)  # flat out, a simulator sends thousands a second
         if parts is self._shown and self._chair is None:
             return  # nothing is new

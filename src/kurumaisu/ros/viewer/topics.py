@@ -87,7 +87,7 @@ class Now:
         return 0.0 if self._clock.last is None else float(self._clock.last.clock.to_sec())
 
 
-class Transforms:
+class PlanarTransforms:
     """What /tf says in the plane, from the newest message of each publisher; enough for a picture."""
 
     def __init__(self) -> None:

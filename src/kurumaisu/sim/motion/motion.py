@@ -16,7 +16,7 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 StateArray = FloatArray | BoolArray
 
 
-class Motion(Protocol):
+class MotionModel(Protocol):
     """Moves all bodies of a world, robots or not, in the order of Bodies, and tells the Arena of it.
 
     The simulator makes a new Motion whenever bodies come or go or a wall is moved.

@@ -14,7 +14,7 @@ from pymunk.autogeometry import convex_decomposition
 from kurumaisu.geometry import PLANAR, compose
 from kurumaisu.types import FloatArray, IntArray
 
-GRAVITY = 9.81  # [m/s^2]
+GRAVITY = 9.81  # [m/s^2], for friction, which is known to a few percent at best
 _SLIVER = 1.0e-9  # [m^2] polygons of less area are no bodies
 # Mean distance of a uniform disc's or square's points from its centre, over its radius of gyration: 0.943 and 0.937.
 _MEAN_OVER_GYRATION = 0.94

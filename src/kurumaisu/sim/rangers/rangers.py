@@ -12,7 +12,7 @@ from kurumaisu._core import mounted
 from kurumaisu.geometry import attached
 from kurumaisu.sim.rangers.fan_effects import FanEffects
 from kurumaisu.sim.rangers.fans import RangerFan, moments, spread
-from kurumaisu.sim.rangers.ray_casters import Eyes
+from kurumaisu.sim.rangers.ray_casters import RayCaster
 from kurumaisu.sim.rangers.scans import Scans, Sweep
 from kurumaisu.sim.sensors.ranger_noise import RangerNoise
 from kurumaisu.types import FloatArray, IntArray
@@ -26,7 +26,7 @@ class Rangers:
 
     def __init__(
         self,
-        eyes: Eyes,
+        eyes: RayCaster,
         fans: Sequence[RangerFan],
         rhythm: IntArray,
         sweep: float,
@@ -107,7 +107,7 @@ class _Cohort:
 
     def __init__(
         self,
-        eyes: Eyes,
+        eyes: RayCaster,
         fans: Sequence[RangerFan],
         rhythm: tuple[int, int],
         sweep: float,

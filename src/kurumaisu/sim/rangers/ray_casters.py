@@ -14,7 +14,7 @@ from kurumaisu.sim.rangers.fans import RangerFan
 from kurumaisu.types import FloatArray, IntArray
 
 
-class Eyes(Protocol):
+class RayCaster(Protocol):
     """Casts rays; scan and cast as in Arena."""
 
     def follow(self, frames: FloatArray) -> None:
@@ -27,7 +27,7 @@ class Eyes(Protocol):
         """Return ranges and ranger returns of single rays."""
 
 
-class ExactEyes:
+class ExactRayCaster:
     """Sees by the arena, which the motion keeps up to date."""
 
     def __init__(self, arena: Arena) -> None:
@@ -38,7 +38,7 @@ class ExactEyes:
         """Nothing to do."""
 
 
-class CellEyes:
+class CellRayCaster:
     """Sees by cells, which have their own bodies."""
 
     def __init__(

@@ -19,13 +19,13 @@ from kurumaisu.sim.motion.slopes import Slopes
 from kurumaisu.sim.options import Options
 from kurumaisu.sim.rangers import fans
 from kurumaisu.sim.rangers.rangers import Rangers
-from kurumaisu.sim.rangers.ray_casters import CellEyes, ExactEyes, Eyes
+from kurumaisu.sim.rangers.ray_casters import CellRayCaster, ExactRayCaster, RayCaster
 from kurumaisu.sim.robots.drive import Drive, Rows
 from kurumaisu.sim.robots.fleet_effects import FleetEffects
-from kurumaisu.sim.robots.odometry import Localization
+from kurumaisu.sim.robots.odometry import StageLocalization
 from kurumaisu.sim.robots.pedestrians import Pedestrians
 from kurumaisu.sim.robots.population import Population
-from kurumaisu.sim.robots.schedule import Rhythm, period
+from kurumaisu.sim.robots.schedule import Schedule, period
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
@@ -94,9 +94,9 @@ class Machinery:
         starts = self.robot_poses
         born = self.population.born
         periods = self._periods([model.update_interval for model in self.robots], always=self.dynamics is not None)
-        self.rhythm = Rhythm(periods, born[[model.index for model in self.robots]].astype(np.int64))
+        self.rhythm = Schedule(periods, born[[model.index for model in self.robots]].astype(np.int64))
         self.drive = Drive(devices, periods * self.interval, self.options.limit_acceleration)
-        self.localization = Localization(
+        self.localization = StageLocalization(
             devices, starts, self.interval, self.options.odometry_walk, self.dynamics is not None
         )
         looks = self._periods([fan.model.update_interval for fan in self.fans], always=False)
@@ -139,13 +139,13 @@ class Machinery:
         cells, known_as = build_cells(start.models, start.poses, self.bodies, self.resolution, layers)
         return SharedCells(self.arena, self.numbers, cells, known_as, layers)
 
-    def _make_eyes(self) -> Eyes:
+    def _make_eyes(self) -> RayCaster:
         if self.options.ray_casting == "exact" or self.dynamics is not None or self.resolution is None:
-            return ExactEyes(self.arena)
+            return ExactRayCaster(self.arena)
         start = self.population
         threads = self.options.threads
         rays, known_as = build_cell_rays(start.models, start.poses, self.bodies, self.resolution, threads)
-        return CellEyes(rays, known_as, self.collisions.drawn, self.fans)
+        return CellRayCaster(rays, known_as, self.collisions.drawn, self.fans)
 
     @property
     def robot_keys(self) -> IntArray:

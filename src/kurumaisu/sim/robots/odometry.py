@@ -17,7 +17,7 @@ from kurumaisu.world.model import Position
 _DEFAULT_ERROR = np.array([0.03, 0.03, 0.05])
 
 
-class Localization:
+class StageLocalization:
     """Estimates poses (n, 3).
 
     gps: the true pose in the map at the robot's last update; before the first one, relative to localization_origin.

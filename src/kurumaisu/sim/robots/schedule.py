@@ -16,7 +16,7 @@ def period(update_interval: float, step: float) -> int:
     return max(1, math.ceil(update_interval / step - rounding))
 
 
-class Rhythm:
+class Schedule:
     """Says which rows are due; each counts its steps from its birth."""
 
     def __init__(self, periods: IntArray, born: IntArray) -> None:

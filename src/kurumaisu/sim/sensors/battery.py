@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kurumaisu.sim.sensors.imu import STANDARD_GRAVITY
 from kurumaisu.types import BoolArray, FloatArray
 
-GRAVITY = 9.80665  # [m/s^2], standard
 _HOUR = 3600.0  # [s]
 
 
@@ -34,7 +34,7 @@ class Load:
         speed, w = np.hypot(velocities[:, 0], velocities[:, 1]), velocities[:, 2]
         inertial = self.mass * (velocities[:, :2] * accelerations[:, :2]).sum(axis=-1)
         inertial += self.inertia * w * accelerations[:, 2]
-        mechanical = inertial + self.rolling * self.mass * GRAVITY * speed + self.scrubbing * np.abs(w)
+        mechanical = inertial + self.rolling * self.mass * STANDARD_GRAVITY * speed + self.scrubbing * np.abs(w)
         driven = np.where(mechanical > 0, mechanical / self.efficiency, mechanical * self.recovery)
         return np.asarray(self.idle + driven)
 

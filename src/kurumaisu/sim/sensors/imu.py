@@ -11,7 +11,7 @@ from kurumaisu.geometry import wrap
 from kurumaisu.sim.sensors.inertial_error import InertialError, InertialErrorSettings
 from kurumaisu.types import FloatArray
 
-GRAVITY = 9.80665  # [m/s^2], standard
+STANDARD_GRAVITY = 9.80665  # [m/s^2], standard: what instruments are calibrated by
 
 
 @dataclass(frozen=True)
@@ -68,5 +68,5 @@ class Imu:
         left = d_leftward + w * forward + d_w * x - w**2 * y
         c, s = np.cos(yaw), np.sin(yaw)
         zero = np.zeros(len(w))
-        force = np.stack([c * ahead + s * left, c * left - s * ahead, zero + GRAVITY], axis=-1)
+        force = np.stack([c * ahead + s * left, c * left - s * ahead, zero + STANDARD_GRAVITY], axis=-1)
         return force, np.stack([zero, zero, w], axis=-1)

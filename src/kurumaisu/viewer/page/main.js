@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Puts the parts together.
+// Puts the parts together. A new panel is a class in panels/, its elements and its modulepreload line in index.html, its
+// name among the tabs there, and one line here. It gets the scene (what the server has said, and when that changed),
+// permit (what may be commanded) and ask (which commands); panels/body.js is a short one.
 
-import {Bag} from "./panels/playback.js";
+import {Playback} from "./panels/playback.js";
 import {BodyPanel} from "./panels/body.js";
 import {Picture} from "./picture/canvas.js";
 import {answer} from "./common/channel.js";
@@ -53,7 +55,7 @@ const quietly = (name, values) => connection.command(name, values);
 
 const transport = new Transport(scene, permit, ask, stick, say);
 stick.emergency = () => transport.stop();
-const bag = new Bag(scene, permit, ask);
+const bag = new Playback(scene, permit, ask);
 new Residuals(scene, picture, new Recording(scene, connection, picture, ask), say);
 const edit = new Edit(picture, scene, options, {
   can: (name) => permit.can(name), ask: quietly, failed: (text) => say(text, true),

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable
 
 from kurumaisu.bench.faults.base.cases import Case, Seen, trips
+from kurumaisu.bench.faults.base.chain import BrokenCalls, Chain, Setup, V, W
 from kurumaisu.bench.faults.base.peers import until
-from kurumaisu.bench.faults.base.stage import BrokenCalls, Setup, Stage, V, W
 
 _SLACK = 0.03  # [s] of two writes and the scheduler, beyond what the board's and the guard's settings allow
 AWAY = 0.4  # [s] that something is unplugged, or stuck
@@ -16,19 +16,19 @@ _BACK = 0.2  # [s] to open a board again, and to write neutral
 _MANY = 16  # commands that meet a fault: it lasts for some attempts to recover
 
 
-def _noticed(stage: Stage) -> float:
+def _noticed(stage: Chain) -> float:
     """Return how long the guard takes at most to find out that replies fail [s]."""
     device = stage.device_values
     asking = (1 + int(device["retries"])) * float(device["reply_timeout"])
     return float(stage.guard_values["period"]) + asking + _SLACK
 
 
-def _reopened(stage: Stage) -> float:
+def _reopened(stage: Chain) -> float:
     return float(stage.guard_values["reopening"]["longest"]) + _BACK
 
 
-def _answers_badly(fault: str, code: str) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _answers_badly(fault: str, code: str) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         stage.drive()
         since = seen.neutral(stage, stage.inject(fault), _noticed(stage))
         seen.said(stage, "GUARD_TRIPPED: the D/A converter failed", code)
@@ -37,8 +37,8 @@ def _answers_badly(fault: str, code: str) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def _hears_nothing(fault: str, code: str) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _hears_nothing(fault: str, code: str) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         stage.drive()
         begin = stage.inject(fault)
         stage.wait_said(code)
@@ -51,8 +51,8 @@ def _hears_nothing(fault: str, code: str) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def _once(fault: str) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _once(fault: str) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         stage.drive()
         before = trips(stage)
         stage.mark()
@@ -65,7 +65,7 @@ def _once(fault: str) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def unplugged(stage: Stage, seen: Seen) -> None:
+def unplugged(stage: Chain, seen: Seen) -> None:
     """Take the device away for a while."""
     stage.drive()
     begin = stage.inject(f"unplug={AWAY}")
@@ -78,7 +78,7 @@ def unplugged(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, since)
 
 
-def _writes_half(stage: Stage, seen: Seen) -> None:
+def _writes_half(stage: Chain, seen: Seen) -> None:
     assert stage.calls
     stage.calls.break_writes(BrokenCalls.HALF)
     stage.drive()
@@ -91,8 +91,8 @@ def _writes_half(stage: Stage, seen: Seen) -> None:
     seen.note(f"{stage.calls.broken() - broken} short ones, no trip, the voltages arrive")
 
 
-def _write_fails(how: int, code: str) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _write_fails(how: int, code: str) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         assert stage.calls
         stage.drive()
         stage.calls.break_writes(how)
@@ -108,7 +108,7 @@ def _write_fails(how: int, code: str) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def _reference_lost(stage: Stage, seen: Seen) -> None:
+def _reference_lost(stage: Chain, seen: Seen) -> None:
     """Whatever is left of the joystick's plug: V_f and V_s go to where the reference was."""
     stage.drive()
     begin = stage.inject(f"lost/referencex{_MANY}")
@@ -130,7 +130,7 @@ def _reference_lost(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, since)
 
 
-def _other_reference(stage: Stage, seen: Seen) -> None:
+def _other_reference(stage: Chain, seen: Seen) -> None:
     said = stage.rig.messages.read_text()
     seen.check("the reference is held at" in said, said)
     stage.peer.say(0.0, 0.0)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from kurumaisu.bench.faults.base.stage import NODE, Setup, Stage
+from kurumaisu.bench.faults.base.chain import NODE, Chain, Setup
 from kurumaisu.bench.rigs.guard import Change
 from kurumaisu.errors import Error
 
@@ -49,27 +49,27 @@ class Seen:
         if words not in to:
             to.append(words)
 
-    def neutral(self, stage: Stage, begin: float, bound: float) -> float:
+    def neutral(self, stage: Chain, begin: float, bound: float) -> float:
         """Wait for neutral, which must come so soon [s] after `begin`; return when it came [s, monotonic]."""
         since = stage.neutral()
         self.within("neutral", since - begin, bound)
         return since
 
-    def held(self, stage: Stage, since: float) -> None:
+    def held(self, stage: Chain, since: float) -> None:
         """See that a stick that is still held moves nothing."""
         self.check(not stage.moved(since + _SETTLED), "moved while the stick was held")
 
-    def latched(self, stage: Stage, since: float) -> None:
+    def latched(self, stage: Chain, since: float) -> None:
         """See that a stick that is still held moves nothing, and one that is let go and moved again does."""
         self.held(stage, since)
         self.again(stage)
 
-    def again(self, stage: Stage) -> None:
+    def again(self, stage: Chain) -> None:
         """See that the chair drives once the stick was let go."""
         trips = stage.drive()
         self.note("let go: drives again" + (f", tripped {trips} times more" if trips else ""))
 
-    def said(self, stage: Stage, *words: str) -> None:
+    def said(self, stage: Chain, *words: str) -> None:
         """See that base_node or guard says so, soon."""
         for each in words:
             try:
@@ -78,11 +78,11 @@ class Seen:
                 self.check(False, f"did not say {each!r}")
         self.note("; ".join(words))
 
-    def undisturbed(self, stage: Stage) -> None:
+    def undisturbed(self, stage: Chain) -> None:
         """See that the board's voltages did not change since the mark."""
         self.check(not stage.changes(), f"{len(stage.changes())} changes of voltage")
 
-    def no_burst(self, stage: Stage, since: float) -> None:
+    def no_burst(self, stage: Chain, since: float) -> None:
         """See that V_f and V_s went nowhere but towards neutral since then [s, monotonic]."""
         before = next(c.volts for c in reversed(stage.rig.changes()) if c.volts and c.time < since)
         for change in stage.changes(since):
@@ -90,7 +90,7 @@ class Seen:
                 less = abs(now) <= abs(was) + _CODE and was * now >= 0
                 self.check(less, f"{now:.3f} V after {was:.3f} V")
 
-    def clamped(self, stage: Stage) -> None:
+    def clamped(self, stage: Chain) -> None:
         """See that no voltage since the mark left the device's clamp, or the model's band."""
         for change in stage.changes():
             for name, low, high in bands(stage):
@@ -114,7 +114,7 @@ def _span(values: Sequence[float]) -> str:
     return f"{low:.{digits}f}" if len(values) == 1 else f"{low:.{digits}f} to {high:.{digits}f}"
 
 
-def bands(stage: Stage) -> list[tuple[str, float, float]]:
+def bands(stage: Chain) -> list[tuple[str, float, float]]:
     """Return the names and limits [V] of what the board may put out, a code's rounding included."""
     model, device = stage.law.voltages, stage.device_values["channels"]
     code = stage.rig.step
@@ -140,7 +140,7 @@ class Case:
     fault: str
     how: str  # it is injected
     expected: str
-    play: Callable[[Stage, Seen], None]
+    play: Callable[[Chain, Seen], None]
     setup: Setup = field(default_factory=Setup)
     repeated: bool = False  # by --times: its times scatter
     last: bool = False  # nothing is left to go on with
@@ -152,7 +152,7 @@ class Case:
         return f"{self.number} {self.fault}, {self.how}"
 
 
-def trips(stage: Stage) -> int:
+def trips(stage: Chain) -> int:
     """Return how often the guard has tripped."""
     return stage.count("trips since the guard's start", "guard")
 

@@ -7,9 +7,9 @@ import signal
 
 from kurumaisu.bench.faults.base.board import AWAY, RETURN, unplugged
 from kurumaisu.bench.faults.base.cases import Case
+from kurumaisu.bench.faults.base.chain import Setup
 from kurumaisu.bench.faults.base.ends import dies, guard_dies, stops
 from kurumaisu.bench.faults.base.owners import second_guard
-from kurumaisu.bench.faults.base.stage import Setup
 
 _CHIP = Setup(chip=True)
 _LET_GO = "then neutral until the stick is let go"

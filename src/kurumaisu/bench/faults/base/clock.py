@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 from kurumaisu.bench.faults.base.braking import SLACK, braking, timeout
 from kurumaisu.bench.faults.base.cases import Case, Seen
+from kurumaisu.bench.faults.base.chain import Chain, Setup, V, W
 from kurumaisu.bench.faults.base.peers import until
-from kurumaisu.bench.faults.base.stage import Setup, Stage, V, W
 from kurumaisu.bench.processes import PATIENCE
 
 _AHEAD, _BACK = 3600.0, -7200.0  # [s] by which the wall clock is set
@@ -20,8 +20,8 @@ _WATCH = 1.0  # [s]
 _QUESTION = 1.2  # of master_timeout: it is asked five times in that time
 
 
-def _wall_clock(step: float) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _wall_clock(step: float) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         assert stage.calls
         stage.drive()
         stage.mark()
@@ -43,7 +43,7 @@ def _wall_clock(step: float) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def _reset(stage: Stage, seen: Seen) -> None:
+def _reset(stage: Chain, seen: Seen) -> None:
     stage.drive()
     begin = time.monotonic()
     stage.tick(1.0)
@@ -54,7 +54,7 @@ def _reset(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, since)
 
 
-def _leap(stage: Stage, seen: Seen) -> None:
+def _leap(stage: Chain, seen: Seen) -> None:
     stage.drive(V, 0.0)
     stage.mark()
     before = stage.peer.heard("odom")[-1]["x"]
@@ -68,7 +68,7 @@ def _leap(stage: Stage, seen: Seen) -> None:
     seen.note(f"{len(stage.changes())} changes of voltage, none beyond what was asked; odometry +{driven:.2f} m")
 
 
-def _stands_still(stage: Stage, seen: Seen) -> None:
+def _stands_still(stage: Chain, seen: Seen) -> None:
     stage.drive()
     begin = time.monotonic()
     stage.tick(None)
@@ -78,12 +78,12 @@ def _stands_still(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, since)
 
 
-def _lost(stage: Stage) -> float:
+def _lost(stage: Chain) -> float:
     """Return after how long the chair rests once nobody answers for the master [s]."""
     return _QUESTION * float(stage.values["master_timeout"]) + braking(stage) + SLACK
 
 
-def _master_dies(stage: Stage, seen: Seen) -> None:
+def _master_dies(stage: Chain, seen: Seen) -> None:
     stage.drive()
     begin = stage.graph.kill_master()
     since = seen.neutral(stage, begin, _lost(stage))
@@ -95,7 +95,7 @@ def _master_dies(stage: Stage, seen: Seen) -> None:
     _supervised(stage, seen)
 
 
-def _ends(stage: Stage, seen: Seen) -> None:
+def _ends(stage: Chain, seen: Seen) -> None:
     """See base_node end, which another master does not know."""
     assert stage.node
     try:
@@ -106,7 +106,7 @@ def _ends(stage: Stage, seen: Seen) -> None:
     seen.said(stage, "BASE_MASTER_FORGOT")
 
 
-def _supervised(stage: Stage, seen: Seen) -> None:
+def _supervised(stage: Chain, seen: Seen) -> None:
     """Start everybody that the new master does not know, with the stick held."""
     stage.replace_peer()
     stage.peer.say(V, W)
@@ -116,14 +116,14 @@ def _supervised(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, begin)
 
 
-def _master_and_commander_die(stage: Stage, seen: Seen) -> None:
+def _master_and_commander_die(stage: Chain, seen: Seen) -> None:
     stage.drive()
     stage.graph.kill_master()
     begin = stage.peer.signal(signal.SIGKILL)
     seen.neutral(stage, begin, timeout(stage) + braking(stage) + SLACK)
 
 
-def _master_hangs(stage: Stage, seen: Seen) -> None:
+def _master_hangs(stage: Chain, seen: Seen) -> None:
     stage.drive()
     stage.mark()
     stage.graph.master.send_signal(signal.SIGSTOP)
@@ -134,7 +134,7 @@ def _master_hangs(stage: Stage, seen: Seen) -> None:
     seen.note("voltages as before")
 
 
-def _master_hangs_long(stage: Stage, seen: Seen) -> None:
+def _master_hangs_long(stage: Chain, seen: Seen) -> None:
     stage.drive()
     begin = stage.strike(signal.SIGSTOP, stage.graph.master.pid)
     since = seen.neutral(stage, begin, _lost(stage))
@@ -144,7 +144,7 @@ def _master_hangs_long(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, since)
 
 
-def _master_restarts(stage: Stage, seen: Seen) -> None:
+def _master_restarts(stage: Chain, seen: Seen) -> None:
     stage.drive()
     begin = stage.graph.kill_master()
     stage.graph.start_master()

@@ -12,14 +12,14 @@ import numpy as np
 
 from kurumaisu.bench.faults.base.braking import BLUR, SLACK, SPAN, brakes, limits_of, ramp, timeout
 from kurumaisu.bench.faults.base.cases import Case, Seen
+from kurumaisu.bench.faults.base.chain import Chain, V, W
 from kurumaisu.bench.faults.base.path import rates, samples, sharpest, steepest
 from kurumaisu.bench.faults.base.peers import end, until
-from kurumaisu.bench.faults.base.stage import Stage, V, W
 
 _STEPS = ((1.2, 1.9), (-0.5, 2.6), (1.2, 2.6), (0.0, 1.6))  # [m/s], and for how long [s]
 
 
-def _silent(stage: Stage, seen: Seen) -> None:
+def _silent(stage: Chain, seen: Seen) -> None:
     stage.drive()
     before = stage.count("timeouts")
     begin = time.monotonic()
@@ -30,7 +30,7 @@ def _silent(stage: Stage, seen: Seen) -> None:
     seen.check(stage.count("timeouts") == before + 1, "the timeout is not counted")
 
 
-def _commander_dies(stage: Stage, seen: Seen) -> None:
+def _commander_dies(stage: Chain, seen: Seen) -> None:
     stage.drive()
     commander, stage.peer = stage.peer, stage.another_peer()
     begin = commander.signal(signal.SIGKILL)
@@ -38,8 +38,8 @@ def _commander_dies(stage: Stage, seen: Seen) -> None:
     seen.said(stage, "BASE_COMMAND_TIMEOUT")
 
 
-def _only_bad(v: float, w: float) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _only_bad(v: float, w: float) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         stage.drive()
         before = stage.count("refused commands")
         begin = time.monotonic()
@@ -52,7 +52,7 @@ def _only_bad(v: float, w: float) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def _bad_among_good(stage: Stage, seen: Seen) -> None:
+def _bad_among_good(stage: Chain, seen: Seen) -> None:
     stage.drive()
     before = stage.count("refused commands")
     stage.mark()
@@ -69,7 +69,7 @@ def _bad_among_good(stage: Stage, seen: Seen) -> None:
     seen.note(f"{len(bad)} refused and counted, voltages as before")
 
 
-def _too_fast(stage: Stage, seen: Seen) -> None:
+def _too_fast(stage: Chain, seen: Seen) -> None:
     stage.drive(V, 0.0)
     before = stage.count("clamped commands")
     stage.peer.say(5.0, 0.0)
@@ -81,7 +81,7 @@ def _too_fast(stage: Stage, seen: Seen) -> None:
     seen.note(f"{top} m/s, counted")
 
 
-def _two_publishers(stage: Stage, seen: Seen) -> None:
+def _two_publishers(stage: Chain, seen: Seen) -> None:
     stage.drive()
     before = stage.count("conflicts")
     other = stage.another_peer()
@@ -96,7 +96,7 @@ def _two_publishers(stage: Stage, seen: Seen) -> None:
     seen.note("counted; one gone: the other is obeyed")
 
 
-def _bounds(stage: Stage, seen: Seen) -> None:
+def _bounds(stage: Chain, seen: Seen) -> None:
     stage.drive(V, 0.0)
     for v, seconds in _STEPS:
         stage.peer.say(v, 0.0)

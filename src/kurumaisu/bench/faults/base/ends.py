@@ -11,8 +11,8 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from kurumaisu.bench.faults.base.cases import Case, Seen, trips
+from kurumaisu.bench.faults.base.chain import Chain, V, W
 from kurumaisu.bench.faults.base.peers import until
-from kurumaisu.bench.faults.base.stage import Stage, V, W
 from kurumaisu.bench.rigs.guard import busy
 
 _DEATH, _HANG, _GUARD = 0.010, 0.020, 0.020  # [s] until neutral; a hang counts from the guard's silence
@@ -20,10 +20,10 @@ _STOPPED = 0.5  # [s]
 _LOADED = 3.0  # [s] of driving on busy cores
 
 
-def dies(number: signal.Signals, bound: float = _DEATH) -> Callable[[Stage, Seen], None]:
+def dies(number: signal.Signals, bound: float = _DEATH) -> Callable[[Chain, Seen], None]:
     """Return how base_node dies of a signal; neutral within the bound [s]."""
 
-    def play(stage: Stage, seen: Seen) -> None:
+    def play(stage: Chain, seen: Seen) -> None:
         stage.drive()
         since = seen.neutral(stage, stage.strike(number), bound)
         seen.said(stage, "GUARD_TRIPPED: the client is gone")
@@ -32,7 +32,7 @@ def dies(number: signal.Signals, bound: float = _DEATH) -> Callable[[Stage, Seen
     return play
 
 
-def _node_again(stage: Stage, seen: Seen, since: float) -> None:
+def _node_again(stage: Chain, seen: Seen, since: float) -> None:
     """Start base_node anew, with the stick held throughout."""
     begin = time.monotonic()
     stage.start_node()
@@ -40,7 +40,7 @@ def _node_again(stage: Stage, seen: Seen, since: float) -> None:
     seen.latched(stage, since)
 
 
-def stops(stage: Stage, seen: Seen) -> None:
+def stops(stage: Chain, seen: Seen) -> None:
     """Stop base_node for a while."""
     stage.drive()
     begin = stage.strike(signal.SIGSTOP)
@@ -51,8 +51,8 @@ def stops(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, since)
 
 
-def _ends(number: signal.Signals) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _ends(number: signal.Signals) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         stage.drive()
         assert stage.node
         since = seen.neutral(stage, stage.strike(number), stage.period + _DEATH)
@@ -65,7 +65,7 @@ def _ends(number: signal.Signals) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def guard_dies(stage: Stage, seen: Seen) -> None:
+def guard_dies(stage: Chain, seen: Seen) -> None:
     """Kill the guard."""
     stage.drive()
     since = seen.neutral(stage, stage.strike(signal.SIGKILL, stage.rig.guard()), _GUARD)
@@ -73,7 +73,7 @@ def guard_dies(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, since)
 
 
-def _guard_stops(stage: Stage, seen: Seen) -> None:
+def _guard_stops(stage: Chain, seen: Seen) -> None:
     stage.drive()
     bound = stage.guard_values["sentinel_silence"] + _GUARD
     since = seen.neutral(stage, stage.strike(signal.SIGSTOP, stage.rig.guard()), bound)
@@ -81,7 +81,7 @@ def _guard_stops(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, since)
 
 
-def _sentinel_dies(stage: Stage, seen: Seen) -> None:
+def _sentinel_dies(stage: Chain, seen: Seen) -> None:
     stage.drive()
     guard = stage.rig.guard()
     since = seen.neutral(stage, stage.strike(signal.SIGKILL, stage.rig.sentinel()), _GUARD)
@@ -94,7 +94,7 @@ def _sentinel_dies(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, since)
 
 
-def _both_die(stage: Stage, seen: Seen) -> None:
+def _both_die(stage: Chain, seen: Seen) -> None:
     stage.drive()
     guard, sentinel = stage.rig.guard(), stage.rig.sentinel()
     for pid in (sentinel, guard):  # so that neither sees the other die
@@ -113,7 +113,7 @@ def _both_die(stage: Stage, seen: Seen) -> None:
     seen.latched(stage, since)
 
 
-def _loaded(stage: Stage, seen: Seen) -> None:
+def _loaded(stage: Chain, seen: Seen) -> None:
     with _all_busy():
         stage.drive()
         before, begin = trips(stage), time.monotonic()
@@ -124,8 +124,8 @@ def _loaded(stage: Stage, seen: Seen) -> None:
         seen.note(f"{len(stage.changes(begin))} changes of voltage and {lost} trips in {_LOADED:g} s")
 
 
-def _loaded_with(play: Callable[[Stage, Seen], None]) -> Callable[[Stage, Seen], None]:
-    def played(stage: Stage, seen: Seen) -> None:
+def _loaded_with(play: Callable[[Chain, Seen], None]) -> Callable[[Chain, Seen], None]:
+    def played(stage: Chain, seen: Seen) -> None:
         with _all_busy():
             play(stage, seen)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from kurumaisu.bench.faults.base import board, chip, clock, commands, ends, odometry, owners, parameters, stops
 from kurumaisu.bench.faults.base.cases import OK, Case, Seen
-from kurumaisu.bench.faults.base.stage import Setup, Stage, stage
+from kurumaisu.bench.faults.base.chain import Chain, Setup, running_chain
 from kurumaisu.bench.table import MarkdownTable
 from kurumaisu.errors import Error
 
@@ -77,7 +77,7 @@ class _Players:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._stage: Stage | None = None
+        self._stage: Chain | None = None
         self._setup = Setup()
         self._stack = ExitStack()
         self._stages = 0
@@ -107,12 +107,12 @@ class _Players:
             self.end()
         return seen
 
-    def _stage_for(self, setup: Setup) -> Stage:
+    def _stage_for(self, setup: Setup) -> Chain:
         if self._stage is None or setup != self._setup:
             self.end()
             self._stages += 1
             self._setup = setup
-            self._stage = self._stack.enter_context(stage(self._folder / str(self._stages), setup))
+            self._stage = self._stack.enter_context(running_chain(self._folder / str(self._stages), setup))
         return self._stage
 
     def end(self) -> None:

@@ -9,15 +9,15 @@ import time
 from collections.abc import Callable
 
 from kurumaisu.bench.faults.base.cases import Case, Seen, service
+from kurumaisu.bench.faults.base.chain import Chain, Setup, V
 from kurumaisu.bench.faults.base.path import distance
 from kurumaisu.bench.faults.base.peers import until
-from kurumaisu.bench.faults.base.stage import Setup, Stage, V
 
 _CUT = 0.8  # [V] where the band of V_f ends
 _DRIVEN = 1.0  # [s]
 
 
-def _compare(stage: Stage, seen: Seen) -> None:
+def _compare(stage: Chain, seen: Seen) -> None:
     """Compare odometry with the board, from the rest at the mark to one that is brought about now."""
     stage.peer.say(0.0, 0.0)
     stage.neutral()
@@ -29,7 +29,7 @@ def _compare(stage: Stage, seen: Seen) -> None:
     seen.note(f"odometry {told:.3f} m, by the board's volts {measured:.3f} m")
 
 
-def _clamp_active(stage: Stage, seen: Seen) -> None:
+def _clamp_active(stage: Chain, seen: Seen) -> None:
     stage.rest()
     stage.drive(0.3, 0.0)
     stage.peer.say(1.0, 0.0)
@@ -42,8 +42,8 @@ def _clamp_active(stage: Stage, seen: Seen) -> None:
     seen.note(f"V_f at most {volts:.3f} V, counted")
 
 
-def _hang(seconds: float) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _hang(seconds: float) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         stage.rest()
         stage.drive(V, 0.0)
         late = stage.count("late ticks")
@@ -57,7 +57,7 @@ def _hang(seconds: float) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def _reset_while_moving(stage: Stage, seen: Seen) -> None:
+def _reset_while_moving(stage: Chain, seen: Seen) -> None:
     stage.drive(V, 0.0)
     stage.mark()
     before = stage.peer.heard("odom")[-1]["x"]

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from kurumaisu.bench.faults.base.cases import Case, Seen
-from kurumaisu.bench.faults.base.stage import Setup, Stage
+from kurumaisu.bench.faults.base.chain import Chain, Setup
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.bench.rigs.guard import changed
 
@@ -20,7 +20,7 @@ _SHORT = 0.5  # [V] a device's clamp that is narrower than the model's band
 _WATCH = 0.4  # [s]
 
 
-def second_guard(stage: Stage, seen: Seen) -> None:
+def second_guard(stage: Chain, seen: Seen) -> None:
     """Start a second guard on the same device."""
     stage.drive()
     stage.mark()
@@ -31,7 +31,7 @@ def second_guard(stage: Stage, seen: Seen) -> None:
     seen.note("DAC_IN_USE; the first one's voltages as before")
 
 
-def _second_program(stage: Stage, seen: Seen) -> None:
+def _second_program(stage: Chain, seen: Seen) -> None:
     stage.drive()
     stage.mark()
     command = [program("set_voltages"), str(stage.rig.device), "0.5", "0", "2.5"]
@@ -42,7 +42,7 @@ def _second_program(stage: Stage, seen: Seen) -> None:
     seen.note(f"exit status {done.returncode}, DAC_IN_USE; the guard's voltages as before")
 
 
-def _second_client(stage: Stage, seen: Seen) -> None:
+def _second_client(stage: Chain, seen: Seen) -> None:
     stage.drive()
     stage.mark()
     name = "/second/base_node"
@@ -58,7 +58,7 @@ def _second_client(stage: Stage, seen: Seen) -> None:
     seen.undisturbed(stage)
 
 
-def _guard(stage: Stage, guard: Mapping[str, Any], device: Mapping[str, Any]) -> tuple[int | None, str]:
+def _guard(stage: Chain, guard: Mapping[str, Any], device: Mapping[str, Any]) -> tuple[int | None, str]:
     """Run a guard with changed files for a moment; return its exit status, None if it went on, and what it said."""
     paths = []
     for name, tree, changes in (("guard", stage.guard_values, guard), ("device", stage.device_values, device)):
@@ -73,8 +73,8 @@ def _guard(stage: Stage, guard: Mapping[str, Any], device: Mapping[str, Any]) ->
             return None, process.communicate()[1]
 
 
-def _bad_file(changes: Mapping[str, Any], words: str) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _bad_file(changes: Mapping[str, Any], words: str) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         code, said = _guard(stage, {}, changes)
         seen.check(code == 1, f"exit status {code}")
         seen.check(words in said and "another_device.yaml" in said, said)
@@ -83,7 +83,7 @@ def _bad_file(changes: Mapping[str, Any], words: str) -> Callable[[Stage, Seen],
     return play
 
 
-def _narrow_device(stage: Stage, seen: Seen) -> None:
+def _narrow_device(stage: Chain, seen: Seen) -> None:
     stage.drive(0.2, 0.0)
     stage.peer.say(1.0, 0.0)
     stage.peer.wait("voltages", lambda e: e["volts"][0] > _SHORT - 0.002, stage.begun)

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from kurumaisu.bench.faults.base.cases import Case, Seen, service
+from kurumaisu.bench.faults.base.chain import NODE, Chain, V, W
 from kurumaisu.bench.faults.base.peers import end
-from kurumaisu.bench.faults.base.stage import NODE, Stage, V, W
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.errors import Error
 
@@ -43,7 +43,7 @@ _GARBAGE: tuple[Any, ...] = (
 )
 
 
-def _start(stage: Stage, changes: Mapping[str, Any]) -> tuple[int | None, str]:
+def _start(stage: Chain, changes: Mapping[str, Any]) -> tuple[int | None, str]:
     """Start base_node with the stick held; return its exit status, None if it went on, and what it said."""
     stage.peer.say(V, W)
     stage.mark()
@@ -56,8 +56,8 @@ def _start(stage: Stage, changes: Mapping[str, Any]) -> tuple[int | None, str]:
     return code, stage.said()
 
 
-def _refused(changes: Mapping[str, Any], key: str) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _refused(changes: Mapping[str, Any], key: str) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         code, said = _start(stage, changes)
         seen.check(code == 1, f"exit status {code}")
         line = next((line for line in said.splitlines() if f"{NODE}/{key}" in line), "")
@@ -75,7 +75,7 @@ def _paths(tree: Mapping[str, Any], above: str = "") -> Iterator[str]:
             yield from _paths(value, f"{above}{key}/")
 
 
-def _garbage(stage: Stage, seen: Seen) -> None:
+def _garbage(stage: Chain, seen: Seen) -> None:
     dice = random.Random(_SEED)
     paths = sorted(path for path in _paths(stage.values) if path != "effects")
     begun = 0
@@ -91,8 +91,8 @@ def _garbage(stage: Stage, seen: Seen) -> None:
     seen.note(f"{_TRIALS - begun} refused, {begun} harmless, with the stick held: neutral")
 
 
-def _no_tree(value: Any) -> Callable[[Stage, Seen], None]:
-    def play(stage: Stage, seen: Seen) -> None:
+def _no_tree(value: Any) -> Callable[[Chain, Seen], None]:
+    def play(stage: Chain, seen: Seen) -> None:
         stage.graph.set_parameter(NODE, value)
         process = stage.graph.run([program("base_node")], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL)
         _, said = process.communicate(timeout=PATIENCE)
@@ -103,7 +103,7 @@ def _no_tree(value: Any) -> Callable[[Stage, Seen], None]:
     return play
 
 
-def _while_driving(stage: Stage, seen: Seen) -> None:
+def _while_driving(stage: Chain, seen: Seen) -> None:
     stage.drive()
     stage.mark()
     for path, value in (("limits/ride/v_forward", "fast"), ("rate", -1.0), ("guard/socket", 7), ("inputs", "none")):
@@ -119,7 +119,7 @@ def _while_driving(stage: Stage, seen: Seen) -> None:
         stage.graph.set_parameter("/use_sim_time", False)
 
 
-def _reconfigured(stage: Stage, seen: Seen) -> None:
+def _reconfigured(stage: Chain, seen: Seen) -> None:
     stage.drive()
     limits = stage.values["limits"]["ride"]
     stage.mark()
@@ -136,7 +136,7 @@ def _reconfigured(stage: Stage, seen: Seen) -> None:
     seen.note("none of them holds")
 
 
-def _master_nonsense(stage: Stage, seen: Seen) -> None:
+def _master_nonsense(stage: Chain, seen: Seen) -> None:
     """A parameter that XML-RPC can carry, and roscpp cannot read as a number."""
     try:
         code, said = _start(stage, {"rate": xmlrpc.client.Binary(b"\xff\x00")})

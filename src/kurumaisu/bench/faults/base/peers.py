@@ -110,7 +110,7 @@ class Event:
         return self.values[key]
 
 
-class Peer:
+class Commander:
     """A commander that also listens."""
 
     def __init__(self, graph: Graph, log: Path) -> None:

@@ -8,14 +8,14 @@ import time
 
 from kurumaisu.bench.faults.base.braking import SLACK, brakes
 from kurumaisu.bench.faults.base.cases import Case, Seen, service
+from kurumaisu.bench.faults.base.chain import Chain, Setup, V, W
 from kurumaisu.bench.faults.base.peers import until
-from kurumaisu.bench.faults.base.stage import Setup, Stage, V, W
 
 _ONCE = 0.06  # [s] until what acts at once has: a tick of the commander, and the way
 _WATCHED = 0.3  # [s] timeout of a watched button
 
 
-def _at_once(stage: Stage, seen: Seen, begin: float, bound: float) -> float:
+def _at_once(stage: Chain, seen: Seen, begin: float, bound: float) -> float:
     """See neutral come without a ramp."""
     since = seen.neutral(stage, begin, bound)
     moving = [change for change in stage.changes(begin) if change.neutral is False]
@@ -23,7 +23,7 @@ def _at_once(stage: Stage, seen: Seen, begin: float, bound: float) -> float:
     return since
 
 
-def _released(stage: Stage, seen: Seen) -> None:
+def _released(stage: Chain, seen: Seen) -> None:
     """See that an emergency stop can be reset only once the stick is let go."""
     answer = stage.peer.call(service("reset"))
     seen.check(not answer["success"], "reset while somebody commands motion")
@@ -33,7 +33,7 @@ def _released(stage: Stage, seen: Seen) -> None:
     seen.again(stage)
 
 
-def _button_silent(stage: Stage, seen: Seen) -> None:
+def _button_silent(stage: Chain, seen: Seen) -> None:
     stage.peer.repeat("e_stop", False)
     stage.drive()
     begin = time.monotonic()
@@ -47,7 +47,7 @@ def _button_silent(stage: Stage, seen: Seen) -> None:
     _released(stage, seen)
 
 
-def _button_pressed(stage: Stage, seen: Seen) -> None:
+def _button_pressed(stage: Chain, seen: Seen) -> None:
     stage.peer.repeat("e_stop", False)
     stage.drive()
     begin = time.monotonic()
@@ -61,7 +61,7 @@ def _button_pressed(stage: Stage, seen: Seen) -> None:
     _released(stage, seen)
 
 
-def _never_watched(stage: Stage, seen: Seen) -> None:
+def _never_watched(stage: Chain, seen: Seen) -> None:
     for word in (False, None):
         stage.peer.repeat("e_stop", word)
     stage.peer.say(V, W)
@@ -76,7 +76,7 @@ def _never_watched(stage: Stage, seen: Seen) -> None:
     _released(stage, seen)
 
 
-def _dead_man(stage: Stage, seen: Seen) -> None:
+def _dead_man(stage: Chain, seen: Seen) -> None:
     stage.peer.repeat("passenger_holds", True)
     stage.drive()
     begin = time.monotonic()
@@ -88,7 +88,7 @@ def _dead_man(stage: Stage, seen: Seen) -> None:
     seen.note("held again: goes on")
 
 
-def _held_from_the_start(stage: Stage, seen: Seen) -> None:
+def _held_from_the_start(stage: Chain, seen: Seen) -> None:
     stage.peer.say(V, W)
     begin = time.monotonic()
     stage.start_node()
@@ -100,7 +100,7 @@ def _held_from_the_start(stage: Stage, seen: Seen) -> None:
     seen.again(stage)
 
 
-def _heard_late(stage: Stage, seen: Seen) -> None:
+def _heard_late(stage: Chain, seen: Seen) -> None:
     """Its stick is held all along, but the first word of it comes when base_node has heard nothing for long."""
     stage.peer.say(V, W)
     begin = time.monotonic()

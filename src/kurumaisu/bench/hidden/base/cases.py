@@ -121,7 +121,7 @@ def _truth(ask: Ask, scale: Scale, heard: Scale, sizes: dict[str, Sizes]) -> Tru
         z_alone=_alone(means, own) | loud,
         z_rival=left[nearest],
         rival=nearest,
-        z_form=sizing.left_beside(whole - usual, {"usual": usual_own})["usual"],
+        z_form=sizing.left_after_rivals(whole - usual, {"usual": usual_own})["usual"],
         accepted=(ids, *((name,) for name in _below(alike, _SAME))),
         near=_below(alike, APART),
     )
@@ -138,7 +138,7 @@ def _left(scale: Scale, ids: Sequence[str], faults: Sequence[Fault], own: FloatA
         others = np.delete(own, i, axis=1)
         rivals = sizing.rival_columns(scale, names, [*faults[:i], *faults[i + 1 :]], part)
         beside = {name: np.column_stack([others, columns]) for name, columns in rivals.items()}
-        for name, rest in sizing.left_beside(own[:, i], beside).items():
+        for name, rest in sizing.left_after_rivals(own[:, i], beside).items():
             left[name] = min(rest, left.get(name, np.inf))
     return left
 
@@ -148,7 +148,7 @@ def _alone(names: Sequence[str], own: FloatArray) -> dict[str, float]:
     if len(names) == 1:
         return {names[0]: float(np.linalg.norm(own))}
     others = [np.delete(own, i, axis=1) for i in range(len(names))]
-    return {name: sizing.left_beside(own[:, i], {"": others[i]})[""] for i, name in enumerate(names)}
+    return {name: sizing.left_after_rivals(own[:, i], {"": others[i]})[""] for i, name in enumerate(names)}
 
 
 def _below(left: dict[str, float], z: float) -> tuple[str, ...]:

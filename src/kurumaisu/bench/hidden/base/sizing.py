@@ -75,7 +75,7 @@ def shares(scale: Scale, faults: Sequence[Fault]) -> tuple[FloatArray, FloatArra
     return signals[:, 0], signals[:, :1] - signals[:, 1:]
 
 
-def left_beside(signal: FloatArray, columns: Mapping[str, FloatArray]) -> dict[str, float]:
+def left_after_rivals(signal: FloatArray, columns: Mapping[str, FloatArray]) -> dict[str, float]:
     """Return the norm of what each name's columns (samples, k), fitted alone, leave of a signal."""
     out = {}
     for name, column in columns.items():

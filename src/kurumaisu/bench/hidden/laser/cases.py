@@ -160,7 +160,7 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
     plain = [scale.signal(LASER[name].fault(sizes[name], "plain")) for name in means]
     others = [name for name in MEANS if name not in ids and (scale.tour.moving or not LASER[name].moving)]
     rivals = scale.rivals(others, ids)
-    gram, rest = beside_rivals(scale, np.stack([*own, *plain], axis=-1), len(means), rivals)
+    gram, rest = left_after_rivals(scale, np.stack([*own, *plain], axis=-1), len(means), rivals)
     nearest = min(rest, key=lambda name: rest[name])
     alone = {name: left(gram, [i], _all_but(len(means), i)) for i, name in enumerate(means)}
     same = tuple((name,) for name, z in rest.items() if z < _SAME) if len(ids) == 1 else ()
@@ -176,7 +176,7 @@ def _truth(ask: Ask, scale: LaserScale, sizes: dict[str, Sizes], backdrop: Backd
     )
 
 
-def beside_rivals(
+def left_after_rivals(
     scale: LaserScale, signals: FloatArray, count: int, rivals: Sequence[tuple[str, FloatArray]]
 ) -> tuple[FloatArray, dict[str, float]]:
     """Return the gram of signals (s, b, n) and all rivals' columns, and the least that each rival leaves, by name.

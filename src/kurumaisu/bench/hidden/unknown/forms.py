@@ -18,7 +18,7 @@ from kurumaisu.types import FloatArray
 
 
 @dataclass(frozen=True)
-class Strange:
+class Unknown:
     """Something outside the catalogue: form, typical size, channel and covariates it is right to name."""
 
     form: Form
@@ -160,36 +160,36 @@ def _uniform(name: str, low: float, high: float) -> Callable[[np.random.Generato
 
 
 _bearing = _uniform("bearing", -np.pi, np.pi)
-STRANGE_BASE: dict[str, Strange] = {
-    "carpet": Strange(Form("floor", carpet), 0.1, "base.v", ("x", "position"), _uniform("edge", -0.5, 0.5)),
-    "heading_veer": Strange(Form("floor", heading_veer), 0.03, "base.w", ("heading",), _bearing),
-    "eccentric": Strange(Form("floor", eccentric), 0.05, "base.v", ("distance",), _uniform("girth", 0.8, 1.3)),
-    "step_in_time": Strange(Form("floor", step_in_time), 0.05, "base.v", ("t", "time"), _uniform("moment", 15.0, 45.0)),
-    "mixed_gain": Strange(Form("floor", mixed_gain), 0.05, "base.v", ("vw", "|vw|")),
-    "bump": Strange(Form("floor", bump), 0.02, "base.v", ("v", "|v|")),
-    "swing": Strange(Form("floor", swing), 0.02, "base.w", ("t", "time"), _uniform("phase", -np.pi, np.pi)),
-    "threshold_slip": Strange(Form("floor", threshold_slip), 0.1, "base.w", ("w", "|w|")),
-    "flat_spot": Strange(
+UNKNOWN_BASE: dict[str, Unknown] = {
+    "carpet": Unknown(Form("floor", carpet), 0.1, "base.v", ("x", "position"), _uniform("edge", -0.5, 0.5)),
+    "heading_veer": Unknown(Form("floor", heading_veer), 0.03, "base.w", ("heading",), _bearing),
+    "eccentric": Unknown(Form("floor", eccentric), 0.05, "base.v", ("distance",), _uniform("girth", 0.8, 1.3)),
+    "step_in_time": Unknown(Form("floor", step_in_time), 0.05, "base.v", ("t", "time"), _uniform("moment", 15.0, 45.0)),
+    "mixed_gain": Unknown(Form("floor", mixed_gain), 0.05, "base.v", ("vw", "|vw|")),
+    "bump": Unknown(Form("floor", bump), 0.02, "base.v", ("v", "|v|")),
+    "swing": Unknown(Form("floor", swing), 0.02, "base.w", ("t", "time"), _uniform("phase", -np.pi, np.pi)),
+    "threshold_slip": Unknown(Form("floor", threshold_slip), 0.1, "base.w", ("w", "|w|")),
+    "flat_spot": Unknown(
         Form("floor", flat_spot),
         0.1,
         "base.v",
         ("distance",),
         lambda rng: {"girth": float(rng.uniform(0.8, 1.3)), "spot": float(rng.random())},
     ),
-    "derating": Strange(Form("floor", derating), 0.1, "base.v", ("t", "time"), _uniform("moment", 15.0, 40.0)),
-    "puncture": Strange(Form("floor", puncture), 0.05, "base.w", ("t", "time"), _uniform("moment", 15.0, 45.0)),
-    "draught": Strange(Form("floor", draught), 0.05, "base.w", ("y", "position"), _uniform("door", -0.5, 0.5)),
+    "derating": Unknown(Form("floor", derating), 0.1, "base.v", ("t", "time"), _uniform("moment", 15.0, 40.0)),
+    "puncture": Unknown(Form("floor", puncture), 0.05, "base.w", ("t", "time"), _uniform("moment", 15.0, 45.0)),
+    "draught": Unknown(Form("floor", draught), 0.05, "base.w", ("y", "position"), _uniform("door", -0.5, 0.5)),
 }
-STRANGE_LASER: dict[str, Strange] = {
-    "sector_bias": Strange(
+UNKNOWN_LASER: dict[str, Unknown] = {
+    "sector_bias": Unknown(
         Form("bias", sector_bias), 0.01, "laser.bias", ("bearing", "beam"), _uniform("bearing", -1.5, 1.5)
     ),
-    "place_bias": Strange(
+    "place_bias": Unknown(
         Form("bias", place_bias), 0.01, "laser.bias", ("hit x", "hit position", "wall", "world bearing")
     ),
-    "ambient_bias": Strange(Form("bias", ambient_bias), 0.01, "laser.bias", ("heading",), _bearing),
-    "near_step": Strange(Form("bias", near_step), 0.01, "laser.bias", ("range", "r"), _uniform("edge", 1.2, 2.2)),
-    "pulse_bias": Strange(
+    "ambient_bias": Unknown(Form("bias", ambient_bias), 0.01, "laser.bias", ("heading",), _bearing),
+    "near_step": Unknown(Form("bias", near_step), 0.01, "laser.bias", ("range", "r"), _uniform("edge", 1.2, 2.2)),
+    "pulse_bias": Unknown(
         Form("bias", pulse_bias), 0.01, "laser.bias", ("t", "time"), _uniform("period", 130.0, 300.0)
     ),
 }

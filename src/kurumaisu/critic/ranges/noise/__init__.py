@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How readings and whole scans err at random: beams, neighbours, scans, and the poses they were taken from."""
+"""How readings err at random: beams, neighbours, whole scans and the poses they were taken from (scan_noise.py)."""

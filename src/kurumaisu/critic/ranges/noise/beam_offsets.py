@@ -50,7 +50,7 @@ def offset_products(rows: FloatArray, valid: BoolArray, sd: FloatArray, rho: flo
 def without_beam_offsets(
     grams: Sequence[Gram], cross: OffsetProducts, layout: Layout, noise: ScanNoise, beam_sd: float
 ) -> FloatArray:
-    """Return normal equations as noise.marginal, with an offset of sd beam_sd [m] of each beam integrated out too."""
+    """Return normal equations as scan_noise.marginal does, offsets of beams of sd beam_sd [m] integrated out too."""
     size, beams = own_pose_sds(noise), len(cross.inner)
     prior = precision(layout, noise)[0]
     scans, shared = len(grams), len(prior)

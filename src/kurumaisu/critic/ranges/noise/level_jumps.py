@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kurumaisu.critic.ranges.noise.reading_noise import MAD
+from kurumaisu.critic.values.robust import MAD
 from kurumaisu.types import FloatArray, IntArray
 
 _FEWEST = 6  # scans of a stand that may be split

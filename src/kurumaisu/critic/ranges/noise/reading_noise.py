@@ -10,12 +10,12 @@ import numpy as np
 
 from kurumaisu.critic.ranges.noise.scan_noise import Layout
 from kurumaisu.critic.ranges.scans.beams import BeamHits
+from kurumaisu.critic.values.robust import MAD
 from kurumaisu.types import BoolArray, FloatArray
 
 OUTLIER = 4.5  # deviations from which a reading does not count
 # Deviations that hardly any noise reaches, however heavy its tails: it is a reading of something else.
 ELSEWHERE = 25.0
-MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
 _BINS = 6  # of the range, and of the incidence, in which the deviation is estimated
 _FEWEST = 300  # readings of a bin in the tails, whose deviation is then known to a twentieth
 _JOLT = 4.0  # sds among scans from which one of them does not count

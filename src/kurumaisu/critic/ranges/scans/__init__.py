@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the scans saw: where and when each beam was fired, which readings count, what the map does not have."""
+"""What the scans saw, and which readings count: mixed pixels are left out of the mean in valid_readings.py."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.robust import MAD
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
@@ -16,7 +17,6 @@ _FEWEST = 10  # scans
 _ROOMS = ((0.06, 0.75), (0.75, 1.5), (1.5, 3.0), (3.0, 10.0))  # [m] distances that are told apart
 _FEW_BEAMS = 10
 _OUTLIER = 5.0  # deviations
-_MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
 _LAGS = (1, 2, 3, 5)  # beams
 _STABLE = 0.02  # [m] robust sd of a beam beyond which it sits on an edge or sees somebody pass
 
@@ -51,7 +51,7 @@ def repeatability(readings: FloatArray) -> Repeatability:
     whole = np.isfinite(readings).all(axis=0)
     middle[whole] = np.median(readings[:, whole], axis=0)
     spread = np.full(readings.shape[1], np.inf)
-    spread[whole] = _MAD * np.median(np.abs(readings[:, whole] - middle[whole]), axis=0)
+    spread[whole] = MAD * np.median(np.abs(readings[:, whole] - middle[whole]), axis=0)
     use = spread < _STABLE
     if not use.any():
         raise Error("repeatability: no beam is valid in all scans and sees one still surface")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kurumaisu.critic.values.robust import third_difference_sd
 from kurumaisu.types import FloatArray
 
 _PAUSE = 5.0  # [s] without a pose, after which the chair may stand elsewhere
@@ -24,7 +25,7 @@ def stands_averaged(times: FloatArray, poses: FloatArray) -> FloatArray:
     """
     if len(times) < _FEWEST:
         return poses
-    jitter = np.maximum(_jitter(poses), 1e-9)
+    jitter = np.maximum(third_difference_sd(poses), 1e-9)
     step = np.abs(np.diff(poses, axis=0)) / jitter
     pauses = np.flatnonzero(np.diff(times) > _PAUSE) + 1
     cuts = np.union1d(np.flatnonzero((step > _STEP).any(axis=1)) + 1, pauses)
@@ -70,8 +71,3 @@ def _still(poses: FloatArray, jitter: FloatArray, before: bool, behind: bool) ->
     low = int(np.argmax(ahead)) + 1 if before else 0
     high = len(poses) - (int(np.argmax(back)) + 1 if behind else 0)
     return slice(low, max(high, low))
-
-
-def _jitter(poses: FloatArray) -> FloatArray:
-    """Return the sd (3,) of errors that differ from pose to pose, by third differences: motion hardly has any."""
-    return np.asarray(1.4826 * np.median(np.abs(np.diff(poses, n=3, axis=0)), axis=0) / np.sqrt(20))

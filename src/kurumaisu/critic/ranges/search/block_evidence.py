@@ -9,19 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, FittedForms, FormPosterior, confusion
+from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, WEAK_PRIOR, FittedForms, FormPosterior, confusion
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.unknown.curves import CurveEvidence, curve_evidence
-from kurumaisu.critic.values.prior import odds
+from kurumaisu.critic.values.prior import UNKNOWN_ODDS, odds
 from kurumaisu.types import FloatArray, IntArray
 
 BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
 LEFT = 0.05  # share of a curve's evidence that the curve itself may leave to other effects
-_ODDS = 0.1  # that something outside the catalogue acts, before the data; all curves share it
 _FITS = 10  # best sets beside which blocks are tried
 _SINGLES = 12  # best single effects likewise
 _PRUNED = 3  # best sets with a block that are pruned
-_WEAK = 1e-4  # prior precision of a coefficient of the catalogue, in units of its parameter's scale
 _FARTHEST = 3.0  # sds of a block's coefficients, beyond which hardly one lies
 _SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in units of its scale
 
@@ -82,7 +80,7 @@ def compare_blocks(found: FormPosterior, free: Sequence[Block], gram: FloatArray
     ids = tuple(dict.fromkeys([*found.p, *(each.id for each in free if each.basis is None)]))
     count = len(ids)
     curves = sum(each.basis is not None for each in free)
-    shares = {e.id: float(np.log(odds(count) if e.basis is None else _ODDS / curves)) for e in free}
+    shares = {e.id: float(np.log(odds(count) if e.basis is None else UNKNOWN_ODDS / curves)) for e in free}
     known = {fit.ids: fit for fit in reversed(found.fits)}
     rivals = []
     for fit in _tried(found.fits):
@@ -150,7 +148,7 @@ def fit_with_block(rival: SetWithBlock, gram: FloatArray) -> tuple[FittedForms, 
     turn = np.eye(len(use))
     turn[len(fixed) :, len(fixed) :] = root
     inner = turn.T @ gram[np.ix_(use, use)] @ turn
-    inverse = np.linalg.inv(inner + np.diag(np.r_[np.full(len(fixed), _WEAK), np.ones(len(own))]))
+    inverse = np.linalg.inv(inner + np.diag(np.r_[np.full(len(fixed), WEAK_PRIOR), np.ones(len(own))]))
     at = turn @ (inverse @ (turn.T @ gram[use, -1]))
     covariance = turn @ inverse @ turn.T
     n = len(fixed)
@@ -195,5 +193,6 @@ def without_own_span(fit: FittedForms, free: Block, gram: FloatArray) -> tuple[F
     if not len(use):
         return inner, b
     cross = gram[np.ix_(use, own)]
-    solved = np.linalg.solve(gram[np.ix_(use, use)] + _WEAK * np.eye(len(use)), np.column_stack([cross, gram[use, -1]]))
+    own_gram = gram[np.ix_(use, use)] + WEAK_PRIOR * np.eye(len(use))
+    solved = np.linalg.solve(own_gram, np.column_stack([cross, gram[use, -1]]))
     return inner - cross.T @ solved[:, :-1], b - cross.T @ solved[:, -1]

@@ -38,8 +38,8 @@ def confounded(
             if winner is not None and name == winner.free.id:
                 own = _with_block(winner.fit, winner.free, gram)
             else:
-                own = _worth(found.best)
-            group |= {other for other, nats in _others(found, fits, blocks, gram) if own - nats < _LOSS}
+                own = _log_posterior(found.best)
+            group |= {other for other, nats in _alternatives(found, fits, blocks, gram) if own - nats < _LOSS}
         for known in [known for known in groups if known & group]:
             groups.remove(known)
             group |= known
@@ -67,14 +67,14 @@ def _sets(found: FormPosterior, winner: SetWithBlock | None, name: str) -> Itera
         yield winner.fit.ids
 
 
-def _others(
+def _alternatives(
     found: FormPosterior, rest: frozenset[str], blocks: Sequence[Block], gram: FloatArray
 ) -> Iterator[tuple[str, float]]:
     """Yield effects that may act beside the rest, and what they explain with it."""
     for fit in found.fits:
         if len(fit.ids) == len(rest) + 1 and rest < fit.ids:
-            yield next(iter(fit.ids - rest)), _worth(fit)
-    base = max((fit for fit in found.fits if fit.ids == rest), key=_worth, default=None)
+            yield next(iter(fit.ids - rest)), _log_posterior(fit)
+    base = max((fit for fit in found.fits if fit.ids == rest), key=_log_posterior, default=None)
     for block in blocks:
         if base is not None and block.id not in rest and not _by_chance(found, base, block, gram):
             yield block.id, _with_block(base, block, gram)
@@ -90,7 +90,7 @@ def _by_chance(found: FormPosterior, base: FittedForms, block: Block, gram: Floa
     return found.best.score - evidence > _CHANCE
 
 
-def _worth(fit: FittedForms) -> float:
+def _log_posterior(fit: FittedForms) -> float:
     return fit.log_likelihood - 0.5 * len(fit.coefficients)
 
 
@@ -99,4 +99,4 @@ def _with_block(fit: FittedForms, block: Block, gram: FloatArray) -> float:
     values, vectors = np.linalg.eigh(inner)
     shows = values > _RANK * values[-1]
     along = (vectors.T @ b)[shows]
-    return _worth(fit) + 0.5 * float(np.sum(along**2 / values[shows])) - 0.5 * int(shows.sum())
+    return _log_posterior(fit) + 0.5 * float(np.sum(along**2 / values[shows])) - 0.5 * int(shows.sum())

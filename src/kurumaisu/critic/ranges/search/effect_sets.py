@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic.engine.search import NAMED, RIVAL
 from kurumaisu.critic.ranges.signals.effect_columns import Form
+from kurumaisu.critic.values.policy import NAMED, RIVAL
 from kurumaisu.critic.values.prior import Z_LOW, log_prior, occam
 from kurumaisu.types import FloatArray
 
 _LARGEST = 5  # effects in a set
 _WIDTH = 8  # sets that are extended at a time
-_WEAK = 1e-4  # prior precision of a coefficient, in units of its parameter's scale
+WEAK_PRIOR = 1e-4  # prior precision of a coefficient, in units of its parameter's scale
 # Share of what a set explains that one more effect in it must bring: a real effect hardly has the catalogue's very
 # form, and what its form leaves is not another one.
 LINE_ERROR = 0.02
@@ -137,7 +137,7 @@ class FormSearch:
             return FittedForms((), np.empty(0), np.empty(0), 0.0, prior)
         use = np.concatenate([np.arange(form.span.start, form.span.stop) for form in forms])
         gram, b = self._gram[np.ix_(use, use)], self._gram[use, -1]
-        inverse = np.linalg.inv(gram + _WEAK * np.eye(len(use)))
+        inverse = np.linalg.inv(gram + WEAK_PRIOR * np.eye(len(use)))
         at = inverse @ b
         likelihood = float(b @ at - 0.5 * at @ gram @ at)
         cost, start = 0.0, 0

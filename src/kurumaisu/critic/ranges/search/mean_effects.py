@@ -62,7 +62,7 @@ class MeanEffects:
             return made
         if winner is None:
             return replace(made, fit=fit, winner=None, coefficients=np.empty(0), covariance=np.empty((0, 0)))
-        fit, winner, coefficients, covariance = _with(winner, normal)
+        fit, winner, coefficients, covariance = _fit_with_block(winner, normal)
         return replace(made, fit=fit, winner=winner, coefficients=coefficients, covariance=covariance)
 
     def with_further(self, assembly: Assembly, normal: NormalEquations, more: FurtherEffects) -> MeanEffects:
@@ -86,10 +86,12 @@ def mean_effects(assembly: Assembly, normal: NormalEquations, found: FormPosteri
     winner = weighed.winner
     if winner is None:
         return MeanEffects(weighed, found.best, None, np.empty(0), np.empty((0, 0)))
-    return MeanEffects(weighed, *_with(winner, normal))
+    return MeanEffects(weighed, *_fit_with_block(winner, normal))
 
 
-def _with(winner: SetWithBlock, normal: NormalEquations) -> tuple[FittedForms, SetWithBlock, FloatArray, FloatArray]:
+def _fit_with_block(
+    winner: SetWithBlock, normal: NormalEquations
+) -> tuple[FittedForms, SetWithBlock, FloatArray, FloatArray]:
     fit, coefficients, covariance = block_evidence.fit_with_block(winner, normal.gram)
     return fit, winner, coefficients, covariance
 

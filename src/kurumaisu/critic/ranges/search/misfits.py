@@ -32,7 +32,9 @@ class Part:
 def misfits(assembly: Assembly, normal: NormalEquations, parts: Sequence[Part]) -> tuple[Misfit, ...]:
     """Return per part what is wrong with the readings without it, over what it follows, and what it adds."""
     added = [np.asarray(assembly.columns[:, :, part.span] @ part.coefficients, dtype=np.float64) for part in parts]
-    left = _left(assembly, normal, np.asarray(assembly.residual - sum(added, np.zeros(assembly.residual.shape))))
+    left = _without_shared_errors(
+        assembly, normal, np.asarray(assembly.residual - sum(added, np.zeros(assembly.residual.shape)))
+    )
     step = max(1, int(normal.beam_noise.valid.sum()) // _SAMPLES)
     rows = np.flatnonzero(normal.beam_noise.valid & np.isfinite(left))[::step]
     over = {name: (unit, values.ravel()[rows]) for name, (unit, values) in _covariates(assembly).items()}
@@ -55,7 +57,7 @@ def _moments(assembly: Assembly, rows: IntArray) -> Moments:
     return Moments(shots.runs, shots.run[scan], shots.stamps[scan] + shots.zero, places)
 
 
-def _left(assembly: Assembly, normal: NormalEquations, error: FloatArray) -> FloatArray:
+def _without_shared_errors(assembly: Assembly, normal: NormalEquations, error: FloatArray) -> FloatArray:
     """Return errors (k, b) [m] without what is most likely an error of the reference or of the whole scan."""
     scan, beam = normal.scan_noise, normal.beam_noise
     pose = np.maximum([scan.position_sd, scan.position_sd, scan.heading_sd], _LEAST)

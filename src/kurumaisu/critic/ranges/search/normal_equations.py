@@ -11,7 +11,6 @@ import numpy as np
 
 from kurumaisu.critic.ranges.noise.beam_offsets import OffsetProducts, offset_products, without_beam_offsets
 from kurumaisu.critic.ranges.noise.reading_noise import (
-    MAD,
     OUTLIER,
     BeamNoise,
     estimate_reading_noise,
@@ -39,6 +38,7 @@ from kurumaisu.critic.ranges.scans.valid_readings import pose_weights, usable_be
 from kurumaisu.critic.ranges.signals.coefficient_blocks import blocks
 from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns, Form
 from kurumaisu.critic.ranges.signals.form_error import FormFamily
+from kurumaisu.critic.values.robust import MAD
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -79,12 +79,12 @@ class Assembly:
         self.motion: list[MotionEvidence] | None = None
         self.blocked = blocked_beams(shots.measured, self.marks.base)
         somewhere = without_cut_off(shots.measured)
-        self.displaced = map_change(somewhere, self.marks.base, self.hits(), self.marks.seen.incidence)
+        self.map_change = map_change(somewhere, self.marks.base, self.hits(), self.marks.seen.incidence)
         # Which readings (k, b) are of what the map has, as far as is known.
-        self.mapped = ~self.blocked & ~self.displaced.readings
+        self.mapped = ~self.blocked & ~self.map_change.readings
         others = np.where(self.mapped, somewhere, np.nan)
-        self.strangers = passing_objects(others, self.marks.base, shots.laser.bearings)
-        self.mapped &= ~self.strangers.readings
+        self.passing_objects = passing_objects(others, self.marks.base, shots.laser.bearings)
+        self.mapped &= ~self.passing_objects.readings
         self.first = self._trust()
         for i in range(_SHIFTS):
             found, self.kinked = pose_corrected(self.shots, self.tracks, self.hats, self.layout, self._sights())
@@ -120,14 +120,14 @@ class Assembly:
     def unknowns(self) -> list[Unknown]:
         """Return what stands where the map has it not, rides with the chair, or comes and goes."""
         riding = described(self.blocked, self.shots.measured, self.shots.laser.bearings)
-        staying = list(self.displaced.unknowns())
+        staying = list(self.map_change.unknowns())
         known = {each.covariate for each in staying}
-        return [*riding, *staying, *(each for each in self.strangers.unknowns() if each.covariate not in known)]
+        return [*riding, *staying, *(each for each in self.passing_objects.unknowns() if each.covariate not in known)]
 
     @property
-    def strange(self) -> bool:
+    def unmapped(self) -> bool:
         """Whether things are there that the map does not have: how far others scatter by them, nobody can say."""
-        return bool(self.displaced.readings.any()) or self.strangers.many
+        return bool(self.map_change.readings.any()) or self.passing_objects.many
 
     def hits(self) -> FloatArray:
         """Return where (k, b, 2) [m] the beams meet the map."""

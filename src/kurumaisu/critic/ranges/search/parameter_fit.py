@@ -20,7 +20,7 @@ from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.signals.effect_columns import Form
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, beam_family
-from kurumaisu.critic.unknown.effect_likeness import FORM_ERROR
+from kurumaisu.critic.values.policy import FORM_ERROR, FORM_WAYS
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
@@ -32,7 +32,6 @@ STRONG = 1.0  # rms of what acts, in sds of single readings, from which scans ar
 _STEP = 0.05  # of a finite difference, in units of the larger of a parameter and its scale
 _SHAPE = 1.0  # prior sd of what only shapes an effect, in the same units
 _SIZE = 100.0  # and of its size
-_WAYS = 4  # in which a form may differ, of which one passes for another effect's size
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ def fit_parameters(
     slopes = [_slope(assembly, forms, at, each) for each in free]
     sds = np.hypot(sds, _doubt(assembly, normal, free, (slopes, guessed, signals)) * sds)
     drawn = {i: others[forms[i].id] for i in guessed if forms[i].id in others}
-    left = left - _instead(
+    left = left - _other_curves(
         assembly, normal, (free, slopes, block), (drawn, dict(zip(guessed, signals, strict=True))), left
     )
     out: list[dict[str, float]] = [{} for _ in forms]
@@ -175,9 +174,9 @@ def _doubt(
 ) -> FloatArray:
     """Return what other forms of what acts may shift each parameter by, in standard deviations.
 
-    Nobody can refuse a form that differs by FORM of what the effect does. At which range or angle a size counts is the
-    form's choice, so its own size is in doubt by all of it; what only shapes it, a wavelength say, by the share that
-    goes one of the ways in which a form may differ; of others, what is like their own marks passes for them.
+    Nobody can refuse a form that differs by FORM_ERROR of what the effect does. At which range or angle a size counts
+    is the form's choice, so its own size is in doubt by all of it; what only shapes it, a wavelength say, by the share
+    that goes one of the ways in which a form may differ; of others, what is like their own marks passes for them.
     parts: how the mean follows each parameter, which effects are empirical, and what these do.
     """
     slopes, guessed, signals = parts
@@ -188,11 +187,11 @@ def _doubt(
     count = len(free)
     alike = (gram / np.outer(norms, norms))[:count, count:]
     own = np.array([[each.index == i for i in guessed] for each in free])
-    share = np.where(own, alike**2 + (1 - alike**2) / _WAYS, alike**2 / _WAYS)
+    share = np.where(own, alike**2 + (1 - alike**2) / FORM_WAYS, alike**2 / FORM_WAYS)
     return np.asarray(FORM_ERROR * np.sqrt(share @ norms[count:] ** 2))
 
 
-def _instead(
+def _other_curves(
     assembly: Assembly,
     normal: NormalEquations,
     fitted: tuple[Sequence[_Free], Sequence[FloatArray], FloatArray],

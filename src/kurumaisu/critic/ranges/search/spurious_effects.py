@@ -12,16 +12,15 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from kurumaisu import effects
-from kurumaisu.critic.engine.search import NAMED
 from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
-from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior
+from kurumaisu.critic.ranges.search.effect_sets import WEAK_PRIOR, FittedForms, FormPosterior
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
 from kurumaisu.critic.unknown.curves import curve_evidence
+from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.prior import occam, odds
 from kurumaisu.types import FloatArray, IntArray
 
-_WEAK = 1e-4  # prior precision of a coefficient, in units of its parameter's scale
 _SURE = float(np.log(NAMED / (1 - NAMED)))  # [nat] from which an effect is named
 
 
@@ -101,13 +100,13 @@ class _JointGram:
             block = self._winner
             if block is not None and name != block.free.id:
                 drawn.append((self._own[block.free.id], block.evidence.prior))
-            gram = _without(self._gram, drawn)
+            gram = _families_integrated(self._gram, drawn)
             rest = self._columns([form.id for form in self._fit.forms if form.id != name])
-            own, b = _left(gram, self._own[name], rest)
+            own, b = _without_span(gram, self._own[name], rest)
             if block is not None and name == block.free.id:
                 nats = curve_evidence(own, b, block.free.priors).nats
             else:
-                nats = 0.5 * float(b @ np.linalg.solve(own + _WEAK * np.eye(len(own)), b))
+                nats = 0.5 * float(b @ np.linalg.solve(own + WEAK_PRIOR * np.eye(len(own)), b))
                 z = float(np.sqrt(max(2 * nats, 0.0)))
                 # A direction among several columns is as free as z is large.
                 nats -= float(occam(z)) + (len(own) - 1) * np.log(max(z, 1.0)) + np.log(self._forms_of[name])
@@ -130,19 +129,19 @@ class _JointGram:
         raise KeyError(name)
 
 
-def _without(gram: FloatArray, drawn: Sequence[tuple[IntArray, FloatArray]]) -> FloatArray:
+def _families_integrated(gram: FloatArray, drawn: Sequence[tuple[IntArray, FloatArray]]) -> FloatArray:
     if not drawn:
         return gram
     return integrated_out(gram, np.concatenate([at for at, _ in drawn]), block_diag(*(prior for _, prior in drawn)))
 
 
-def _left(gram: FloatArray, own: IntArray, rest: IntArray) -> tuple[FloatArray, FloatArray]:
+def _without_span(gram: FloatArray, own: IntArray, rest: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return gram and target of some columns without what others could take up."""
     inner, b = gram[np.ix_(own, own)], gram[own, -1]
     if not len(rest):
         return inner, b
     cross = gram[np.ix_(rest, own)]
     solved = np.linalg.solve(
-        gram[np.ix_(rest, rest)] + _WEAK * np.eye(len(rest)), np.column_stack([cross, gram[rest, -1]])
+        gram[np.ix_(rest, rest)] + WEAK_PRIOR * np.eye(len(rest)), np.column_stack([cross, gram[rest, -1]])
     )
     return inner - cross.T @ solved[:, :-1], b - cross.T @ solved[:, -1]

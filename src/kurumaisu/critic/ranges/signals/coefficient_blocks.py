@@ -19,7 +19,7 @@ from kurumaisu.critic.ranges.noise.level_jumps import knots_parted, level_jumps
 from kurumaisu.critic.ranges.poses.pose_corrections import stands_of
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
 from kurumaisu.critic.ranges.scans.walls import Rays
-from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns
+from kurumaisu.critic.ranges.signals.effect_columns import STEP, EffectColumns
 from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of
 from kurumaisu.effects import Echoes, Parameter
 from kurumaisu.types import FloatArray
@@ -28,7 +28,6 @@ _HATS = 14
 _PAUSE = 5.0  # [s] between scans, which makes two stops of what was one
 _STOPS = 20  # stops of which each may have a knot of its own
 _DRAWS = 150  # coefficients of an effect that are still told one by one; of more, so many draws stand for all
-_STEP = 0.2  # of a finite difference, in units of a parameter's scale
 _ROUNDING = 1e-6
 _LEAST = 0.3  # [m, rad, s] spread of a covariate that a curve may follow
 _SAMPLES = 20000  # readings that say how often a covariate has which value
@@ -91,7 +90,7 @@ def _drawn(shots: Shots, marks: EffectColumns, ids: frozenset[str] | None) -> It
         for p in effect.parameters:
             if not effect.random or (ids is not None and effect.id not in ids):
                 continue
-            values = {**null, p.name: p.null + _STEP * p.scale}
+            values = {**null, p.name: p.null + STEP * p.scale}
             counter = _Spike(-1, 0.0)
             drawn = effect(values, np.random.default_rng(0)).apply(shots.walls.segments)
             still = effect(values, counter).apply(shots.walls.segments)
@@ -102,7 +101,7 @@ def _drawn(shots: Shots, marks: EffectColumns, ids: frozenset[str] | None) -> It
             for i in range(_DRAWS if many else counter.asked):
                 rng = np.random.default_rng(i) if many else _Spike(i, 1.0)
                 change = _moved(shots, effect(values, rng).apply(shots.walls.segments), marks)
-                made.append((change * slope / _STEP / (np.sqrt(_DRAWS) if many else 1.0)).astype(np.float32))
+                made.append((change * slope / STEP / (np.sqrt(_DRAWS) if many else 1.0)).astype(np.float32))
             columns: Any = np.stack([one for one in made if np.abs(one).max() > 0], axis=-1)
             yield Block(effect.id, p, None, (np.eye(columns.shape[2]),), slice(0)), columns
 

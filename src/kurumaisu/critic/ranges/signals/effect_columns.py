@@ -21,7 +21,7 @@ from kurumaisu.effects import Mechanism, Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray, IntArray
 
-_STEP = 0.2  # of a finite difference, in units of a parameter's scale
+STEP = 0.2  # of a finite difference, in units of a parameter's scale
 _NOTHING = 1e-9  # [m] a change that is none
 _SAME = 0.98  # correlation from which two forms of an effect are one
 _PROBE = 12  # scans on which it is tried how a parameter acts
@@ -215,12 +215,10 @@ class EffectColumns:
         """Return the change per scale, from both sides where bounds allow: one side sees half the curvature."""
         null = self.null(effect)[parameter.name]
         if issubclass(effect, effects.ReadingEffect) and effect.id not in self._own and self._linear(effect, parameter):
-            step = _STEP * parameter.scale if parameter.upper > null else -_STEP * parameter.scale
+            step = STEP * parameter.scale if parameter.upper > null else -STEP * parameter.scale
             moved = self.change(effect, {**beside, parameter.name: null + step})
             return np.asarray(moved * (parameter.scale / step))
-        ends = np.clip(
-            [null - _STEP * parameter.scale, null + _STEP * parameter.scale], parameter.lower, parameter.upper
-        )
+        ends = np.clip([null - STEP * parameter.scale, null + STEP * parameter.scale], parameter.lower, parameter.upper)
         low, high = (
             np.float64(0.0) if end == null else self.change(effect, {**beside, parameter.name: end})
             for end in ends.tolist()

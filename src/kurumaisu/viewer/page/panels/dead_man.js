@@ -5,7 +5,7 @@ const PERIOD = 100; // [ms] between commands
 const UNANSWERED = 10; // commands without a reply: what is seen is a second old, and nobody can drive by that
 const BACKLOG = 2000; // [bytes] that the network has not taken: what waits there would be obeyed too late
 
-export class Drive {
+export class DeadMan {
   armed = false;
   body = null; // id of the robot that is driven, where there are several
   #held = null; // [v, w] [m/s, rad/s]

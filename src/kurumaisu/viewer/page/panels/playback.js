@@ -5,7 +5,7 @@ import {byId, fixed, newest, setText} from "../common/dom.js";
 
 const NUDGE = 0.1; // [s] of a key
 
-export class Bag {
+export class Playback {
   #held = false; // the user has the slider
   #send;
   #wanted = null; // [s] asked for, until the recording has moved there

@@ -2,7 +2,7 @@
 // What the critic's report says is furthest off: where on the map, and when.
 
 import {byId, make, setText} from "../common/dom.js";
-import {fragment, largest, pictures, quantity, told} from "../report/data.js";
+import {fragment, largest, pictures, quantity, momentText} from "../report/data.js";
 
 // Of the report's page only the data are wanted; its styles may not act here, and each would be complained about.
 const STYLES = /<(style)\b[^>]*>[^]*?<\/\1>|\bstyle="[^"]*"/g;
@@ -47,7 +47,7 @@ export class Residuals {
     this.#marks = largest(samples, MARKED);
     setText(byId("residual-count"), `The ${Math.min(LISTED, this.#marks.length)} largest of ${samples.length} misfits in the picture:`);
     byId("residual-list").replaceChildren(...this.#marks.slice(0, LISTED).map((sample) => make("li", {},
-      make("a", {href: fragment(sample), textContent: `${quantity(sample.value, unit)} ${told(sample)}`}))));
+      make("a", {href: fragment(sample), textContent: `${quantity(sample.value, unit)} ${momentText(sample)}`}))));
     this.picture.dirty("front");
   }
 

@@ -2,7 +2,7 @@
 // The stick on the screen and the keys that do the same.
 
 import {byId, fixed, make, setPressed, setText} from "../common/dom.js";
-import {Drive} from "./dead_man.js";
+import {DeadMan} from "./dead_man.js";
 
 const KEYS = {
   ArrowUp: [1, 0], KeyW: [1, 0], ArrowDown: [-1, 0], KeyS: [-1, 0],
@@ -18,7 +18,7 @@ export class Stick {
   /** options: what is chosen; say(text): tells the driver why the stick was taken away. */
   constructor(connection, scene, options, say) {
     Object.assign(this, {scene, options});
-    this.drive = new Drive(connection, (reason) => this.#changed(reason, say));
+    this.drive = new DeadMan(connection, (reason) => this.#changed(reason, say));
     this.pad = byId("stick");
     this.pad.addEventListener("pointerdown", (event) => this.#take(event));
     this.pad.addEventListener("pointermove", (event) => event.pointerId === this.#pointer && this.#pull(event));

@@ -84,7 +84,7 @@ export function quantity(value, unit) {
 }
 
 /** Say when and where. */
-export function told({run, t, x, y}) {
+export function momentText({run, t, x, y}) {
   const metres = (value) => (Math.round(100 * value) / 100 + 0).toFixed(2).replace("-", "−"); // + 0: none is minus nothing
   const place = Number.isFinite(x) && Number.isFinite(y) ? `, at ${metres(x)}, ${metres(y)} m` : "";
   return `${run}, t = ${t.toFixed(2)} s${place}`;

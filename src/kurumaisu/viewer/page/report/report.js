@@ -2,7 +2,7 @@
 // In the critic's report, where the viewer serves it: a point leads to its moment and place.
 
 import {ask} from "../common/channel.js";
-import {fragment, largest, pictures, quantity, told} from "./data.js";
+import {fragment, largest, pictures, quantity, momentText} from "./data.js";
 
 const VIEWER = "kurumaisu-viewer"; // the window that the viewer is in
 const NEAR = 12; // of the picture's own coordinates: points are found from so far
@@ -17,7 +17,7 @@ const news = document.createElement("p");
 async function show(sample) {
   if (!window.opener || window.opener.closed) {
     const {gone, why} = await ask(fragment(sample));
-    if (gone) return say(`${told(sample)}: shown in the viewer's tab.`);
+    if (gone) return say(`${momentText(sample)}: shown in the viewer's tab.`);
     if (why) return say(`The viewer's tab cannot show it. ${why}`);
   }
   // an empty target would take this page away
@@ -70,7 +70,7 @@ function lead(picture) {
       ring.setAttribute("cx", sample.left);
       ring.setAttribute("cy", sample.top);
     }
-    said.textContent = sample ? `${quantity(sample.value, unit)} ${told(sample)}`.trim() : hint;
+    said.textContent = sample ? `${quantity(sample.value, unit)} ${momentText(sample)}`.trim() : hint;
     return sample;
   };
   // what is ringed is what a click means: a click's own place is rounded to whole pixels
@@ -90,7 +90,7 @@ function list(samples, unit) {
   summary.textContent = `The ${samples.length} largest misfits, in the viewer`;
   const items = samples.map((sample) => {
     const link = document.createElement("a");
-    Object.assign(link, {href: address(sample), target: VIEWER, textContent: `${quantity(sample.value, unit)} ${told(sample)}`});
+    Object.assign(link, {href: address(sample), target: VIEWER, textContent: `${quantity(sample.value, unit)} ${momentText(sample)}`});
     link.addEventListener("click", (event) => {
       event.preventDefault();
       show(sample);

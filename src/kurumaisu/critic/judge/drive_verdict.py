@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Drive criticism from a recording to a verdict: what acts on the base, whether it holds, what to drive next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from kurumaisu.critic.base.covariates import with_covariates
+from kurumaisu.critic.base.drive import Drive, driven, prepare
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.experiment.proposal import drives as scripted_drives
+from kurumaisu.critic.experiment.proposal import propose
+from kurumaisu.critic.heldout import drive_gain
+from kurumaisu.critic.heldout.extension_gain import Extension
+from kurumaisu.critic.judge import excitation, explain, explain_unknown
+from kurumaisu.critic.judge.decide import Decision, decide, noise_residuals
+from kurumaisu.critic.judge.forecast import forecast_of
+from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
+from kurumaisu.critic.noise import base_noise
+from kurumaisu.critic.predict.motion import Forecast
+from kurumaisu.critic.sanity import early_stamps
+from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.progress import Progress
+from kurumaisu.critic.values.recording import Recording, Run
+from kurumaisu.critic.values.selection import beside_odometry
+from kurumaisu.critic.values.settings import Settings
+from kurumaisu.critic.values.verdict import Gain
+from kurumaisu.errors import Error
+from kurumaisu.params import Model
+
+NOTHING = Extension(None, (), lambda _: ())
+
+
+def criticise_drives(
+    recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None
+) -> tuple[Criticism, Extension]:
+    """Return what the drives of a recording say against a model, and what extends it by that."""
+    drives = _drives(recording, model)
+    progress("estimating the noise")
+    if all(drives[name].source == "odom" for name in recording.train if name in drives):
+        ids = beside_odometry(ids)
+    rough, first = _begun(recording, model, drives, ids)
+    by = early_stamps.lead(first, progress)
+    if by > early_stamps.tolerated_lead([run for run in recording.runs if run.name in drives]):
+        return explain.invalid(recording, model, [early_stamps.problem(by)]), NOTHING
+    if by > 0:
+        recording = replace(recording, problems=(*recording.problems, early_stamps.note(by)))
+        drives = {name: early_stamps.restamped(drive, by) for name, drive in drives.items()}
+        rough, first = _begun(recording, model, drives, ids)
+    train = list(first.drives)
+    test = [drives[name] for name in recording.test if name in drives]
+    made = decide(first, recording.truth, progress)
+
+    progress("measuring the gain on held-out drives")
+    left = noise_residuals(rough, rough.fit((), {}), recording.truth, project=False)
+    baseline = left.estimate(made.problem.noise).noise
+    hidden = [drives[run.name] for run in recording.runs if run.name in drives and withheld(recording, run)]
+    made, held = _held_out(made, model, baseline, train, test, hidden)
+    progress("planning the next drive")
+    scripts = scripted_drives()
+    proposal = propose(made.problem, made.found, scripts)
+    judge = explain.criticism if made.beyond.extension is None else explain_unknown.criticism
+    judged = excitation.with_shortcomings(judge(recording, made, held, train + test, proposal), made, train, scripts)
+    return judged, _extension(made, forecast_of(made, judged.settings, baseline), train)
+
+
+def _held_out(
+    made: Decision,
+    model: Model,
+    baseline: base_noise.Noise,
+    train: Sequence[Drive],
+    test: Sequence[Drive],
+    hidden: Sequence[Drive],
+) -> tuple[Decision, Gain | None]:
+    """Return what of a decision drives held out do not refuse, and what that gains; hidden: withheld drives."""
+    names = {drive.name for drive in hidden}
+    whole = [drive for drive in test if drive.name not in names]
+    splits = drive_gain.with_withheld(drive_gain.folds(train, whole), train, hidden)
+
+    def gain_of(one: Decision) -> Gain:
+        return drive_gain.measure(model, splits, one.refit, baseline, one.problem.noise)
+
+    made, held = confirmed_part(made, gain_of(made) if splits and made.something else None, gain_of)
+    if whole and len(train) > 1:
+        more = [*drive_gain.folds(train, ()), *splits]
+        held = leave_one_out(
+            made, held, lambda: drive_gain.measure(model, more, made.refit, baseline, made.problem.noise)
+        )
+    return replace(made, untested=bool(whole) and untested(made, held, whole)), held
+
+
+def _extension(made: Decision, forecast: Forecast, train: Sequence[Drive]) -> Extension:
+    """Return what extends the model on drives, which can be fitted again without one of them."""
+
+    def refit(name: str) -> Settings:
+        others = [drive for drive in train if drive.name != name]
+        again = forecast.settings and len(others) in range(1, len(train))
+        return tuple(made.refit(others).settings) if again else forecast.settings
+
+    return Extension(forecast, (), refit)
+
+
+def withheld(recording: Recording, run: Run) -> bool:
+    """Tell whether a run lacks poses because they are to be predicted: gaps in it are no fault."""
+    return run.queries is not None and run.name in recording.test
+
+
+def _drives(recording: Recording, model: Model) -> dict[str, Drive]:
+    """Return the drives, without those of withheld runs that have too few poses left to judge by."""
+    drives = {}
+    for run in filter(driven, recording.runs):
+        try:
+            drives[run.name] = with_covariates(prepare(run, model), run)
+        except Error:
+            if not withheld(recording, run):
+                raise
+    return drives
+
+
+def _begun(
+    recording: Recording, model: Model, drives: Mapping[str, Drive], ids: frozenset[str] | None
+) -> tuple[Problem, Problem]:
+    """Return the problem of the drives to fit, with any noise and with a first estimate of theirs."""
+    rough = Problem([drives[name] for name in recording.train if name in drives], model, base_noise.START, ids=ids)
+    left = noise_residuals(rough, rough.fit((), {}), recording.truth, project=True)
+    return rough, rough.changed(noise=left.estimate().noise)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Here it is decided what changes how readings scatter, and whether that matters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kurumaisu import effects
+from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
+from kurumaisu.critic.ranges.search import block_evidence
+from kurumaisu.critic.ranges.search.mean_effects import MeanEffects
+from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
+from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit
+from kurumaisu.critic.scatter.common_offset import beyond_own_offset, with_common_offset
+from kurumaisu.critic.scatter.scatter_fit import ScatterFit
+from kurumaisu.critic.scatter.scatter_search import ScatterEffect, ScatterSearch
+from kurumaisu.critic.scatter.simulation import ScatterSimulator
+from kurumaisu.critic.scatter.statistics import Statistics
+from kurumaisu.critic.values.policy import FORM_ERROR, NAMED, RIVAL
+from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.story import Comparison
+
+# Share of what single readings scatter by, from which it matters that whole scans are off together: what neighbours
+# have in common beyond the simplest equation for it moves the mean of a scan as well.
+_HEARD = 0.06
+_SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
+
+
+@dataclass(frozen=True)
+class MeanFit:
+    """What acts on the mean readings of some scans, in their noise, and its fit by simulation."""
+
+    assembly: Assembly
+    normal: NormalEquations
+    made: MeanEffects
+    fit: ParameterFit
+
+
+def scatter_effects(
+    mean: MeanFit, recording: Recording, ids: frozenset[str] | None, own: float
+) -> tuple[list[ScatterEffect], tuple[Comparison, ...]]:
+    """Return the effects on how readings scatter, those of whole scans among them, and what they mend.
+
+    own: the sd [m] of whole scans in the model.
+    """
+    assembly, made, fit = mean.assembly, mean.made, mean.fit
+    if fit.assembly.unmapped:
+        return [], ()
+    away = 0.0 if made.winner is None else block_evidence.wall_error(made.winner, mean.normal.gram)
+    scatter, comparison = _of_readings(assembly, fit, ids, strange=made.curve, away=away)
+    if not made.curve:
+        seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, own)
+        scatter = with_common_offset(scatter, seen, fit.normal.scan_noise, recording, ids)
+        scatter = beyond_own_offset(scatter, FORM_ERROR * _spread_of(assembly, mean.normal, made), own)
+    return scatter, comparison
+
+
+def material(scatter: list[ScatterEffect], normal: NormalEquations, own: float) -> list[ScatterEffect]:
+    """Return the effects that matter beside what single readings scatter by; own as above."""
+    return beyond_own_offset(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])), own)
+
+
+def _of_readings(
+    assembly: Assembly, fit: ParameterFit, ids: frozenset[str] | None, *, strange: bool, away: float
+) -> tuple[list[ScatterEffect], tuple[Comparison, ...]]:
+    """Return the effects on how readings scatter about the best fit of their mean, and what they mend.
+
+    strange: something that is in no catalogue acts on the mean. A curve misses steps and edges of it, nobody can say
+    how far, so that errors about it say nothing of scatter. away [m]: by how far ends of walls may be elsewhere.
+    """
+    rows = fit.assembly.smooth_rows(_SCATTERED)
+    few = fit.assembly.thinned(rows)
+    few.geometry &= usable_beams(few.shots, few.marks.seen, few.marks.base, away)
+    statistics = Statistics(few, fit.normal.scan_noise)
+    means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
+    means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
+    measured = few.shots.measured
+    seen = statistics.of(measured, np.where(np.isfinite(measured), fit.left[rows], np.nan))
+    heard = ~statistics.of_errors() | (not strange)
+    simulate = ScatterSimulator(few, statistics, fit.missed[rows])
+    search = ScatterSearch(ScatterFit(simulate, seen, sorted(means), ids, heard))
+    found = search.run()
+    return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
+
+
+def open_set(scatter: ScatterEffect) -> tuple[str, ...]:
+    """Return the effects of which one makes readings scatter so, where it is not certain which."""
+    every = {scatter.setting.id: scatter.p, **scatter.rivals}
+    group = tuple(sorted(name for name, p in every.items() if p >= RIVAL or name == scatter.setting.id))
+    certain = len(group) > 1 and sum(every[name] for name in group) >= NAMED
+    return group if certain and scatter.p < NAMED else ()
+
+
+def _spread_of(assembly: Assembly, normal: NormalEquations, made: MeanEffects) -> float:
+    """Return by how much [m] what acts on the mean, by equations nearly right, moves some readings more than others.
+
+    In the curves that some of it may follow instead no scans are off together.
+    """
+    valid, blocks = normal.beam_noise.valid, {free.id for free in assembly.free}
+    parts = [part for part in made.parts() if part.id in blocks or effects.by_id(part.id).empirical]
+    parts = [part for part in parts if part.id not in made.others]
+    moved = [assembly.columns[valid][:, part.span] @ part.coefficients for part in parts]
+    return float(np.std(sum(moved))) if moved else 0.0

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "slam/nodes/scan_feed.h"
+
+#include <ctime>
+#include <stdexcept>
+
+namespace kurumaisu {
+namespace {
+
+constexpr double kSlowWarningPeriod = 5.0;  // [s] of throttled warnings
+constexpr double kWorkLimit = 0.1;          // [s] of work in a row before scans that wait are skipped
+constexpr std::size_t kQueue = 100;         // scans that may wait
+
+// Apart, because the macro counts as a handful of branches.
+void warnSlow(const std::string& prefix, std::uint64_t skipped) {
+  ROS_WARN_THROTTLE(kSlowWarningPeriod, "%s_TOO_SLOW: scan: skipped, %lu so far", prefix.c_str(), skipped);
+}
+
+}  // namespace
+
+ScanFeed::ScanFeed(ros::NodeHandle& nh, FeedSettings settings, Use use, Reset reset)
+    : settings_(std::move(settings)),
+      use_(std::move(use)),
+      reset_(std::move(reset)),
+      queue_(buffer_, settings_.frames, settings_.error, settings_.prefix, kQueue),
+      scan_(nh.subscribe("scan", kQueue, &ScanFeed::onScan, this)) {}
+
+void ScanFeed::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) {
+  if (scan->header.stamp + ros::Duration(kTimeJump) < last_scan_) begin("a scan is older than the last one");
+  came_ = ros::SteadyTime::now();
+  frame_ = scan->header.frame_id;
+  if (paused_ || came_in_all_++ % settings_.every != 0) return;
+  queue_.push(scan);
+}
+
+void ScanFeed::work() {
+  const ros::Time now = ros::Time::now();
+  if (now + ros::Duration(kTimeJump) < last_clock_) begin("time ran backwards");
+  last_clock_ = now;
+  const ros::SteadyTime start = ros::SteadyTime::now();
+  while (ros::ok()) {
+    const auto ready = queue_.next();
+    if (!ready) return;
+    const bool is_slow = (ros::SteadyTime::now() - start).toSec() > kWorkLimit;
+    if (is_slow && queue_.size() >= static_cast<std::size_t>(settings_.backlog)) {
+      warnSlow(settings_.prefix, ++skipped_);
+    } else {
+      take(*ready);
+    }
+  }
+}
+
+void ScanFeed::take(const ScanQueue::Ready& ready) try {
+  taken_ = ros::SteadyTime::now();
+  last_scan_ = ready.stamp;
+  const std::clock_t start = std::clock();
+  use_(ready);
+  seconds_ += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  ++used_;
+  came_ = ros::SteadyTime::now();  // who works does not hear
+} catch (const std::invalid_argument& error) {
+  queue_.refuse(error.what());
+}
+
+void ScanFeed::pause(bool paused) {
+  paused_ = paused;
+  if (paused) queue_.forgetAfter(ros::Time());
+  taken_ = ros::SteadyTime::now();
+}
+
+std::string ScanFeed::missing(double since) const {
+  const bool waiting = silence() < since && (ros::SteadyTime::now() - taken_).toSec() > since;
+  if (!waiting || paused_) return "";
+  const auto& [odom, base, deadline] = settings_.frames;
+  if (!buffer_.canTransform(odom, base, ros::Time())) return "no odometry: tf has no " + odom + " -> " + base;
+  if (!buffer_.canTransform(base, frame_, ros::Time()))
+    return "the mounting of the laser is unknown: tf has no " + base + " -> " + frame_;
+  return "no odometry for their times within transform_deadline, or all of them are invalid";
+}
+
+void ScanFeed::begin(const char* why) {
+  ROS_WARN("%s_TIME_RESET: %s: it restarts", settings_.prefix.c_str(), why);
+  buffer_.clear();
+  queue_.forgetAfter(ros::Time::now() + ros::Duration(kTimeJump));
+  last_scan_ = ros::Time();
+  reset_(why);
+}
+
+}  // namespace kurumaisu
