@@ -235,7 +235,7 @@ class LaserNode(unittest.TestCase):
     def test_senseless_parameters_stop_the_start(self) -> None:
         cases: list[tuple[dict[str, Any], str]] = [
             ({"angle_min": 1.0, "angle_max": 0.5}, "angle_min must be less than angle_max: 1, 0.5"),
-            ({"serial_baud": 1200}, "serial_baud is no rate of SCIP 2.0: 1200"),
+            ({"serial_baud": 1200}, "serial_baud is not a rate of SCIP 2.0: 1200"),
             ({"angle_mni": 0.0}, "/laser_node/angle_mni: is not a known key"),
         ]
         processes = [begin(f"refused{i}", **changes) for i, (changes, _) in enumerate(cases)]

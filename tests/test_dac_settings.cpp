@@ -191,7 +191,7 @@ TEST(DacSettings, RefusesWhatIsWrongInASerialDevice) {
       {{{"frame: channel", "frame: each"}}, "write/frame: must be one of channel, burst, all"},
       {{{"W{ch}{code:04X}", "W{ch}{kode:04X}"}}, "write/send: placeholder {kode:04X}: is unknown"},
       {{{"W{ch}{code:04X}", "W{code:04X}"}}, "write/send: does not say which channel"},
-      {{{"W{ch}{code:04X}", "W{ch}"}}, "write/send: says neither"},
+      {{{"W{ch}{code:04X}", "W{ch}"}}, "write/send: has neither"},
       {{{"W{ch}{code:04X}", "W{ch}{code:02X}"}}, "code 4095 does not fit into 2 characters"},
       {{{"OK {ch}{code:04X}", "OK {answer}"}}, "write/expect: placeholder {answer}"},
       {{{"frame: channel", "frame: all"}}, "write/send: placeholder {ch}"},

@@ -104,7 +104,7 @@ def test_points_are_the_ends_of_what_was_held(tmp_path):
 
 
 def test_a_log_that_is_none_is_refused(tmp_path):
-    with pytest.raises(Error, match=r"dac\.log:1: is no line of virtual_dac's log"):
+    with pytest.raises(Error, match=r"dac\.log:1: is not a line of virtual_dac's log"):
         dac_line.read_log(log_of(tmp_path, [(1.0, "volts 0.3 x 2.5")]), 0.0)
     with pytest.raises(Error, match="got no voltages"):
         dac_line.read_log(log_of(tmp_path, []), 0.0)

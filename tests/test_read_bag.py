@@ -87,14 +87,14 @@ def test_a_bag_alone_is_a_recording_and_its_queries_lie_in_a_folder_of_its_name(
     (tmp_path / "drive" / "query.csv").write_text("t0,t1\n1,2\n")
     assert read_recording(tmp_path).runs[0].queries.tolist() == [[1, 2]]
     (tmp_path / "drive" / "pose.csv").write_text("t,x,y,theta\n1,2,3,4\n")
-    with pytest.raises(Error, match="the run drive is there as a bag too"):
+    with pytest.raises(Error, match="the run drive also exists as a bag"):
         read_recording(tmp_path)
 
 
 def test_a_topic_of_the_wrong_type_is_named(tmp_path):
     (tmp_path / "meta.yaml").write_text("topics: {scan: /odom}\n")
     write_bag(tmp_path / "run_1.bag", full_run())
-    with pytest.raises(Error, match="/odom is given to two parts"):
+    with pytest.raises(Error, match="/odom is assigned to two parts"):
         read_recording(tmp_path)
     (tmp_path / "meta.yaml").write_text("topics: {scan: /mocap/pose}\n")
     with pytest.raises(
@@ -111,7 +111,7 @@ def test_a_cut_bag_is_an_error_not_a_traceback(tmp_path):
     for size in (0, 10, 5000, len(data) // 2, len(data) - 100):
         path = tmp_path / "cut.bag"
         path.write_bytes(data[:size])
-        with pytest.raises(Error, match=r"cut\.bag: is not a whole ROS 1 bag"):
+        with pytest.raises(Error, match=r"cut\.bag: is not a complete ROS 1 bag"):
             read_recording(path)
 
 

@@ -162,7 +162,7 @@ def test_rows_that_repeat_a_stretch_are_found_and_standing_still_is_not():
     series = Series(np.arange(100) / 10, rows, ("x", "y", "theta"))
     assert sanity_rows.blocks(series, "pose") is None
     rows[80:95] = rows[5:20]
-    assert "15 rows from t = 8 s on are those from t = 0.5 s on" in sanity_rows.blocks(series, "pose")
+    assert "15 rows from t = 8 s on equal those from t = 0.5 s on" in sanity_rows.blocks(series, "pose")
 
 
 def test_nothing_is_wrong_with_a_real_bag():

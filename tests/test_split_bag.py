@@ -66,7 +66,7 @@ def test_a_part_that_is_missing_is_named(split):
 
 def test_a_part_that_is_damaged_is_named(split):
     (split / "drive_7.bag").write_bytes(b"#ROSBAG V2.0\n")
-    with pytest.raises(Error, match=r"drive_7\.bag: is not a whole ROS 1 bag"):
+    with pytest.raises(Error, match=r"drive_7\.bag: is not a complete ROS 1 bag"):
         read_recording(split / "drive.bag")
 
 

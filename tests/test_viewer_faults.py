@@ -24,9 +24,9 @@ from kurumaisu.viewer.server import Server
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("{", "no JSON"),
-        ("", "no JSON"),
-        ("[" * 50000, "no JSON"),
+        ("{", "not JSON"),
+        ("", "not JSON"),
+        ("[" * 50000, "not JSON"),
         ("[]", "must be an object"),
         ('{"type": "moon"}', "token, session or command: 'moon'"),
         ('{"type": "token"}', "must be a text"),
@@ -37,7 +37,7 @@ from kurumaisu.viewer.server import Server
         ('{"type": "command", "id": 1, "name": "pause"}', "on is missing"),
         ('{"type": "command", "id": 1, "name": "pause", "on": 1}', "on must be true or false"),
         ('{"type": "command", "id": 1, "name": "pause", "on": true, "off": 1}', "has no 'off'"),
-        ('{"type": "command", "id": 1, "name": "speed", "value": NaN}', "no JSON"),
+        ('{"type": "command", "id": 1, "name": "speed", "value": NaN}', "not JSON"),
         ('{"type": "command", "id": 1, "name": "speed", "value": 1e999}', "finite number"),
         ('{"type": "command", "id": 1, "name": "speed", "value": "1"}', "finite number"),
         ('{"type": "command", "id": 1, "name": "seed", "value": 1.5}', "integer"),

@@ -83,8 +83,8 @@ def cut_bag(path):
     ("make", "words"),
     [
         (empty_bag, r"drive.bag: has nothing to look at: none of command.csv or /cmd_vel.*/scan"),
-        (cut_bag, r"drive.bag: is not a whole ROS 1 bag \(rosbag reindex may help\)"),
-        (lambda path: path.write_text("no bag"), r"drive.bag: is not a whole ROS 1 bag"),
+        (cut_bag, r"drive.bag: is not a complete ROS 1 bag \(rosbag reindex may help\)"),
+        (lambda path: path.write_text("no bag"), r"drive.bag: is not a complete ROS 1 bag"),
         (lambda path: None, r"drive.bag: there is no such file or folder"),
         (lambda path: path.mkdir(), r"drive.bag: holds no run"),
     ],

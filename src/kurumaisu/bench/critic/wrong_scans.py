@@ -141,7 +141,7 @@ SPOILT: dict[str, tuple[_Spoil, str]] = {
     ),
     "ranges in mm": (_ranges(lambda r, _: 1000 * r), "millimetres"),
     "ranges in cm": (_ranges(lambda r, _: 100 * r), "centimetres"),
-    "all 0": (_ranges(lambda r, _: 0 * np.nan_to_num(r, posinf=0)), "hardly any"),
+    "all 0": (_ranges(lambda r, _: 0 * np.nan_to_num(r, posinf=0)), "almost no readings"),
     "constant": (_ranges(lambda r, _: 0 * np.nan_to_num(r, posinf=0) + 1.234), "all ranges are"),
     "stuck": (_ranges(lambda r, _: np.tile(r[20], (len(r), 1))), "equal the one before"),
     "no return as 4.095": (_ranges(lambda r, _: np.where(np.isinf(r), 4.095, r)), "exactly"),
