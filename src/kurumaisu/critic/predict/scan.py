@@ -12,8 +12,8 @@ from scipy.optimize import minimize
 from kurumaisu import effects
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, hits_of, predict, thin
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
-from kurumaisu.critic.values.robust import MAD
 from kurumaisu.params import EffectSetting
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray
 
 _START = (1.0, 0.005, 0.005, 3e-4)  # factor on the laser's own deviation; pose [m], [rad]; common to all [m]
@@ -130,7 +130,7 @@ def scattered(
     for _ in range(2):
         z = error / ScanModel(settings, factors, (1.0, 1.0)).of(what)[1]
         middle = float(np.median(np.abs(z[inside]))) if inside.any() else 1.0
-        near = inside & (np.abs(np.nan_to_num(z)) < OUTLIER * MAD * max(middle, 0.1))
+        near = inside & (np.abs(np.nan_to_num(z)) < OUTLIER * SIGMA_PER_MAD * max(middle, 0.1))
         if near.sum() < _FEWEST:
             break
         factors = _factors(Joint(what, error, near), start, np.array(_SPREAD if truth is None else _KNOWN))

@@ -8,7 +8,7 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.reading_noise import expected_readings
 from kurumaisu.critic.ranges.noise.scan_noise import ScanNoise
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
-from kurumaisu.critic.values.robust import MAD
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _COMMON = 0.005  # [m] plausible common mode of a scan, when it is read off one scan alone
@@ -93,7 +93,7 @@ class ScanFit:
             coefficients = (self._solve @ filled[:, :, np.newaxis])[:, :, 0]
             fitted = (self._fitted @ coefficients[:, :, np.newaxis])[:, :, 0]
             left = np.abs((z - fitted)[inside])[::_SOME]
-            width = MAD * float(np.median(left)) if left.size else 1.0
+            width = SIGMA_PER_MAD * float(np.median(left)) if left.size else 1.0
             inside = known & (np.abs(np.nan_to_num(z - fitted)) < 4.5 * max(width, 0.1))
         return np.where(known, z - fitted, np.nan), self._fluctuating(coefficients[:, 0])
 

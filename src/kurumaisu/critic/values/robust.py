@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import FloatArray
-
-MAD = 1.4826  # sd of a normal distribution over its median absolute deviation
 
 
 def third_difference_sd(values: FloatArray, axis: int | None = 0) -> FloatArray:
@@ -15,4 +14,4 @@ def third_difference_sd(values: FloatArray, axis: int | None = 0) -> FloatArray:
 
     axis: 0 for each column of values (n, m), None for all of them together.
     """
-    return np.asarray(MAD * np.median(np.abs(np.diff(values, n=3, axis=0)), axis=axis) / np.sqrt(20))
+    return np.asarray(SIGMA_PER_MAD * np.median(np.abs(np.diff(values, n=3, axis=0)), axis=axis) / np.sqrt(20))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kurumaisu.critic.values.robust import MAD
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import FloatArray, IntArray
 
 _FEWEST = 6  # scans of a stand that may be split
@@ -29,7 +29,7 @@ def level_jumps(off: FloatArray, stand: IntArray) -> IntArray:
     steps = steps[np.isfinite(steps)]
     if not len(steps):
         return np.empty(0, dtype=np.int64)
-    noise = max(MAD * float(np.median(steps)) / np.sqrt(2), 1e-6)
+    noise = max(SIGMA_PER_MAD * float(np.median(steps)) / np.sqrt(2), 1e-6)
     found = [(z / noise, int(own[at])) for own, level in levels.values() for z, at in [_split(level)]]
     least = max(_SURE, _ODD * float(np.median([z for z, _ in found])))
     return np.array(sorted(row for z, row in sorted(found, reverse=True)[:_MOST] if z > least), dtype=np.int64)

@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu.critic.ranges.noise.scan_noise import Layout
 from kurumaisu.critic.ranges.scans.beams import BeamHits
-from kurumaisu.critic.values.robust import MAD
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray
 
 OUTLIER = 4.5  # deviations from which a reading does not count
@@ -39,7 +39,7 @@ def expected_readings(z: FloatArray, known: BoolArray, reach: FloatArray) -> Boo
     reach: by how many deviations errors that a scan shares move each of them, 1 sd. A scan whose first fit gives way to
     readings that are off by metres comes near none of the others, ever.
     """
-    width = MAD * float(np.median(np.abs(z[known]))) if known.any() else 0.0
+    width = SIGMA_PER_MAD * float(np.median(np.abs(z[known]))) if known.any() else 0.0
     with np.errstate(invalid="ignore"):
         return np.asarray(known & (np.abs(z) < np.maximum(max(ELSEWHERE, OUTLIER * width), OUTLIER * reach)))
 
@@ -93,7 +93,7 @@ def _jolted(z: FloatArray, first: BeamNoise, layout: Layout) -> BoolArray:
     size = np.ones(len(z))
     size[some] = np.sqrt(np.nanmean(seen[some] ** 2, axis=1))
     middle = float(np.median(size[some]))
-    width = MAD * float(np.median(np.abs(size[some] - middle)))
+    width = SIGMA_PER_MAD * float(np.median(np.abs(size[some] - middle)))
     return np.asarray((size > middle + max(_JOLT * width, _TOLERATED * middle)) & (layout.stand < 0))
 
 
@@ -112,7 +112,7 @@ def _factors(left: FloatArray, sd: FloatArray, known: FloatArray, covariate: Flo
     for i in range(len(levels) + 1):
         inside = (bins == i) & np.isfinite(known)
         if inside.any():
-            out[bins == i] = max(MAD * float(np.median(np.abs(left[inside] / sd[inside]))), 0.05)
+            out[bins == i] = max(SIGMA_PER_MAD * float(np.median(np.abs(left[inside] / sd[inside]))), 0.05)
     return out
 
 
@@ -125,5 +125,5 @@ def _own_sd(left: FloatArray, sd: FloatArray) -> float:
         return 0.0
     middle = np.nanmean(left[:, many], axis=0)
     chance = np.nansum(np.where(seen, sd, 0.0)[:, many] ** 2, axis=0) / count[many] ** 2
-    spread = (MAD * float(np.median(np.abs(middle - np.median(middle))))) ** 2
+    spread = (SIGMA_PER_MAD * float(np.median(np.abs(middle - np.median(middle))))) ** 2
     return float(np.sqrt(max(spread - float(np.median(chance)), 0.0)))

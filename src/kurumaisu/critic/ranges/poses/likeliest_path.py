@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from kurumaisu.critic.values.robust import MAD
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray
 
 DOUBT = np.array([0.02, 0.02, 0.01])  # [m, m, rad] sd of the reference, before any is known
@@ -95,7 +95,7 @@ def motion_evidence(
     parts = [_Changes(times[rows], reference[rows]) for rows in scans]
     units = [terms.of(path[rows]) / terms.sd for terms, rows in zip(parts, scans, strict=True)]
     every = np.concatenate([np.empty((0, 3)), *units])
-    usual = np.maximum(MAD * np.median(np.abs(every), axis=0), 1.0) if len(every) else np.ones(3)
+    usual = np.maximum(SIGMA_PER_MAD * np.median(np.abs(every), axis=0), 1.0) if len(every) else np.ones(3)
     return [
         _steady(terms, usual, unit / usual, reference[rows])
         for terms, unit, rows in zip(parts, units, scans, strict=True)
@@ -154,7 +154,7 @@ class _Changes:
         jumps = np.abs(self.of(poses))
         some = ~held[self.rows]
         if some.any():
-            usual = MAD * np.median(jumps[some], axis=0)
+            usual = SIGMA_PER_MAD * np.median(jumps[some], axis=0)
             far = (jumps > _OFTEN * usual) & (jumps * self._lasts[:, np.newaxis] > _SEEN)
             out[self.rows] = some & far.any(axis=1)
         return out

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu.critic.values.recording import Recording
-from kurumaisu.critic.values.robust import MAD
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import FloatArray
 
 _FEWEST = 10  # scans
@@ -51,7 +51,7 @@ def repeatability(readings: FloatArray) -> Repeatability:
     whole = np.isfinite(readings).all(axis=0)
     middle[whole] = np.median(readings[:, whole], axis=0)
     spread = np.full(readings.shape[1], np.inf)
-    spread[whole] = MAD * np.median(np.abs(readings[:, whole] - middle[whole]), axis=0)
+    spread[whole] = SIGMA_PER_MAD * np.median(np.abs(readings[:, whole] - middle[whole]), axis=0)
     use = spread < _STABLE
     if not use.any():
         raise Error("repeatability: no beam is valid in all scans and sees one still surface")

@@ -38,9 +38,9 @@ from kurumaisu.critic.ranges.scans.valid_readings import pose_weights, usable_be
 from kurumaisu.critic.ranges.signals.coefficient_blocks import blocks
 from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns, Form
 from kurumaisu.critic.ranges.signals.form_error import FormFamily
-from kurumaisu.critic.values.robust import MAD
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.params import EffectSetting
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
@@ -156,10 +156,10 @@ class Assembly:
                 left[k] = self.residual[k] - np.hstack([own, shared]) @ errors
                 # What nothing fits as well as its noise allows, says less by as much.
                 z = np.abs(left[k] / self.first.sd[k])[beam.valid[k]]
-                width = max(MAD * float(np.median(z)), 1.0) if len(z) else 1.0
+                width = max(SIGMA_PER_MAD * float(np.median(z)), 1.0) if len(z) else 1.0
                 out.append(_pose_evidence(gram, self.hats[k].rows, width))
             z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
-            beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * MAD * np.nanmedian(z)))
+            beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * SIGMA_PER_MAD * np.nanmedian(z)))
         return out
 
     def _begun(self) -> BeamNoise:
