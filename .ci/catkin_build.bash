@@ -3,6 +3,7 @@
 # packaging, so it compiles as scripts/setup does: folders lie as in .ws, and ccache has nearly all of it.
 set -eu
 source "$(dirname "$0")/../scripts/environment.bash"   # without it, .ws would be extended
+export LC_ALL=C.UTF-8   # as scripts/setup has it: ccache knows results by language, too
 workspace=$root/.ws-tools   # as deep as .ws: ccache compares paths that are relative
 rm -rf "$workspace"
 trap 'rm -rf "$workspace"' EXIT

@@ -72,9 +72,9 @@ class Inputs:
 
     @cached_property
     def built(self) -> str:
-        """Hash of all programs and libraries, as they are when this is asked for first."""
+        """Hash of all programs and libraries but those that the checks themselves build."""
         made = (path for path in DEVEL.rglob("*") if path.suffix in ("", ".so") and not path.is_symlink())
-        return sources.content_hash(path for path in made if path.is_file())
+        return sources.content_hash(p for p in made if p.is_file() and not p.name.startswith(("test_", "fuzz_")))
 
     @cached_property
     def recordings(self) -> str:
@@ -109,8 +109,7 @@ class Inputs:
 
     def of_program(self, program: Path) -> str:
         """Return the state of what a program of gtest depends on."""
-        others = {path for path in program.parents[1].rglob("*") if path.is_file() and not path.suffix}
-        return self.state(self.data | others | with_libraries(program), self.recordings)
+        return self.state(self.data | with_libraries(program), self.built, self.recordings)
 
 
 def with_libraries(*programs: Path) -> set[Path]:

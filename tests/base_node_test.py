@@ -25,8 +25,7 @@ from std_srvs.srv import Trigger
 
 from kurumaisu import _core
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import unexplained
-from kurumaisu.ros.testing.nodes import Commander, Topic, wait_for
+from kurumaisu.ros.testing.nodes import Commander, Topic, unexplained, wait_for
 
 
 def is_neutral(message: Voltages) -> bool:

@@ -23,6 +23,9 @@ SAMPLES = {
     "NAME": "saved",
 }
 
+# Ports that somebody else on this computer may have taken are left to the system.
+PORTS = {r"(viewer:=true)": r"\1 viewer_port:=0", r"(kurumaisu view .*)": r"\1 --port 0"}
+
 # What cannot be run, and why.
 NOT_RUN = {
     r"^scripts/(demo|test)\b": "installs packages; tests/test_demo.py runs the demonstration, and this is scripts/test",
@@ -172,4 +175,6 @@ def filled_in(text: str, scratch: Path) -> str:
     """Return the command with the samples in place of the words in capitals, and all of it below one folder."""
     for word, sample in SAMPLES.items():
         text = re.sub(rf"(?<![\w./]){re.escape(word)}(?![\w])", sample, text)
+    for pattern, port in PORTS.items():
+        text = re.sub(pattern, port, text)
     return re.sub(r"(?<![\w.])/tmp/", f"{scratch}/tmp/", text)

@@ -7,6 +7,7 @@ differential equation, a delay is a queue, a dead zone is in volts beyond the th
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -99,22 +100,25 @@ def drive(
     steps = round((command[-1, 0] + 1.0) / _STEP)
     asked = command[np.searchsorted(command[:, 0], np.arange(steps) * _STEP, side="right") - 1, 1:]
     noise = _ornstein_uhlenbeck(steps, rng, disturbance)
+    rates = np.column_stack([asked, noise]).tolist()  # Python's own floats: the same sums in a third of the time
     chair = _Chair(effect, size, disturbance.at_rest)
     poses = []
-    for k in range(steps):
+    for k, each in enumerate(rates):
         if k % _POSE_EVERY == 0:
             error = rng.standard_normal(3) * disturbance.pose_sd
             poses.append([k * _STEP, *(np.array([chair.x, chair.y, chair.theta]) + error)])
-        chair.step(float(asked[k, 0]), float(asked[k, 1]), float(noise[k, 0]), float(noise[k, 1]))
+        chair.step(*each)
     return {"command": command, "voltage": voltage, "pose": np.array(poses)}
 
 
 def _ornstein_uhlenbeck(steps: int, rng: np.random.Generator, like: Disturbance) -> FloatArray:
-    out = np.zeros((steps, 2))
     kick = np.sqrt(2 * _STEP / like.tau) * np.array([like.sd_v, like.sd_w]) * rng.standard_normal((steps, 2))
-    for k in range(1, steps):
-        out[k] = out[k - 1] * (1 - _STEP / like.tau) + kick[k]
-    return out
+    kept, v, w = 1 - _STEP / like.tau, 0.0, 0.0
+    out = [(v, w)]
+    for kick_v, kick_w in kick[1:].tolist():
+        v, w = v * kept + kick_v, w * kept + kick_w
+        out.append((v, w))
+    return np.array(out)
 
 
 def _volts(rate: float, lines: tuple[_Line, _Line]) -> float:
@@ -142,8 +146,8 @@ class _Chair:
         self._v = self._v + share * (v - self._v) if self._effect == "base.lag_v" else v
         self._w = self._w + share * (w - self._w) if self._effect == "base.lag_w" else w
         forward, turn = self._v + moving * noise_v, self._w + moving * noise_w
-        self.x += _STEP * forward * np.cos(self.theta + 0.5 * _STEP * turn)
-        self.y += _STEP * forward * np.sin(self.theta + 0.5 * _STEP * turn)
+        self.x += _STEP * forward * math.cos(self.theta + 0.5 * _STEP * turn)
+        self.y += _STEP * forward * math.sin(self.theta + 0.5 * _STEP * turn)
         self.theta += _STEP * turn
 
     def _steady(self, v: float, w: float) -> tuple[float, float]:

@@ -25,8 +25,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
 
-from kurumaisu.ros.testing import unexplained
-from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, unexplained, wait_for
 from kurumaisu.virtual_urg import Pty, Tcp, VirtualUrg, load_sensor
 
 SENSOR = load_sensor("urg_04lx")

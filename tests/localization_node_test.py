@@ -20,8 +20,7 @@ from nav_msgs.srv import SetMap
 from std_srvs.srv import Empty
 
 from kurumaisu.geometry import wrap
-from kurumaisu.ros.testing import unexplained
-from kurumaisu.ros.testing.nodes import Topic, deviation, pose_of, wait_for
+from kurumaisu.ros.testing.nodes import Topic, deviation, pose_of, unexplained, wait_for
 from kurumaisu.ros.testing.room import BEAMS, STEP, WALLS, Room, ranges_at, transform, truth
 
 DEADLINE = 40.0  # [s] of the wall clock

@@ -32,8 +32,7 @@ from kurumaisu.geometry import between, compose, wrap
 from kurumaisu.map_file import read_map
 from kurumaisu.ros.maps.messages import map_of
 from kurumaisu.ros.rotation import yaw_of
-from kurumaisu.ros.testing import unexplained
-from kurumaisu.ros.testing.nodes import Topic, wait_for
+from kurumaisu.ros.testing.nodes import Topic, unexplained, wait_for
 from kurumaisu.ros.testing.room import BEAMS, SPEED_ERROR, STEP, WALLS, Room, ranges_at, truth
 from kurumaisu.slam_score import distance_to_walls
 

@@ -19,8 +19,7 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, SetBool
 
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import unexplained
-from kurumaisu.ros.testing.nodes import PATIENCE, Topic, pose_of, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, pose_of, unexplained, wait_for
 
 STEP = rospy.Duration(0, 10_000_000)
 

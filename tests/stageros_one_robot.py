@@ -16,8 +16,7 @@ from stageros_services import Services
 from std_srvs.srv import SetBool, Trigger
 
 from kurumaisu.params import shipped
-from kurumaisu.ros.testing import unexplained
-from kurumaisu.ros.testing.nodes import Topic, wait_for
+from kurumaisu.ros.testing.nodes import Topic, unexplained, wait_for
 from kurumaisu.sim import Simulator, load_options
 from kurumaisu.world import load_world
 

@@ -20,8 +20,7 @@ from tf2_msgs.msg import TFMessage
 
 from kurumaisu.bench.speed.viewer.page import Page
 from kurumaisu.params import load_model
-from kurumaisu.ros.testing import unexplained
-from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, unexplained, wait_for
 from kurumaisu.ros.viewer.calls import call
 
 STEP = 0.01  # [s]

@@ -19,7 +19,7 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,7 +29,7 @@ from kurumaisu.errors import Error
 _AWAY = re.compile(r"src/kurumaisu/(bench|demo)/")  # what measures or shows
 _NEIGHBOURS = 3  # lines before and after that tell a place from others
 _BOUNDS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
-_CODE = {  # by kind: what is changed in a line, and into what
+_CODE: dict[str, tuple[re.Pattern[str], Callable[[str], str]]] = {  # by kind: what is changed in a line, and into what
     "sign": (re.compile(r"(?<=[\w)\]] )[+-](?= [\w(])"), lambda text: "-" if text == "+" else "+"),
     "bound": (re.compile(r"(?<= )(<=|>=|==|!=|<|>)(?= )"), lambda text: _BOUNDS[text]),
     "constant": (re.compile(r"(?<![\w.\"'])\d+(?![\w.\"'])"), lambda text: str(int(text) + 1)),

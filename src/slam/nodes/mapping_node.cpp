@@ -31,8 +31,8 @@ using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
 constexpr const char* kHelp = R"(usage: mapping_node
 
-Make a map from scans and odometry, and estimate the chair's pose in it. Replaces
-slam_gmapping. slam.launch starts it: roslaunch kurumaisu slam.launch
+Make a map from scans and odometry, and estimate the chair's pose in it.
+Replaces slam_gmapping. slam.launch starts it: roslaunch kurumaisu slam.launch
 
 subscribes to:
   scan
