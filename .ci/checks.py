@@ -33,6 +33,7 @@ XUNIT = BUILD / "test_results"
 LOGS = ROOT / ".ws/log"
 CTEST = "_ctest_kurumaisu_"
 BUILD_TESTS = "build tests"
+TESTS_FAILED = "exit status 1"  # of pytest that ran to its end
 TAIL = 60  # lines of a failed check's output that are shown
 AT_ONCE = 3  # rostests; each has a master of its own, and waits more than it computes
 # They compare with the wall's clock, and would find a busy machine rather than a mistake: no other rostest beside them.
@@ -98,20 +99,23 @@ def every_check(tree: Inputs, quick: bool) -> list[Check]:
 def _run_all(checks: list[Check]) -> Counts:
     """Run some checks beside the others, and of those some at once."""
     stop, begun = Event(), dict[str, Future[Counts]]()
+    behind = any(not check.beside for check in checks)  # there is somebody to stand back for
 
     def after(check: Check) -> Counts:
-        """Run a check when what it waits for has ended."""
+        """Run a check when what it waits for, which began before it, has ended."""
         if check.after in begun:
             begun[check.after].result()
-        return _run(check, stop)
+        return _run(replace(check, beside=check.beside and behind), stop)
 
     # two beside: one of them alone often has work for one core only
     with ThreadPoolExecutor(2) as idle, ThreadPoolExecutor(AT_ONCE) as several:
         try:
-            begun.update({check.name: idle.submit(after, check) for check in checks if check.beside})
+            for check in (check for check in checks if check.beside):
+                begun[check.name] = idle.submit(after, check)
             total = sum((after(check) for check in checks if check.alone), Counts())
-            rest = [several.submit(after, check) for check in checks if not (check.beside or check.alone)]
-            return sum((future.result() for future in [*rest, *begun.values()]), total)
+            for check in (check for check in checks if not check.beside and not check.alone):
+                begun[check.name] = several.submit(after, check)
+            return sum((future.result() for future in begun.values()), total)
         finally:
             stop.set()
 
@@ -157,16 +161,22 @@ def _known() -> dict[str, list[str]]:
     return {test["name"].removeprefix(CTEST): test["command"] for test in listing["tests"]}
 
 
+def _folder(name: str) -> Path:
+    """Return where a check's test programs write their results."""
+    return XUNIT / name.replace(" ", "-")
+
+
 def _ctest(name: str, command: list[str] | None, state: Callable[[], str], **more: Any) -> Check:
     """Return a check of a test that CMake should know: without a command it fails."""
     words = command or ["bash", "-c", f"echo tests/CMakeLists.txt does not run {name}; false"]
-    own = [word.replace(str(XUNIT), str(XUNIT / name)) for word in words]
+    own = [word.replace(str(XUNIT), str(_folder(name))) for word in words]
     return Check(name, own, (Part(name, state),), tests=True, **more)
 
 
 def _rostests(tree: Inputs) -> list[Check]:
-    """Return a check for each rostest; those first that are alone, as they keep the others waiting."""
-    known, paths = _known(), sorted((ROOT / "tests").glob("*.test"), key=lambda path: path.stem not in ALONE)
+    """Return a check for each rostest: first those that are alone, then those that took longest."""
+    known, paths = _known(), sorted((ROOT / "tests").glob("*.test"))
+    paths.sort(key=lambda path: (path.stem not in ALONE, -passed.seconds(path.name, 0.0)))
     return [
         _ctest(
             path.name,
@@ -186,7 +196,7 @@ def _gtests(tree: Inputs) -> list[Check]:
         if name.startswith("gtest_"):
             program = Path(re.findall(r"(\S+) --gtest_output", " ".join(command))[0])
             state = partial(tree.of_program, program)
-            checks.append(_ctest(name.removeprefix("gtest_"), command, state, after=BUILD_TESTS))
+            checks.append(_ctest(name.replace("_", " ", 1), command, state, after=BUILD_TESTS))
     return checks
 
 
@@ -198,7 +208,7 @@ def _pytests(tree: Inputs, quick: bool) -> list[Check]:
     wait = [path for path in paths if inputs.waits(path)]
 
     def check(name: str, some: Iterable[Path], **more: Any) -> Check:
-        output = XUNIT / name.replace(" ", "-") / "pytest.xml"
+        output = _folder(name) / "pytest.xml"
         command = ["env", "OPENBLAS_NUM_THREADS=1", "python", "-m", "pytest", "-n", "auto", "--dist", "loadfile"]
         command += [f"--junit-xml={output}", *(["--quick"] if quick else [])]
         parts = tuple(Part(path.stem, partial(tree.of_pytest, path), path, quick) for path in some)
@@ -216,7 +226,7 @@ def _run(check: Check, stop: Event) -> Counts:
     if not stale:
         _line("ok", check.name, 0.0, 0.0, f"{total if check.tests else 'nothing changed'} (as before)")
         return total
-    folder, log = XUNIT / check.name.replace(" ", "-"), LOGS / f"{check.name}.log"
+    folder, log = _folder(check.name), LOGS / f"{check.name}.log"
     if check.tests:
         shutil.rmtree(folder, ignore_errors=True)
     files = [str(part.path) for part in stale if part.path]
@@ -224,8 +234,9 @@ def _run(check: Check, stop: Event) -> Counts:
     xunit = sorted(folder.rglob("*.xml")) if check.tests else []
     now = _counts(check, stale, xunit, ended.problem)
     for part in stale:
-        if not now[part].failed:
-            passed.keep(part, states[part], now[part], results.seconds(xunit, part.name))
+        if not now[part].failed and ended.problem in ("", TESTS_FAILED):  # else some of them may not have run
+            took = results.seconds(xunit, part.name) if part.path else ended.wall
+            passed.keep(part, states[part], now[part], took)
     ran = sum(now.values(), Counts())
     note = ended.problem or (str(ran) if check.tests else "")
     note += f" ({len(before)} of {len(check.parts)} files as before)" if before else ""

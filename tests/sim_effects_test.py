@@ -151,7 +151,7 @@ class SimEffectsTest(unittest.TestCase):
 
     def test_too_much_is_bounded_and_said(self):
         assert self.switch("base.lag_w", tau=9.0) == {"enabled": True, "tau": 3.0}
-        self.said("SIM_EFFECTS_BOUNDED base.lag_w: tau must be 0 to 3 s: 9; 3 is taken")
+        self.said("SIM_EFFECTS_BOUNDED base.lag_w: tau must be 0 to 3 s: 9; 3 is used")
 
     def test_what_is_no_number_or_no_parameter_is_left_out_and_said(self):
         ask = rospy.ServiceProxy("/sim_node/live/set_parameters", Reconfigure)

@@ -191,12 +191,12 @@ def test_slam_goes_wrong_with_a_wrong_mounting_and_says_so(tmp_path: Path):
 def test_why_slam_was_not_compared_is_said(tmp_path, change, words):
     data = make(Ask("null", design="drive", family="laser", regime="usual"), 3, tmp_path).null
     data = replace(data, runs=tuple(replace(run, **change) for run in data.runs))
-    assert words in slam_gain.measure(data, MODEL, lambda _: ()).told
+    assert words in slam_gain.measure(data, MODEL, lambda _: ()).sentence
 
 
 def test_scans_of_another_laser_are_no_reason_to_fail(tmp_path):
     data = make(Ask("null", design="drive", family="laser", regime="usual"), 3, tmp_path).null
-    assert "682" in slam_gain.measure(replace(data, laser=replace(data.laser, beams=681)), MODEL, lambda _: ()).told
+    assert "682" in slam_gain.measure(replace(data, laser=replace(data.laser, beams=681)), MODEL, lambda _: ()).sentence
 
 
 def test_slam_gets_the_ranges_behind_the_readings(tmp_path):

@@ -50,7 +50,7 @@ def test_what_is_not_known_confirms_nothing():
 def test_evidence_is_over_nothing_where_an_effect_may_be_it_as_well(winner, nats):
     """What lies between a curve and an effect that explain as much is no evidence that neither acts."""
     fit = object()
-    best = SimpleNamespace(fit=fit, belief=SimpleNamespace(nats=40.0))
+    best = SimpleNamespace(fit=fit, evidence=SimpleNamespace(nats=40.0))
     rivalry = SimpleNamespace(rivals=(best,), lead=5.0, winner=winner)
     found = SimpleNamespace(nats={fit: 22.0}.__getitem__)
     assert explain_unknown._nats(found, SimpleNamespace(rivalry=rivalry)) == nats

@@ -141,7 +141,9 @@ def test_what_waits_for_processes_is_told_from_sums(tree):
 def test_every_test_file_belongs_to_a_check():
     """Whatever is renamed or new."""
     chosen = checks.every_check(inputs.Inputs(), quick=False)
-    names = {part.name for check in chosen for part in check.parts}
+    every = [part.name for check in chosen for part in check.parts]
+    assert len(set(every)) == len(every), "what passed is kept by name"
+    names = set(every)
     tests = sources.ROOT / "tests"
     assert {path.stem for path in tests.glob("test_*.py")} <= names
     assert {path.name for path in tests.glob("*.test")} <= names

@@ -55,8 +55,8 @@ def test_defaults_lie_within_their_bounds():
     [
         ({"base_lag_w_tau": 0.3}, {"base_lag_w_tau": 0.3}, None),
         ({"base_lag_w_tau": 3}, {"base_lag_w_tau": 3.0}, None),
-        ({"base_lag_w_tau": -1.0}, {"base_lag_w_tau": 0.0}, "tau must be 0 to 3 s: -1; 0 is taken"),
-        ({"base_lag_w_tau": math.inf}, {"base_lag_w_tau": 3.0}, "tau must be 0 to 3 s: inf; 3 is taken"),
+        ({"base_lag_w_tau": -1.0}, {"base_lag_w_tau": 0.0}, "tau must be 0 to 3 s: -1; 0 is used"),
+        ({"base_lag_w_tau": math.inf}, {"base_lag_w_tau": 3.0}, "tau must be 0 to 3 s: inf; 3 is used"),
         ({"base_lag_w_tau": math.nan}, {}, "nan; it stays as it is"),
         ({"base_lag_w_enabled": 1}, {"base_lag_w_enabled": True}, None),
         ({"tau": 0.3}, {}, "tau: is not a parameter of an effect"),

@@ -60,7 +60,7 @@ def test_a_bag_of_that_name_is_meant_rather_than_parts(split):
 
 def test_a_part_that_is_missing_is_named(split):
     (split / "drive_4.bag").unlink()
-    with pytest.raises(Error, match=r"drive_4\.bag: is missing; drive_5\.bag is there"):
+    with pytest.raises(Error, match=r"drive_4\.bag: is missing, but drive_5\.bag exists"):
         read_recording(split / "drive.bag")
 
 

@@ -180,7 +180,7 @@ def test_every_shipped_key_can_be_given():
         ({"base_watchdog_timeout": "0.2"}, "base_watchdog_timeout: must be a number"),
         ({"is_depth_canonical": 1}, "is_depth_canonical: must be true or false: 1"),
         ({"simulator": {"semantics": "real"}}, "simulator.semantics: must be one of world, stage, physical: 'real'"),
-        ({"simulator": {"semantic": "stage"}}, "simulator/semantic is not a parameter; is semantics meant?"),
+        ({"simulator": {"semantic": "stage"}}, "simulator/semantic is not a parameter; did you mean semantics?"),
         ({"robot_prefix": "none"}, "robot_prefix: must be one of stage, always, never: 'none'"),
         ({"frame_odom": "/odom"}, "frame_odom: must not start with a slash"),
         ({"frame_odom": "base_link"}, "base_link"),
@@ -202,7 +202,7 @@ def test_bad_values_are_refused(values, message):
 def test_a_key_nobody_reads_is_said_not_refused():
     """As stage_ros starts with it."""
     assert settings(base_watchdog_timout=1).unknown == (
-        "/stageros/base_watchdog_timout is not a parameter; is base_watchdog_timeout meant?",
+        "/stageros/base_watchdog_timout is not a parameter; did you mean base_watchdog_timeout?",
     )
 
 

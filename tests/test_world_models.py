@@ -215,7 +215,7 @@ def test_what_is_warned_of(tmp_path: Path) -> None:
             "5:36: range_min has no effect: Stage 4 uses range [MIN MAX] instead",
             "5:48: update_interval has no effect: Stage 4 uses that of the ranger",
             "6:5: blobfinder: only its body is simulated here",
-            "4:25: drive must be one of diff, omni, car, not 'tank': diff is taken",
+            "4:25: drive must be one of diff, omni, car, not 'tank': diff is used",
         ]
     )
 

@@ -132,7 +132,7 @@ void Server::drop() {
   client_left_ = false;
   asked_.reset();
   guard_.disconnect();
-  if (guard_.state() == State::kIdle) say("GUARD_CLIENT_GONE", "neutral all along");
+  if (guard_.state() == State::kIdle) say("GUARD_CLIENT_GONE", "neutral all the time");
 }
 
 void Server::write(double now) {
@@ -192,7 +192,8 @@ void Server::report() {
   reported_ = guard_.state();
   if (reported_ == State::kArmed) say("GUARD_ARMED", "neutral was held");
   if (reported_ == State::kTripped)
-    say("GUARD_TRIPPED", nameOf(guard_.reason()) + ": neutral until it is held again" + reacted());
+    say("GUARD_TRIPPED",
+        nameOf(guard_.reason()) + ": neutral, until the client holds neutral again" + reacted());
 }
 
 std::string Server::reacted() const {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A serial D/A board that is none: for tests, for the guard's benchmark, and for whoever writes a template.
+// A simulated serial D/A board: for tests, for the guard's benchmark, and for whoever writes a template.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A D/A chip that is none, as Linux's IIO would show it: a folder of attributes, for tests and the guard's benchmark.
+// A simulated D/A chip, as Linux's IIO would show it: a folder of attributes, for tests and the guard's benchmark.
 #pragma once
 
 #include <filesystem>

@@ -27,6 +27,7 @@ from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 
 _AWAY = re.compile(r"src/kurumaisu/(bench|demo)/")  # what measures or shows
+_AGAIN, _BUILD = 300.0, 7200.0  # [s] for a check without a mutation; for a build of all
 _NEIGHBOURS = 3  # lines before and after that tell a place from others
 _BOUNDS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
 _CODE: dict[str, tuple[re.Pattern[str], Callable[[str], str]]] = {  # by kind: what is changed in a line, and into what
@@ -194,14 +195,14 @@ def copied(tree: Path, folder: Path) -> Copy:
     )
     if built.returncode:
         raise Error(f"{tree}: does not build: {built.stderr[-2000:]}")
-    copy = Copy(root, end=time.monotonic() + 7200.0)
+    copy = Copy(root, end=time.monotonic() + _BUILD)
     copy.run("mypy")  # so that it knows what has not changed
     _build(copy)
     return copy
 
 
 def judged(copy: Copy, mutation: Mutation) -> str | None:
-    """Return the check that catches a mutation, None if none does in the time there is."""
+    """Return the check that catches a mutation, None if none does in the time there is; leave the copy without it."""
     try:
         while True:
             copy.write(mutation, mutation.new)
@@ -209,13 +210,17 @@ def judged(copy: Copy, mutation: Mutation) -> str | None:
             copy.write(mutation, mutation.old)
             if found is None:
                 return None
-            copy.end += 300.0  # to see whether it is the mutation's
+            copy.end += _AGAIN  # to see whether it is the mutation's
             if found not in _failures(copy, mutation, found):
                 return found
             copy.unsure.add(found)
     except subprocess.TimeoutExpired:
-        copy.write(mutation, mutation.old)
         return None
+    finally:
+        copy.write(mutation, mutation.old)
+        if not mutation.path.endswith(".py"):
+            copy.end = time.monotonic() + _BUILD
+            _build(copy)
 
 
 def _failures(copy: Copy, mutation: Mutation, only: str = "") -> Iterator[str]:
@@ -256,7 +261,8 @@ def _of_ctest(copy: Copy, kind: str, only: str) -> str:
     if only and kind not in only:
         return ""
     command = ["ctest", "--test-dir", ".ws/build", "--stop-on-failure", "-R", f"^{only}$" if only else f"_{kind}_"]
-    command += ["-E", "|".join(copy.unsure)] if copy.unsure and not only else []
+    unsure = [name for name in copy.unsure if name.startswith("_ctest_")]
+    command += ["-E", "|".join(unsure)] if unsure and not only else []
     match = re.search(r"^\s*\d+ - (\S+) \(", copy.run(*command).stdout, re.MULTILINE)
     return match.group(1) if match else ""
 

@@ -91,7 +91,7 @@ def _run(jobs: list[Job], options: argparse.Namespace, shown: Display, done: dic
 def _jobs(options: argparse.Namespace) -> list[Job]:
     found = inputs.recordings(options.recordings, options.output)
     if not found:
-        raise Error(f"{options.recordings[0]}: holds no recording")
+        raise Error(f"{options.recordings[0]}: contains no recording")
     ids = effect_ids(options.only, options.without)
     asked = Job(Path(), Path(), "", options.model, options.runs, ids, options.seed, not options.no_slam)
     if len(found) == 1:

@@ -56,11 +56,11 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     what = "a bag, a folder of runs or CSV tables, an MRPT rawlog, or a folder of such recordings"
     add("recordings", type=Path, nargs="+", metavar="RECORDING", help=what)
-    add("-o", "--output", type=Path, default=Path("criticism"), metavar="FOLDER", help="write here (criticism)")
+    add("-o", "--output", type=Path, default=Path("criticism"), metavar="FOLDER", help="output folder (criticism)")
     add("--model", type=Path, metavar="FILE", help="model to criticise (the recording's, else md100.yaml)")
     add("--runs", type=name_list, default=(), metavar="A,B", help="only these runs; patterns like drive_* are allowed")
     add_effects(parser)
-    add("--seed", type=int, default=1, help="of the particle filter that makes a missing reference (1)")
+    add("--seed", type=int, default=1, help="seed of the particle filter for a missing reference (1)")
     add("--no-slam", action="store_true", help="do not compare SLAM with both models (saves some seconds)")
     where = parser.add_mutually_exclusive_group()
     where.add_argument(

@@ -30,5 +30,5 @@ def parts_of(path: Path) -> list[Path]:
     for number, part in enumerate(parts):
         wanted = path.with_name(f"{path.stem}_{number}{path.suffix}")
         if part != wanted:
-            raise Error(f"{wanted}: is missing; {part.name} is there")
+            raise Error(f"{wanted}: is missing, but {part.name} exists")
     return parts

@@ -32,7 +32,7 @@ def shortcomings(assembly: Assembly) -> list[str]:
         out.append("laser: all scans are from one place; record room_poses or wall_five_distances.")
     ranges = seen.ranges[trust]
     if float(np.quantile(ranges, 0.98)) < _DISTANCES * float(np.quantile(ranges, 0.02)):
-        out.append("laser: all walls are equally far, so the range has no visible effect; drive wall_five_distances.")
+        out.append("laser: all walls are equally far, so effects of the range do not show; drive wall_five_distances.")
     return out
 
 
