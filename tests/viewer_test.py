@@ -195,7 +195,7 @@ class ViewerTest(unittest.TestCase):
         assert "# What the chair IS" in model  # its comments, too
         self.do("effect", effect="laser.offset", enabled=False, values={})
         self.page.wait(lambda: not self.group("laser.offset")["enabled"], "the effect to be gone")
-        assert "none 'moon'" in self.refused("effect", effect="moon", enabled=True, values={})
+        assert "no effect 'moon'" in self.refused("effect", effect="moon", enabled=True, values={})
         assert "has no" in self.refused("effect", effect="laser.offset", enabled=True, values={"moon": 1.0})
         assert "must be" in self.refused("effect", effect="laser.offset", enabled=True, values={"offset": 1e6})
         self.do("effect", effect="laser.offset", enabled=False, values={})
