@@ -8,6 +8,7 @@
 
 #include "model/laser_error.h"
 #include "slam/basics/occupancy.h"
+#include "slam/basics/scan.h"
 #include "slam/localization/motion.h"
 
 namespace kurumaisu {
