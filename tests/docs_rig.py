@@ -19,7 +19,7 @@ from docs_pages import ROOT, SCENES, Command, End, Step, filled_in
 
 PATIENCE = 300.0  # [s] for anything to come about: a busy machine may take a while
 DRIVE = 10.0  # [s] of simulated time
-FAULTS = re.compile(r"\[ ?(ERROR|FATAL)\]|Traceback|has died!")  # in what a program or launch file prints
+FAULTS = re.compile(r"\[ ?(ERROR|FATAL)\]|Traceback|has died \[")  # in what a program or launch file prints
 
 
 class CommandError(Exception):
