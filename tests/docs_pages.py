@@ -173,7 +173,7 @@ def commands() -> list[Command]:
 def filled_in(text: str, scratch: Path) -> str:
     """Return the command with the samples in place of the words in capitals, and all of it below one folder."""
     for word, sample in SAMPLES.items():
-        text = re.sub(rf"(?<![\w./]){re.escape(word)}(?![\w])", sample, text)
+        text = re.sub(rf"(?<![\w.]){re.escape(word)}(?![\w])", sample, text)
     for pattern, port in PORTS.items():
         text = re.sub(pattern, port, text)
     return re.sub(r"(?<![\w.])/tmp/", f"{scratch}/tmp/", text)
