@@ -31,6 +31,7 @@ NOT_RUN = {
     r"^scripts/(demo|test)\b": "installs packages; tests/test_demo.py runs the demonstration, and this is scripts/test",
     r"\bsudo\b|/sys/bus/iio": "needs root, and changes the computer",
     r"/dev/ttyACM0|192\.168\.": "needs a sensor",
+    r"critic experiment": "needs a chair with room around it; experiment.launch runs the same program",
     r"python -m pytest": "scripts/test runs it",
 }
 
@@ -93,12 +94,10 @@ SCENES: tuple[tuple[Step | End, ...], ...] = (
         Step(r"rosrun kurumaisu map_saver"),
         End(r"rosrun kurumaisu map_server"),
         Step(r"critic watch", topic="/diagnostics@critic"),
-        Step(r"critic experiment"),
         Step(r"dynparam set /sim_node/live \"\{"),
         Step(r"rostopic echo -n 1 /sim_node/effects"),
         Step(r"dynparam set /sim_node/live base_lag_v_enabled false"),
         End(r"roslaunch kurumaisu sim\.launch viewer:=true"),
-        Step(r"critic spin\.bag", codes=_VERDICTS),
         Step(r"critic RECORDING$|critic drive\.bag", codes=_VERDICTS),
         Step(r"kurumaisu map RECORDING"),
         Step(r"kurumaisu view RECORDING$", says="http://"),
@@ -107,7 +106,7 @@ SCENES: tuple[tuple[Step | End, ...], ...] = (
     (Step(r"sim\.launch laser:=driver", topic="/scan"),),
     (Step(r"stageros\.launch", topic="/base_scan"),),
     (Step(r"round\.launch", topic="/scan"),),
-    (Step(r"experiment\.launch", topic="/scan"),),
+    (Step(r"experiment\.launch"), Step(r"critic spin\.bag", codes=_VERDICTS)),
     (Step(r"base\.launch", topic="/voltages"),),
     (
         Step(r"sed .*serial_ascii.yaml > /tmp/board\.yaml"),
@@ -174,7 +173,7 @@ def commands() -> list[Command]:
 def filled_in(text: str, scratch: Path) -> str:
     """Return the command with the samples in place of the words in capitals, and all of it below one folder."""
     for word, sample in SAMPLES.items():
-        text = re.sub(rf"(?<![\w./]){re.escape(word)}(?![\w])", sample, text)
+        text = re.sub(rf"(?<![\w.]){re.escape(word)}(?![\w])", sample, text)
     for pattern, port in PORTS.items():
         text = re.sub(pattern, port, text)
     return re.sub(r"(?<![\w.])/tmp/", f"{scratch}/tmp/", text)
