@@ -93,7 +93,7 @@ def names() -> tuple[str, ...]:
 def shipped_script(name: str) -> Script:
     """Return one of the package's own experiments. Raise Error, with near names, for another one."""
     if name not in names():
-        raise Error(f"{name!r} is not an experiment; {hint(name, names(), 'docs/experiments.md')}")
+        raise Error(f"{name!r} is not an experiment: {hint(name, names(), 'docs/experiments.md')}")
     return load_script(shipped(f"{_FOLDER}/{name}.yaml"))
 
 
