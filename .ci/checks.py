@@ -214,7 +214,7 @@ def _pytests(tree: Inputs, quick: bool) -> list[Check]:
         parts = tuple(Part(path.stem, partial(tree.of_pytest, path), path, quick) for path in some)
         return Check(name, command, parts, tests=True, **more)
 
-    sums = check("pytest sums", (path for path in paths if path not in wait), beside=not quick)
+    sums = check("pytest sums", (path for path in paths if path not in wait), after=BUILD_TESTS, beside=not quick)
     return [sums, check("pytest", wait, after=BUILD_TESTS, quick=False)]
 
 
