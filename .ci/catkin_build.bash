@@ -10,6 +10,7 @@ trap 'rm -rf "$workspace"' EXIT
 mkdir -p "$workspace/src"
 cp -a "$root/.ws/src/kurumaisu" "$workspace/src/kurumaisu"   # links into the tree
 mapfile -t arguments < <(grep -o -- '-D.*' "$root/.ws/stamp" | sed 's/ -D/\n-D/g')
+arguments=("${arguments[@]//"$root/.ws/"/"$workspace/"}")
 catkin config --workspace "$workspace" --init --no-extend --install --merge-devel \
   --cmake-args "${arguments[@]}" -DCATKIN_ENABLE_TESTING=OFF
 catkin build --workspace "$workspace" --no-status --no-notify --force-cmake --jobs "$(jobs)"

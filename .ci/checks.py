@@ -110,10 +110,11 @@ def _run_all(checks: list[Check]) -> Counts:
     # two beside: one of them alone often has work for one core only
     with ThreadPoolExecutor(2) as idle, ThreadPoolExecutor(AT_ONCE) as several:
         try:
-            for check in (check for check in checks if check.beside):
-                begun[check.name] = idle.submit(after, check)
+            # lint at once: who made a slip does not want to wait
+            for check in (check for check in checks if check.beside or not check.tests):
+                begun[check.name] = (idle if check.beside else several).submit(after, check)
             total = sum((after(check) for check in checks if check.alone), Counts())
-            for check in (check for check in checks if not check.beside and not check.alone):
+            for check in (check for check in checks if check.tests and not check.beside and not check.alone):
                 begun[check.name] = several.submit(after, check)
             return sum((future.result() for future in begun.values()), total)
         finally:
@@ -214,7 +215,7 @@ def _pytests(tree: Inputs, quick: bool) -> list[Check]:
         parts = tuple(Part(path.stem, partial(tree.of_pytest, path), path, quick) for path in some)
         return Check(name, command, parts, tests=True, **more)
 
-    sums = check("pytest sums", (path for path in paths if path not in wait), beside=not quick)
+    sums = check("pytest sums", (path for path in paths if path not in wait), after=BUILD_TESTS, beside=not quick)
     return [sums, check("pytest", wait, after=BUILD_TESTS, quick=False)]
 
 

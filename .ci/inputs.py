@@ -85,7 +85,7 @@ class Inputs:
     def of_pytest(self, test: Path) -> str:
         """Return the state of what a file of pytest depends on."""
         reached = closure(test, TESTS / "conftest.py")
-        own = "\n".join(_text(path) for path in reached if path.is_relative_to(TESTS))
+        own = "\n".join(_text(path) for path in reached if _is_rig(path))
         if _WHOLE_TREE.search(own):
             reached |= self.tree
         if _PAGES.search(own):
@@ -122,8 +122,13 @@ def with_libraries(*programs: Path) -> set[Path]:
 
 
 def waits(test: Path) -> bool:
-    """Tell whether a test, or what of tests/ it imports, waits for processes, threads or the clock."""
-    return any(_WAITS.search(_text(path)) for path in closure(test) if path.is_relative_to(TESTS))
+    """Tell whether a test, or a rig that it imports, waits for processes, threads or the clock."""
+    return any(_WAITS.search(_text(path)) for path in closure(test) if _is_rig(path))
+
+
+def _is_rig(path: Path) -> bool:
+    """Tell whether a module is there for tests and benchmarks only."""
+    return path.is_relative_to(TESTS) or path.is_relative_to(ROOT / "src/kurumaisu/bench")
 
 
 def closure(*paths: Path) -> set[Path]:
@@ -146,6 +151,7 @@ def _text(path: Path) -> str:
 def _imported(path: Path) -> frozenset[Path]:
     text = _text(path)
     names = set(_DOTTED.findall(text))
+    names.update([f"{name}.__main__" for name in names] if '"-m"' in text else [])  # a package that it runs
     for base, some in _FROM.findall(text):
         stem = base if base.endswith(".") else f"{base}."
         names.update([base, *(stem + name for name in re.findall(r"\w+", some))])
@@ -173,7 +179,5 @@ def _files(name: str) -> frozenset[Path]:
     for root in ROOTS:
         for i in range(1, len(parts) + 1):
             place = root.joinpath(*parts[:i])
-            found.update(
-                p for p in (place / "__init__.py", place.with_suffix(".py"), place / "__main__.py") if p.is_file()
-            )
+            found.update(p for p in (place / "__init__.py", place.with_suffix(".py")) if p.is_file())
     return frozenset(found)
