@@ -22,7 +22,9 @@ _FROM = re.compile(r"^[ \t]*from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n#
 _IMPORT = re.compile(r"^[ \t]*import[ \t]+([\w., \t]+)", re.MULTILINE)
 _DOTTED = re.compile(r"\bkurumaisu(?:\.\w+)+")
 _ANY_MODULE = re.compile(r"import_module|__import__|iter_modules|walk_packages")
-_WHOLE_TREE = re.compile(r"subprocess|multiprocessing|Popen|processes|glob\(|iterdir|listdir|os\.walk|ls-files")
+_WHOLE_TREE = re.compile(
+    r"subprocess|multiprocessing|Popen|\.processes\b|glob\(|iterdir|listdir|os\.walk|ls-files|\.cpp\b"
+)
 _PAGES = re.compile(r"docs|README|CONTRIBUTING|CHANGELOG|\.md\b|\.rst\b|ls-files")
 # Waits for what others do, rather than for its own sums: gets the cores first, and is what a busy machine disturbs.
 _WAITS = re.compile(
@@ -59,7 +61,7 @@ class Inputs:
     @cached_property
     def data(self) -> set[Path]:
         """Files that any test may read: all in src, launch and so on that is no source, and the tests' own."""
-        folders = self.under("src", "launch", "worlds", "msg", "tests")
+        folders = self.under("src", "launch", "worlds", "msg", "scripts", "tests")
         return {path for path in folders if path.suffix not in (".py", ".cpp", ".h")} | self._top
 
     @cached_property
@@ -84,7 +86,7 @@ class Inputs:
 
     def of_pytest(self, test: Path) -> str:
         """Return the state of what a file of pytest depends on."""
-        reached = closure(test, TESTS / "conftest.py")
+        reached = _with_fixtures(test)
         own = "\n".join(_text(path) for path in reached if _is_rig(path))
         if _WHOLE_TREE.search(own):
             reached |= self.tree
@@ -124,6 +126,14 @@ def with_libraries(*programs: Path) -> set[Path]:
 def waits(test: Path) -> bool:
     """Tell whether a test, or a rig that it imports, waits for processes, threads or the clock."""
     return any(_WAITS.search(_text(path)) for path in closure(test) if _is_rig(path))
+
+
+def _with_fixtures(test: Path) -> set[Path]:
+    """Return what a test reaches; with what the fixtures for all tests reach, if it asks for one."""
+    shared = TESTS / "conftest.py"
+    names = "|".join(re.findall(r"@pytest\.fixture.*\ndef (\w+)", _text(shared)))
+    asked = re.search(rf"^ *(?:async )?def \w+\([^)]*\b({names})\b", _text(test), re.MULTILINE)
+    return closure(test, shared) if asked else closure(test) | {shared}
 
 
 def _is_rig(path: Path) -> bool:

@@ -109,6 +109,8 @@ def tree(tmp_path, monkeypatch):
         "src/kurumaisu/late.py": "def f():\n    from . import law\n",
         "src/kurumaisu/alone.py": "",
         "tests/helper.py": "import subprocess\n",
+        "tests/conftest.py": "@pytest.fixture\ndef room():\n    from kurumaisu import alone\n",
+        "tests/test_room.py": "def test_it(room):\n    pass\n",
         "tests/test_law.py": "from kurumaisu import law\n",
         "tests/test_late.py": 'import pytest, helper\nNAME = "kurumaisu.late.f"\n',
     }
@@ -131,6 +133,14 @@ def test_a_test_depends_on_what_its_imports_reach(tree):
 
     assert reached("test_law") == {"test_law", "__init__", "law", "units"}
     assert reached("test_late") == {"test_late", "helper", "__init__", "late", "law", "units"}
+
+
+def test_what_a_shared_fixture_needs_counts_for_those_who_ask_for_it(tree):
+    def reached(name):
+        return {path.stem for path in inputs._with_fixtures(tree / f"tests/{name}.py")}
+
+    assert reached("test_room") == {"test_room", "conftest", "__init__", "alone"}
+    assert reached("test_law") == {"test_law", "conftest", "__init__", "law", "units"}
 
 
 def test_what_waits_for_processes_is_told_from_sums(tree):
