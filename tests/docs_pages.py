@@ -128,10 +128,10 @@ SCENES: tuple[tuple[Step | End, ...], ...] = (
     (
         Step(r"echo .*> hidden\.yaml"),
         Step(r"critic rehearse .*hidden\.yaml"),
-        Step(r"critic rehearse spin_both_ways steps_big -o drives$"),
         Step(r"critic drives$", codes=_VERDICTS),
     ),
     (Step(r"critic DAY_1 DAY_2", codes=_VERDICTS),),
+    (Step(r"critic rehearse spin_both_ways"),),
     (Step(r"critic plan"),),
     (Step(r"roslaunch --ros-args"),),
     (Step(r"check-world"),),
