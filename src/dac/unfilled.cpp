@@ -29,7 +29,7 @@ void refuseUnfilled(const YamlValue& tree) {
   Found found;
   collect(tree, "", 0, found);
   if (found.empty()) return;
-  std::string message = "this board cannot be used before these unknown values are filled in:";
+  std::string message = "this board cannot be used before its owner fills in these unknown values:";
   for (const auto& item : found) message += "\n" + item.second;
   throw std::invalid_argument(message);
 }

@@ -26,6 +26,7 @@ PATIENCE = (
 )
 
 _EVERY_NODES = (
+    "clock",
     "rosout",
     "get_loggers",
     "set_logger_level",
