@@ -56,7 +56,7 @@ def test_what_is_not_as_expected_is_told(monkeypatch, capsys, play, verdict, sta
 
     peer = SimpleNamespace(heard=lambda _what, _since: [])
     stage = SimpleNamespace(mark=lambda: None, fail=fail, peer=peer, begun=0.0)
-    monkeypatch.setattr(main, "stage", lambda _folder, _setup: contextlib.nullcontext(stage))
+    monkeypatch.setattr(main, "running_chain", lambda _folder, _setup: contextlib.nullcontext(stage))
     monkeypatch.setattr(main, "cases", lambda: [Case("1", "a", "b", "c", play, clamped=False)])
     assert main.main(["--times", "1"]) == status
     assert f"| {verdict} |" in capsys.readouterr().out
@@ -73,7 +73,7 @@ def test_a_play_that_its_commander_spoils_does_not_count(monkeypatch, capsys):
     def stages(_folder, _setup):
         return contextlib.nullcontext(stage)
 
-    monkeypatch.setattr(main, "stage", stages)
+    monkeypatch.setattr(main, "running_chain", stages)
     monkeypatch.setattr(main, "cases", lambda: [Case("1", "a", "b", "c", play, clamped=False)])
     assert main.main([]) == 1  # it never keeps time
     stage.peer.heard = lambda _what, _since: late.pop(0)

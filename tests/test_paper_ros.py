@@ -170,8 +170,8 @@ def test_all_figures_are_repeated_and_one_that_fails_is_not_forgotten(monkeypatc
         return run
 
     monkeypatch.setattr(figures, "drive", part("3-6", 1))
-    monkeypatch.setattr(figures.commands_wall, "figures_wall_of", part("7-9", 0))
-    monkeypatch.setattr(figures.commands_wall, "asked", part("conjecture", 0))
+    monkeypatch.setattr(figures.wall, "figures_wall_of", part("7-9", 0))
+    monkeypatch.setattr(figures.wall, "asked", part("conjecture", 0))
     monkeypatch.setattr(figures, "dac", part("10", 0))
     monkeypatch.setattr(figures, "simulated_wall", part("11-12", 0))
     assert main(["all", "--out", str(tmp_path)]) == 1
