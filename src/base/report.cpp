@@ -6,7 +6,7 @@
 namespace kurumaisu {
 namespace {
 
-std::string shown(const Band& band) {
+std::string textOf(const Band& band) {
   std::ostringstream out;
   out << "(" << band.low << ", " << band.high << ")";
   return out.str();
@@ -40,7 +40,7 @@ std::string ambiguity(const Outlet& outlet) {
   std::string text;
   const auto say = [&text](const std::string& name, const std::optional<Band>& band) {
     if (!band) return;
-    text += (text.empty() ? "" : "; ") + name + " in " + shown(*band) + " V stands for two rates";
+    text += (text.empty() ? "" : "; ") + name + " in " + textOf(*band) + " V stands for two rates";
   };
   say("V_f", outlet.translationBand());
   say("V_s", outlet.steeringBand());
@@ -53,7 +53,7 @@ Report reportLaw(const Outlet& outlet, const std::string& law_name) {
                 law_name + ": " + (warning.empty() ? "every voltage stands for one rate" : warning),
                 {{"voltage law", law_name}}};
   const auto add = [&report](const char* name, const std::optional<Band>& band) {
-    report.values.emplace_back(name, band ? shown(*band) : "none");
+    report.values.emplace_back(name, band ? textOf(*band) : "none");
   };
   add("ambiguous V_f [V]", outlet.translationBand());
   add("ambiguous V_s [V]", outlet.steeringBand());

@@ -191,9 +191,10 @@ void Server::report() {
   if (guard_.state() == reported_) return;
   reported_ = guard_.state();
   if (reported_ == State::kArmed) say("GUARD_ARMED", "neutral was held");
-  if (reported_ == State::kTripped)
+  if (reported_ == State::kTripped) {
     say("GUARD_TRIPPED",
         nameOf(guard_.reason()) + ": neutral, until the client holds neutral again" + reacted());
+  }
 }
 
 std::string Server::reacted() const {
