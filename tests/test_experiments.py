@@ -69,7 +69,7 @@ def test_every_experiment_of_the_contract_fits_its_world_and_the_base(name):
 
 
 def test_another_name_is_refused_with_a_list():
-    with pytest.raises(Error, match=r"'spin' is not an experiment; did you mean spin_both_ways"):
+    with pytest.raises(Error, match=r"'spin' is not an experiment: did you mean spin_both_ways"):
         experiments.shipped_script("spin")
 
 
