@@ -73,6 +73,8 @@ def run(target: str, runs: int, seed: int, log: Path | None = None) -> Outcome:
             "-artifact_prefix=" + name + "/",
             name,
         ]
+        # Linux counts the memory of who starts a program as that program's: a shell is small.
+        command = ["sh", "-c", '"$@"; exit $?', "sh", *command]
         environment = {**os.environ, "ASAN_OPTIONS": "quarantine_size_mb=8:malloc_context_size=4"}
         start = time.monotonic()
         done = subprocess.run(command, check=False, stderr=subprocess.PIPE, env=environment)
