@@ -49,7 +49,7 @@ class CriticWatch(unittest.TestCase):
         def drive_a_window():
             start = rospy.get_time()
             done = None  # criticisms when there was a whole window to judge; the one under way may have begun before
-            deadline = time.monotonic() + 400.0  # a busy machine may take long
+            deadline = time.monotonic() + 300.0  # two others of its kind run beside it; less than its time-limit
             while done is None or int(values(status())["criticisms"]) < done + 2:
                 assert time.monotonic() < deadline, f"no verdict: {status()}"
                 v, w = next(moves)
