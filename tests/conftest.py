@@ -14,7 +14,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-LONG = 0.5  # [s] of the processor, setup and teardown included: with --quick no test gets more
+LONG = 0.3  # [s] of the processor, setup and teardown included: with --quick no test gets more
 TIMES = Path(__file__).resolve().parents[1] / ".ws/log/times.json"
 TOOK = {}  # [s] by name, of this session
 
