@@ -14,6 +14,18 @@ inline std::int64_t steadyNanoseconds() {
   return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
 }
 
+/// [ns] that this computer has slept since its start: what CLOCK_BOOTTIME counts more. Both clocks are read again
+/// where something came in between.
+inline std::int64_t sleptNanoseconds() {
+  for (;;) {
+    const std::int64_t before = steadyNanoseconds();
+    timespec with_sleep{};
+    clock_gettime(CLOCK_BOOTTIME, &with_sleep);
+    if (steadyNanoseconds() - before > 1'000'000) continue;
+    return std::int64_t{1'000'000'000} * with_sleep.tv_sec + with_sleep.tv_nsec - before;
+  }
+}
+
 /// Nanoseconds as seconds.
 constexpr double seconds(std::int64_t nanoseconds) { return 1e-9 * static_cast<double>(nanoseconds); }
 

@@ -86,12 +86,13 @@ struct Rig {
   explicit Rig(const Edits& edits = {})
       : device(deviceOf(edits)), board(device, folder / "port", folder / "log") {}
 
-  std::unique_ptr<Converter> open() const { return dac::open(device); }
+  std::unique_ptr<Converter> open() const { return openAndPrepare(device); }
 
   Device deviceOf(const Edits& edits) const {
     Edits all{{"port: /dev/kurumaisu_dac", "port: " + (folder / "port")},
               {"reply_timeout: 0.05", "reply_timeout: 0.4"},  // this computer may be busy
-              {"late_reply: 0.1", "late_reply: 0.8"}};
+              {"late_reply: 0.1", "late_reply: 0.8"},
+              {"boot: 3.0", "boot: 0.1"}};
     all.insert(all.end(), edits.begin(), edits.end());
     return readDevice(written(folder, "device.yaml", edited(textOf(shipped("serial_ascii.yaml")), all)));
   }

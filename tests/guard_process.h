@@ -57,12 +57,14 @@ class GuardProcess : public testing::Test {
   }
 
   void start() {
+    const std::size_t before = board->count;
     sentinel = fork();
     if (sentinel == 0) {
       prctl(PR_SET_PDEATHSIG, SIGKILL);  // of a test that is killed nothing remains
       _exit(g::runSentinel(settings, board.opener()));
     }
     waitFor([this] { return fs::exists(settings.socket); }, "the socket");
+    waitFor([&] { return board->count > before || board->unplugged || board->broken; }, "its first word");
   }
 
   /// Ends the sentinel; returns its wait status.

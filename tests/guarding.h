@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <optional>
 
 #include "guard/guard.h"
@@ -15,8 +16,8 @@ namespace g = kurumaisu::guard;
 /// Limits of the tests; not those that ship.
 inline g::Limits limits() {
   g::Limits limits{};
-  limits.translation = {-2.0, 2.0, 0.5};
-  limits.steering = {-1.0, 1.0, 0.4};
+  limits.translation = {-2.0, 2.0, 0.5, 20.0};
+  limits.steering = {-1.0, 1.0, 0.4, 20.0};
   limits.reference = 2.5;
   limits.reference_tolerance = 0.01;
   limits.neutral = 0.004;
@@ -90,6 +91,9 @@ class Watch {
     if (!in(out.translation, limits_.translation) || !in(out.steering, limits_.steering))
       return "outside its band";
     if (out.reference != limits_.reference) return "another reference";
+    if (translation_.jumps(out.translation, limits_.translation, now) ||
+        steering_.jumps(out.steering, limits_.steering, now))
+      return "faster away from neutral than its rate";
     const bool moves = out.translation != 0 || out.steering != 0;
     if (guard.state() != g::State::kArmed) return moves ? "motion though not armed" : nullptr;
     if (!armable(now)) return "armed without neutral held since the last trouble";
@@ -103,6 +107,25 @@ class Watch {
   /// NaN is in no band.
   static bool in(double volts, const g::Band& band) { return volts >= band.low && volts <= band.high; }
 
+  /// The last outputs of one voltage.
+  struct Track {
+    std::deque<std::pair<double, double>> last;  ///< time [s], output [V]
+
+    /// Whether it went further from neutral since any of them than a step, and what the time since then allows.
+    bool jumps(double volts, const g::Band& band, double now) {
+      bool result = false;
+      for (const auto& [then, before] : last) {
+        const double from = before * volts > 0 ? std::abs(before) : 0;
+        result |= std::abs(volts) - from > band.step + band.rate * (now - then) + 1e-6;
+      }
+      last.emplace_back(now, volts);
+      if (last.size() > 50) last.pop_front();
+      return result;
+    }
+  };
+
+  Track translation_;
+  Track steering_;
   g::Limits limits_;
   std::optional<double> neutral_since_;
   double last_made_ = -1e9;

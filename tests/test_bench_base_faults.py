@@ -10,7 +10,7 @@ import pytest
 
 from kurumaisu.bench.faults.base import main, path
 from kurumaisu.bench.faults.base.cases import Case, Seen
-from kurumaisu.bench.rigs.guard import Change, changed
+from kurumaisu.bench.guard_rig import Change, changed
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 

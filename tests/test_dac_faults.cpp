@@ -10,6 +10,7 @@
 
 #include "dac_rig.h"
 #include "steady.h"
+#include "steady.h"
 
 namespace test_dac_faults {
 
@@ -193,6 +194,7 @@ TEST(DacFaults, UnpluggedAndBackUnderANewTerminal) {
   EXPECT_TRUE(has(complaint<d::Fault>([&] { converter->reopen(); }), "DAC_NO_PORT"));
   ASSERT_TRUE(rig.board.wait([&] { return std::filesystem::exists(rig.folder / "port"); }, d::kLong));
   converter->reopen();
+  while (!converter->prepare()) continue;
   EXPECT_NE(std::filesystem::read_symlink(rig.folder / "port"), before);
   EXPECT_NEAR(rig.board.volts().translation, 0.5, 1e-3) << "opening moves nothing";
   converter->put(d::kNeutral);
@@ -225,6 +227,33 @@ TEST(DacFaults, AFaultOfOneSignalSparesTheOthers) {
   const std::string fault = faultOf(*converter, d::kMoving);
   EXPECT_TRUE(has(fault, "steering") && !has(fault, "translation of")) << fault;
   EXPECT_THROW(rig.board.inject("silent/brakes"), std::invalid_argument);
+}
+
+TEST(DacFaults, ABoardThatBootsWhenItIsOpenedIsAskedUntilItAnswers) {
+  Rig rig(d::Edits{{"boot: 0.1", "boot: 10"}, {"reply_timeout: 0.4", "reply_timeout: 0.05"}});
+  rig.board.inject("deaf@1x7");
+  const auto converter = d::open(rig.device);
+  int steps = 0;
+  while (!converter->prepare()) ++steps;
+  EXPECT_GE(steps, 3);  // of two questions each
+  EXPECT_NEAR(converter->put(d::kMoving).translation, 0.5, 1e-3);
+}
+
+TEST(DacFaults, ABoardThatStaysDeafIsAFaultWhenItMustHaveBooted) {
+  Rig rig(d::Edits{{"reply_timeout: 0.4", "reply_timeout: 0.05"}});
+  rig.board.inject("deaf@1x1000");
+  const std::string fault = complaint<d::Fault>([&] { rig.open(); });
+  EXPECT_TRUE(has(fault, "DAC_NO_REPLY") && has(fault, "start of")) << fault;
+}
+
+TEST(DacFaults, ABoardThatSaysNothingGetsItsFirstVoltageWhenItMustHaveBooted) {
+  Rig rig(d::Edits{{"boot: 0.1", "boot: 0.5"}, {"can_identify: true", "can_identify: false"},
+           {R"(expect: "ASCII-DAC *")", R"(expect: "")"}});
+  const double begin = kurumaisu::steadyTime();
+  const auto converter = d::open(rig.device);
+  EXPECT_THROW(converter->put(d::kMoving), d::Fault) << "it is not prepared";
+  while (!converter->prepare()) continue;
+  EXPECT_GE(kurumaisu::steadyTime() - begin, 0.5);
 }
 
 TEST(DacFaults, ASecondOwnerIsRefused) {

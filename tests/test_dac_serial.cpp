@@ -35,6 +35,7 @@ void recover(d::Converter& converter) {
   } catch (const d::Fault&) {
     try {
       converter.reopen();
+      while (!converter.prepare()) continue;
     } catch (const d::Fault&) {
     }
   }

@@ -182,6 +182,7 @@ TEST(DacSettings, RefusesWhatIsWrongInASerialDevice) {
   const std::vector<std::pair<d::Edits, std::string>> cases{
       {{{"kind: serial", "kind: usb"}}, "kind: must be one of serial, iio: usb"},
       {{{"retries: 1 ", "tries: 1 "}}, "retries: is missing"},
+      {{{"boot: 3.0", "boot: -1"}}, "boot: must be"},
       {{{"bits: 12", "bits: 12\nextra: 1"}}, "extra: is not a known key"},
       {{{"baud: 115200", "baud: 115200.0"}}, "baud: must be an integer"},
       {{{"baud: 115200", "baud: 0"}}, "baud: must be at least 1"},

@@ -9,6 +9,7 @@
 
 #include "guard/guard.h"
 #include "guarding.h"
+#include "sleep_watch.h"
 
 namespace test_guard {
 
@@ -186,6 +187,60 @@ TEST_F(Story, TowardsNeutralIsFreeHoweverFar) {
   EXPECT_EQ(guard.output().translation, 0);
 }
 
+TEST_F(Story, StepsThatComeFasterThanTheirRateTrip) {
+  drive();
+  now += kPeriod;
+  say(0.8, 0.3);
+  EXPECT_EQ(guard.state(), g::State::kArmed);
+  now += 0.001;  // of the step of 0.5 V, 0.1 V is left, and 0.02 V is there again
+  say(0.91, 0.3);
+  EXPECT_EQ(guard.state(), g::State::kArmed);
+  now += 0.001;
+  say(1.0, 0.3);
+  expectTrip(g::Reason::kStep);
+}
+
+TEST_F(Story, BackAndForthCountsEachTimeItLeavesNeutral) {
+  drive();
+  now += 0.1;
+  say(0.4, -0.05);  // across neutral: 0.35 V
+  now += 0.001;
+  say(0.4, 0);
+  say(0.4, 0.1);
+  expectTrip(g::Reason::kStep);
+}
+
+TEST_F(Story, WithoutASentinelItIsNeutralAndDoesNotArm) {
+  drive();
+  guard.watch(false);
+  expectTrip(g::Reason::kUnwatched);
+  hold();
+  expectTrip(g::Reason::kUnwatched);
+  guard.watch(true);
+  now += kPeriod;
+  say(0.4);
+  expectTrip(g::Reason::kUnwatched);
+  watch.broken();
+  EXPECT_NEAR(hold(), 0.5, kPeriod);
+}
+
+TEST_F(Story, WhatWasAskedForBeforeASleepDoesNotCount) {
+  drive();
+  guard.wake();
+  expectTrip(g::Reason::kSlept);
+  EXPECT_NEAR(hold(), 0.5, kPeriod);
+}
+
+TEST(SleepWatch, NoticesASleepOnce) {
+  std::int64_t slept = 7'000'000'000;
+  kurumaisu::SleepWatch watch([&slept] { return slept; });
+  slept += 1'000;  // clocks that were not read at one time
+  EXPECT_FALSE(watch.hasSlept());
+  slept += 3'600'000'000'000;
+  EXPECT_TRUE(watch.hasSlept());
+  EXPECT_FALSE(watch.hasSlept());
+}
+
 TEST_F(Story, ANewClientMustHoldNeutralToo) {
   drive();
   guard.disconnect();
@@ -231,6 +286,7 @@ TEST(GuardLimits, ThatMakeNoSenseAreRefused) {
       [](g::Limits& l) { l.translation.low = 0.1; },
       [](g::Limits& l) { l.steering.high = 0; },
       [](g::Limits& l) { l.steering.step = 0; },
+      [](g::Limits& l) { l.translation.rate = 0; },
       [](g::Limits& l) { l.neutral = 1.5; },
       [](g::Limits& l) { l.neutral = -0.1; },
       [](g::Limits& l) { l.reference = kNaN; },
@@ -272,7 +328,7 @@ class RandomStory {
   bool chance(double probability) { return roll(0, 1) < probability; }
 
   void step() {
-    now_ += chance(0.005) ? roll(0, 0.4) : roll(0.001, 0.03);
+    now_ += chance(0.005) ? roll(0, 0.4) : roll(0.005, 0.03);
     if (chance(0.002)) {
       guard_.disconnect();
       guard_.connect();
@@ -282,6 +338,9 @@ class RandomStory {
       guard_.loseDevice();
       watch_.device(true);
     }
+    if (chance(0.002)) guard_.wake();
+    if (chance(0.002)) guard_.watch(false);
+    if (chance(0.1)) guard_.watch(true);
     if (chance(0.05)) {
       guard_.findDevice();
       watch_.device(false);
@@ -316,7 +375,7 @@ class RandomStory {
 
 TEST(GuardRandom, ArmedAndMovingOnlyAfterNeutralAndByRecentMessages) {
   int moves = 0;
-  for (unsigned seed = 1; seed <= 50; ++seed) moves += RandomStory(seed).tell(4000);
+  for (unsigned seed = 1; seed <= 50; ++seed) moves += RandomStory(seed).tell(6000);
   EXPECT_GT(moves, 10'000);  // else the stories say nothing
 }
 

@@ -1,20 +1,35 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What guard and sentinel do when a client, a device or one of them fails.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 
 #include <array>
 #include <csignal>
+#include <fstream>
 #include <string>
+#include <vector>
 
 #include "guard/socket.h"
 #include "guard_process.h"
+#include "signals.h"
 
 namespace test_guard_server {
 
 using namespace guarding;  // NOLINT: a test
+
+/// [s] of the processor that a process has used.
+double cpuOf(pid_t process) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
+  std::string word;
+  for (int i = 0; i < 13; ++i) file >> word;
+  double user = 0;
+  double system = 0;
+  file >> user >> system;
+  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
 
 TEST_F(GuardProcess, WritesNeutralAndReferenceFirstAndAllTheTimeWithoutAClient) {
   start();
@@ -209,8 +224,23 @@ TEST_F(GuardProcess, AGuardWhoseSentinelDiesEndsNeutral) {
   EXPECT_TRUE(isNeutral(driver.status().volts) || driver.status().volts.reference == 2.5);
 }
 
-TEST_F(GuardProcess, ASignalToEndIsFollowedByNeutral) {
-  for (const int signal : {SIGTERM, SIGINT}) {
+constexpr double kSoonArmed = 0.16;  // [s] for the sake of many rounds
+
+/// Numbers of all signals that end or stop whoever does nothing about them; 32 and 33 are glibc's.
+std::vector<int> signalsThatEnd() {
+  std::vector<int> numbers;
+  for (int signal = 1; signal <= SIGRTMAX; ++signal) {
+    if (kurumaisu::isToEnd(signal) && (signal < 32 || signal >= SIGRTMIN)) numbers.push_back(signal);
+  }
+  return numbers;
+}
+
+TEST_F(GuardProcess, EverySignalToTheSentinelIsFollowedByNeutralAndItsEnd) {
+  settings.limits.arming = kSoonArmed;
+  ASSERT_EQ(signalsThatEnd().size(), 31U - 5U + 31U);
+  for (const int signal : signalsThatEnd()) {
+    if (signal == SIGKILL || signal == SIGSTOP) continue;  // below
+    SCOPED_TRACE(signal);
     start();
     g::Client driver = client();
     drive(driver);
@@ -223,11 +253,73 @@ TEST_F(GuardProcess, ASignalToEndIsFollowedByNeutral) {
   }
 }
 
+TEST_F(GuardProcess, EverySignalToTheGuardIsFollowedByNeutralAndAnotherGuard) {
+  settings.limits.arming = kSoonArmed;
+  start();
+  g::Client driver = client();
+  for (const int signal : signalsThatEnd()) {
+    SCOPED_TRACE(signal);
+    drive(driver);
+    const pid_t guard = guardPid();
+    const double begin = kurumaisu::steadyTime();
+    kill(guard, signal);
+    EXPECT_LT(neutralAfter(begin), 0.3 + kSoon);  // SIGSTOP: the sentinel's patience
+    waitFor([&] { return guardPid() != guard && guardPid() != sentinel; }, "another guard");
+  }
+}
+
+TEST_F(GuardProcess, AStoppedSentinelMeansNeutralUntilItGoesOn) {
+  start();
+  g::Client driver = client();
+  drive(driver);
+  const pid_t guard = guardPid();
+  const double begin = kurumaisu::steadyTime();
+  kill(sentinel, SIGSTOP);
+  EXPECT_LT(neutralAfter(begin), 0.3 + kSoon);
+  putUntil(driver, 0, [](const g::Status& s) { return s.reason == g::Reason::kUnwatched; });
+  kill(sentinel, SIGCONT);
+  drive(driver);
+  EXPECT_EQ(guardPid(), guard);
+}
+
+TEST_F(GuardProcess, ATerminalThatSignalsTheSentinelDoesNotSignalTheGuard) {
+  start();
+  EXPECT_NE(getsid(guardPid()), getsid(sentinel));
+  EXPECT_NE(getpgid(guardPid()), getpgid(sentinel));
+}
+
+TEST_F(GuardProcess, WithoutDescriptorsItAnswersItsClientAndDoesNotSpin) {
+  start();
+  g::Client driver = client();
+  drive(driver);
+  const std::string files = "/proc/" + std::to_string(guardPid()) + "/fd";
+  const auto open = std::distance(fs::directory_iterator(files), fs::directory_iterator());
+  const rlimit none{static_cast<rlim_t>(open), static_cast<rlim_t>(open)};
+  ASSERT_EQ(prlimit(guardPid(), RLIMIT_NOFILE, &none, nullptr), 0);
+  const double used = cpuOf(guardPid());
+  const double begin = kurumaisu::steadyTime();
+  for (int i = 0; i < 5; ++i) {  // the spare descriptor serves one at a time
+    g::Client second = client();
+    putUntil(driver, 0.4, [&second](const g::Status&) {
+      return second.put({0, 0, 2.5}).reason == g::Reason::kBusy;
+    });
+  }
+  const std::vector<kurumaisu::Descriptor> more = [&] {
+    std::vector<kurumaisu::Descriptor> result;
+    for (int i = 0; i < 5; ++i) result.push_back(g::connectTo(settings.socket));
+    return result;
+  }();
+  for (int i = 0; i < 50; ++i, pause(kPeriod)) EXPECT_TRUE(driver.put({0.4, 0, 2.5}).connected);
+  EXPECT_EQ(driver.status().state, g::State::kArmed);
+  EXPECT_LT(cpuOf(guardPid()) - used, 0.5 * (kurumaisu::steadyTime() - begin));
+}
+
 TEST_F(GuardProcess, TheSocketIsForOwnerAndGroupAndForOneGuard) {
   start();
   struct stat status {};
   ASSERT_EQ(stat(settings.socket.c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777U, 0660U);
+  waitFor([&] { return static_cast<bool>(g::connectTo(settings.socket)); }, "a guard that listens");
   EXPECT_THROW(g::listenAt(settings.socket), std::system_error);
   EXPECT_THROW(g::listenAt(""), std::invalid_argument);
   EXPECT_THROW(g::listenAt(std::string(108, 'a')), std::invalid_argument);

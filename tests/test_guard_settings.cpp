@@ -73,6 +73,7 @@ TEST(GuardSettings, WhatIsWrongIsNamed) {
       {"guard.yaml", "arming: 0.5", "arming: 0.1", "limits: silence must be shorter than arming"},
       {"guard.yaml", "age: 0.1", "age: 1e-1", "age: must be a number"},
       {"guard.yaml", "step: 0.5", "step: 0", "step: must be above 0"},
+      {"guard.yaml", "rate: 25.0", "rate: -1", "rate: must be above 0"},
       {"guard.yaml", "period: 0.02", "period: 9.0", "sentinel_silence: must be longer than period"},
       {"guard.yaml", "first: 0.02", "first: 0.9", "longest: must be at least 0.9"},
       {"guard.yaml", "md100.yaml", "md200.yaml", "md200.yaml: cannot be read"},

@@ -28,11 +28,15 @@ class Converter {
   Converter& operator=(const Converter&) = delete;
   virtual ~Converter() = default;
 
+  /// One step towards the first voltage, of some replies' time at most: a device that was opened may have to boot, to
+  /// identify itself and to be told how to work. True once voltages can be put out. Throws Fault.
+  virtual bool prepare() { return true; }
+
   /// Puts out all three, the reference first, and returns what the device now holds: clamped to the channel's band
   /// and rounded to its codes. Throws Fault when that is not known; std::invalid_argument for a value not finite.
   virtual Volts put(const Volts& volts) = 0;
 
-  /// Closes and opens the device anew, for example after it was unplugged. Throws Fault.
+  /// Closes and opens the device anew, for example after it was unplugged; prepare() comes next. Throws Fault.
   virtual void reopen() = 0;
 
   /// What it is, for logs and diagnostics: kind, device, identity.

@@ -13,4 +13,10 @@ std::unique_ptr<Converter> open(const Device& device) {
   return std::make_unique<IioConverter>(device);
 }
 
+std::unique_ptr<Converter> openAndPrepare(const Device& device) {
+  std::unique_ptr<Converter> converter = open(device);
+  while (!converter->prepare()) continue;
+  return converter;
+}
+
 }  // namespace kurumaisu::dac

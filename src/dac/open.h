@@ -9,9 +9,12 @@
 
 namespace kurumaisu::dac {
 
-/// Opens a device for this program alone. No voltage is written before the first put().
+/// Opens a device for this program alone; prepare() comes next. No voltage is written before the first put().
 ///
 /// Throws Fault; std::invalid_argument for a device that is not what its file says.
 std::unique_ptr<Converter> open(const Device& device);
+
+/// The same, and waits until it takes voltages.
+std::unique_ptr<Converter> openAndPrepare(const Device& device);
 
 }  // namespace kurumaisu::dac

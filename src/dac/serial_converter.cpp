@@ -2,10 +2,13 @@
 #include "dac/serial_converter.h"
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
+#include <thread>
 #include <utility>
 
 #include "serial/tty.h"
+#include "steady.h"
 
 namespace kurumaisu::dac {
 namespace {
@@ -19,7 +22,7 @@ SerialConverter::SerialConverter(Channels channels, SerialSettings settings, Ope
   if (!open_port_) {
     open_port_ = [this] { return std::make_unique<serial::Tty>(settings_.port, settings_.baud, kWho); };
   }
-  start();
+  openPort();
 }
 
 std::string SerialConverter::name() const {
@@ -33,26 +36,64 @@ Fault SerialConverter::lost(const std::string& what, const std::string& why) {
   return Fault(why + " (" + what + " of " + settings_.port + ")");
 }
 
-void SerialConverter::start() {
+void SerialConverter::openPort() {
+  greeted_ = prepared_ = false;
   try {
     dialogue_ = std::make_unique<Dialogue>(
         open_port_(), Manner{settings_.terminator, settings_.reply_terminator, settings_.reply_timeout,
                              settings_.late_reply, settings_.retries});
-    bool first = true;
-    for (const Exchange& each : settings_.start) {
-      if (each.answered) {
-        const std::string reply = dialogue_->ask(each.send.plain(), each.expect.plain());
-        if (first && settings_.identifies) identity_ = reply;
-      } else {
-        dialogue_->tell(each.send.plain(), "");
-      }
-      first = false;
-    }
+  } catch (const serial::LinkLost& error) {
+    throw lost("start", error.what());
+  }
+  opened_ = steadyTime();
+}
+
+bool SerialConverter::prepare() {
+  if (prepared_) return true;
+  if (!dialogue_) throw Fault("DAC_CLOSED: " + settings_.port + " must be opened again");
+  try {
+    if (!greeted_ && !greet()) return false;
+    start();
   } catch (const serial::LinkLost& error) {
     throw lost("start", error.what());
   } catch (const Fault& error) {
     settle();
     throw lost("start", error.what());
+  }
+  prepared_ = true;
+  return true;
+}
+
+/// The first word; false if it must be said again, for the board may be booting.
+bool SerialConverter::greet() {
+  const double left = opened_ + settings_.boot - steadyTime();
+  if (settings_.start.empty() || !settings_.start.front().answered) {  // nothing tells when it has booted
+    if (left <= 0) return greeted_ = true;
+    std::this_thread::sleep_for(std::chrono::duration<double>(std::min(left, settings_.reply_timeout)));
+    return false;
+  }
+  const Exchange& first = settings_.start.front();
+  try {
+    const std::string reply = dialogue_->ask(first.send.plain(), first.expect.plain());
+    if (settings_.identifies) identity_ = reply;
+  } catch (const Fault&) {
+    if (left <= 0) throw;
+    return false;
+  }
+  dialogue_->settle();  // it may have kept what it was asked while it booted
+  return greeted_ = true;
+}
+
+void SerialConverter::start() {
+  bool first = true;
+  for (const Exchange& each : settings_.start) {
+    const bool is_done = std::exchange(first, false) && each.answered;
+    if (is_done) continue;
+    if (each.answered) {
+      dialogue_->ask(each.send.plain(), each.expect.plain());
+    } else {
+      dialogue_->tell(each.send.plain(), "");
+    }
   }
 }
 
@@ -68,7 +109,7 @@ void SerialConverter::settle() {
 void SerialConverter::reopen() {
   settle();
   dialogue_.reset();
-  start();
+  openPort();
 }
 
 SerialConverter::Frames SerialConverter::framesOf(const Levels& levels) const {
@@ -123,7 +164,7 @@ bool SerialConverter::putAtOnce(const Frames& frames) {
 
 Volts SerialConverter::put(const Volts& volts) {
   const Levels levels = levelsOf(volts, channels_, settings_.codings);
-  if (!dialogue_) throw Fault("DAC_CLOSED: " + settings_.port + " must be opened again");
+  if (!dialogue_ || !prepared_) throw Fault("DAC_CLOSED: " + settings_.port + " must be opened again");
   const Frames frames = framesOf(levels);
   try {
     if (!settings_.burst || !putAtOnce(frames)) converse(frames.begin(), frames.end());

@@ -21,9 +21,12 @@ class SerialConverter : public Converter {
  public:
   using OpenPort = std::function<std::unique_ptr<serial::Port>()>;
 
-  /// Opens the port for this program alone, identifies the board and sends what comes before the first voltage, but no
-  /// voltage. open_port: a tty by default. Throws Fault.
+  /// Opens the port for this program alone. open_port: a tty by default. Throws Fault.
   SerialConverter(Channels channels, SerialSettings settings, OpenPort open_port = {});
+
+  /// Identifies the board and sends what comes before the first voltage, but no voltage. Many boards start anew when
+  /// their port is opened: what they do not answer is asked again until `boot` is over.
+  bool prepare() override;
 
   Volts put(const Volts& volts) override;
   void reopen() override;
@@ -39,6 +42,8 @@ class SerialConverter : public Converter {
 
   Frames framesOf(const Levels& levels) const;
   bool putAtOnce(const Frames& frames);
+  void openPort();
+  bool greet();
   void start();
   void settle();
   void converse(Frames::const_iterator frame, Frames::const_iterator end);
@@ -51,7 +56,10 @@ class SerialConverter : public Converter {
   OpenPort open_port_;
   std::unique_ptr<Dialogue> dialogue_;  // none while the port is lost
   std::string identity_;
-  bool failed_ = false;  // at the last put
+  double opened_ = 0;      // [s] steady
+  bool greeted_ = false;   // the first of what comes before the first voltage is done
+  bool prepared_ = false;  // all of it is
+  bool failed_ = false;    // at the last put
 };
 
 }  // namespace kurumaisu::dac

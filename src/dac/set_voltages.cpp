@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // rosrun kurumaisu set_voltages DEVICE.yaml V_F V_S V_REF: try a device's file with a voltmeter, without a chair.
 #include <poll.h>
-#include <sys/signalfd.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,6 +15,8 @@
 
 #include "command_line.h"
 #include "dac/open.h"
+#include "signals.h"
+#include "standard_streams.h"
 
 namespace {
 
@@ -23,7 +24,7 @@ namespace dac = kurumaisu::dac;
 
 constexpr const char* kHelp = R"(usage: set_voltages DEVICE.yaml V_F V_S V_REF
 
-Puts out three voltages until Enter or Ctrl-C, then neutral: to try a D/A
+Puts out three voltages until Enter or a signal such as Ctrl-C, then neutral: to try a D/A
 converter with a voltmeter. It has no guard: never connect a chair!
 
   DEVICE.yaml    the D/A converter: launch/dac holds examples
@@ -46,28 +47,23 @@ void put(dac::Converter& converter, const dac::Volts& volts) {
   std::fflush(stdout);
 }
 
-/// From now on Ctrl-C and its like end no program, but a wait. Returns what becomes readable then.
-int holdSignals() {
-  sigset_t ends;
-  sigemptyset(&ends);
-  for (const int end : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, end);
-  sigprocmask(SIG_BLOCK, &ends, nullptr);
-  return signalfd(-1, &ends, SFD_CLOEXEC);
-}
-
 void run(const std::string& device, const dac::Volts& volts) {
-  std::array<pollfd, 2> ends{{{holdSignals(), POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}}};
-  const auto converter = dac::open(dac::readDevice(device));
+  const kurumaisu::Signals signals;
+  std::array<pollfd, 2> ends{{{signals.fd(), POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}}};
+  const auto converter = dac::openAndPrepare(dac::readDevice(device));
   std::fprintf(stderr, "%s\n", converter->name().c_str());
   put(*converter, {0, 0, volts.reference});
   put(*converter, volts);
-  poll(ends.data(), ends.size(), -1);
+  do {
+    poll(ends.data(), ends.size(), -1);
+  } while (ends[1].revents == 0 && !kurumaisu::isToEnd(signals.next().value_or(SIGCONT)));
   put(*converter, {0, 0, volts.reference});
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  kurumaisu::holdStandardStreams();
   const std::vector<std::string> arguments = kurumaisu::wordsOf(argc, argv);
   if (std::any_of(arguments.begin(), arguments.end(), kurumaisu::isHelp)) {
     std::fputs(kHelp, stdout);

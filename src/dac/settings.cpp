@@ -121,6 +121,7 @@ SerialSettings readSerial(Section& top, Channels& channels) {
   serial.reply_timeout = top.within("reply_timeout", 1e-3, kWaitMost);
   serial.late_reply = top.within("late_reply", 1e-3, kWaitMost);
   serial.retries = top.integer("retries", 0, kRetriesMost);
+  serial.boot = top.within("boot", 0, kWaitMost);
   if (serial.late_reply < serial.reply_timeout)
     throw top.error("late_reply", "must not be below reply_timeout");
   const int bits = top.integer("bits", 1, kBitsMost);

@@ -27,6 +27,7 @@ struct SerialSettings {
   double reply_timeout;          ///< [s]
   double late_reply;             ///< [s] after a command was sent, its reply has come, or never will
   int retries;                   ///< of a command whose reply is missing or wrong
+  double boot;                   ///< [s] after its port was opened, a board may be deaf
   std::vector<Exchange> start;   ///< identification and what else comes before the first voltage
   bool identifies;               ///< is the first of them the identification?
   bool one_frame;                ///< for all channels

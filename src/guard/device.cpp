@@ -42,6 +42,10 @@ bool Device::put(const dac::Volts& volts, double now) {
 
 bool Device::recover(double now) {
   try {
+    if (is_open_ && !is_ready_) {
+      is_ready_ = converter_->prepare();
+      return false;
+    }
     if (is_open_) {
       hold({0, 0, neutral_.reference});
       lost_ = false;
@@ -54,6 +58,7 @@ bool Device::recover(double now) {
       converter_ = open_();
     }
     is_open_ = true;
+    is_ready_ = false;
     retry_at_ = now;
   } catch (const std::exception& fault) {
     problem_ = fault.what();

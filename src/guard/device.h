@@ -33,8 +33,9 @@ class Device {
   /// Puts out, and says whether the device now holds it. If not, see problem(), and the device is lost.
   bool put(const dac::Volts& volts, double now);
 
-  /// The next step to a device that holds neutral: neutral over the line that failed, then opening, then neutral over
-  /// the new line. True if it is there. One step at a time, for each may take as long as the device's timeouts are.
+  /// The next step to a device that holds neutral: neutral over the line that failed, then opening, then what the device
+  /// must be told first, for as long as it boots, then neutral over the new line. True if it is there. One step at a
+  /// time, for each may take as long as the device's timeouts are.
   bool recover(double now);
 
   bool isLost() const { return lost_; }
@@ -53,7 +54,8 @@ class Device {
   std::unique_ptr<dac::Converter> converter_;
   dac::Volts held_;
   bool lost_ = true;
-  bool is_open_ = false;  ///< there is a line to try
+  bool is_open_ = false;   ///< there is a line to try
+  bool is_ready_ = false;  ///< the device at its end takes voltages
   double retry_at_ = 0;
   double pause_;
   std::string problem_;

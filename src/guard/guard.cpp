@@ -11,12 +11,13 @@
 namespace kurumaisu::guard {
 namespace {
 
+constexpr double kSlack = 1e-9;  // [V]
+
 bool isWithin(const Band& band, double volts) { return band.low <= volts && volts <= band.high; }
 
-/// How far the voltage goes beyond what lies between neutral and the last one.
-bool isStepTooLarge(const Band& band, double from, double to) {
-  return to > std::max(from, 0.0) + band.step || to < std::min(from, 0.0) - band.step ||
-         (from * to < 0 && std::abs(to - from) > band.step);
+/// [V] of a step that counts: away from neutral, or all of it where it crosses neutral.
+double away(double from, double to) {
+  return from * to < 0 ? std::abs(to - from) : std::max(0.0, std::abs(to) - std::abs(from));
 }
 
 void require(bool holds, const char* what) {
@@ -29,6 +30,7 @@ void validate(const Limits& limits) {
   for (const Band& band : {limits.translation, limits.steering}) {
     require(band.low < 0 && band.high > 0, "a band must reach from below 0 V to above 0 V");
     require(band.step > 0, "step must be above 0 V");
+    require(band.rate > 0, "rate must be above 0 V/s");
     require(limits.neutral < std::min(-band.low, band.high), "neutral must lie inside both bands");
   }
   require(limits.neutral >= 0 && limits.reference_tolerance >= 0, "a tolerance must not be negative");
@@ -37,7 +39,22 @@ void validate(const Limits& limits) {
   require(limits.silence < limits.arming, "silence must be shorter than arming");
 }
 
-Guard::Guard(const Limits& limits) : limits_(limits) { validate(limits); }
+Guard::Guard(const Limits& limits)
+    : limits_(limits), translation_{limits.translation}, steering_{limits.steering} {
+  validate(limits);
+}
+
+double Guard::Axis::spentAt(double now) const { return std::max(0.0, spent - band.rate * (now - at)); }
+
+bool Guard::Axis::allows(double to, double now) const {
+  return spentAt(now) + away(volts, to) <= band.step + kSlack;
+}
+
+void Guard::Axis::go(double to, double now) {
+  spent = spentAt(now) + away(volts, to);
+  at = now;
+  volts = to;
+}
 
 void Guard::connect() { sequence_.reset(); }
 
@@ -49,7 +66,12 @@ void Guard::disconnect() {
 
 void Guard::loseDevice() {
   has_device_ = false;
-  trip(Reason::kDevice);
+  if (state_ != State::kIdle) trip(Reason::kDevice);
+}
+
+void Guard::watch(bool is_watched) {
+  is_watched_ = is_watched;
+  if (!is_watched) trip(Reason::kUnwatched);
 }
 
 void Guard::receive(const Request& request, double now) {
@@ -73,7 +95,7 @@ std::optional<double> Guard::deadline() const {
 
 dac::Volts Guard::output() const {
   if (state_ != State::kArmed) return {0, 0, limits_.reference};
-  return {translation_, steering_, limits_.reference};
+  return {translation_.volts, steering_.volts, limits_.reference};
 }
 
 Reason Guard::judge(const Request& request, double now) const {
@@ -83,7 +105,8 @@ Reason Guard::judge(const Request& request, double now) const {
   if (request.kind == static_cast<std::uint16_t>(Kind::kStop)) return Reason::kStopped;
   if (request.kind != static_cast<std::uint16_t>(Kind::kPut)) return Reason::kGarbage;
   if (!has_device_) return Reason::kDevice;
-  return judgeVolts(request);
+  if (!is_watched_) return Reason::kUnwatched;
+  return judgeVolts(request, now);
 }
 
 Reason Guard::judgeTime(const Request& request, double now) const {
@@ -93,7 +116,7 @@ Reason Guard::judgeTime(const Request& request, double now) const {
   return now - made > limits_.age || runs_back ? Reason::kOld : Reason::kNone;
 }
 
-Reason Guard::judgeVolts(const Request& request) const {
+Reason Guard::judgeVolts(const Request& request, double now) const {
   if (!std::isfinite(request.translation) || !std::isfinite(request.steering) ||
       !std::isfinite(request.reference)) {
     return Reason::kNotFinite;
@@ -104,9 +127,9 @@ Reason Guard::judgeVolts(const Request& request) const {
   if (std::abs(request.reference - limits_.reference) > limits_.reference_tolerance)
     return Reason::kReference;
   if (state_ != State::kArmed) return isNeutral(request) ? Reason::kNone : Reason::kNotNeutral;
-  const bool too_large = isStepTooLarge(limits_.translation, translation_, request.translation) ||
-                         isStepTooLarge(limits_.steering, steering_, request.steering);
-  return too_large ? Reason::kStep : Reason::kNone;
+  const bool is_allowed =
+      translation_.allows(request.translation, now) && steering_.allows(request.steering, now);
+  return is_allowed ? Reason::kNone : Reason::kStep;
 }
 
 void Guard::accept(const Request& request, double now) {
@@ -120,8 +143,8 @@ void Guard::accept(const Request& request, double now) {
     state_ = State::kArmed;
     reason_ = Reason::kNone;
   }
-  translation_ = request.translation;
-  steering_ = request.steering;
+  translation_.go(request.translation, now);
+  steering_.go(request.steering, now);
 }
 
 void Guard::trip(Reason reason) {

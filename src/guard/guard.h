@@ -14,7 +14,8 @@ namespace kurumaisu::guard {
 struct Band {
   double low;   ///< [V]
   double high;  ///< [V]
-  double step;  ///< [V] away from neutral in one message; towards neutral is free
+  double step;  ///< [V] away from neutral at once; towards neutral is free
+  double rate;  ///< [V/s] at which, after a step, one more becomes possible
 };
 
 struct Limits {
@@ -34,7 +35,7 @@ void validate(const Limits& limits);
 /// From a client's messages to three voltages.
 ///
 /// Neutral, unless the client has held neutral for `arming` and every message since was valid, in time, and a small
-/// step from the one before. Whatever else happens trips: neutral at once, until neutral has been held again.
+/// step from the one before, however fast they come. Whatever else happens trips: neutral at once, until neutral has been held again.
 class Guard {
  public:
   explicit Guard(const Limits& limits);
@@ -49,9 +50,15 @@ class Guard {
   /// Something came that is no message.
   void receiveGarbage() { trip(Reason::kGarbage); }
 
-  /// The device failed: neutral, and no arming until it is back.
+  /// The device failed, or is not there yet: neutral, and no arming until it is.
   void loseDevice();
   void findDevice() { has_device_ = true; }
+
+  /// Whether somebody would notice the death of this process: neutral, and no arming, while nobody does.
+  void watch(bool is_watched);
+
+  /// This computer slept: nothing that was asked for before counts.
+  void wake() { trip(Reason::kSlept); }
 
   /// Notices silence. To be called before output(), and at deadline() at the latest.
   void advance(double now);
@@ -67,21 +74,34 @@ class Guard {
  private:
   Reason judge(const Request& request, double now) const;
   Reason judgeTime(const Request& request, double now) const;
-  Reason judgeVolts(const Request& request) const;
+  Reason judgeVolts(const Request& request, double now) const;
   void accept(const Request& request, double now);
   void trip(Reason reason);
   bool isNeutral(const Request& request) const;
+
+  /// One voltage, and how far it may go at once: a bucket of `step` that fills with `rate`.
+  struct Axis {
+    Band band;
+    double volts = 0;  ///< [V] of the last valid message
+    double spent = 0;  ///< [V] of the step, at the time `at`
+    double at = 0;     ///< [s]
+
+    double spentAt(double now) const;
+    bool allows(double to, double now) const;
+    void go(double to, double now);
+  };
 
   Limits limits_;
   State state_ = State::kIdle;
   Reason reason_ = Reason::kNone;
   std::uint32_t trips_ = 0;
   bool has_device_ = true;
+  bool is_watched_ = true;
   std::optional<std::uint64_t> sequence_;  ///< of the last valid message of this client
   double last_made_ = 0;                   ///< its stamp [s]
   double hold_since_ = 0;                  ///< when holding began [s]
-  double translation_ = 0;                 ///< [V] of the last valid message
-  double steering_ = 0;                    ///< [V]
+  Axis translation_;
+  Axis steering_;
 };
 
 }  // namespace kurumaisu::guard

@@ -13,6 +13,7 @@
 #include "guard/realtime.h"
 #include "guard/sentinel.h"
 #include "guard/settings.h"
+#include "standard_streams.h"
 
 namespace {
 
@@ -34,6 +35,7 @@ More: docs/guard.md
 int run(const std::string& device_file, const std::string& guard_file, bool only_neutral) {
   const k::dac::Device device = k::dac::readDevice(device_file);
   const k::guard::Settings settings = k::guard::readSettings(guard_file);
+  const k::guard::LogWriter log;
   const auto open = [&device] { return k::dac::open(device); };
   if (!only_neutral) return k::guard::runSentinel(settings, open);
   k::guard::makeRealtime(settings.priority);
@@ -43,17 +45,18 @@ int run(const std::string& device_file, const std::string& guard_file, bool only
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::vector<std::string> words = kurumaisu::wordsOf(argc, argv);
-  if (std::any_of(words.begin(), words.end(), kurumaisu::isHelp)) {
+  k::holdStandardStreams();
+  std::vector<std::string> words = k::wordsOf(argc, argv);
+  if (std::any_of(words.begin(), words.end(), k::isHelp)) {
     std::cout << kHelp;
     return 0;
   }
   const bool only_neutral = !words.empty() && words[0] == "--neutral";
   if (only_neutral) words.erase(words.begin());
   for (const std::string& word : words) {
-    if (word.rfind('-', 0) == 0) return kurumaisu::misused("guard: unknown option: " + word, kHelp);
+    if (word.rfind('-', 0) == 0) return k::misused("guard: unknown option: " + word, kHelp);
   }
-  if (words.size() != 2) return kurumaisu::misused("guard: two files are needed", kHelp);
+  if (words.size() != 2) return k::misused("guard: two files are needed", kHelp);
   try {
     return run(words[0], words[1], only_neutral);
   } catch (const std::exception& error) {

@@ -23,7 +23,9 @@ constexpr std::array kReasons = {"none",
                                  "step too large",
                                  "not neutral before arming",
                                  "stopped by the client",
-                                 "the D/A converter failed"};
+                                 "the D/A converter failed",
+                                 "the sentinel is silent",
+                                 "the computer slept"};
 
 }  // namespace
 

@@ -54,10 +54,12 @@ enum class Reason : std::uint16_t {
   kNotFinite,
   kBand,        ///< a voltage outside its band
   kReference,   ///< not the reference that is put out
-  kStep,        ///< too far from the last voltage
+  kStep,        ///< too far from the last voltage, for the time that has passed
   kNotNeutral,  ///< motion asked for before arming
   kStopped,     ///< the client asked for it
   kDevice,      ///< the D/A converter failed
+  kUnwatched,   ///< no sentinel watches over the guard
+  kSlept,       ///< this computer was suspended
 };
 
 /// What the guard answers to each message, and to a client that it refuses.

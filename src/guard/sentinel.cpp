@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/prctl.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -15,7 +16,7 @@
 #include <cstring>
 #include <exception>
 #include <optional>
-#include <system_error>
+#include <utility>
 
 #include "guard/log.h"
 #include "guard/notify.h"
@@ -28,11 +29,42 @@ namespace {
 
 constexpr double kNotifyPeriod = 0.1;  // [s] of signs of life to systemd; its WatchdogSec is longer
 
-/// In the child: a guard, whose parent's death is a SIGTERM.
-int runGuard(const Settings& settings, const Device::Open& open, int beats, pid_t parent) {
+/// Empties a socket of signs of life; whether there were any.
+bool hearBeats(const Descriptor& socket) {
+  std::array<char, 64> bytes{};
+  bool heard = false;
+  while (read(socket.get(), bytes.data(), bytes.size()) > 0) heard = true;
+  return heard;
+}
+
+void sendBeat(const Descriptor& socket) { ::send(socket.get(), "", 1, MSG_DONTWAIT | MSG_NOSIGNAL); }
+
+/// The guard's end: a sign of its life for each of the sentinel's, which must not be missing for too long.
+class Watched {
+ public:
+  Watched(Descriptor socket, double silence) : socket_(std::move(socket)), silence_(silence) {}
+
+  /// Tells the sentinel that the guard lives; whether the sentinel does.
+  bool beat() {
+    sendBeat(socket_);
+    if (hearBeats(socket_)) heard_ = steadyTime();
+    return steadyTime() < heard_ + silence_;
+  }
+
+ private:
+  Descriptor socket_;
+  double silence_;              ///< [s]
+  double heard_ = steadyTime();  ///< [s]
+};
+
+/// In the child: a guard, whose parent's death is a SIGTERM. It has a session of its own: what a terminal does to its
+/// parent's, it does not do to both.
+int runGuard(const Settings& settings, const Device::Open& open, Descriptor beats, pid_t parent) {
   try {
+    setsid();
     makeRealtime(settings.priority);
-    Server server(settings, open, [beats] { [[maybe_unused]] const ssize_t written = write(beats, "", 1); });
+    Watched watched(std::move(beats), settings.sentinel_silence);
+    Server server(settings, open, [&watched] { return watched.beat(); });
     prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (getppid() == parent) server.run();  // or it died before the line above
     return 0;
@@ -62,7 +94,7 @@ class Sentinel {
 
   const Settings& settings_;
   const Device::Open& open_;
-  Signals signals_{SIGTERM, SIGINT, SIGCHLD};
+  Signals signals_;
   Descriptor beats_;
   pid_t guard_ = -1;
   double last_beat_ = 0;  ///< [s]
@@ -89,15 +121,13 @@ int Sentinel::run() {
 
 void Sentinel::start() {
   std::array<int, 2> ends{};
-  if (pipe2(ends.data(), O_NONBLOCK | O_CLOEXEC) != 0)
-    throw std::system_error(errno, std::generic_category(), "pipe");
+  checked(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends.data()), "socketpair");
   beats_ = Descriptor(ends[0]);
   Descriptor beating(ends[1]);
   last_beat_ = steadyTime();
   const pid_t parent = getpid();
-  guard_ = fork();
-  if (guard_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
-  if (guard_ == 0) _exit(runGuard(settings_, open_, beating.get(), parent));
+  guard_ = checked(fork(), "fork");
+  if (guard_ == 0) _exit(runGuard(settings_, open_, std::move(beating), parent));
 }
 
 /// Returns the guard's wait status once it is dead.
@@ -117,10 +147,8 @@ int Sentinel::watch() {
 }
 
 bool Sentinel::hear() {
-  std::array<char, 64> bytes{};
-  bool heard = false;
-  while (read(beats_.get(), bytes.data(), bytes.size()) > 0) heard = true;
-  if (!heard) return false;
+  if (!hearBeats(beats_)) return false;
+  sendBeat(beats_);
   last_beat_ = steadyTime();
   if (!has_begun_) notify("READY=1");
   has_begun_ = true;
@@ -132,7 +160,7 @@ bool Sentinel::hear() {
 }
 
 void Sentinel::pass(int signal) {
-  if (signal == SIGCHLD) return;
+  if (!isToEnd(signal)) return;
   if (!is_leaving_) notify("STOPPING=1");
   is_leaving_ = true;
   kill(guard_, SIGTERM);
@@ -144,7 +172,7 @@ bool Sentinel::rest() {
   while (!is_leaving_ && steadyTime() < until) {
     pollfd ready{signals_.fd(), POLLIN, 0};
     poll(&ready, 1, static_cast<int>(std::ceil(1e3 * std::max(0.0, until - steadyTime()))));
-    while (const auto signal = signals_.next()) is_leaving_ |= *signal != SIGCHLD;
+    while (const auto signal = signals_.next()) is_leaving_ |= isToEnd(*signal);
   }
   return !is_leaving_;
 }

@@ -7,9 +7,9 @@
 
 namespace kurumaisu::guard {
 
-/// Runs guards until SIGTERM or SIGINT. Returns the exit status: 0, or 1 if a guard could not even begin.
+/// Runs guards until a signal says to end; isToEnd(). Returns the exit status: 0, or 1 if a guard could not even begin.
 ///
-/// The guard ends, neutral, when this process dies. systemd hears of the guard's signs of life from here, so that its
+/// The guard ends, neutral, when this process dies, and is neutral while it is stopped. systemd hears of the guard's signs of life from here, so that its
 /// watchdog sees either of them hang.
 int runSentinel(const Settings& settings, const Device::Open& open);
 

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "guard/server.h"
 
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <ctime>
 #include <utility>
 
@@ -19,10 +22,13 @@ namespace {
 
 constexpr int kMessagesPerRound = 64;  // then the device has its turn
 constexpr int kClientsPerRound = 8;
+constexpr double kAcceptPause = 0.1;  // [s] after one who connected could not be taken
 
 bool isSame(const dac::Volts& a, const dac::Volts& b) {
   return a.translation == b.translation && a.steering == b.steering && a.reference == b.reference;
 }
+
+Descriptor spare() { return Descriptor(open("/dev/null", O_RDONLY | O_CLOEXEC)); }
 
 timespec timeUntil(double when) {
   const double wait = std::max(0.0, when - steadyTime());
@@ -41,21 +47,29 @@ std::string peerOf(const Descriptor& client) {
 
 }  // namespace
 
-Server::Server(const Settings& settings, Device::Open open, std::function<void()> beat)
+Server::Server(const Settings& settings, Device::Open open, Beat beat)
     : settings_(settings),
       beat_(std::move(beat)),
       guard_(settings.limits),
       device_(std::move(open), neutralOf(settings.limits), settings.reopening) {
-  // neutral comes before anybody can ask for anything
-  for (double now = steadyTime(); device_.isLost() && device_.retryAt() <= now; now = steadyTime())
-    recover(now);
-  if (device_.isLost()) guard_.loseDevice();
+  guard_.loseDevice();
   listener_ = listenAt(settings.socket);
+  reserve_ = spare();
+}
+
+/// Neutral comes before anybody can ask for anything, or the news that there is no device.
+void Server::begin() {
+  for (double now = steadyTime(); device_.isLost() && device_.retryAt() <= now && !isTold();
+       now = steadyTime()) {
+    look();
+    recover(now);
+  }
 }
 
 void Server::run() {
-  while (!signals_.next()) {
-    beat_();
+  begin();
+  while (!isTold()) {
+    look();
     wait();
     noticed_ = steadyTime();
     listen();
@@ -68,15 +82,31 @@ void Server::run() {
   }
   drop();
   if (!device_.isLost()) put({0, 0, settings_.limits.reference}, steadyTime());
-  say("GUARD_END", "told to stop" + reacted());
+  say("GUARD_END", "told to stop: " + signalName(told_) + reacted());
+}
+
+bool Server::isTold() {
+  while (const auto signal = signals_.next()) {
+    if (isToEnd(*signal)) told_ = *signal;
+  }
+  return told_ != 0;
+}
+
+/// Whether the sentinel lives, and whether this computer slept: then nothing that was asked for before it counts.
+void Server::look() {
+  guard_.watch(beat_());
+  if (sleep_.hasSlept()) guard_.wake();
 }
 
 void Server::wait() {
   double until = device_.isLost() ? device_.retryAt() : written_at_ + settings_.period;
   // silence shows just after its deadline, not at it
   if (const auto deadline = guard_.deadline()) until = std::min(until, std::nextafter(*deadline, INFINITY));
-  std::array<pollfd, 3> ready = {
-      {{signals_.fd(), POLLIN, 0}, {listener_.get(), POLLIN, 0}, {client_.get(), POLLIN | POLLRDHUP, 0}}};
+  const bool accepts = accept_at_ <= steadyTime();
+  if (!accepts) until = std::min(until, accept_at_);
+  std::array<pollfd, 3> ready = {{{signals_.fd(), POLLIN, 0},
+                                  {accepts ? listener_.get() : -1, POLLIN, 0},
+                                  {client_.get(), POLLIN | POLLRDHUP, 0}}};
   const timespec timeout = timeUntil(until);
   ppoll(ready.data(), ready.size(), &timeout, nullptr);
   client_left_ = (ready[2].revents & (POLLHUP | POLLRDHUP | POLLERR)) != 0;
@@ -84,7 +114,7 @@ void Server::wait() {
 
 void Server::acceptClients() {
   for (int i = 0; i < kClientsPerRound; ++i) {
-    Descriptor client(accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    Descriptor client = acceptClient();
     if (!client) return;
     if (!client_) {
       say("GUARD_CLIENT", peerOf(client));
@@ -101,6 +131,22 @@ void Server::acceptClients() {
     send(client, &refusal, sizeof refusal);
     say("GUARD_BUSY", peerOf(client) + " is refused: there is a client");
   }
+}
+
+/// Who connects; none if nobody does. Where no descriptor is left, the spare one serves to refuse him.
+Descriptor Server::acceptClient() {
+  const auto next = [this] {
+    return Descriptor(accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+  };
+  if (!reserve_) reserve_ = spare();
+  if (accept_at_ > steadyTime()) return Descriptor();
+  Descriptor client = next();
+  if (client || errno == EAGAIN) return client;
+  say("GUARD_CANNOT_ACCEPT", std::strerror(errno));
+  reserve_.close();
+  client = next();
+  accept_at_ = steadyTime() + kAcceptPause;
+  return client;
 }
 
 void Server::listen() {

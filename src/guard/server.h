@@ -2,7 +2,6 @@
 // The guard's process: one device, one client, and the time in between.
 #pragma once
 
-#include <csignal>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -12,7 +11,8 @@
 #include "guard/device.h"
 #include "guard/guard.h"
 #include "guard/settings.h"
-#include "guard/signals.h"
+#include "signals.h"
+#include "sleep_watch.h"
 
 namespace kurumaisu::guard {
 
@@ -20,15 +20,22 @@ namespace kurumaisu::guard {
 /// for nothing but the device, which answers or fails within its own timeout.
 class Server {
  public:
-  /// beat: called in every round, as a sign of life. Throws where the socket cannot be had.
-  Server(const Settings& settings, Device::Open open, std::function<void()> beat);
+  using Beat = std::function<bool()>;
 
-  /// Works until SIGTERM or SIGINT; neutral is the last thing put out.
+  /// beat: called in every round, as a sign of life; false: nobody watches over this process any more. Throws where
+  /// the socket cannot be had.
+  Server(const Settings& settings, Device::Open open, Beat beat);
+
+  /// Works until a signal says to end, isToEnd(); neutral is the last thing put out.
   void run();
 
  private:
   void wait();
+  void begin();
+  bool isTold();
+  void look();
   void acceptClients();
+  Descriptor acceptClient();
   void listen();
   void take(const void* bytes, std::size_t size, double now);
   void drop();
@@ -40,12 +47,16 @@ class Server {
   std::string reacted() const;
 
   Settings settings_;
-  std::function<void()> beat_;
-  Signals signals_{SIGTERM, SIGINT};
+  Beat beat_;
+  Signals signals_;
+  int told_ = 0;  ///< the signal that says to end
+  SleepWatch sleep_;
   Guard guard_;
   Device device_;
   Descriptor listener_;
   Descriptor client_;
+  Descriptor reserve_;            ///< given up where none is left for one more who connects
+  double accept_at_ = 0;          ///< [s] not to be tried before
   bool client_left_ = false;            ///< says poll(): what it still sent is not to be read
   std::optional<std::uint64_t> asked_;  ///< sequence of a message that is not answered yet
   std::optional<dac::Volts> written_;   ///< what the device was last asked for; none: write at once

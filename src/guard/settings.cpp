@@ -15,14 +15,13 @@ constexpr double kRounding = 1e-9;  // [V] by which codes at the end of a band m
 
 /// How far the model file lets a voltage go; what else it says of it is base_node's.
 Band readBand(YamlSection section) {
-  const Band band{section.number("min") - kRounding, section.number("max") + kRounding, 0};
-  return band;
+  return {section.number("min") - kRounding, section.number("max") + kRounding, 0, 0};
 }
 
-double readStep(YamlSection section) {
-  const double step = section.above("step", 0);
+void readStep(YamlSection section, Band& band) {
+  band.step = section.above("step", 0);
+  band.rate = section.above("rate", 0);
   section.end();
-  return step;
 }
 
 /// Of the model file, which has other readers for all else.
@@ -37,8 +36,8 @@ void readModel(const std::string& file, Limits& limits) {
 Limits readLimits(YamlSection section, const std::string& model_file) {
   Limits limits{};
   readModel(model_file, limits);
-  limits.translation.step = readStep(section.section("translation"));
-  limits.steering.step = readStep(section.section("steering"));
+  readStep(section.section("translation"), limits.translation);
+  readStep(section.section("steering"), limits.steering);
   limits.reference_tolerance = section.atLeast("reference_tolerance", 0);
   limits.neutral = section.atLeast("neutral", 0);
   limits.arming = section.above("arming", 0);

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from kurumaisu.bench.faults.base.chain import NODE, Chain, Setup
-from kurumaisu.bench.rigs.guard import Change
+from kurumaisu.bench.guard_rig import Change
 from kurumaisu.errors import Error
 
 _SETTLED = 0.05  # [s] after the first neutral; a burst of commands on the wire may end in between

@@ -20,7 +20,7 @@ import yaml
 
 from kurumaisu.bench.faults.base.peers import Commander, Event, Graph, end, until
 from kurumaisu.bench.processes import PATIENCE, program
-from kurumaisu.bench.rigs.guard import Change, ChipRig, Rig, changed
+from kurumaisu.bench.guard_rig import Change, ChipRig, Rig, changed
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 

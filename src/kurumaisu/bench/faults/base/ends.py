@@ -13,7 +13,7 @@ from pathlib import Path
 from kurumaisu.bench.faults.base.cases import Case, Seen, trips
 from kurumaisu.bench.faults.base.chain import Chain, V, W
 from kurumaisu.bench.faults.base.peers import until
-from kurumaisu.bench.rigs.guard import busy
+from kurumaisu.bench.guard_rig import busy
 
 _DEATH, _HANG, _GUARD = 0.010, 0.020, 0.020  # [s] until neutral; a hang counts from the guard's silence
 _STOPPED = 0.5  # [s]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kurumaisu._core import AxisInverse, AxisLaw
-from kurumaisu.bench.rigs.guard import Change
+from kurumaisu.bench.guard_rig import Change
 from kurumaisu.types import FloatArray
 
 _REST = 0.002  # [V] more than a code of the board: the rounding of rest

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from kurumaisu.bench.processes import PATIENCE
-from kurumaisu.bench.rigs.guard import Rig, strike
+from kurumaisu.bench.guard_rig import Rig, strike
 from kurumaisu.bench.rigs.guard_client import Client, Favour
 
 _HELD = 0.5  # [s] without neutral, when nobody is left to write it

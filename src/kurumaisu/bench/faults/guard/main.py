@@ -18,7 +18,7 @@ import numpy as np
 
 from kurumaisu.bench.faults.guard.endings import CASES, Case, both, sentinel, unplug
 from kurumaisu.bench.processes import PATIENCE
-from kurumaisu.bench.rigs.guard import ChipRig, Rig, busy, in_memory
+from kurumaisu.bench.guard_rig import ChipRig, Rig, busy, in_memory
 from kurumaisu.bench.rigs.guard_client import Client
 from kurumaisu.bench.table import Table
 

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Signals, for programs that must do something before they end.
+#pragma once
+
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstring>
+#include <optional>
+#include <string>
+
+#include "file_descriptor.h"
+
+namespace kurumaisu {
+
+/// Every signal that can be held back waits to be read in place of ending, or stopping, this process; signalfd(2).
+/// SIGKILL, SIGSTOP and a crash of its own cannot.
+class Signals {
+ public:
+  Signals() {
+    sigset_t set;
+    sigfillset(&set);
+    sigprocmask(SIG_BLOCK, &set, nullptr);
+    descriptor_ = Descriptor(checked(signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC), "signalfd"));
+  }
+
+  int fd() const { return descriptor_.get(); }
+
+  /// The next that came; none if there is none.
+  std::optional<int> next() const {
+    signalfd_siginfo info{};
+    if (read(descriptor_.get(), &info, sizeof info) != sizeof info) return std::nullopt;
+    return static_cast<int>(info.ssi_signo);
+  }
+
+ private:
+  Descriptor descriptor_;
+};
+
+/// Whether a signal would end or stop a process that does nothing about it; all such signals mean: end.
+inline bool isToEnd(int signal) {
+  constexpr std::array kHarmless = {SIGCHLD, SIGCONT, SIGURG, SIGWINCH, SIGPIPE};  // the last: a write tells
+  return std::find(kHarmless.begin(), kHarmless.end(), signal) == kHarmless.end();
+}
+
+/// "SIGHUP"
+inline std::string signalName(int signal) {
+  const char* const name = sigabbrev_np(signal);
+  return name ? std::string("SIG") + name : "signal " + std::to_string(signal);
+}
+
+}  // namespace kurumaisu
