@@ -40,6 +40,13 @@ class Signals {
   Descriptor descriptor_;
 };
 
+/// What the kernel sends to a process for a fault of its own.
+constexpr std::array kCrashes = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP};
+
+inline bool isCrash(int signal) {
+  return std::find(kCrashes.begin(), kCrashes.end(), signal) != kCrashes.end();
+}
+
 /// Whether a signal would end or stop a process that does nothing about it; all such signals mean: end.
 inline bool isToEnd(int signal) {
   constexpr std::array kHarmless = {SIGCHLD, SIGCONT, SIGURG, SIGWINCH, SIGPIPE};  // the last: a write tells

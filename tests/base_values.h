@@ -62,10 +62,12 @@ inline Value nodeValues() {
   v["inputs"]["joystick"] = input("joy_vel", 200);
   v["inputs"]["navigation"] = input("cmd_vel", 50);
   v["absurd"]["v"] = v["absurd"]["w"] = 10.0;
+  v["rest"]["v"] = v["rest"]["w"] = 0.001;
   v["locks"]["dead_man"]["topic"] = std::string("dead_man");
   v["locks"]["dead_man"]["blocks_on"] = false;
   v["locks"]["dead_man"]["priority"] = 255;
   v["locks"]["dead_man"]["timeout"] = 0.3;
+  v["locks"]["dead_man"]["from_start"] = true;
   v["estop"]["topic"] = std::string("e_stop");
   v["estop"]["timeout"] = 0.0;
   v["speed_cap"]["topic"] = std::string("speed_cap");

@@ -2,12 +2,14 @@
 // Who drives: priorities, timeouts, locks, several publishers, release; the emergency stop; the cap.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <stdexcept>
 #include <thread>
 
 #include "base/last_word.h"
+#include "base/report.h"
 #include "base_drive.h"
 
 namespace test_arbiter {
@@ -16,6 +18,9 @@ namespace k = kurumaisu;
 using namespace kurumaisu::test;  // NOLINT(google-build-using-namespace)
 
 namespace {
+
+const k::Speaker kA{"/a"};
+const k::Speaker kB{"/b"};
 
 k::ArbiterSettings withDeadMan() {
   k::ArbiterSettings settings = kArbiter;
@@ -55,12 +60,12 @@ TEST_F(ArbiterTest, AZeroOfTheHighestHoldsTheOthersOff) {
 
 TEST_F(ArbiterTest, ALockBlocksWhatIsBelowItsPriority) {
   hear(kNavigation, 0.3, 1.0);
-  arbiter.lock(kHold, true, 1.0);
+  arbiter.lock(kHold, kA, true, 1.0);
   const k::Choice choice = arbiter.choose(1.1);
   EXPECT_EQ(choice.reason, k::Reason::kLocked);
   EXPECT_EQ(*choice.lock, kHold);
   EXPECT_EQ(hear(kJoystick, 0.2, 1.1).reason, k::Reason::kDriving);
-  arbiter.lock(kHold, false, 1.2);
+  arbiter.lock(kHold, kA, false, 1.2);
   EXPECT_EQ(hear(kNavigation, 0.3, 9.0).reason, k::Reason::kDriving);  // its silence means nothing
 }
 
@@ -72,18 +77,77 @@ TEST(Arbiter, ADeadManThatFallsSilentOrWasNeverHeardBlocks) {
     return arbiter.choose(t).reason;
   };
   EXPECT_EQ(reason(1.0), k::Reason::kLocked);
-  arbiter.lock(kDeadMan, true, 1.1);  // held
+  arbiter.lock(kDeadMan, kA, false, 1.1);  // held
   EXPECT_EQ(reason(1.1), k::Reason::kDriving);
   EXPECT_EQ(reason(1.39), k::Reason::kDriving);
   EXPECT_EQ(reason(1.41), k::Reason::kLocked);
-  arbiter.lock(kDeadMan, true, 1.5);
+  arbiter.lock(kDeadMan, kA, false, 1.5);
   EXPECT_EQ(reason(1.5), k::Reason::kDriving);
-  arbiter.lock(kDeadMan, false, 1.6);  // let go
+  arbiter.lock(kDeadMan, kA, true, 1.6);  // let go
   EXPECT_EQ(reason(1.6), k::Reason::kLocked);
-  arbiter.lock(kDeadMan, true, 1.7);
+  arbiter.lock(kDeadMan, kA, false, 1.7);
   EXPECT_EQ(reason(1.7), k::Reason::kDriving);
   EXPECT_EQ(reason(0.5), k::Reason::kIdle);  // the clock was set back: nobody knows how old a word is
   EXPECT_EQ(reason(0.6), k::Reason::kLocked);
+}
+
+TEST_F(ArbiterTest, ALockHoldsAsLongAsAnyOfItsPublishersHoldsIt) {
+  const auto reason = [this](double t) { return hear(kNavigation, 0.3, t).reason; };
+  arbiter.lock(kHold, kA, true, 1.0);
+  arbiter.lock(kHold, kB, false, 1.0);
+  EXPECT_EQ(reason(1.0), k::Reason::kLocked);
+  arbiter.lock(kHold, kA, false, 1.1);
+  EXPECT_EQ(reason(1.1), k::Reason::kDriving);
+}
+
+TEST_F(ArbiterTest, AWordOfOneWhoIsGoneStandsUntilAnybodySpeaksOrTheLocksAreReset) {
+  const auto reason = [this](double t) { return hear(kNavigation, 0.3, t).reason; };
+  bool is_there = true;
+  const k::Speaker leaving{"/leaving", [&is_there] { return is_there; }};
+  arbiter.lock(kHold, leaving, true, 1.0);
+  is_there = false;
+  EXPECT_EQ(reason(1.0), k::Reason::kLocked);
+  arbiter.lock(kHold, kA, false, 1.1);
+  EXPECT_EQ(reason(1.1), k::Reason::kDriving);
+  is_there = true;
+  arbiter.lock(kHold, leaving, true, 1.2);
+  arbiter.forgetGone();
+  EXPECT_EQ(reason(1.2), k::Reason::kLocked);
+  is_there = false;
+  arbiter.forgetGone();
+  EXPECT_EQ(reason(1.3), k::Reason::kDriving);
+}
+
+TEST(Arbiter, ADeadManThatNeedNotBeThereBlocksOnceItWasHeard) {
+  k::ArbiterSettings settings = withDeadMan();
+  settings.locks[kDeadMan].from_start = false;
+  k::Arbiter arbiter(settings);
+  arbiter.choose(0);
+  const auto reason = [&arbiter](double t) {
+    arbiter.command(kNavigation, "/a", {0.3, 0}, t);
+    return arbiter.choose(t).reason;
+  };
+  EXPECT_EQ(reason(1.0), k::Reason::kDriving);
+  EXPECT_EQ(k::deadMenUnheard(arbiter), std::vector<std::string>{"dead man"});
+  arbiter.lock(kDeadMan, kA, false, 1.1);  // held
+  EXPECT_EQ(reason(1.1), k::Reason::kDriving);
+  EXPECT_EQ(k::deadMenUnheard(arbiter), std::vector<std::string>{});
+  EXPECT_EQ(reason(1.41), k::Reason::kLocked);
+  arbiter.lock(kDeadMan, kA, false, 1.5);
+  arbiter.lock(kDeadMan, kB, true, 1.5);
+  EXPECT_EQ(reason(1.5), k::Reason::kLocked);
+}
+
+TEST_F(ArbiterTest, ARateThatTheChairCannotGoIsRest) {
+  k::ArbiterSettings settings = kArbiter;
+  settings.rest = {0.001, 0.002};
+  k::Arbiter slow(settings);
+  slow.choose(0);
+  slow.command(kNavigation, "/a", {1e-300, 0}, 1.0);
+  EXPECT_TRUE(slow.choose(1.0).command.zero());
+  slow.command(kNavigation, "/a", {0.001, -0.0019}, 1.1);
+  EXPECT_EQ(slow.choose(1.1).command.v, 0.001);
+  EXPECT_EQ(slow.choose(1.1).command.w, 0);
 }
 
 TEST_F(ArbiterTest, TwoPublishersStopAnInputUnlessItAllowsSeveral) {
@@ -130,8 +194,8 @@ TEST(EStop, IsReleasedByNothingButAReset) {
   k::EStop stop(0);
   stop.tick(1);
   EXPECT_FALSE(stop.stopped());
-  stop.hear(true, 2);
-  stop.hear(false, 3);
+  stop.hear(kA, true, 2);
+  stop.hear(kA, false, 3);
   stop.tick(4);
   EXPECT_TRUE(stop.latched());
   EXPECT_EQ(stop.reset(true), "motion is commanded: release the input first");
@@ -140,8 +204,8 @@ TEST(EStop, IsReleasedByNothingButAReset) {
   EXPECT_FALSE(stop.stopped());  // without a timeout silence means nothing
   stop.press();
   EXPECT_TRUE(stop.latched());
-  stop.hear(true, 1001);
-  EXPECT_EQ(stop.reset(false), "the emergency stop is still pressed");
+  stop.hear(kA, true, 1001);
+  EXPECT_EQ(stop.reset(false), "the emergency stop is still pressed by /a");
 }
 
 TEST(EStop, WithATimeoutSomebodyMustSayThatAllIsWell) {
@@ -149,13 +213,13 @@ TEST(EStop, WithATimeoutSomebodyMustSayThatAllIsWell) {
   stop.tick(1.0);
   EXPECT_TRUE(stop.stopped());
   EXPECT_FALSE(stop.latched());
-  stop.hear(false, 1.2);
+  stop.hear(kA, false, 1.2);
   stop.tick(1.4);
   EXPECT_FALSE(stop.stopped());
   stop.tick(1.51);
   EXPECT_TRUE(stop.latched());
   EXPECT_EQ(stop.reset(false), "no message says that the emergency stop is not pressed");
-  stop.hear(false, 1.6);
+  stop.hear(kA, false, 1.6);
   stop.tick(1.6);
   EXPECT_EQ(stop.reset(false), "");
   stop.tick(0.1);  // the clock was set back
@@ -165,13 +229,55 @@ TEST(EStop, WithATimeoutSomebodyMustSayThatAllIsWell) {
   EXPECT_TRUE(stop.latched());
 }
 
+TEST(EStop, HoldsAsLongAsAnybodyPressesIt) {
+  k::EStop stop(0);
+  bool is_there = true;
+  const k::Speaker leaving{"/leaving", [&is_there] { return is_there; }};
+  stop.hear(kA, true, 1);
+  stop.hear(kB, false, 2);
+  stop.hear(leaving, true, 2);
+  EXPECT_EQ(stop.reset(false), "the emergency stop is still pressed by /a, /leaving");
+  stop.hear(kA, false, 3);
+  EXPECT_EQ(stop.reset(false), "the emergency stop is still pressed by /leaving");
+  is_there = false;  // its press stays; but nobody is left to take it back
+  EXPECT_TRUE(stop.latched());
+  EXPECT_EQ(stop.reset(false), "");
+}
+
+TEST(EStop, WithATimeoutNobodyWhoWatchesMayFallSilent) {
+  k::EStop stop(0.3);
+  stop.tick(1.0);
+  stop.hear(kA, false, 1.1);
+  stop.hear(kB, false, 1.1);
+  stop.hear(kB, false, 1.3);
+  stop.tick(1.3);
+  EXPECT_FALSE(stop.stopped());
+  stop.hear(kB, false, 1.41);
+  stop.tick(1.41);
+  EXPECT_TRUE(stop.latched());
+}
+
+TEST(SpeedCap, OfSeveralTheLowestCountsAndNonsenseStops) {
+  k::SpeedCap cap({0.5, 1.2});
+  cap.hear("/a", 0.4, 1.0);
+  cap.hear("/b", 0.9, 1.1);
+  EXPECT_EQ(cap.at(1.2), 0.4);
+  EXPECT_EQ(cap.at(1.55), 0.9);
+  for (const double nonsense : {-1.0, -HUGE_VAL, std::nan("")}) {
+    EXPECT_FALSE(cap.hear("/a", nonsense, 2.0));
+    EXPECT_EQ(cap.at(2.0), 0);
+  }
+  EXPECT_EQ(cap.at(2.51), 1.2);
+  EXPECT_EQ(cap.counts().refused, 3U);
+}
+
 TEST(SpeedCap, HoldsForItsTimeout) {
   k::SpeedCap cap({0.5, 1.2});
   EXPECT_EQ(cap.at(0), 1.2);
-  EXPECT_TRUE(cap.hear(0.0, 1.0));
+  EXPECT_TRUE(cap.hear("/a", 0.0, 1.0));
   EXPECT_EQ(cap.at(1.5), 0.0);
   EXPECT_EQ(cap.at(1.51), 1.2);
-  cap.hear(0.2, 9.0);
+  cap.hear("/a", 0.2, 9.0);
   EXPECT_EQ(cap.at(3.0), 1.2);  // the clock was set back
 }
 

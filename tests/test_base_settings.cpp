@@ -183,6 +183,14 @@ TEST(BaseSettings, AnInputALockOrASetThatMakesNoSenseIsNamed) {
   expect([](Value& v) { v["locks"]["dead_man"]["topic"] = std::string("cmd_vel"); },
          "/base_node: names the topic cmd_vel twice");
   expect([](Value& v) { v["locks"]["dead_man"]["timeout"] = -0.1; }, "/timeout: must be at least 0: -0.1");
+  expect([](Value& v) { v["rate"] = 1e9; }, "/base_node/rate: must be from 0.1 to 1000: 1e+09");
+  expect([](Value& v) { v["odometry"]["child_frame"] = std::string("/odom"); },
+         "/child_frame: must differ from frame: odom");
+  expect([](Value& v) { v["odometry"]["frame"] = std::string("odom 2"); },
+         "/frame: must be a frame's name without blanks: odom 2");
+  expect([](Value& v) { v["odometry"]["frame"] = std::string("/"); },
+         "/frame: must be a frame's name without blanks: /");
+  expect([](Value& v) { v["rest"]["w"] = 30; }, "/base_node/absurd/w: must be above 30");
   expect([](Value& v) { v["limits"]["ride"]["w_jerk"] = 0; },
          "/base_node/limits/ride/w_jerk: must be above 0: 0");
   expect([](Value& v) { v["longest_step"] = 0.001; }, "/base_node/longest_step: must be at least one period");

@@ -69,12 +69,12 @@ TEST_F(RideTest, ASecondPublisherBrakesUntilOnlyOneIsLeft) {
 TEST_F(DriveTest, AnEmergencyStopIsNeutralAtOnceAndNeedsAReset) {
   chair.say(0.5, 0.2);
   chair.run(0.5);
-  chair.drive.eStop().hear(true, chair.t);
+  chair.drive.eStop().hear({"/button"}, true, chair.t);
   chair.run(kPeriod);
   EXPECT_TRUE(chair.neutral());
   EXPECT_TRUE(k::reportCommands(chair.drive, {}).error);
   EXPECT_NE(chair.drive.resetEStop(chair.t), "");  // pressed
-  chair.drive.eStop().hear(false, chair.t);
+  chair.drive.eStop().hear({"/button"}, false, chair.t);
   chair.run(0.5);
   EXPECT_TRUE(chair.neutral());
   EXPECT_NE(chair.drive.resetEStop(chair.t), "");  // commanded
@@ -98,7 +98,7 @@ TEST(Drive, AnEmergencyStopThatFallsSilentIsALatchedStop) {
   Chair chair(settings);
   const auto watched = [&chair](double seconds) {
     for (const double end = chair.t + seconds; chair.t < end;) {
-      chair.drive.eStop().hear(false, chair.t);
+      chair.drive.eStop().hear({"/button"}, false, chair.t);
       chair.run(kPeriod);
     }
   };
@@ -149,15 +149,16 @@ TEST_F(RideTest, ACapSlowsDownByTheRampAndForgetsItself) {
   chair.say(1.0, 0.6);
   chair.run(3.0);
   for (int i = 0; i < 150; ++i) {
-    chair.drive.speedCap().hear(0.3, chair.t);
+    chair.drive.speedCap().hear("/watcher", 0.3, chair.t);
     const double before = chair.dac.last().v;
     chair.run(kPeriod);
     ASSERT_LE(before - chair.dac.last().v, 1.0 * kPeriod + 1e-12);
   }
   EXPECT_EQ(chair.dac.last().v, 0.3);
   EXPECT_NEAR(chair.dac.last().w, 1.2 * 0.3 / 1.5, 1e-12);
-  EXPECT_FALSE(chair.drive.speedCap().hear(std::numeric_limits<double>::quiet_NaN(), chair.t));
-  EXPECT_FALSE(chair.drive.speedCap().hear(-1, chair.t));
+  EXPECT_FALSE(chair.drive.speedCap().hear("/watcher", -1, chair.t));
+  chair.run(0.4);
+  EXPECT_EQ(chair.dac.last().v, 0);
   chair.run(3.0);
   EXPECT_EQ(chair.dac.last().v, 1.0);
 }

@@ -6,6 +6,11 @@
 #include <numeric>
 
 namespace kurumaisu {
+namespace {
+
+double restOr(double rate, double least) { return std::abs(rate) < least ? 0 : rate; }
+
+}  // namespace
 
 Arbiter::Arbiter(const ArbiterSettings& settings)
     : settings_(settings),
@@ -18,7 +23,7 @@ Arbiter::Arbiter(const ArbiterSettings& settings)
   });
 }
 
-bool Arbiter::command(std::size_t input, const std::string& publisher, const Rates& rates, double t) {
+bool Arbiter::command(std::size_t input, const std::string& publisher, const Rates& wish, double t) {
   Input& to = inputs_.at(input);
   const double timeout = settings_.inputs[input].timeout;
   const std::optional<double> heard = to.heard || settings_.first_word_is_rest ? to.heard : since_;
@@ -26,17 +31,22 @@ bool Arbiter::command(std::size_t input, const std::string& publisher, const Rat
   to.heard = t;
   ++counts_.commands;
   // Written so that NaN is beyond every bound.
-  if (!(std::abs(rates.v) <= settings_.absurd.v) || !(std::abs(rates.w) <= settings_.absurd.w)) {
+  if (!(std::abs(wish.v) <= settings_.absurd.v) || !(std::abs(wish.w) <= settings_.absurd.w)) {
     ++counts_.refused;
     return false;
   }
+  const Rates rates{restOr(wish.v, settings_.rest.v), restOr(wish.w, settings_.rest.w)};
   if (rates.zero()) to.released = true;
   to.commands[publisher] = {rates, t, counts_.commands};
   return true;
 }
 
-void Arbiter::lock(std::size_t lock, bool word, double t) {
-  locks_.at(lock) = {t, word == settings_.locks[lock].blocks_on};
+void Arbiter::lock(std::size_t lock, const Speaker& by, bool engages, double t) {
+  locks_.at(lock).hear(by, engages, t);
+}
+
+void Arbiter::forgetGone() {
+  for (Words& lock : locks_) lock.forgetGone();
 }
 
 Choice Arbiter::choose(double t) {
@@ -53,7 +63,7 @@ Choice Arbiter::choose(double t) {
 /// After the clock ran backwards nobody knows how old anything is.
 void Arbiter::forgetTime() {
   reset();
-  for (Lock& lock : locks_) lock.heard.reset();
+  for (Words& lock : locks_) lock.forgetTimes();
 }
 
 void Arbiter::reset() {
@@ -82,12 +92,19 @@ std::optional<std::size_t> Arbiter::loudest() const {
   return std::nullopt;
 }
 
+bool Arbiter::isEngaged(std::size_t lock, double t) const {
+  const LockSettings& settings = settings_.locks[lock];
+  const Words& words = locks_[lock];
+  if (words.anyHolds()) return true;
+  if (settings.timeout == 0 || (words.empty() && !settings.from_start)) return false;
+  const std::optional<double> heard = words.oldest();
+  return !heard || t - *heard > settings.timeout;
+}
+
 std::optional<std::size_t> Arbiter::lockOver(std::size_t input, double t) const {
   for (std::size_t i = 0; i < locks_.size(); ++i) {
-    const LockSettings& settings = settings_.locks[i];
-    if (settings_.inputs[input].priority >= settings.priority) continue;
-    const bool silent = settings.timeout > 0 && (!locks_[i].heard || t - *locks_[i].heard > settings.timeout);
-    if (locks_[i].engaged || silent) return i;
+    if (settings_.inputs[input].priority >= settings_.locks[i].priority) continue;
+    if (isEngaged(i, t)) return i;
   }
   return std::nullopt;
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/limiter.h"
+#include "base/words.h"
 
 namespace kurumaisu {
 
@@ -24,8 +25,9 @@ struct InputSettings {
 struct LockSettings {
   std::string name;
   int priority;    ///< inputs below it are blocked
-  double timeout;  ///< engages when silent for so long, also from the start [s]; 0: silence means nothing
+  double timeout;  ///< engages when silent for so long [s]; 0: silence means nothing
   bool blocks_on;  ///< the word that engages it: true for a lock, false for a dead-man that is held
+  bool from_start = true;  ///< whether silence counts before the first word, too
 };
 
 struct ArbiterSettings {
@@ -34,6 +36,7 @@ struct ArbiterSettings {
   Rates absurd;  ///< commands beyond these magnitudes are mistakes, not wishes [m/s, rad/s]
   /// Silence does not release an input that was never heard: its commander may hang.
   bool first_word_is_rest{};
+  Rates rest{};  ///< below these magnitudes a rate is 0: the chair cannot go so slowly [m/s, rad/s]
 };
 
 /// Events since the start.
@@ -66,8 +69,14 @@ class Arbiter {
   /// refused (false): it neither moves the chair nor keeps the last command alive.
   bool command(std::size_t input, const std::string& publisher, const Rates& rates, double t);
 
-  /// What a lock's topic says at time t [s].
-  void lock(std::size_t lock, bool word, double t);
+  /// What a publisher of a lock's topic says at time t [s]. It is engaged as long as any of them engages it.
+  void lock(std::size_t lock, const Speaker& by, bool engages, double t);
+
+  /// Whether anybody has spoken on a lock's topic.
+  bool hasHeard(std::size_t lock) const { return !locks_.at(lock).empty(); }
+
+  /// Locks no longer heed those who spoke and are gone.
+  void forgetGone();
 
   /// Who drives from time t [s] on.
   Choice choose(double t);
@@ -99,14 +108,11 @@ class Arbiter {
     std::optional<double> heard;              ///< anything, refused or not [s]
     bool released = false;
   };
-  struct Lock {
-    std::optional<double> heard;  ///< [s]
-    bool engaged = false;         ///< by what was said
-  };
 
   void forgetTime();
   void prune(double t);
   std::optional<std::size_t> loudest() const;
+  bool isEngaged(std::size_t lock, double t) const;
   std::optional<std::size_t> lockOver(std::size_t input, double t) const;
   Choice judge(double t) const;
   void count(const Choice& before, const Choice& now);
@@ -114,7 +120,7 @@ class Arbiter {
   ArbiterSettings settings_;
   std::vector<std::size_t> by_priority_;
   std::vector<Input> inputs_;
-  std::vector<Lock> locks_;
+  std::vector<Words> locks_;
   ArbiterCounts counts_;
   Choice last_;
   std::optional<double> since_;  ///< when listening began [s]

@@ -64,7 +64,9 @@ void Drive::stop(double t) {
 
 std::string Drive::resetEStop(double t) {
   estop_.tick(t);
-  return estop_.reset(arbiter_.moving(t));
+  std::string refusal = estop_.reset(arbiter_.moving(t));
+  if (refusal.empty()) arbiter_.forgetGone();
+  return refusal;
 }
 
 void Drive::configure(std::size_t set, const Limits& limits) {

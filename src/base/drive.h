@@ -67,7 +67,8 @@ class Drive {
   /// Brakes, and obeys nobody, as long as this is on; then every input must be released anew.
   void cutOff(bool on) { cut_off_ = on; }
 
-  /// Releases the emergency stop at time t [s], or says why not. Every input must be released anew.
+  /// Releases the emergency stop, and what locks hold of publishers that are gone, at time t [s], or says why not. Every
+  /// input must be released anew.
   std::string resetEStop(double t);
 
   /// Other limits for those inputs that use this set, from the next tick on.

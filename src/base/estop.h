@@ -5,16 +5,18 @@
 #include <optional>
 #include <string>
 
+#include "base/words.h"
+
 namespace kurumaisu {
 
-/// Latches when it is pressed and, with a timeout, when whoever watches over it falls silent.
+/// Latches when anybody presses it and, with a timeout, when anybody who watches over it falls silent.
 class EStop {
  public:
   /// timeout [s] after which silence is a stop; 0: it never is.
   explicit EStop(double timeout) : timeout_(timeout) {}
 
-  /// Whoever watches says at time t [s] whether there is a cause to stop.
-  void hear(bool stop, double t);
+  /// Somebody who watches says at time t [s] whether there is a cause to stop.
+  void hear(const Speaker& by, bool stop, double t);
 
   /// Stops without a cause that lasts.
   void press() { latched_ = true; }
@@ -26,17 +28,17 @@ class EStop {
   bool stopped() const { return latched_ || waiting(); }
   bool latched() const { return latched_; }
 
-  /// Releases the latch, or says why not. moving: whether somebody commands more than rest.
+  /// Releases the latch, or says why not. Who pressed it and is gone does not keep it. moving: whether somebody commands
+  /// more than rest.
   std::string reset(bool moving);
 
  private:
-  bool waiting() const { return timeout_ > 0 && !heard_; }
+  bool waiting() const { return timeout_ > 0 && !words_.oldest(); }
 
   double timeout_;
   bool latched_ = false;
-  bool cause_ = false;           ///< what was said last
+  Words words_;
   bool silent_ = false;          ///< for longer than the timeout, at the last tick
-  std::optional<double> heard_;  ///< when [s]
   std::optional<double> since_;  ///< when the wait for the first word began [s]
   std::optional<double> now_;    ///< the last tick [s]
 };

@@ -63,6 +63,16 @@ Report reportLaw(const Outlet& outlet, const std::string& law_name) {
   return report;
 }
 
+std::vector<std::string> deadMenUnheard(const Arbiter& arbiter) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < arbiter.settings().locks.size(); ++i) {
+    const LockSettings& lock = arbiter.settings().locks[i];
+    const bool waits = lock.timeout > 0 && lock.from_start;
+    if (!lock.blocks_on && !waits && !arbiter.hasHeard(i)) names.push_back(lock.name);
+  }
+  return names;
+}
+
 Report reportCommands(const Drive& drive, const Tally& before) {
   const Tally now = tally(drive);
   std::string warning;
@@ -85,6 +95,7 @@ Report reportCommands(const Drive& drive, const Tally& before) {
           {{"state", stateOf(drive)},
            {"active", active.empty() ? "none" : active},
            {"speed cap [m/s]", shown(drive.cap())},
+           {"dead-men never heard", joined(deadMenUnheard(drive.arbiter()))},
            {"commands", std::to_string(now.arbiter.commands)},
            {"refused commands", std::to_string(now.arbiter.refused)},
            {"clamped commands", std::to_string(now.drive.clamped)},
@@ -97,6 +108,13 @@ Report reportCommands(const Drive& drive, const Tally& before) {
            {"late ticks", std::to_string(now.drive.late_ticks)},
            {"time resets", std::to_string(now.drive.time_resets)}},
           drive.eStop().stopped()};
+}
+
+std::string lockWarning(const Arbiter& arbiter) {
+  const std::vector<std::string> unheard = deadMenUnheard(arbiter);
+  if (unheard.empty()) return "";
+  return "BASE_NO_DEAD_MAN: nobody has spoken on " + joined(unheard) +
+         ": until somebody does, the chair drives without";
 }
 
 std::string stateOf(const Drive& drive) {

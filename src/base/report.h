@@ -41,6 +41,12 @@ Report reportLaw(const Outlet& outlet, const std::string& law_name);
 /// before: the counts at the last report.
 Report reportCommands(const Drive& drive, const Tally& before);
 
+/// Locks that are dead-men (let go, they engage) but do not engage yet: nobody has spoken on them.
+std::vector<std::string> deadMenUnheard(const Arbiter& arbiter);
+
+/// What there is to know of the locks at the start: that nobody holds a dead-man; "": nothing.
+std::string lockWarning(const Arbiter& arbiter);
+
 /// What the chair does, in a word that stays the same: "driving: joystick", "idle", "locked: dead_man", ...
 std::string stateOf(const Drive& drive);
 

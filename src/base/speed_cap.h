@@ -2,8 +2,12 @@
 // How fast others let the chair go: whoever watches the laser, a slope, a crowd. No ROS: time is an argument.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
-#include <optional>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <string>
 
 namespace kurumaisu {
 
@@ -16,26 +20,30 @@ class SpeedCap {
  public:
   explicit SpeedCap(const SpeedCapSettings& settings) : settings_(settings) {}
 
-  /// Takes a cap [m/s] at time t [s]; refuses (false) one that is NaN or negative. Infinity is no cap.
-  bool hear(double cap, double t) {
+  /// Takes a cap [m/s] of a publisher at time t [s]. Infinity is no cap; one that is NaN or negative is not understood
+  /// (false): then the chair must not go at all.
+  bool hear(const std::string& publisher, double cap, double t) {
+    const bool is_understood = cap >= 0;
     ++counts_.heard;
-    if (!(cap >= 0)) {
-      ++counts_.refused;
-      return false;
-    }
-    heard_ = {cap, t};
-    return true;
+    if (!is_understood) ++counts_.refused;
+    heard_[publisher] = {is_understood ? cap : 0, t};
+    return is_understood;
   }
 
-  /// The cap at time t [s]; heard in the future, before the clock ran backwards, it is none.
+  /// The lowest cap at time t [s]; heard in the future, before the clock ran backwards, it is none.
   double at(double t) {
-    if (heard_ && (t < heard_->t || t - heard_->t > settings_.timeout)) heard_.reset();
-    return heard_ ? heard_->cap : settings_.fallback;
+    double lowest = std::numeric_limits<double>::infinity();
+    for (auto it = heard_.begin(); it != heard_.end();) {
+      const bool is_old = t < it->second.t || t - it->second.t > settings_.timeout;
+      if (!is_old) lowest = std::min(lowest, it->second.cap);
+      it = is_old ? heard_.erase(it) : std::next(it);
+    }
+    return heard_.empty() ? settings_.fallback : lowest;
   }
 
   struct Counts {
     std::uint64_t heard = 0;
-    std::uint64_t refused = 0;  ///< of those
+    std::uint64_t refused = 0;  ///< of those, not understood
   };
   const Counts& counts() const { return counts_; }
 
@@ -47,7 +55,7 @@ class SpeedCap {
 
   SpeedCapSettings settings_;
   Counts counts_;
-  std::optional<Heard> heard_;
+  std::map<std::string, Heard> heard_;  ///< by publisher
 };
 
 }  // namespace kurumaisu

@@ -3,32 +3,38 @@
 
 #include <sched.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <csignal>
-#include <initializer_list>
+
+#include "signals.h"
 
 namespace kurumaisu::guard {
 namespace {
 
 std::atomic<int> to_hang_up{-1};
+void (*on_sent)(int) = nullptr;
 
 /// Nothing but system calls that a signal's handler may make. A core file is not written at a real-time priority: that
 /// would keep the kernel's thread that carries the tty's bytes waiting, and neutral.
-void hangUp(int signal) {
+void hangUp(int signal, siginfo_t* info, void* /*context*/) {
+  if (on_sent != nullptr && info->si_code == SI_USER && info->si_pid != getpid()) return on_sent(signal);
+  std::signal(signal, SIG_DFL);
   shutdown(to_hang_up, SHUT_RDWR);
   const sched_param ordinary{};
   sched_setscheduler(0, SCHED_OTHER, &ordinary);
-  raise(signal);  // by then its default again
+  raise(signal);
 }
 
 }  // namespace
 
-void catchCrashes() {
+void catchCrashes(void (*sent)(int signal)) {
+  on_sent = sent;
   struct sigaction action {};
-  action.sa_handler = hangUp;
-  action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_NODEFER;
-  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) sigaction(signal, &action, nullptr);
+  action.sa_sigaction = hangUp;
+  action.sa_flags = SA_SIGINFO | SA_NODEFER;
+  for (const int signal : kCrashes) sigaction(signal, &action, nullptr);
 }
 
 void hangUpOnCrash(int socket) { to_hang_up = socket; }

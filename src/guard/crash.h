@@ -5,8 +5,9 @@
 
 namespace kurumaisu::guard {
 
-/// From now on a crash (SIGSEGV and the like, abort()) first hangs up the socket that was last named.
-void catchCrashes();
+/// From now on a crash (isCrash(), abort()) first hangs up the socket that was last named. sent: called instead where
+/// another process only sent the signal; null: it is a crash, too.
+void catchCrashes(void (*sent)(int signal) = nullptr);
 
 /// Names the socket; -1: none.
 void hangUpOnCrash(int socket);

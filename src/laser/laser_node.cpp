@@ -20,6 +20,7 @@
 #include "laser/self_test.h"
 #include "laser/settings.h"
 #include "laser/shipped.h"
+#include "standard_streams.h"
 
 namespace {
 
@@ -272,6 +273,7 @@ k::NodeSettings read(const XmlRpc::XmlRpcValue& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  kurumaisu::holdStandardStreams();
   if (const auto code = kurumaisu::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "laser_node");
   ros::NodeHandle nh;  // here, because ROS's log is mute once the last one is gone

@@ -23,8 +23,9 @@
 #include "base/node/topic_dac.h"
 #include "base/report.h"
 #include "command_line.h"
-#include "guard/crash.h"
 #include "guard/realtime.h"
+#include "sleep_watch.h"
+#include "standard_streams.h"
 
 namespace k = kurumaisu;
 
@@ -39,7 +40,7 @@ base.launch starts it: roslaunch kurumaisu base.launch
 subscribes to:
   joy_vel, key_vel, viewer_vel, experiment_vel, cmd_vel
                     commands, those of the highest priority first
-  hold, passenger_holds
+  hold, dead_man, passenger_holds
                     locks: while one is engaged, lower inputs do not drive
   e_stop            the emergency stop
   speed_cap         [m/s] at most
@@ -104,6 +105,7 @@ class BaseNode {
   std::string state_;   ///< at the last tick
   int unfavoured_ = 0;  ///< threads, at the last tick
   bool heard_ = false;  ///< a word that may change what is put out
+  k::SleepWatch sleep_;
   k::DiagnosticsOutput diagnostics_;
   k::OdometryOutput odom_;
   k::OdometryInput odom_input_;
@@ -135,6 +137,8 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
   logLaw(settings_.law_name, k::ambiguity(drive_.outlet()));
   const std::string unfollowed = k::unfollowedWarning(settings.effects.unfollowed);
   if (!unfollowed.empty()) warn(unfollowed);
+  const std::string no_dead_man = k::lockWarning(drive_.arbiter());
+  if (!no_dead_man.empty()) warn(no_dead_man);
   if (guard_) favour();
   if (ros::Time::isSimTime()) {
     timer_ =
@@ -142,9 +146,8 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
   }
 }
 
-/// With a guard, dying must not wait for busy cores, and a crash must not wait to be heard of.
+/// With a guard, dying must not wait for busy cores.
 void BaseNode::favour() {
-  k::guard::catchCrashes();
   const std::string refusal = k::guard::favourThreads(settings_.dac.favour);
   if (!refusal.empty()) warn("BASE_NOT_FAVOURED: busy cores may delay commands, and neutral: " + refusal);
 }
@@ -206,6 +209,10 @@ void BaseNode::onTick() {
   if (ros::Time::isSimTime() && stamp == dac_.stamp) return;  // made up for a tick that was late
   dac_.stamp = stamp;
   const double t = loopTime(dac_.stamp);
+  if (sleep_.hasSlept()) {
+    warn("BASE_SLEPT: this computer was suspended: neutral, every input must be released anew");
+    drive_.stop(t);
+  }
   drive_.cutOff(master_.lost() || master_.forgotten());
   const k::Drive::Tick tick = drive_.tick(t);
   if (tick == k::Drive::Tick::kReset) {
@@ -254,6 +261,7 @@ void BaseNode::tell() {
 }  // namespace
 
 int main(int argc, char** argv) {
+  k::holdStandardStreams();
   if (const auto code = k::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "base_node", ros::init_options::NoSigintHandler);
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone

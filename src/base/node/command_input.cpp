@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kWarningPeriod = 1.0;  // [s] of throttled warnings
 constexpr int kQueue = 10;
+constexpr int kAll = 0;  // a queue that drops nothing: a press must not be lost among releases
 
 void warnIgnored(const std::string& topic, const geometry_msgs::Twist& twist) {
   ROS_WARN_THROTTLE(kWarningPeriod,
@@ -21,6 +22,13 @@ void warnIgnored(const std::string& topic, const geometry_msgs::Twist& twist) {
 void warnRefused(const std::string& topic, const geometry_msgs::Twist& twist) {
   ROS_WARN_THROTTLE(kWarningPeriod, "BASE_BAD_COMMAND: %s: refused: linear.x %g, angular.z %g", topic.c_str(),
                     twist.linear.x, twist.angular.z);
+}
+
+/// A publisher is there as long as its connection is: only that holds what it introduced itself with.
+template <typename Message>
+Speaker speakerOf(const ros::MessageEvent<const Message>& event) {
+  const boost::weak_ptr<ros::M_string> connection = event.getConnectionHeaderPtr();
+  return {event.getPublisherName(), [connection] { return !connection.expired(); }};
 }
 
 void tellReset(const std::string& refusal) {
@@ -46,35 +54,39 @@ CommandInput::CommandInput(ros::NodeHandle& nh, const BaseTopics& topics, Drive&
 }
 
 void CommandInput::hearInput(ros::NodeHandle& nh, std::size_t input, const std::string& topic) {
-  const boost::function<void(const Command&)> hear = [this, input, topic](const Command& event) {
+  hear<geometry_msgs::Twist>(nh, topic, kQueue, [this, input, topic](const Command& event) {
     onCommand(input, topic, event);
     act_();
-  };
-  subscribers_.push_back(nh.subscribe<geometry_msgs::Twist, const Command&>(
-      topic, kQueue, hear, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+  });
+}
+
+template <typename Message>
+void CommandInput::hear(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue,
+                        const boost::function<void(const ros::MessageEvent<const Message>&)>& action) {
+  subscribers_.push_back(nh.subscribe<Message, const ros::MessageEvent<const Message>&>(
+      topic, queue, action, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
 }
 
 void CommandInput::hearOthers(ros::NodeHandle& nh, const BaseTopics& topics) {
-  const ros::TransportHints soon = ros::TransportHints().tcpNoDelay();
-  using Bool = std_msgs::Bool::ConstPtr;
   for (std::size_t i = 0; i < topics.locks.size(); ++i) {
-    const boost::function<void(const Bool&)> lock = [this, i](const Bool& word) {
-      drive_.arbiter().lock(i, word->data != 0, clock_());
+    hear<std_msgs::Bool>(nh, topics.locks[i], kAll, [this, i](const auto& event) {
+      const unsigned word = event.getConstMessage()->data;
+      const bool blocks_on = drive_.arbiter().settings().locks[i].blocks_on;
+      drive_.arbiter().lock(i, speakerOf(event), word > 1 || (word != 0) == blocks_on, clock_());
       act_();
-    };
-    subscribers_.push_back(nh.subscribe<std_msgs::Bool>(topics.locks[i], kQueue, lock, {}, soon));
+    });
   }
-  const boost::function<void(const Bool&)> stop = [this](const Bool& word) {
-    drive_.eStop().hear(word->data != 0, clock_());
+  hear<std_msgs::Bool>(nh, topics.estop, kAll, [this](const auto& event) {
+    drive_.eStop().hear(speakerOf(event), event.getConstMessage()->data != 0, clock_());
     act_();
-  };
-  subscribers_.push_back(nh.subscribe<std_msgs::Bool>(topics.estop, kQueue, stop, {}, soon));
-  const boost::function<void(const std_msgs::Float64::ConstPtr&)> cap =
-      [this](const std_msgs::Float64::ConstPtr& word) {
-        if (drive_.speedCap().hear(word->data, clock_())) return;
-        ROS_WARN_THROTTLE(kWarningPeriod, "BASE_BAD_CAP: refused: %g m/s", word->data);
-      };
-  subscribers_.push_back(nh.subscribe<std_msgs::Float64>(topics.speed_cap, kQueue, cap, {}, soon));
+  });
+  hear<std_msgs::Float64>(nh, topics.speed_cap, kQueue, [this](const auto& event) {
+    const double cap = event.getConstMessage()->data;
+    if (drive_.speedCap().hear(event.getPublisherName(), cap, clock_())) return;
+    ROS_WARN_THROTTLE(kWarningPeriod, "BASE_BAD_CAP: %s says %g m/s, not from 0 on: stops",
+                      event.getPublisherName().c_str(), cap);
+    act_();
+  });
 }
 
 void CommandInput::serve(ros::NodeHandle& nh, const std::string& name,

@@ -9,6 +9,7 @@
 #include <std_msgs/Float64.h>
 #include <std_srvs/Trigger.h>
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -31,6 +32,9 @@ class CommandInput {
   using Command = ros::MessageEvent<const geometry_msgs::Twist>;
   using Answer = std_srvs::Trigger::Response;
 
+  template <typename Message>
+  void hear(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue,
+            const boost::function<void(const ros::MessageEvent<const Message>&)>& action);
   void hearInput(ros::NodeHandle& nh, std::size_t input, const std::string& topic);
   void hearOthers(ros::NodeHandle& nh, const BaseTopics& topics);
   void serve(ros::NodeHandle& nh, const std::string& name, const std::function<void(Answer&)>& action);

@@ -57,7 +57,10 @@ KnownEffects readEffects(Section& model) {
 }
 
 OdometrySettings readOdometry(Section section, const KnownEffects& known) {
-  OdometrySettings settings{{section.text("frame"), section.text("child_frame"), section.flag("publish_tf")},
+  const std::string frame = section.frame("frame");
+  const std::string child = section.frame("child_frame");
+  if (child == frame) throw section.error("child_frame", "must differ from frame: " + child);
+  OdometrySettings settings{{frame, child, section.flag("publish_tf")},
                             readNoise(section.section("noise"), known),
                             std::nullopt};
   Section imu = section.section("imu");

@@ -8,6 +8,8 @@ namespace {
 
 constexpr int kLowest = 0;  // priority
 constexpr int kHighest = 255;
+constexpr double kSlowest = 0.1;  // [Hz]
+constexpr double kFastest = 1000;
 
 int readPriority(Section& section) { return section.integer("priority", kLowest, kHighest); }
 
@@ -61,13 +63,18 @@ void readLocks(Section section, BaseSettings& settings) {
     settings.topics.locks.push_back(item.text("topic"));
     const int priority = readPriority(item);
     const double timeout = item.atLeast("timeout", 0);
-    settings.drive.arbiter.locks.push_back({name, priority, timeout, item.flag("blocks_on")});
+    settings.drive.arbiter.locks.push_back(
+        {name, priority, timeout, item.flag("blocks_on"), item.flag("from_start")});
   });
 }
 
 void readWatchers(Section& node, BaseSettings& settings) {
+  Section rest = node.section("rest");
+  const Rates least{rest.atLeast("v", 0), rest.atLeast("w", 0)};
+  rest.end();
   Section absurd = node.section("absurd");
-  settings.drive.arbiter.absurd = {absurd.above("v", 0), absurd.above("w", 0)};
+  settings.drive.arbiter.absurd = {absurd.above("v", least.v), absurd.above("w", least.w)};
+  settings.drive.arbiter.rest = least;
   absurd.end();
   Section estop = node.section("estop");
   settings.topics.estop = estop.text("topic");
@@ -116,7 +123,7 @@ BaseSettings readBaseSettings(Section node) {
   readWatchers(node, settings);
   checkTopics(node, settings.topics);
   settings.drive.longest_step = node.above("longest_step", 0);
-  settings.rate = node.above("rate", 0);
+  settings.rate = node.within("rate", kSlowest, kFastest);
   if (settings.drive.longest_step * settings.rate < 1) {
     throw node.error("longest_step",
                      "must be at least one period of rate: " + std::to_string(settings.drive.longest_step));

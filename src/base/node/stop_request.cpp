@@ -6,10 +6,15 @@
 #include <atomic>
 #include <csignal>
 
+#include "guard/crash.h"
+#include "signals.h"
+
 namespace kurumaisu {
 namespace {
 
 std::atomic<bool> requested{false};
+
+void onSignal(int /*signal*/) { requested = true; }
 
 void onShutdownCall(XmlRpc::XmlRpcValue& /*parameters*/, XmlRpc::XmlRpcValue& result) {
   requested = true;
@@ -19,9 +24,10 @@ void onShutdownCall(XmlRpc::XmlRpcValue& /*parameters*/, XmlRpc::XmlRpcValue& re
 }  // namespace
 
 void catchStopRequests() {
-  for (const int signal : {SIGINT, SIGTERM}) {
-    std::signal(signal, [](int /*signal*/) { requested = true; });
+  for (int signal = 1; signal <= SIGRTMAX; ++signal) {
+    if (isToEnd(signal) && !isCrash(signal)) std::signal(signal, onSignal);
   }
+  guard::catchCrashes(onSignal);
   ros::XMLRPCManager::instance()->unbind("shutdown");
   ros::XMLRPCManager::instance()->bind("shutdown", onShutdownCall);
 }

@@ -18,6 +18,7 @@
 #include "command_line.h"
 #include "dac/virtual/board.h"
 #include "dac/virtual/chip.h"
+#include "standard_streams.h"
 
 namespace {
 
@@ -167,6 +168,7 @@ int run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  kurumaisu::holdStandardStreams();
   const std::string help = kHelp + kurumaisu::dac::boardFaults();
   Options options;
   try {

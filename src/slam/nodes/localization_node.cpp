@@ -23,6 +23,7 @@
 #include "slam/nodes/localization_settings.h"
 #include "slam/nodes/messages.h"
 #include "slam/nodes/scan_feed.h"
+#include "standard_streams.h"
 
 namespace k = kurumaisu;
 
@@ -320,6 +321,7 @@ void LocalizationNode::diagnose(Status& status) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  k::holdStandardStreams();
   if (const auto code = k::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "localization_node");
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone

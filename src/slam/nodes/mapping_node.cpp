@@ -22,6 +22,7 @@
 #include "slam/nodes/mapping_settings.h"
 #include "slam/nodes/messages.h"
 #include "slam/nodes/scan_feed.h"
+#include "standard_streams.h"
 
 namespace k = kurumaisu;
 
@@ -302,6 +303,7 @@ void MappingNode::diagnose(Status& status) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  k::holdStandardStreams();
   if (const auto code = k::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "mapping_node");
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });  // ros::init() sees to SIGINT only

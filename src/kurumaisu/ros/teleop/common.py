@@ -42,13 +42,14 @@ def overlaid(name: str, read: Callable[[Section], T]) -> tuple[float, T]:
 class Hand:
     """Publishes what somebody asks for, and on dead_man whether he holds it.
 
-    Both are silent after a while of rest, so that others may drive, or hold a dead-man, too.
+    Both are silent after a while of rest, so that others may drive. The last word on dead_man, and at the start that
+    nobody holds it, is latched: it reaches a base that starts later.
     """
 
     def __init__(self, topic: str) -> None:
         self._commands = rospy.Publisher(topic, Twist, queue_size=1, tcp_nodelay=True)
-        self._dead_man = rospy.Publisher("dead_man", Bool, queue_size=1, tcp_nodelay=True)
-        self._last_words = {"commands": 0, "dead_man": 0}
+        self._dead_man = rospy.Publisher("dead_man", Bool, queue_size=1, tcp_nodelay=True, latch=True)
+        self._last_words = {"commands": 0, "dead_man": _LAST_WORDS}
 
     def say(self, command: HandCommand) -> None:
         """Publish one command; to be called at the rate."""
