@@ -154,7 +154,7 @@ TEST(BaseSettings, EveryMistakeIsNamed) {
 
   v = nodeValues();
   v["rate"] = 0;
-  EXPECT_EQ(complaintOf(v), "/base_node/rate: must be above 0: 0");
+  EXPECT_EQ(complaintOf(v), "/base_node/rate: must be from 0.1 to 1000: 0");
 
   v = nodeValues();
   v["odometry"]["noise"]["heading_per_turn"] = -0.01;

@@ -18,10 +18,10 @@ void (*on_sent)(int) = nullptr;
 
 /// Nothing but system calls that a signal's handler may make. A core file is not written at a real-time priority: that
 /// would keep the kernel's thread that carries the tty's bytes waiting, and neutral.
-void hangUp(int signal, siginfo_t* info, void* /*context*/) {
+void onCrash(int signal, siginfo_t* info, void* /*context*/) {
   if (on_sent != nullptr && info->si_code == SI_USER && info->si_pid != getpid()) return on_sent(signal);
   std::signal(signal, SIG_DFL);
-  shutdown(to_hang_up, SHUT_RDWR);
+  hangUp();
   const sched_param ordinary{};
   sched_setscheduler(0, SCHED_OTHER, &ordinary);
   raise(signal);
@@ -29,10 +29,12 @@ void hangUp(int signal, siginfo_t* info, void* /*context*/) {
 
 }  // namespace
 
+void hangUp() { shutdown(to_hang_up, SHUT_RDWR); }
+
 void catchCrashes(void (*sent)(int signal)) {
   on_sent = sent;
   struct sigaction action {};
-  action.sa_sigaction = hangUp;
+  action.sa_sigaction = onCrash;
   action.sa_flags = SA_SIGINFO | SA_NODEFER;
   for (const int signal : kCrashes) sigaction(signal, &action, nullptr);
 }

@@ -193,7 +193,7 @@ bool forceNeutral(const Settings& settings, const Device::Open& open, double pat
       say("GUARD_NO_NEUTRAL", device.problem());
       return false;
     }
-    poll(nullptr, 0, static_cast<int>(std::ceil(1e3 * (device.retryAt() - now))));
+    poll(nullptr, 0, static_cast<int>(std::ceil(1e3 * std::max(0.0, device.retryAt() - now))));
   }
 }
 

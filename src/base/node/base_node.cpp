@@ -23,6 +23,7 @@
 #include "base/node/topic_dac.h"
 #include "base/report.h"
 #include "command_line.h"
+#include "guard/crash.h"
 #include "guard/realtime.h"
 #include "sleep_watch.h"
 #include "standard_streams.h"
@@ -146,8 +147,9 @@ BaseNode::BaseNode(ros::NodeHandle& nh, const k::BaseSettings& settings)
   }
 }
 
-/// With a guard, dying must not wait for busy cores.
+/// With a guard, dying must not wait for busy cores, and who is crashed from outside may leave a core file.
 void BaseNode::favour() {
+  k::guard::catchCrashes();
   const std::string refusal = k::guard::favourThreads(settings_.dac.favour);
   if (!refusal.empty()) warn("BASE_NOT_FAVOURED: busy cores may delay commands, and neutral: " + refusal);
 }

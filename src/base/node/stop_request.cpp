@@ -14,7 +14,11 @@ namespace {
 
 std::atomic<bool> requested{false};
 
-void onSignal(int /*signal*/) { requested = true; }
+/// The guard need not wait for this loop's next turn.
+void onSignal(int /*signal*/) {
+  requested = true;
+  guard::hangUp();
+}
 
 void onShutdownCall(XmlRpc::XmlRpcValue& /*parameters*/, XmlRpc::XmlRpcValue& result) {
   requested = true;

@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import select
+import socket
+import struct
 import subprocess
 import time
 from dataclasses import dataclass
@@ -15,6 +18,7 @@ from kurumaisu.errors import Error
 
 _NS = 1e-9  # [s]
 _ENDING = 5.0  # [s]
+_REPLY_MOST = 100  # [bytes]
 _BREAKING = 0.05  # [s] that a client gets to break
 
 
@@ -25,6 +29,44 @@ class Favour:
     priority: int
     longest_run: float  # [s]
     nice: int
+
+
+class RawClient:
+    """A connection to a guard, for messages of any kind."""
+
+    _REQUEST, _MAGIC, _VERSION, _PUT = "<IHHQq3d", 0x4B475244, 1, 1  # of src/guard/protocol.h, little-endian
+    _PERIOD = 0.02  # [s]
+
+    def __init__(self, path: Path, reference: float = 2.5) -> None:
+        """Connect. path: the guard's socket; reference [V]: of the model."""
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.connect(str(path))
+        self._sequence = itertools.count(1)
+        self._reference = reference
+
+    def put(self, translation: float, steering: float = 0.0) -> None:
+        """Ask for voltages [V]; wait for no answer."""
+        head = (self._MAGIC, self._VERSION, self._PUT, next(self._sequence), time.monotonic_ns())
+        self._socket.send(struct.pack(self._REQUEST, *head, translation, steering, self._reference))
+
+    def answers(self) -> int:
+        """Return how many answers have come since the last call."""
+        count = 0
+        with contextlib.suppress(BlockingIOError):
+            while self._socket.recv(_REPLY_MOST, socket.MSG_DONTWAIT):
+                count += 1
+        return count
+
+    def arm(self, seconds: float) -> None:
+        """Hold neutral for so long."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.put(0.0)
+            time.sleep(self._PERIOD)
+
+    def close(self) -> None:
+        """Leave."""
+        self._socket.close()
 
 
 class Client:

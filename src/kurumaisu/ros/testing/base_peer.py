@@ -75,9 +75,9 @@ class PeerProcess:
         self._clock: SimulatedClock | None = None
 
     def obey(self, order: dict[str, Any]) -> None:
-        """Do {"do": "repeat", "topic": ..., "value": ...}, "once", "clock", "call" or "limits": see the methods."""
+        """Do {"do": "repeat", "topic": ..., "value": ...}, "burst", "clock", "call" or "limits": see the methods."""
         what = order.pop("do")
-        if what not in ("repeat", "once", "clock", "call", "limits"):
+        if what not in ("repeat", "burst", "clock", "call", "limits"):
             raise Error(f"{what}: is no order")
         getattr(self, what)(**order)
 
@@ -87,9 +87,11 @@ class PeerProcess:
             self._topics[topic] = Repeated(topic, _kind(value), _PERIOD)
         self._topics[topic].say(None if value is None else _timed(topic, _maker(value)))
 
-    def once(self, topic: str, value: Any) -> None:
-        """Publish a value once, on a topic that something is repeated on."""
-        rospy.Publisher(topic, _kind(value), queue_size=10).publish(_maker(value)())
+    def burst(self, topic: str, values: list[Any]) -> None:
+        """Publish values at once, on a topic that something is repeated on."""
+        publisher = rospy.Publisher(topic, _kind(values[0]), queue_size=len(values))
+        for value in values:
+            publisher.publish(_maker(value)())
 
     def clock(self, now: float | None) -> None:
         """Let simulated time pass from `now` [s] on; None: let it stand still."""

@@ -223,7 +223,7 @@ class Chain:
         time.sleep(seconds)
         return any(change.neutral is False for change in self.changes(since))
 
-    def strike(self, number: signal.Signals, pid: int | None = None) -> float:
+    def strike(self, number: int, pid: int | None = None) -> float:
         """Send base_node, or another process, a signal; return when [s, monotonic]."""
         assert self.node
         begin = time.monotonic()

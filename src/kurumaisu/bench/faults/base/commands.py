@@ -58,7 +58,7 @@ def _bad_among_good(stage: Chain, seen: Seen) -> None:
     stage.mark()
     bad = [(math.nan, W), (V, math.inf), (-math.inf, W), (1e308, W), (V, -1e308), (10.1, 0.0)]
     for v, w in bad:
-        stage.peer.order(do="once", topic="cmd_vel", value=[v, w])
+        stage.peer.order(do="burst", topic="cmd_vel", values=[[v, w]])
 
     def counted() -> int:
         return stage.count("refused commands") - before

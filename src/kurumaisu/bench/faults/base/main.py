@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from kurumaisu.bench.faults.base import board, chip, clock, commands, ends, odometry, owners, parameters, stops
+from kurumaisu.bench.faults.base import board, chip, clock, commands, ends, hands, odometry, owners, parameters, signals, stops
 from kurumaisu.bench.faults.base.cases import OK, Case, Seen
 from kurumaisu.bench.faults.base.chain import Chain, Setup, running_chain
 from kurumaisu.bench.table import MarkdownTable
@@ -27,6 +27,8 @@ _MODULES = (
     stops,
     odometry,
     parameters,
+    hands,
+    signals,
 )
 _TRIES = 3  # of a play that the benchmark's own commander spoils, on a machine that is busy otherwise
 _COLUMNS = ("#", "fault", "injected", "expected", "seen", "verdict")
