@@ -18,8 +18,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from kurumaisu.msg import Voltages
 from nav_msgs.msg import Odometry
 
-from kurumaisu.bench.processes import program
 from kurumaisu.bench.guard_rig import Rig
+from kurumaisu.bench.processes import program
 from kurumaisu.ros.testing.nodes import PATIENCE, Commander, Topic, wait_for
 
 NEUTRAL = 0.002  # [V] more than half a code of the board

@@ -7,8 +7,8 @@ import sys
 import pytest
 import yaml
 
-from kurumaisu.bench.processes import master, program, running
 from kurumaisu.bench.guard_rig import Rig
+from kurumaisu.bench.processes import master, program, running
 from kurumaisu.ros.testing.nodes import wait_for
 
 PATIENCE = 60.0  # [s] of wall time for anything to come about

@@ -19,8 +19,8 @@ from typing import Any
 
 import yaml
 
+from kurumaisu.bench.guard_client import Favour
 from kurumaisu.bench.processes import PATIENCE, program
-from kurumaisu.bench.rigs.guard_client import Favour
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from kurumaisu.bench.processes import PATIENCE, cpu, master, memory, program
 from kurumaisu.bench.guard_rig import Rig
+from kurumaisu.bench.processes import PATIENCE, cpu, master, memory, program
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped

@@ -7,7 +7,6 @@ import contextlib
 import math
 import mmap
 import os
-import signal
 import struct
 import subprocess
 import time
@@ -19,8 +18,8 @@ from typing import Any
 import yaml
 
 from kurumaisu.bench.faults.base.peers import Commander, Event, Graph, end, until
-from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.bench.guard_rig import Change, ChipRig, Rig, changed
+from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 

@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Callable
 
-from kurumaisu.bench.faults.base.braking import SLACK, braking, brakes, limits_of
+from kurumaisu.bench.faults.base.braking import SLACK, brakes, braking, limits_of
 from kurumaisu.bench.faults.base.cases import Case, Seen, service
 from kurumaisu.bench.faults.base.chain import Chain, V, W
 from kurumaisu.bench.faults.base.peers import until
@@ -106,13 +106,37 @@ def _tiny(stage: Chain, seen: Seen) -> None:
 
 
 CASES = (
-    Case("A", "hand-held dead-man", "let go; then silent", "brakes, at once and after its timeout; held: goes on", _let_go),
+    Case(
+        "A",
+        "hand-held dead-man",
+        "let go; then silent",
+        "brakes, at once and after its timeout; held: goes on",
+        _let_go,
+    ),
     Case("A", "hand-held dead-man", "never there", "drives without, and says so", _never_there),
-    Case("B", "two buttons", "one presses, the other says that it does not", "neutral; latched", _two("e_stop", "BASE_EMERGENCY_STOP")),
-    Case("B", "two publishers of a lock", "one engages, the other does not", "brakes; blocked", _two("hold", "BASE_LOCKED: hold")),
+    Case(
+        "B",
+        "two buttons",
+        "one presses, the other says that it does not",
+        "neutral; latched",
+        _two("e_stop", "BASE_EMERGENCY_STOP"),
+    ),
+    Case(
+        "B",
+        "two publishers of a lock",
+        "one engages, the other does not",
+        "brakes; blocked",
+        _two("hold", "BASE_LOCKED: hold"),
+    ),
     Case("B", "emergency stop", f"pressed, then {_RELEASES} releases at once", "neutral at once; latched", _burst),
     *(
-        Case("C", "speed cap", f"{value:g} m/s", "not understood: brakes, by the ramp with its jerk, as for 0 m/s", _cap(value))
+        Case(
+            "C",
+            "speed cap",
+            f"{value:g} m/s",
+            "not understood: brakes, by the ramp with its jerk, as for 0 m/s",
+            _cap(value),
+        )
         for value in (-1.0, math.nan)
     ),
     Case("D", "a command too small to obey", f"{_TINY:g} m/s", "rest: neutral", _tiny),

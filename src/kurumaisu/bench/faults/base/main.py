@@ -11,7 +11,19 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from kurumaisu.bench.faults.base import board, chip, clock, commands, ends, hands, odometry, owners, parameters, signals, stops
+from kurumaisu.bench.faults.base import (
+    board,
+    chip,
+    clock,
+    commands,
+    ends,
+    hands,
+    odometry,
+    owners,
+    parameters,
+    signals,
+    stops,
+)
 from kurumaisu.bench.faults.base.cases import OK, Case, Seen
 from kurumaisu.bench.faults.base.chain import Chain, Setup, running_chain
 from kurumaisu.bench.table import MarkdownTable

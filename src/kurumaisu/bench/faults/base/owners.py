@@ -13,8 +13,8 @@ import yaml
 
 from kurumaisu.bench.faults.base.cases import Case, Seen
 from kurumaisu.bench.faults.base.chain import Chain, Setup
-from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.bench.guard_rig import changed
+from kurumaisu.bench.processes import PATIENCE, program
 
 _SHORT = 0.5  # [V] a device's clamp that is narrower than the model's band
 _WATCH = 0.4  # [s]

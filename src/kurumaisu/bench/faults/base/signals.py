@@ -7,13 +7,12 @@ import os
 import resource
 import signal
 import time
-from collections.abc import Callable
 
 from kurumaisu.bench.faults.base.cases import Case, Seen
 from kurumaisu.bench.faults.base.chain import Chain, Setup
 from kurumaisu.bench.faults.base.peers import end, until
+from kurumaisu.bench.guard_client import RawClient
 from kurumaisu.bench.processes import cpu
-from kurumaisu.bench.rigs.guard_client import RawClient
 
 _CLIENT, _GUARD = 0.010, 0.020  # [s] until neutral
 _HARMLESS = (signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH, signal.SIGPIPE)
@@ -133,7 +132,26 @@ CASES = (
     Case("E", "guard is signalled", _BY_NUMBER, "neutral within 20 ms; then another guard", _guard),
     Case("E", "sentinel is signalled", _BY_NUMBER, "neutral within 20 ms", _sentinel),
     Case("E", "sentinel hangs", "SIGSTOP", "neutral within its silence + 20 ms, by the guard", _sentinel_stops),
-    Case("F", "guard at its limit of descriptors", "5 more connect", "drives on; hardly any processor time", _no_descriptors),
-    Case("G", "a client in a hurry", f"{len(_STEPS)} steps of 0.5 V as fast as they are taken", f"trips; within a period at most {_MOST:g} V", _steps),
-    Case("H", "board: boots when its port is opened", f"deaf to {_DEAF} commands", "opened once; neutral when it hears", _boots, Setup(device={"boot": 10.0})),
+    Case(
+        "F",
+        "guard at its limit of descriptors",
+        "5 more connect",
+        "drives on; hardly any processor time",
+        _no_descriptors,
+    ),
+    Case(
+        "G",
+        "a client in a hurry",
+        f"{len(_STEPS)} steps of 0.5 V as fast as they are taken",
+        f"trips; within a period at most {_MOST:g} V",
+        _steps,
+    ),
+    Case(
+        "H",
+        "board: boots when its port is opened",
+        f"deaf to {_DEAF} commands",
+        "opened once; neutral when it hears",
+        _boots,
+        Setup(device={"boot": 10.0}),
+    ),
 )

@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from kurumaisu.bench.processes import PATIENCE
+from kurumaisu.bench.guard_client import Client, Favour
 from kurumaisu.bench.guard_rig import Rig, strike
-from kurumaisu.bench.rigs.guard_client import Client, Favour
+from kurumaisu.bench.processes import PATIENCE
 
 _HELD = 0.5  # [s] without neutral, when nobody is left to write it
 _AWAY = 0.1  # [s] that the device is unplugged

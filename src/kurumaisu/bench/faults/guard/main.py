@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu.bench.faults.guard.endings import CASES, Case, both, sentinel, unplug
-from kurumaisu.bench.processes import PATIENCE
+from kurumaisu.bench.guard_client import Client
 from kurumaisu.bench.guard_rig import ChipRig, Rig, busy, in_memory
-from kurumaisu.bench.rigs.guard_client import Client
+from kurumaisu.bench.processes import PATIENCE
 from kurumaisu.bench.table import Table
 
 _PHASE = 0.04  # [s] from armed to the strike, at most: two periods of the client
