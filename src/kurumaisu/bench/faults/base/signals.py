@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-import os
 import resource
 import signal
 import time
+from pathlib import Path
 
 from kurumaisu.bench.faults.base.cases import Case, Seen
 from kurumaisu.bench.faults.base.chain import Chain, Setup
@@ -71,7 +71,7 @@ def _no_descriptors(stage: Chain, seen: Seen) -> None:
     stage.drive()
     guard = stage.rig.guard()
     limits = resource.prlimit(guard, resource.RLIMIT_NOFILE)
-    count = len(os.listdir(f"/proc/{guard}/fd"))
+    count = sum(1 for _ in Path(f"/proc/{guard}/fd").iterdir())
     resource.prlimit(guard, resource.RLIMIT_NOFILE, (count, limits[1]))
     stage.mark()
     others = [RawClient(stage.rig.socket) for _ in range(5)]
