@@ -33,11 +33,6 @@ def publishers(topic: str) -> Sequence[str]:
     return _nodes(topic, 0)
 
 
-def wait_until_gone(patience: float) -> None:
-    """Return when the master knows nothing of this node any more, or after so many seconds of wall time."""
-    wait_until(lambda: not any(rospy.get_name() in nodes for side in _state() for _, nodes in side), patience)
-
-
 def _nodes(topic: str, side: int) -> Sequence[str]:
     name = rospy.resolve_name(topic)
     return [node for known, nodes in _state()[side] if known == name for node in nodes if node != rospy.get_name()]

@@ -31,6 +31,7 @@ from kurumaisu.critic.values.selection import effect_ids
 from kurumaisu.errors import Error, one_line
 from kurumaisu.msg import Voltages
 from kurumaisu.params import load_model, shipped
+from kurumaisu.ros import life
 
 _TOPICS = {
     "command": ("cmd_vel", Twist),
@@ -211,17 +212,17 @@ def main(arguments: Sequence[str]) -> int:
     meta = read_meta(options.meta) if options.meta is not None else Meta()
     model = options.model or meta.model or shipped("launch/md100.yaml")
     load_model(model)
-    rospy.init_node("critic_watch")
-    watch = CriticWatch(options, model, meta, ids)
-    try:
-        while not rospy.is_shutdown():
-            watch.step()
-            time.sleep(_PERIOD)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        watch.close()
-    return 0
+
+    def node(own: life.Life) -> int:
+        watch = CriticWatch(options, model, meta, ids)
+        try:
+            while not own.asked.wait(_PERIOD):
+                watch.step()
+        finally:
+            watch.close()
+        return 0
+
+    return life.run("critic_watch", node)
 
 
 def _parser() -> argparse.ArgumentParser:
