@@ -14,6 +14,7 @@
 #include "base/last_word.h"
 #include "base/node/command_input.h"
 #include "base/node/diagnostics_output.h"
+#include "base/node/host_gate.h"
 #include "base/node/limits_server.h"
 #include "base/node/master_watch.h"
 #include "base/node/odometry_input.h"
@@ -259,7 +260,9 @@ int main(int argc, char** argv) {
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
   k::catchStopRequests();
   try {
-    BaseNode node(nh, k::readBaseSettings(k::Section::load(ros::this_node::getName())));
+    const k::BaseSettings settings = k::readBaseSettings(k::Section::load(ros::this_node::getName()));
+    k::allowHosts(settings.allowed_hosts);
+    BaseNode node(nh, settings);
     node.run();
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());

@@ -127,6 +127,7 @@ BaseSettings readBaseSettings(Section node) {
   settings.drive.noise = settings.odometry.noise;
   if (settings.odometry.imu) settings.drive.gyro = settings.odometry.imu->gyro;
   settings.master_timeout = node.atLeast("master_timeout", 0);
+  settings.allowed_hosts = node.texts("allowed_hosts");
   settings.diagnostic_period = node.above("diagnostic_period", 0);
   node.end();
   return settings;

@@ -28,9 +28,10 @@ struct BaseSettings {
   std::vector<std::string> limit_names;  ///< of DriveSettings::limits
   double rate;                           ///< of voltages and odometry [Hz]
   OdometrySettings odometry;
-  KnownEffects effects;      ///< the model file's, as far as they concern odometry
-  double diagnostic_period;  ///< [s]
-  double master_timeout;     ///< the chair brakes when the ROS master is silent for longer [s]; 0: never
+  KnownEffects effects;                    ///< the model file's, as far as they concern odometry
+  std::vector<std::string> allowed_hosts;  ///< entries of AllowedHosts
+  double diagnostic_period;                ///< [s]
+  double master_timeout;  ///< the chair brakes when the ROS master is silent for longer [s]; 0: never
 };
 
 /// Throws std::invalid_argument naming parameter and value for anything missing, unknown, mistyped or

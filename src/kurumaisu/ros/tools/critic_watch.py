@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""critic watch: the verdict on the last minutes of a running robot, on /diagnostics."""
+"""critic watch: the verdict on the last minutes of a running robot, on diagnostics."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ _EPILOG = """\
 subscribes to:
   cmd_vel, voltages, ground_truth, odom, scan, battery, temperature
 publishes:
-  /diagnostics
+  diagnostics
 
 examples:
   critic watch
   critic watch --window 300 --every 60 ground_truth:=/mocap/pose
   critic watch --meta recordings/office/meta.yaml
-  rostopic echo /diagnostics
+  rostopic echo diagnostics
 
 More: docs/critic.md"""
 
@@ -86,7 +86,7 @@ class CriticWatch:
         self._answered: float | None = None  # ROS time [s]
         self._number = 0
         self._problems: tuple[str, ...] = ()
-        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
+        self._publisher = rospy.Publisher("diagnostics", DiagnosticArray, queue_size=1)
         self._subscribers = [
             rospy.Subscriber(name, kind, partial(self._hear, part), queue_size=100)
             for part, (name, kind) in _TOPICS.items()
