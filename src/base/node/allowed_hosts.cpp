@@ -8,7 +8,6 @@
 #include <cstring>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 
 namespace kurumaisu {
 namespace {
@@ -52,8 +51,8 @@ bool isIn(const HostBytes& host, const Network& network) {
   return true;
 }
 
-std::invalid_argument wrong(const std::string& entry) {
-  return std::invalid_argument(
+AllowedHosts::Unknown wrong(const std::string& entry) {
+  return AllowedHosts::Unknown(
       "must have addresses like 192.168.1.20, networks like 192.168.1.0/24, or `any`, not " + entry);
 }
 

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 
 #include <array>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,12 @@ struct Network {
 
 class AllowedHosts {
  public:
-  /// Each entry an address in numbers, a network like 192.168.1.0/24, or `any`. Throws std::invalid_argument
-  /// for another one.
+  /// What an entry says that is none of these.
+  struct Unknown : std::invalid_argument {
+    using std::invalid_argument::invalid_argument;
+  };
+
+  /// Each entry an address in numbers, a network like 192.168.1.0/24, or `any`. Throws Unknown.
   explicit AllowedHosts(const std::vector<std::string>& entries);
 
   /// Whether an address is on the list; of what is no address of the internet, like a file: yes.

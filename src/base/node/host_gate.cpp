@@ -15,8 +15,7 @@
 #include <cstring>
 #include <memory>
 #include <mutex>
-
-#include "base/node/allowed_hosts.h"
+#include <vector>
 
 namespace kurumaisu {
 namespace {
@@ -102,7 +101,7 @@ void warnRefused(const sockaddr& peer, const char* what) {
 
 }  // namespace
 
-void allowHosts(const std::vector<std::string>& entries) { gate().allow(AllowedHosts(entries)); }
+void allowHosts(const AllowedHosts& hosts) { gate().allow(hosts); }
 
 }  // namespace kurumaisu
 
