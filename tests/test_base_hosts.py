@@ -2,7 +2,6 @@
 """base_node's ports: strangers find them closed, and it goes to no stranger."""
 
 import contextlib
-import os
 import socket
 import subprocess
 import time
@@ -39,7 +38,7 @@ class Base:
         sockets = set()
         for link in Path(f"/proc/{self.process.pid}/fd").iterdir():
             with contextlib.suppress(OSError):
-                sockets.add(os.readlink(link))
+                sockets.add(str(link.readlink()))
         found = set()
         for line in Path(f"/proc/{self.process.pid}/net/tcp").read_text().splitlines()[1:]:
             words = line.split()

@@ -28,9 +28,8 @@ _PATIENCE = 14.0  # [s] for the other nodes to end, in which roslaunch does not 
 def main() -> int:
     """Watch the master until told to end."""
     program.no_arguments("launch_watch", _HELP)
-    ends = {signal.SIGINT, signal.SIGTERM}
+    launch, run, ends = os.getppid(), _run(), {signal.SIGINT, signal.SIGTERM}
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
-    launch, run = os.getppid(), _run()
     while signal.sigtimedwait(ends, _PERIOD) is None:
         now = _run()
         run = run or now
