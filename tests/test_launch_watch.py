@@ -68,7 +68,7 @@ def test_a_master_that_is_replaced_ends_it_with_an_error(tmp_path, environment):
         first.wait(PATIENCE)
         with master(environment):
             assert launch.wait(PATIENCE) != 0
-            assert [pid for pid in nodes if "kurumaisu" in words(pid)] == []  # none is left behind
+            wait_for(lambda: not [pid for pid in nodes if "kurumaisu" in words(pid)], "none is left behind")
     assert "LAUNCH_MASTER_REPLACED" in (tmp_path / "said").read_text()
 
 
