@@ -74,7 +74,7 @@ PYTHON_RULES = [
 CPP_RULES = [
     Rule(
         r"(?!.*_node\.cpp|kurumaisu/bench/drivers/|.*/messages\.(cpp|h)|params\.h"
-        r"|base/node/((command|odometry|diagnostics)_(in|out)put|limits_server|master_watch|stop_request|topic_dac)\.(cpp|h)"
+        r"|base/node/((command|odometry|diagnostics)_(in|out)put|limits_server|host_gate|master_watch|stop_request|topic_dac)\.(cpp|h)"
         r"|slam/nodes/((mapping_output|scan_feed)\.(cpp|h)|mapping_parameters\.h))",
         ROS_CPP,
         "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, params.h, and peers of benchmarks",

@@ -97,14 +97,14 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = program.Parser(
         prog="urdf",
-        usage="urdf [--prefix PREFIX] MODEL.yaml BASE_FRAME [IMU_FRAME 'X Y Z ROLL PITCH YAW']",
+        usage="urdf [--prefix P] MODEL.yaml BASE_FRAME [IMU_FRAME POSE]",
         description="Print the URDF of the chair, for the parameter robot_description.",
     )
     parser.add_argument("model", type=Path, metavar="MODEL.yaml", help="what the chair is, as launch/md100.yaml")
     parser.add_argument("--prefix", default="", help="what is put before the frames of chair and laser")
     parser.add_argument("base_frame", metavar="BASE_FRAME", help="of the chair: its name, or base_node's settings")
     parser.add_argument("imu_frame", nargs="?", metavar="IMU_FRAME", help="frame of an inertial sensor")
-    parser.add_argument("imu_pose", nargs="?", type=_pose, metavar="POSE", help="where it is on the chair [m, rad]")
+    parser.add_argument("imu_pose", nargs="?", type=_pose, metavar="POSE", help="where it is on the chair: 'X Y Z ROLL PITCH YAW' [m, rad]")
     return parser
 
 
