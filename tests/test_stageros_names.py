@@ -151,7 +151,7 @@ def test_sonars_are_apart_when_asked():
 
 @pytest.mark.parametrize("names", [("r", "r"), ("robot_1", None)])
 def test_two_robots_of_one_name_are_refused_with_both_places(names):
-    with pytest.raises(Error, match="a.world:1:1: with -u .* of the robot at a.world:1:1: both are"):
+    with pytest.raises(Error, match=r"a\.world:1:1: with -u .* of the robot at a\.world:1:1: both are"):
         names_of(world(*((name, []) for name in names)), read_settings({}, "/stageros"), True)
     assert len(names_of(world(*((name, []) for name in names)), read_settings({}, "/stageros"), False)) == 2
 

@@ -104,7 +104,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--prefix", default="", help="what is put before the frames of chair and laser")
     parser.add_argument("base_frame", metavar="BASE_FRAME", help="of the chair: its name, or base_node's settings")
     parser.add_argument("imu_frame", nargs="?", metavar="IMU_FRAME", help="frame of an inertial sensor")
-    parser.add_argument("imu_pose", nargs="?", type=_pose, metavar="POSE", help="where it is on the chair: 'X Y Z ROLL PITCH YAW' [m, rad]")
+    parser.add_argument(
+        "imu_pose",
+        nargs="?",
+        type=_pose,
+        metavar="POSE",
+        help="where it is on the chair: 'X Y Z ROLL PITCH YAW' [m, rad]",
+    )
     return parser
 
 

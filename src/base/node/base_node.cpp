@@ -23,6 +23,7 @@
 #include "base/node/stop_request.h"
 #include "base/node/topic_dac.h"
 #include "base/report.h"
+#include "clock_watch.h"
 #include "command_line.h"
 #include "guard/crash.h"
 #include "guard/realtime.h"
@@ -258,6 +259,7 @@ int main(int argc, char** argv) {
   if (const auto code = k::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "base_node", ros::init_options::NoSigintHandler);
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
+  const k::ClockWatch clock(nh);
   k::catchStopRequests();
   try {
     const k::BaseSettings settings = k::readBaseSettings(k::Section::load(ros::this_node::getName()));

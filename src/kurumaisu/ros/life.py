@@ -18,6 +18,7 @@ from kurumaisu.ros import master
 
 _PATIENCE = 4.0  # [s] from a signal to the end, in order or not
 _LAST_WORDS = 2.0  # [s] that topics stay open for a node that is to end
+_CLOCK_PERIOD = 5.0  # [s]
 _GLANCE = 0.3  # [s] between looks for a master
 _SHELL = 128  # exit code of who ends by a signal, with its number added, as shells have it
 
@@ -54,6 +55,8 @@ class Life:
             return False
         rospy.init_node(name, anonymous=anonymous, disable_rostime=not rostime, disable_signals=True)
         rospy.on_shutdown(self._hold)
+        if rostime:
+            threading.Thread(target=self._watch_clock, daemon=True).start()
         return not rospy.core.is_shutdown_requested()
 
     def end(self) -> None:
@@ -72,6 +75,14 @@ class Life:
         threading.Thread(target=rospy.signal_shutdown, args=("a signal",), daemon=True).start()
         time.sleep(_PATIENCE)
         os._exit(self.code)
+
+    def _watch_clock(self) -> None:
+        """Say why nothing goes on where a simulator that ended has left /use_sim_time behind."""
+        while not self.asked.wait(_CLOCK_PERIOD) and not rospy.rostime.is_wallclock() and rospy.get_time() == 0:
+            rospy.logerr(
+                "CLOCK_SILENT: /use_sim_time is true, but nothing comes on /clock: time stands at 0. "
+                "Start a simulator; or rosparam set /use_sim_time false, and start this again"
+            )
 
     def _hold(self) -> None:
         """Keep the topics open for a moment: a node may want to say its last words."""
