@@ -22,9 +22,9 @@ def hearers(topic: str, patience: float) -> Sequence[str]:
 
 
 def wait_until(condition: Callable[[], bool], patience: float) -> None:
-    """Return when a condition holds, or after so many seconds of wall time."""
+    """Return when a condition holds, after so many seconds of wall time, or when this node is to end."""
     deadline = time.monotonic() + patience
-    while not condition() and time.monotonic() < deadline:
+    while not condition() and time.monotonic() < deadline and not rospy.core.is_shutdown_requested():
         time.sleep(_GLANCE)
 
 

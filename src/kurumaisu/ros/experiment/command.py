@@ -71,6 +71,8 @@ def _run(script: Script, options: argparse.Namespace, stop: Callable[[], bool]) 
     care = read_care(settings.load(options.settings))
     model = load_model(options.model)
     ground = ExperimentSpace(script, model.chassis, care, options.world)
+    if stop():
+        return "interrupted"
     print(f"experiment: {options.name}: {script.seconds:.0f} s; Ctrl-C stops it", file=sys.stderr, flush=True)
     if script.kind == "places":
         return run_places(script, care, ground, stop, options.bag)
