@@ -136,6 +136,18 @@ class BasicSection {
     return result;
   }
 
+  /// A list of strings, perhaps empty.
+  std::vector<std::string> texts(const std::string& key) {
+    const Value value = take(key);
+    if (value.kind() != Kind::kList) throw wrongType(key, "a list of strings", value);
+    std::vector<std::string> result;
+    for (const Value& each : value.list()) {
+      if (each.kind() != Kind::kText) throw wrongType(key, "a list of strings", value);
+      result.push_back(each.text());
+    }
+    return result;
+  }
+
   /// A mapping inside this one.
   BasicSection section(const std::string& key) { return {take(key), nameOf(key)}; }
 

@@ -59,6 +59,7 @@ inline Value nodeValues() {
   v["longest_step"] = 0.1;
   v["diagnostic_period"] = 1.0;
   v["master_timeout"] = 5.0;
+  v["allowed_hosts"].setSize(0);
   v["inputs"]["joystick"] = input("joy_vel", 200);
   v["inputs"]["navigation"] = input("cmd_vel", 50);
   v["absurd"]["v"] = v["absurd"]["w"] = 10.0;

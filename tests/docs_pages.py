@@ -30,6 +30,7 @@ PORTS = {r"(viewer:=true)": r"\1 viewer_port:=0", r"(kurumaisu view .*)": r"\1 -
 NOT_RUN = {
     r"^scripts/(demo|test)\b": "installs packages; tests/test_demo.py runs the demonstration, and this is scripts/test",
     r"\bsudo\b|/sys/bus/iio": "needs root, and changes the computer",
+    r"^ROS_NAMESPACE=": "needs a laser; two_chairs.test does the same",
     r"/dev/ttyACM0|192\.168\.": "needs a sensor",
     r"critic experiment": "needs a chair with room around it; experiment.launch runs the same program",
     r"python -m pytest": "scripts/test runs it",

@@ -37,7 +37,7 @@ class BadConfiguration:
         name = f"bad_{self.id().rsplit('.', 1)[-1]}"
         rospy.set_param(f"/{name}", values)
         # Not rosrun: in a workspace it finds scripts several times and asks which.
-        node = [sys.executable, "-c", "from kurumaisu.ros.sim.node import main; main()"]
+        node = [sys.executable, "-c", "import sys; from kurumaisu.ros.sim.node import main; sys.exit(main())"]
         command = [*node, f"__name:={name}", "/clock:=/bad_clock", "scan:=bad_scan"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
         return done.returncode, done.stdout + done.stderr

@@ -27,7 +27,7 @@ ABSTRACT = {"base", "mechanism", "laser"}
 MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - ABSTRACT | {r"laser\.\w+"}
 CONCRETE = rf"kurumaisu\.effects\.({'|'.join([*MODULES, *(effect.__name__ for effect in effects.ALL)])})(\.|$)"
 # C++ that rests on nothing
-SHARED = r"command_line\.h|file_descriptor\.h|signals\.h|sleep_watch\.h|standard_streams\.h|steady\.h"
+SHARED = r"clock_watch\.h|command_line\.h|file_descriptor\.h|signals\.h|sleep_watch\.h|standard_streams\.h|steady\.h"
 IDS = {effect.id for effect in effects.ALL}
 LARGEST = 25  # files in a folder of src/; a C++ header and its source are one
 ONE_PER_EFFECT = "kurumaisu/effects"  # as many files as there are effects
@@ -74,11 +74,11 @@ PYTHON_RULES = [
 ]
 CPP_RULES = [
     Rule(
-        r"(?!.*_node\.cpp|kurumaisu/bench/drivers/|.*/messages\.(cpp|h)|params\.h"
-        r"|base/node/((command|odometry|diagnostics)_(in|out)put|limits_server|master_watch|stop_request|topic_dac)\.(cpp|h)"
+        r"(?!.*_node\.cpp|kurumaisu/bench/drivers/|.*/messages\.(cpp|h)|params\.h|clock_watch\.h"
+        r"|base/node/((command|odometry|diagnostics)_(in|out)put|limits_server|host_gate|master_watch|stop_request|topic_dac)\.(cpp|h)"
         r"|slam/nodes/((mapping_output|scan_feed)\.(cpp|h)|mapping_parameters\.h))",
         ROS_CPP,
-        "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, params.h, and peers of benchmarks",
+        "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, params.h and clock_watch.h, and peers",
     ),
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
     Rule(r"(?!.*bindings(\.(cpp|h)|/))", r"<pybind11/", "pybind11 only in bindings"),

@@ -221,6 +221,7 @@ FILES = [
     ("calibrate", "drive", LOST, "--test", LOST, "--out", "out"),
     ("calibrate", "laser", LOST, "--distances", "1", "--out", "out"),
     ("urdf", LOST, "base_link"),
+    ("frame", LOST, "laser/frame"),
     ("virtual_urg", "--tcp", "0", "--sensor", LOST),
     ("virtual_urg", "--tcp", "0", "--world", LOST, "--pose", "0", "0", "0"),
     ("example_numpy", LOST),

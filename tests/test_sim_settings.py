@@ -12,7 +12,14 @@ from kurumaisu.params import shipped
 from kurumaisu.ros.sim.settings import SimSettings, read_settings
 from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator
 
-CHOSEN = {"seed": 1, "speed": 1.0, "effects": "none", "sensors": "none", "image_extents": False}
+CHOSEN = {
+    "seed": 1,
+    "speed": 1.0,
+    "effects": "none",
+    "sensors": "none",
+    "image_extents": False,
+    "base_frame": "base_link",
+}
 LASER = {"laser": "direct", "laser_port": "urg", "laser_faults": "none"}
 WORLD = {"world": shipped("worlds/room.world"), "world_values": "none", "start": "none"}
 

@@ -149,6 +149,13 @@ def test_sonars_are_apart_when_asked():
     ]
 
 
+@pytest.mark.parametrize("names", [("r", "r"), ("robot_1", None)])
+def test_two_robots_of_one_name_are_refused_with_both_places(names):
+    with pytest.raises(Error, match=r"a\.world:1:1: with -u .* of the robot at a\.world:1:1: both are"):
+        names_of(world(*((name, []) for name in names)), read_settings({}, "/stageros"), True)
+    assert len(names_of(world(*((name, []) for name in names)), read_settings({}, "/stageros"), False)) == 2
+
+
 def test_switches_of_names():
     two = world((None, [ONE]), (None, []))
     assert names(two, strip_leading_slash=True)[0][:2] == ("/robot_0/odom", "robot_0/odom")

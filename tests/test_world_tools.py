@@ -112,6 +112,10 @@ SURPRISES = {
         "slow laser",
     ),
     "has no laser, but": (WALL % ("1", "") + ROBOT % ("", LASER % "") + ROBOT % ("pose [0 2 0 0]", ""), "sensorless"),
+    "has the name of the robot at": (
+        WALL % ("1", "") + ROBOT % ('name "r"', LASER % "") + ROBOT % ('name "r" pose [0 2 0 0]', LASER % ""),
+        "one name twice",
+    ),
     "first one only": (
         WALL % ("1", "") + ROBOT % ("", "ranger ( sensor ( range [0 8] ) sensor ( range [0 8] ) )"),
         "ring",

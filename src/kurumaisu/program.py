@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -42,3 +43,8 @@ def words(arguments: Sequence[str] | None = None) -> list[str]:
 def no_arguments(name: str, text: str) -> None:
     """End the program for --help, or with 2 for any argument that is not ROS's; text as of node_parser."""
     node_parser(name, text).parse_args(words())
+
+
+def die_of_ctrl_c() -> None:
+    """Let Ctrl-C end the program while the modules of a node load: a KeyboardInterrupt may get lost in an import."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -19,6 +19,7 @@ def main() -> int:
     """Become rviz; return 1 where it is not installed."""
     parser = program.node_parser("rviz", _HELP)
     parser.add_argument("-d", dest="config", type=Path, metavar="FILE.rviz", help="what it shows")
+    parser.add_argument("-f", dest="frame", metavar="FRAME", help="the frame it is shown in, instead of the file's")
     parser.parse_args(program.words())
     found = shutil.which("rviz")
     if found is not None:

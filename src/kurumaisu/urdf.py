@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
-from kurumaisu import program
+from kurumaisu import frames, program
 from kurumaisu.errors import Error, failed
 from kurumaisu.params import Model, load_model
 
@@ -27,14 +27,17 @@ class Pose:
     rpy: tuple[float, float, float]
 
 
-def robot_description(model: Model, base_frame: str, imu: tuple[str, Pose] | None = None) -> str:
+def robot_description(model: Model, base_frame: str, imu: tuple[str, Pose] | None = None, prefix: str = "") -> str:
     """Return URDF: the chair, its laser, and fixed joints. imu: frame and mounting of an inertial sensor.
+
+    prefix: before the frames of the chair and of the laser; that of the sensor is what its messages say.
 
     What collides is the box of the model, as in the simulator: its footprint, up to the head of the occupant.
     """
     robot = ElementTree.Element("robot", name=model.name)
     chassis, laser = model.chassis, model.laser
     centre = chassis.axle_to_front - chassis.length / 2
+    base_frame, laser_frame = prefix + base_frame, prefix + laser.frame
     base = ElementTree.SubElement(robot, "link", name=base_frame)
     seat = ElementTree.Element("box", size=_text((chassis.length, chassis.width, _SEAT)))
     _shape(base, "visual", seat, Pose((centre, 0.0, _SEAT / 2), (0.0, 0.0, 0.0)), "0.2 0.3 0.6 0.6")
@@ -46,7 +49,7 @@ def robot_description(model: Model, base_frame: str, imu: tuple[str, Pose] | Non
     _shape(base, "collision", box, Pose((centre, 0.0, chassis.height / 2), (0.0, 0.0, 0.0)))
     mount = laser.mount
     housing = ElementTree.Element("box", size=_text(_SENSOR))
-    link = _attach(robot, base_frame, laser.frame, Pose((mount.x, mount.y, mount.z), (0.0, 0.0, mount.yaw)))
+    link = _attach(robot, base_frame, laser_frame, Pose((mount.x, mount.y, mount.z), (0.0, 0.0, mount.yaw)))
     _shape(link, "visual", housing, Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), "0.1 0.1 0.1 1")
     if imu is not None:
         _attach(robot, base_frame, *imu)
@@ -85,7 +88,8 @@ def main() -> None:
         parser.error("IMU_FRAME goes with a pose: 'X Y Z ROLL PITCH YAW'")
     imu = None if options.imu_frame is None else (options.imu_frame, options.imu_pose)
     try:
-        print(robot_description(load_model(options.model), options.base_frame, imu))
+        base_frame = frames.base_frame(options.base_frame)
+        print(robot_description(load_model(options.model), base_frame, imu, options.prefix))
     except Error as error:
         sys.exit(failed("urdf", error))
 
@@ -93,13 +97,20 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = program.Parser(
         prog="urdf",
-        usage="urdf MODEL.yaml BASE_FRAME [IMU_FRAME 'X Y Z ROLL PITCH YAW']",
+        usage="urdf [--prefix P] MODEL.yaml BASE_FRAME [IMU_FRAME POSE]",
         description="Print the URDF of the chair, for the parameter robot_description.",
     )
     parser.add_argument("model", type=Path, metavar="MODEL.yaml", help="what the chair is, as launch/md100.yaml")
-    parser.add_argument("base_frame", metavar="BASE_FRAME", help="frame of the chair, as base_link")
+    parser.add_argument("--prefix", default="", help="what is put before the frames of chair and laser")
+    parser.add_argument("base_frame", metavar="BASE_FRAME", help="of the chair: its name, or base_node's settings")
     parser.add_argument("imu_frame", nargs="?", metavar="IMU_FRAME", help="frame of an inertial sensor")
-    parser.add_argument("imu_pose", nargs="?", type=_pose, metavar="POSE", help="where it is on the chair [m, rad]")
+    parser.add_argument(
+        "imu_pose",
+        nargs="?",
+        type=_pose,
+        metavar="POSE",
+        help="where it is on the chair: 'X Y Z ROLL PITCH YAW' [m, rad]",
+    )
     return parser
 
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "clock_watch.h"
 #include "command_line.h"
 #include "laser/diagnosis.h"
 #include "laser/driver.h"
@@ -277,6 +278,7 @@ int main(int argc, char** argv) {
   if (const auto code = kurumaisu::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "laser_node");
   ros::NodeHandle nh;  // here, because ROS's log is mute once the last one is gone
+  const kurumaisu::ClockWatch clock(nh);
   try {
     XmlRpc::XmlRpcValue given;
     ros::param::get(ros::this_node::getName(), given);  // nothing given: all as shipped

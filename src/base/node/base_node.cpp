@@ -14,6 +14,7 @@
 #include "base/last_word.h"
 #include "base/node/command_input.h"
 #include "base/node/diagnostics_output.h"
+#include "base/node/host_gate.h"
 #include "base/node/limits_server.h"
 #include "base/node/master_watch.h"
 #include "base/node/odometry_input.h"
@@ -22,6 +23,7 @@
 #include "base/node/stop_request.h"
 #include "base/node/topic_dac.h"
 #include "base/report.h"
+#include "clock_watch.h"
 #include "command_line.h"
 #include "guard/crash.h"
 #include "guard/realtime.h"
@@ -267,9 +269,12 @@ int main(int argc, char** argv) {
   if (const auto code = k::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "base_node", ros::init_options::NoSigintHandler);
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
+  const k::ClockWatch clock(nh);
   k::catchStopRequests();
   try {
-    BaseNode node(nh, k::readBaseSettings(k::Section::load(ros::this_node::getName())));
+    const k::BaseSettings settings = k::readBaseSettings(k::Section::load(ros::this_node::getName()));
+    k::allowHosts(settings.allowed_hosts);
+    BaseNode node(nh, settings);
     node.run();
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());

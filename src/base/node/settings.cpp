@@ -86,6 +86,14 @@ void readWatchers(Section& node, BaseSettings& settings) {
   cap.end();
 }
 
+AllowedHosts readHosts(Section& node) {
+  try {
+    return AllowedHosts(node.texts("allowed_hosts"));
+  } catch (const AllowedHosts::Unknown& error) {
+    throw node.error("allowed_hosts", error.what());
+  }
+}
+
 /// One topic, one meaning.
 void checkTopics(const Section& node, const BaseTopics& topics) {
   std::vector<std::string> all = topics.inputs;
@@ -134,6 +142,7 @@ BaseSettings readBaseSettings(Section node) {
   settings.drive.noise = settings.odometry.noise;
   if (settings.odometry.imu) settings.drive.gyro = settings.odometry.imu->gyro;
   settings.master_timeout = node.atLeast("master_timeout", 0);
+  settings.allowed_hosts = readHosts(node);
   settings.diagnostic_period = node.above("diagnostic_period", 0);
   node.end();
   return settings;

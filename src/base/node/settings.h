@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/drive.h"
+#include "base/node/allowed_hosts.h"
 #include "base/node/dac_settings.h"
 #include "base/node/odometry_settings.h"
 #include "params.h"
@@ -28,9 +29,10 @@ struct BaseSettings {
   std::vector<std::string> limit_names;  ///< of DriveSettings::limits
   double rate;                           ///< of voltages and odometry [Hz]
   OdometrySettings odometry;
-  KnownEffects effects;      ///< the model file's, as far as they concern odometry
-  double diagnostic_period;  ///< [s]
-  double master_timeout;     ///< the chair brakes when the ROS master is silent for longer [s]; 0: never
+  KnownEffects effects;            ///< the model file's, as far as they concern odometry
+  AllowedHosts allowed_hosts{{}};  ///< beside this computer and the master's
+  double diagnostic_period;        ///< [s]
+  double master_timeout;  ///< the chair brakes when the ROS master is silent for longer [s]; 0: never
 };
 
 /// Throws std::invalid_argument naming parameter and value for anything missing, unknown, mistyped or

@@ -13,6 +13,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from kurumaisu import children
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.errors import Error
 
@@ -76,7 +77,7 @@ class Client:
         """Start it. socket: the guard's; it may leave a core file beside it."""
         command = [program("guard_client"), str(socket), mode]
         command += [str(favour.priority), str(favour.longest_run), str(favour.nice)]
-        self.process = subprocess.Popen(
+        self.process = children.start(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1, cwd=socket.parent
         )
 
@@ -85,7 +86,7 @@ class Client:
         assert self.process.stdout
         if not select.select([self.process.stdout], [], [], PATIENCE)[0]:
             raise Error("guard_client: says nothing; is the guard armed?")
-        return self.process.stdout.readline().strip()
+        return str(self.process.stdout.readline()).strip()
 
     def wait_armed(self) -> None:
         """Wait until its voltage is put out."""

@@ -19,6 +19,7 @@ from typing import Any
 
 import yaml
 
+from kurumaisu import children
 from kurumaisu.bench.guard_client import Favour
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.errors import Error
@@ -115,9 +116,7 @@ class Rig:
     def board(self) -> Iterator[None]:
         """Run the board, before all others: hardware waits for no scheduler. At the end nothing is left."""
         command = [program("virtual_dac"), str(self.device), str(self.folder / "dac"), "--log", str(self._log)]
-        self._board = subprocess.Popen(
-            [*command, "--realtime"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
+        self._board = children.start([*command, "--realtime"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         try:
             assert self._board.stdout
             if "virtual board" not in self._board.stdout.readline():
@@ -131,7 +130,7 @@ class Rig:
         """Start sentinel and guard, unless they run."""
         if self._sentinel and self._sentinel.poll() is None:
             return
-        self._sentinel = subprocess.Popen(
+        self._sentinel = children.start(
             [program("guard"), str(self.device), str(self.settings)],
             stderr=self.messages.open("ab"),
             env=self._environment,
@@ -244,7 +243,7 @@ def strike(pids: Callable[[], list[int]], number: signal.Signals) -> float:
 @contextlib.contextmanager
 def busy(count: int) -> Iterator[None]:
     """Keep so many processes busy; they end with this one, too."""
-    loops = [subprocess.Popen([sys.executable, "-c", _BUSY]) for _ in range(count)]
+    loops = [children.start([sys.executable, "-c", _BUSY]) for _ in range(count)]
     try:
         yield
     finally:

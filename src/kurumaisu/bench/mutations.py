@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from kurumaisu import children
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 
@@ -71,7 +72,7 @@ class Copy:
     def run(self, *command: str) -> subprocess.CompletedProcess[str]:
         """Run a command in its environment."""
         words = ["scripts/run", *command]
-        process = subprocess.Popen(
+        process = children.start(
             words, cwd=self.root, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
         )
         try:

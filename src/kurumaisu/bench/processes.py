@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from kurumaisu import children
 from kurumaisu.errors import Error
 
 PATIENCE = 30.0  # [s] for a process to be ready, or to end
@@ -60,7 +61,7 @@ def running(
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Run a program, its output to a log if one is named; interrupt it at the end if it still runs, wait for it."""
     with (log or Path(os.devnull)).open("wb") as output:
-        process = subprocess.Popen(command, env=environment, stdout=output, stderr=output)
+        process = children.start(command, env=environment, stdout=output, stderr=output)
     try:
         yield process
     finally:
@@ -74,7 +75,7 @@ def master() -> Iterator[dict[str, str]]:
     """Run a master of our own; yield the environment of those who are to find it."""
     port = free_port()
     environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "ROS_HOSTNAME": "localhost"}
-    process = subprocess.Popen(
+    process = children.start(
         ["rosmaster", "--core", "-p", str(port)],
         env=environment,
         stdout=subprocess.DEVNULL,

@@ -11,7 +11,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from kurumaisu.children import interrupt
+from kurumaisu import children
 from kurumaisu.errors import Error
 
 _PATIENCE = 20.0  # [s] for one that was interrupted to end
@@ -38,7 +38,7 @@ def roslaunch(arguments: Sequence[str], log: Path, deadline: float, words: str) 
         "ROS_LOG_DIR": str(log.parent / "ros_log"),
     }
     with log.open("w", encoding="utf-8") as stream:
-        process = subprocess.Popen(
+        process = children.start(
             ["roslaunch", "-p", str(port), *arguments], stdout=stream, stderr=subprocess.STDOUT, env=environment
         )
         late = _wait(process, deadline, words)
@@ -62,4 +62,4 @@ def _wait(process: subprocess.Popen[bytes], deadline: float, words: str) -> bool
             time.sleep(0.1)
         return False
     finally:
-        interrupt(process, _PATIENCE)
+        children.interrupt(process, _PATIENCE)

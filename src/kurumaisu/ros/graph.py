@@ -22,20 +22,15 @@ def hearers(topic: str, patience: float) -> Sequence[str]:
 
 
 def wait_until(condition: Callable[[], bool], patience: float) -> None:
-    """Return when a condition holds, or after so many seconds of wall time."""
+    """Return when a condition holds, after so many seconds of wall time, or when this node is to end."""
     deadline = time.monotonic() + patience
-    while not condition() and time.monotonic() < deadline:
+    while not condition() and time.monotonic() < deadline and not rospy.core.is_shutdown_requested():
         time.sleep(_GLANCE)
 
 
 def publishers(topic: str) -> Sequence[str]:
     """Return the nodes that publish a topic. Raise Error when the master does not answer."""
     return _nodes(topic, 0)
-
-
-def wait_until_gone(patience: float) -> None:
-    """Return when the master knows nothing of this node any more, or after so many seconds of wall time."""
-    wait_until(lambda: not any(rospy.get_name() in nodes for side in _state() for _, nodes in side), patience)
 
 
 def _nodes(topic: str, side: int) -> Sequence[str]:

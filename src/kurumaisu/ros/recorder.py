@@ -14,7 +14,7 @@ from typing import Any
 import rosgraph
 import rospy
 
-from kurumaisu.children import interrupt
+from kurumaisu import children
 from kurumaisu.critic.data.bag_parts import numbered
 from kurumaisu.errors import Error
 from kurumaisu.ros.graph import publishers
@@ -46,7 +46,7 @@ class Recorder:
         how = ["--lz4", "--buffsize=256", *parts]
         command = ["rosbag", "record", "-O", str(path), *how, *topics, f"__name:={node}"]
         # In a group of its own: Ctrl-C at the terminal must not end it before the chair has stopped.
-        self._process = subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL)
+        self._process = children.start(command, start_new_session=True, stdout=subprocess.DEVNULL)
         self._wait_until_heard([rospy.resolve_name(topic) for topic in topics], f"/{node}")
 
     def check(self) -> None:
@@ -59,7 +59,7 @@ class Recorder:
         """End the bag. Raise Error when it was not written."""
         if self._process.poll() is not None:
             self.check()
-        interrupt(self._process, _PATIENCE)
+        children.interrupt(self._process, _PATIENCE)
         # `rosbag` is a wrapper, which may end before the recorder itself has given the bag its name.
         deadline = time.monotonic() + _PATIENCE
         while self._named(".active") and time.monotonic() < deadline:

@@ -120,6 +120,18 @@ def _sensorless(world: World) -> Iterator[Finding]:
             )
 
 
+def _twins(world: World) -> Iterator[Finding]:
+    first: dict[str, Model] = {}
+    for robot, _ in _positions(world):
+        twin = first.setdefault(robot.name, robot) if robot.name else robot
+        if twin is not robot:
+            yield Finding(
+                robot.place,
+                f"{_name(robot)} has the name of the robot at {twin.place}: with -u stageros refuses it, because their "
+                "topics and frames would be the same",
+            )
+
+
 def _rangers(world: World) -> Iterator[Finding]:
     for model in world.models:
         if not isinstance(model.device, Ranger):
@@ -196,6 +208,7 @@ _RULES: tuple[Callable[[World], Iterator[Finding]], ...] = (
     _speed,
     _localization,
     _sensorless,
+    _twins,
     _rangers,
     _intangible,
     _slopes,

@@ -17,6 +17,7 @@
 #include <optional>
 #include <utility>
 
+#include "clock_watch.h"
 #include "command_line.h"
 #include "slam/basics/pose.h"
 #include "slam/localization/report.h"
@@ -325,6 +326,7 @@ int main(int argc, char** argv) {
   if (const auto code = k::answered(argc, argv, kHelp)) return *code;
   ros::init(argc, argv, "localization_node");
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
+  const k::ClockWatch clock(nh);
   try {
     LocalizationNode node(nh, k::readLocalizationNodeSettings(ros::this_node::getName()));
     ros::spin();

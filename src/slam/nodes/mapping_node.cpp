@@ -13,6 +13,7 @@
 #include <optional>
 #include <utility>
 
+#include "clock_watch.h"
 #include "command_line.h"
 #include "slam/basics/pose.h"
 #include "slam/mapping/mapper.h"
@@ -308,6 +309,7 @@ int main(int argc, char** argv) {
   ros::init(argc, argv, "mapping_node");
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });  // ros::init() sees to SIGINT only
   ros::NodeHandle nh;  // here, because ROS_FATAL is mute once the last one is gone
+  const k::ClockWatch clock(nh);
   try {
     const std::string& name = ros::this_node::getName();
     const std::string launch = ros::package::getPath("kurumaisu") + "/launch/";

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kurumaisu import children
 from kurumaisu.bench.processes import PATIENCE, cpu, memory, program
 from kurumaisu.bench.rigs.heard_scans import FIRST, LAST, Heard, Scan
 from kurumaisu.virtual_urg import Pty, Tcp, VirtualUrg, load_sensor
@@ -145,7 +146,7 @@ class Driver:
     def __init__(self, command: Sequence[str], environment: dict[str, str], log: Path, *, heard: bool = False) -> None:
         """Start it; with `heard` its output is what it measured, else it goes to the log like its errors."""
         with log.open("w") as file:
-            self.process = subprocess.Popen(
+            self.process = children.start(
                 command,
                 env=environment,
                 stdout=subprocess.PIPE if heard else file,
@@ -196,7 +197,7 @@ class Driver:
 def listening(topics: Sequence[str], environment: dict[str, str]) -> Iterator[Heard]:
     """Hear scans and diagnostics until the block ends."""
     command = [program("scan_listener"), *topics]
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+    process = children.start(command, env=environment, stdout=subprocess.PIPE, text=True)
     try:
         heard = Heard(process)
         heard.wait_ready(PATIENCE)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from kurumaisu import children
 from kurumaisu.bench.guard_rig import Rig
 from kurumaisu.bench.processes import PATIENCE, cpu, master, memory, program
 from kurumaisu.bench.table import Table
@@ -87,7 +88,7 @@ def measure(name: str, peer: str | None, loop: float, commands: float, seconds: 
             _load(loop, rig.settings if name == "guard" else None, folder, environment)
             command = [program("base_node")]
         pid = stack.enter_context(_node(command, folder, environment))
-        probe = subprocess.Popen(
+        probe = children.start(
             [program("drive_probe"), _INPUT, str(commands), str(seconds)],
             env=environment,
             stdout=subprocess.PIPE,
@@ -121,7 +122,7 @@ def _load(loop: float, guard: Path | None, folder: Path, environment: dict[str, 
 def _node(command: list[str], folder: Path, environment: dict[str, str]) -> Iterator[int]:
     """Run a node; yield its process id."""
     with (folder / "log").open("w") as log:
-        process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+        process = children.start(command, env=environment, stdout=log, stderr=log)
     try:
         time.sleep(1.0)  # what it costs to start does not count
         if process.poll() is not None:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kurumaisu import children
 from kurumaisu.bench.processes import PATIENCE, cpu, master, memory, program
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
@@ -103,9 +104,9 @@ def _measure(command: list[str], world: Path, robots: int, seconds: float, envir
     topics = ["/clock", "/tf", *(prefix + topic for prefix in prefixes for topic in (*_TOPICS, "cmd_vel"))]
     # flat out, 0.2 s of simulated time go by before a command is heard
     line = [*command, "_base_watchdog_timeout:=0", "-g", str(world)]
-    node = subprocess.Popen(line, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    node = children.start(line, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        with subprocess.Popen(
+        with children.start(
             [program("listener"), str(seconds), *topics], env=environment, stdout=subprocess.PIPE, text=True
         ) as listener:
             assert listener.stdout is not None

@@ -3,14 +3,19 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
+import time
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import rospy
 
 from kurumaisu import program
 from kurumaisu.errors import Error, failed
 from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, write_map
+from kurumaisu.ros import life
 from kurumaisu.ros.maps.messages import GridMessage, map_of
 
 _HELP = """
@@ -19,6 +24,7 @@ Save the next map as an image and its YAML file, and end.
 subscribes to:
   map  nav_msgs/OccupancyGrid
 """
+_GLANCE = 0.02  # [s]
 
 
 def main() -> int:
@@ -38,14 +44,23 @@ def main() -> int:
     options = parser.parse_args(program.words())
     if not 0 <= options.free < options.occ <= 100:
         parser.error(f"--free must be from 0 and below --occ, which is at most 100: {options.free:g}, {options.occ:g}")
-    rospy.init_node("map_saver", anonymous=True, disable_signals=True)
-    try:
-        served = map_of(rospy.wait_for_message("map", GridMessage, options.wait))
-        suffix = ".png" if options.png else ".pgm"
-        image, text = write_map(served, options.name, suffix, options.occ, options.free)
-    except rospy.ROSException:
-        print(f"map_saver: {rospy.resolve_name('map')}: no map came within {options.wait:g} s", file=sys.stderr)
+    return life.run("map_saver", partial(_save, options), anonymous=True)
+
+
+def _save(options: argparse.Namespace, node: life.Life) -> int:
+    heard: list[Any] = []
+    subscriber = rospy.Subscriber("map", GridMessage, heard.append, queue_size=1)
+    deadline = time.monotonic() + options.wait
+    while not heard and time.monotonic() < deadline:
+        if node.asked.wait(_GLANCE):
+            return node.code
+    subscriber.unregister()
+    if not heard:
+        print(f"map_saver: {subscriber.resolved_name}: no map came within {options.wait:g} s", file=sys.stderr)
         return 1
+    try:
+        suffix = ".png" if options.png else ".pgm"
+        image, text = write_map(map_of(heard[0]), options.name, suffix, options.occ, options.free)
     except Error as error:
         return failed("map_saver", error)
     print(f"written: {image}, {text}")

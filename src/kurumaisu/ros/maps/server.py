@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -16,6 +17,7 @@ from kurumaisu import program, settings
 from kurumaisu.errors import Error, one_line
 from kurumaisu.map_file import read_map
 from kurumaisu.params import shipped
+from kurumaisu.ros import life
 from kurumaisu.ros.maps.messages import message_of
 
 _HELP = """
@@ -100,13 +102,11 @@ def main() -> int:
     parser = program.node_parser("map_server", _HELP)
     parser.add_argument("map", type=Path, metavar="FILE.yaml", help="the map")
     options = parser.parse_args(program.words())
-    rospy.init_node("map_server")
-    try:
-        frame = read_settings(rospy.get_param("~", {}), rospy.get_name())
-        server = MapServer(options.map, frame)
-    except Error as error:
-        rospy.logfatal("%s", one_line(error))
-        return 1
-    rospy.spin()
+    return life.run("map_server", partial(_serve, options.map))
+
+
+def _serve(path: Path, node: life.Life) -> int:
+    server = MapServer(path, read_settings(rospy.get_param("~", {}), rospy.get_name()))
+    node.asked.wait()
     del server
     return 0

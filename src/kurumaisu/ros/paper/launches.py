@@ -15,7 +15,7 @@ from pathlib import Path
 
 import roslib.packages
 
-from kurumaisu.children import interrupt
+from kurumaisu import children
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 from kurumaisu.paper.chair import dac_line
@@ -45,11 +45,11 @@ def launch(arguments: Sequence[str], log: Path, deadline: float) -> None:
     log.parent.mkdir(parents=True, exist_ok=True)
     with log.open("w", encoding="utf-8") as stream:
         command = ["roslaunch", "-p", str(port), "kurumaisu", *arguments]
-        process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, env=environment)
+        process = children.start(command, stdout=stream, stderr=subprocess.STDOUT, env=environment)
         try:
             why = _awaited(process, arguments[0], deadline)
         finally:
-            interrupt(process, _PATIENCE)
+            children.interrupt(process, _PATIENCE)
     text = log.read_text(encoding="utf-8", errors="replace")
     if why or ("experiment: " in text and ": done, " not in text):
         tail = "\n".join(text.splitlines()[-_TAIL:])
@@ -121,7 +121,7 @@ def _board(device: Path, link: str, log: Path) -> Iterator[None]:
     if program is None:
         raise Error("virtual_dac: is not built")
     command = [program, str(device), link, "--log", str(log)]
-    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    process = children.start(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     try:
         deadline = time.monotonic() + _PATIENCE
         while not Path(link).exists():
@@ -130,7 +130,7 @@ def _board(device: Path, link: str, log: Path) -> Iterator[None]:
             time.sleep(_GLANCE)
         yield
     finally:
-        interrupt(process, _PATIENCE)
+        children.interrupt(process, _PATIENCE)
 
 
 def _rewrite(source: Path, out: Path, values: dict[tuple[str, ...], str]) -> None:

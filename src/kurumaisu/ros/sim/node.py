@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import re
-import sys
 import threading
 import time
 from collections import deque
@@ -14,10 +13,10 @@ import rospy
 from geometry_msgs.msg import Twist
 
 from kurumaisu import program
-from kurumaisu.errors import Error, one_line
+from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.params import EffectSetting
-from kurumaisu.ros import messages
+from kurumaisu.ros import life, messages
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.services import Services
@@ -99,17 +98,17 @@ class SimNode:
         """What /clock says [s]."""
         return self._now / _NS
 
-    def run(self) -> None:
-        """Simulate until ROS shuts down."""
+    def run(self, asked: threading.Event) -> None:
+        """Simulate until asked to end."""
         try:
-            self._loop()
+            self._loop(asked)
         finally:
             self._requests.close()
             self._laser.close()
 
-    def _loop(self) -> None:
+    def _loop(self, asked: threading.Event) -> None:
         self.reset()
-        while not rospy.is_shutdown():
+        while not asked.is_set():
             if self._requests:
                 self._requests.serve()
             self._view.show(self._now, self.paused, self._pacer.speed)
@@ -228,17 +227,17 @@ class SimNode:
             )
 
 
-def main() -> None:
-    """Run the node; exit with 1 and one line for bad configuration."""
+def main() -> int:
+    """Run the node; return 1 after one line for bad configuration."""
     program.no_arguments("sim_node", _HELP)
-    rospy.init_node("sim_node")
-    try:
-        values = {key: value for key, value in rospy.get_param("~", {}).items() if key != NAMESPACE}
-        settings = read_settings(values, rospy.get_name())
-        node = SimNode(settings)
-    except Error as error:
-        rospy.logfatal(one_line(error))
-        sys.exit(1)
+    return life.run("sim_node", _simulate)
+
+
+def _simulate(own: life.Life) -> int:
+    values = {key: value for key, value in rospy.get_param("~", {}).items() if key != NAMESPACE}
+    settings = read_settings(values, rospy.get_name())
+    node = SimNode(settings)
     for warning in settings.world.warnings:
         rospy.logwarn(f"SIM_WORLD_IGNORED {warning}")
-    node.run()
+    node.run(own.asked)
+    return 0

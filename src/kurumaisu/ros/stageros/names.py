@@ -43,9 +43,10 @@ def robots_of(models: Sequence[Model]) -> list[Model]:
 
 
 def names_of(models: Sequence[Model], settings: StagerosSettings, use_model_names: bool) -> list[Names]:
-    """Return the names of each robot. Raise Error for a name that ROS does not take, naming its place."""
+    """Return the names of each robot. Raise Error for a name that ROS does not take, or that two have, with places."""
     robots = robots_of(models)
     prefixes = [_prefix(number, robot, use_model_names) for number, robot in enumerate(robots)]
+    _refuse_twins(robots, prefixes)
     if settings.robot_prefix != "always" and not use_model_names and len(robots) == 1:
         prefixes = [None]
     if settings.robot_prefix == "never":
@@ -69,6 +70,17 @@ def _prefix(number: int, robot: Model, use_model_names: bool) -> str | None:
     if not re.fullmatch(r"[A-Za-z0-9_/]+", robot.name):
         raise Error(f"{robot.place}: with -u the name must be valid in a ROS topic: {robot.name!r}")
     return robot.name
+
+
+def _refuse_twins(robots: Sequence[Model], prefixes: Sequence[str | None]) -> None:
+    first: dict[str | None, Model] = {}
+    for robot, prefix in zip(robots, prefixes, strict=True):
+        twin = first.setdefault(prefix, robot)
+        if twin is not robot:
+            raise Error(
+                f"{robot.place}: with -u its topics and frames would be those of the robot at {twin.place}: both are "
+                f"{prefix!r}: robots must have different names"
+            )
 
 
 def _only_sensor_carrier_plain(

@@ -4,16 +4,17 @@
 from __future__ import annotations
 
 import argparse
-import signal
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import rospy
 
 from kurumaisu import program
 from kurumaisu.errors import Error
+from kurumaisu.ros import life
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.stageros.services import StagerosServices
@@ -85,35 +86,24 @@ def main() -> int:
     if arguments is None:
         print(_USAGE)
         return 255
-    stopped = _signals()
     # rostime stays off: with /use_sim_time rospy would read back every /clock that we send
-    rospy.init_node("stageros", disable_rostime=True, disable_signals=True)
-    try:
-        settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
-        values = {name: str(value) for name, value in settings.parameters.items()}
-        world = load_world(arguments.world, image_extents=settings.image_extents, values=values)
-        speed = _speed(world, settings, arguments.headless)
-        session = Session(world, settings, arguments.use_model_names)
-        for warning in (*settings.unknown, *session.warnings):
-            rospy.logwarn(f"STAGEROS_WORLD {warning}")
-    except Error as error:
-        rospy.logfatal(str(error))
-        return 1
+    return life.run("stageros", partial(_simulate, arguments), rostime=False)
+
+
+def _simulate(arguments: Arguments, own: life.Life) -> int:
+    settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
+    values = {name: str(value) for name, value in settings.parameters.items()}
+    world = load_world(arguments.world, image_extents=settings.image_extents, values=values)
+    speed = _speed(world, settings, arguments.headless)
+    session = Session(world, settings, arguments.use_model_names)
+    for warning in (*settings.unknown, *session.warnings):
+        rospy.logwarn(f"STAGEROS_WORLD {warning}")
     rospy.set_param("/use_sim_time", True)
     requests = Requests()
     pacer = Pacer(speed)
     StagerosServices(session, requests, pacer)
-    _run(session, requests, pacer, world, stopped)
-    rospy.signal_shutdown("the simulation has ended")
+    _run(session, requests, pacer, world, own.asked)
     return 0
-
-
-def _signals() -> threading.Event:
-    """Return what SIGINT and SIGTERM set: rospy's own handler hangs when it comes while a topic is registered."""
-    stopped = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda _number, _frame: stopped.set())
-    return stopped
 
 
 def _speed(world: World, settings: StagerosSettings, headless: bool) -> float:
@@ -129,8 +119,8 @@ def _speed(world: World, settings: StagerosSettings, headless: bool) -> float:
 
 
 def _run(session: Session, requests: Requests, pacer: Pacer, world: World, stopped: threading.Event) -> None:
-    """Simulate until it is stopped, ROS shuts down, or the world's quit_time has come."""
-    while not (stopped.is_set() or rospy.is_shutdown()):
+    """Simulate until it is stopped, or the world's quit_time has come."""
+    while not stopped.is_set():
         if requests:
             requests.serve()
             session.show(pacer.speed)

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -13,15 +11,12 @@ import rospy
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool
 
-from kurumaisu import program, settings
-from kurumaisu.errors import Error
+from kurumaisu import settings
 from kurumaisu.params import shipped
 from kurumaisu.settings import Section
 from kurumaisu.teleop import REST, HandCommand
 
 _LAST_WORDS = 10  # of rest, or of a dead-man that was let go, in case one is not heard
-
-_LAST_PATIENCE = 1.0  # [s] for the last words
 
 T = TypeVar("T")
 
@@ -70,39 +65,3 @@ class Hand:
         left = _LAST_WORDS if active else max(self._last_words[what] - 1, 0)
         self._last_words[what] = left
         return left > 0
-
-
-class Ending:
-    """Lets a node say its last words however it is told to end: rospy would close the topics first, or go on."""
-
-    def __init__(self) -> None:
-        """Take over the signals; the node was made with disable_signals."""
-        self.asked = threading.Event()
-        self._done = threading.Event()
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, lambda *_: self.asked.set())
-        rospy.on_shutdown(self._wait)
-
-    def done(self) -> None:
-        """Close the topics: the last word is said."""
-        self._done.set()
-        rospy.signal_shutdown("the end")
-
-    def _wait(self) -> None:
-        self.asked.set()
-        self._done.wait(_LAST_PATIENCE)
-
-
-def run(name: str, help_text: str, node: Callable[[Ending], None]) -> int:
-    """Run a node until it returns. Return 1 after an Error, which is logged. help_text: as of program.node_parser."""
-    program.no_arguments(name, help_text)
-    rospy.init_node(name, disable_signals=True)
-    ending = Ending()
-    try:
-        node(ending)
-    except Error as error:
-        rospy.logfatal("%s", error)
-        return 1
-    finally:
-        ending.done()
-    return 0

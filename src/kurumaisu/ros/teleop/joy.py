@@ -9,7 +9,9 @@ import time
 import rospy
 from sensor_msgs.msg import Joy
 
-from kurumaisu.ros.teleop.common import Ending, Hand, overlaid, run
+from kurumaisu import program
+from kurumaisu.ros import life
+from kurumaisu.ros.teleop.common import Hand, overlaid
 from kurumaisu.teleop.stick import Stick, read_stick
 
 _HELP = """
@@ -31,10 +33,11 @@ _WARNING_PERIOD = 5.0  # [s]
 
 def main() -> int:
     """Drive by a joystick until shut down; rest is the last command. Return 1 for settings that make no sense."""
-    return run("teleop_joy", _HELP, _drive)
+    program.no_arguments("teleop_joy", _HELP)
+    return life.run("teleop_joy", _drive)
 
 
-def _drive(ending: Ending) -> None:
+def _drive(own: life.Life) -> int:
     rate, stick_settings = overlaid("teleop_joy.yaml", read_stick)
     stick, lock = Stick(stick_settings), threading.Lock()
 
@@ -49,8 +52,9 @@ def _drive(ending: Ending) -> None:
 
     hand = Hand("joy_vel")
     rospy.Subscriber("joy", Joy, on_joy, queue_size=1, tcp_nodelay=True)
-    while not ending.asked.wait(1 / rate):
+    while not own.asked.wait(1 / rate):
         with lock:
             command = stick.command(time.monotonic())
         hand.say(command)
     hand.rest(1 / rate)
+    return 0

@@ -9,8 +9,10 @@ from pathlib import Path
 import rospy
 from sensor_msgs.msg import Joy
 
+from kurumaisu import program
 from kurumaisu.errors import Error
-from kurumaisu.ros.teleop.common import Ending, overlaid, run
+from kurumaisu.ros import life
+from kurumaisu.ros.teleop.common import overlaid
 from kurumaisu.settings import Section
 from kurumaisu.teleop.reader import JoystickReader, open_device
 
@@ -36,7 +38,8 @@ class _Settings:
 
 def main() -> int:
     """Publish joy until shut down; nothing while the device is away. Return 1 for settings that make no sense."""
-    return run("joystick", _HELP, _serve)
+    program.no_arguments("joystick", _HELP)
+    return life.run("joystick", _serve)
 
 
 def _read(section: Section) -> _Settings:
@@ -47,28 +50,29 @@ def _read(section: Section) -> _Settings:
     )
 
 
-def _serve(ending: Ending) -> None:
+def _serve(own: life.Life) -> int:
     rate, known = overlaid("joystick.yaml", _read)
     publisher = rospy.Publisher("joy", Joy, queue_size=1, tcp_nodelay=True)
-    while not ending.asked.is_set():
+    while not own.asked.is_set():
         try:
             reader = JoystickReader(open_device(known.device), known.dead_zone)
         except Error as error:
             rospy.logwarn_throttle(10.0, f"JOYSTICK_AWAY: {known.device}: {error}")
-            ending.asked.wait(known.retry)
+            own.asked.wait(known.retry)
             continue
         rospy.loginfo("%s: here", known.device)
-        _publish_while_here(reader, publisher, known.device, 1 / rate, ending)
+        _publish_while_here(reader, publisher, known.device, 1 / rate, own)
+    return 0
 
 
 def _publish_while_here(
-    reader: JoystickReader, publisher: rospy.Publisher, device: Path, period: float, ending: Ending
+    reader: JoystickReader, publisher: rospy.Publisher, device: Path, period: float, own: life.Life
 ) -> None:
     try:
-        while not ending.asked.is_set():
+        while not own.asked.is_set():
             reader.poll()
             publisher.publish(_message(reader.joystick.axes, reader.joystick.buttons))
-            ending.asked.wait(period)
+            own.asked.wait(period)
     except Error as error:
         rospy.logwarn("JOYSTICK_LOST: %s: %s", device, error)
         released = _message([0.0] * len(reader.joystick.axes), [0] * len(reader.joystick.buttons))

@@ -7,7 +7,9 @@ import os
 import sys
 import time
 
-from kurumaisu.ros.teleop.common import Ending, Hand, overlaid, run
+from kurumaisu import program
+from kurumaisu.ros import life
+from kurumaisu.ros.teleop.common import Hand, overlaid
 from kurumaisu.teleop.keys import HELP, Keys, KeySettings, read_keys
 from kurumaisu.teleop.terminal import Terminal
 
@@ -26,25 +28,27 @@ More: docs/robot.md
 
 def main() -> int:
     """Drive by keys until Ctrl-C or the terminal's end; rest is the last command. Return 1 without a terminal."""
-    return run("teleop_keyboard", _HELP, _drive)
+    program.no_arguments("teleop_keyboard", _HELP)
+    return life.run("teleop_keyboard", _drive)
 
 
-def _drive(ending: Ending) -> None:
+def _drive(own: life.Life) -> int:
     rate, key_settings = overlaid("teleop_keyboard.yaml", read_keys)
     with Terminal(sys.stdin.fileno()) as terminal:
         hand = Hand("key_vel")
         try:
-            _follow(terminal, hand, key_settings, 1 / rate, ending)
+            _follow(terminal, hand, key_settings, 1 / rate, own)
         finally:
             hand.rest(1 / rate)
             _show("\n")
+    return 0
 
 
-def _follow(terminal: Terminal, hand: Hand, key_settings: KeySettings, period: float, ending: Ending) -> None:
+def _follow(terminal: Terminal, hand: Hand, key_settings: KeySettings, period: float, own: life.Life) -> None:
     _show(HELP.format(timeout=key_settings.timeout, percent=100 * key_settings.step) + "\n")
     keys = Keys(key_settings)
     due = time.monotonic()
-    while not ending.asked.is_set():
+    while not own.asked.is_set():
         typed = terminal.keys(max(due - time.monotonic(), 0.0))
         if typed is None:
             return

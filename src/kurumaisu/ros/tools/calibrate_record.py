@@ -3,26 +3,25 @@
 
 from __future__ import annotations
 
-import signal
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-import rosgraph
 import rospy
 from nav_msgs.msg import Odometry
 
 from kurumaisu.critic.values.recording import Run, Series
-from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper.chair import advice
 from kurumaisu.paper.options import PaperOptions
+from kurumaisu.ros import life
 from kurumaisu.ros.recorder import Recorder
 from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.types import FloatArray
 
-_TOPICS = ("voltages", "ground_truth", "odom", "scan", "cmd_vel_out", "tf_static")
+_TOPICS = ("voltages", "ground_truth", "odom", "scan", "cmd_vel_out", "/tf_static")
 _GLANCE = 0.05  # [s] of wall time
 _ROWS = 10**6  # of a topic at most, the newest: hours
 
@@ -78,20 +77,18 @@ def _table(rows: list[tuple[float, ...]]) -> FloatArray:
 
 
 def record(bag: Path, options: PaperOptions, every: float, split: int) -> int:
-    """Record until nothing is missing, or Ctrl-C; return 0, or 1 when something is. Raise Error as Recorder does."""
-    if not rosgraph.is_master_online():
-        raise Error(f"no ROS master at {rosgraph.get_master_uri()}: start robot.launch, or sim.launch, first")
-    rospy.init_node("calibrate", anonymous=True, disable_signals=True)
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    """Record until nothing is missing, or Ctrl-C; return 0, or 1 when something is. What Recorder refuses is logged."""
+    return life.run("calibrate", partial(_record, bag, options, every, split), anonymous=True)
+
+
+def _record(bag: Path, options: PaperOptions, every: float, split: int, own: life.Life) -> int:
     heard = Received()
     recorder = Recorder(bag, _TOPICS, split=split)
     said: list[str] = []
     missing = ["nothing was heard yet"]
     try:
         due = time.monotonic() + every
-        while missing and not stop.is_set() and not rospy.is_shutdown():
+        while missing and not own.asked.is_set():
             if time.monotonic() >= due:
                 recorder.check()
                 missing = _look(heard, options)

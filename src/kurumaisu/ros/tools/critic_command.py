@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
 
+from kurumaisu import program
 from kurumaisu.errors import Error, failed
 
 # Other commands, by the first word, and where their main is.
@@ -17,6 +18,7 @@ _PARTS = {
     "rehearse": "kurumaisu.critic.experiment.rehearse",
     "watch": "kurumaisu.ros.tools.critic_watch",
 }
+_NODES = ("experiment", "watch")
 
 
 def main() -> int:
@@ -24,6 +26,8 @@ def main() -> int:
     # The same sums in the same order, however many cores there are and however many recordings run at once.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     name, arguments = (sys.argv[1] if len(sys.argv) > 1 else ""), sys.argv[2:]
+    if name in _NODES:
+        program.die_of_ctrl_c()
     if name in _PARTS:
         command: Callable[[Sequence[str]], int] = import_module(_PARTS[name]).main
         return _told(command, arguments)

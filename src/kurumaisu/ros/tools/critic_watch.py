@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""critic watch: the verdict on the last minutes of a running robot, on /diagnostics."""
+"""critic watch: the verdict on the last minutes of a running robot, on diagnostics."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ from kurumaisu.critic.values.selection import effect_ids
 from kurumaisu.errors import Error, one_line
 from kurumaisu.msg import Voltages
 from kurumaisu.params import load_model, shipped
+from kurumaisu.ros import life
 
 _TOPICS = {
     "command": ("cmd_vel", Twist),
@@ -59,13 +60,13 @@ _EPILOG = """\
 subscribes to:
   cmd_vel, voltages, ground_truth, odom, scan, battery, temperature
 publishes:
-  /diagnostics
+  diagnostics
 
 examples:
   critic watch
   critic watch --window 300 --every 60 ground_truth:=/mocap/pose
   critic watch --meta recordings/office/meta.yaml
-  rostopic echo /diagnostics
+  rostopic echo diagnostics
 
 More: docs/critic.md"""
 
@@ -85,7 +86,7 @@ class CriticWatch:
         self._answered: float | None = None  # ROS time [s]
         self._number = 0
         self._problems: tuple[str, ...] = ()
-        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
+        self._publisher = rospy.Publisher("diagnostics", DiagnosticArray, queue_size=1)
         self._subscribers = [
             rospy.Subscriber(name, kind, partial(self._hear, part), queue_size=100)
             for part, (name, kind) in _TOPICS.items()
@@ -211,17 +212,17 @@ def main(arguments: Sequence[str]) -> int:
     meta = read_meta(options.meta) if options.meta is not None else Meta()
     model = options.model or meta.model or shipped("launch/md100.yaml")
     load_model(model)
-    rospy.init_node("critic_watch")
-    watch = CriticWatch(options, model, meta, ids)
-    try:
-        while not rospy.is_shutdown():
-            watch.step()
-            time.sleep(_PERIOD)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        watch.close()
-    return 0
+
+    def node(own: life.Life) -> int:
+        watch = CriticWatch(options, model, meta, ids)
+        try:
+            while not own.asked.wait(_PERIOD):
+                watch.step()
+        finally:
+            watch.close()
+        return 0
+
+    return life.run("critic_watch", node)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -9,6 +9,7 @@ from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 
 from kurumaisu import program
+from kurumaisu.ros import life
 
 _HELP = """
 Publish the transform that each odometry message holds: for recordings whose tf
@@ -24,10 +25,13 @@ publishes:
 def main() -> int:
     """Publish a transform for every message on odom, until shut down."""
     program.no_arguments("odom_to_tf", _HELP)
-    rospy.init_node("odom_to_tf")
+    return life.run("odom_to_tf", _serve)
+
+
+def _serve(node: life.Life) -> int:
     broadcaster = tf2_ros.TransformBroadcaster()
     rospy.Subscriber("odom", Odometry, lambda odom: broadcaster.sendTransform(_transform(odom)), queue_size=100)
-    rospy.spin()
+    node.asked.wait()
     return 0
 
 

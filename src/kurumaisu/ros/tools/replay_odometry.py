@@ -18,6 +18,7 @@ from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper.chair import dead_reckoning
 from kurumaisu.paper.chair.dead_reckoning import Odom, Put, Reckoner
+from kurumaisu.ros import life
 
 _HELP = """
 Compute base_node's odometry again, from the voltages of a bag that is played.
@@ -90,9 +91,12 @@ class _Again:
 def main() -> int:
     """Publish odom, until shut down."""
     program.no_arguments("replay_odometry", _HELP)
-    rospy.init_node("replay_odometry")
+    return life.run("replay_odometry", _serve)
+
+
+def _serve(node: life.Life) -> int:
     again = _Again()
-    rospy.spin()
+    node.asked.wait()
     del again
     return 0
 

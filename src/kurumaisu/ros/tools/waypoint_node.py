@@ -12,7 +12,7 @@ from nav_msgs.msg import Odometry
 
 from kurumaisu import program, settings
 from kurumaisu.driving import Route, RouteFollower, read_route
-from kurumaisu.errors import Error, one_line
+from kurumaisu.ros import life
 from kurumaisu.ros.rotation import planar
 
 _HELP = """
@@ -62,13 +62,12 @@ class WaypointNode:
 def main() -> int:
     """Drive the route in the private parameters; return 1 when it is not done by its deadline."""
     program.no_arguments("waypoint_node", _HELP)
-    rospy.init_node("waypoint_node")
-    try:
-        node = WaypointNode(read_route(settings.Section(_own_parameters(), rospy.get_name())))
-    except Error as error:
-        rospy.logfatal("%s", one_line(error))
-        return 1
-    while not rospy.is_shutdown() and not node.finished.wait(0.1):
+    return life.run("waypoint_node", _drive)
+
+
+def _drive(own: life.Life) -> int:
+    node = WaypointNode(read_route(settings.Section(_own_parameters(), rospy.get_name())))
+    while not own.asked.is_set() and not node.finished.wait(0.1):
         pass
     if node.late:
         print(f"{rospy.get_name()}: the route was not done within its deadline", file=sys.stderr)

@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-import sys
-
 import rospy
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from kurumaisu import program
-from kurumaisu.errors import Error, one_line
+from kurumaisu.ros import life
 from kurumaisu.ros.viewer.settings import read_settings
 from kurumaisu.ros.viewer.source import RosSource
 from kurumaisu.viewer.hub import Hub
@@ -41,20 +39,19 @@ More: docs/viewer.md
 """
 
 
-def main() -> None:
-    """Run the node; exit with 1 and one line for bad configuration or a port that is taken."""
+def main() -> int:
+    """Run the node; return 1 after one line for bad configuration or a port that is taken."""
     program.no_arguments("viewer", _HELP)
     # rostime stays off: it would hear every /clock of a simulator, though nobody looks
-    rospy.init_node("viewer_node", disable_rostime=True)
-    try:
-        settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
-        hub = Hub()
-        source = RosSource(hub, settings)
-        server = Server(settings.server, hub, source, settings.control)
-        server.start()
-    except Error as error:
-        rospy.logfatal(one_line(error))
-        sys.exit(1)
+    return life.run("viewer_node", _serve, rostime=False)
+
+
+def _serve(own: life.Life) -> int:
+    settings = read_settings(rospy.get_param("~", {}), rospy.get_name())
+    hub = Hub()
+    source = RosSource(hub, settings)
+    server = Server(settings.server, hub, source, settings.control)
+    server.start()
 
     def new_token(_request: TriggerRequest) -> TriggerResponse:
         # Who reaches this service can publish commands, too: nothing is given away.
@@ -74,9 +71,10 @@ def main() -> None:
         print(f"viewer, with control (the link works once): {server.new_address()}")
     print(f"viewer, view only: {server.address}", flush=True)
     try:
-        source.run(settings.server.rate)
+        source.run(settings.server.rate, own.asked)
     finally:
-        for service in services:
-            service.shutdown()
         source.close()
         server.close()
+        for service in services:
+            service.shutdown()
+    return 0

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from kurumaisu.children import interrupt
+from kurumaisu import children
 from kurumaisu.errors import Error
 from kurumaisu.viewer.source import Outcome
 
@@ -53,7 +53,7 @@ class BagRecorder:
             raise Error(f"{self._folder}: {error.strerror}") from error
         self._bag = self._folder.resolve() / time.strftime("%Y-%m-%d-%H-%M-%S.bag")
         # In a session of its own: Ctrl-C at the terminal reaches it by our close only, which waits for the bag.
-        self._process = subprocess.Popen(
+        self._process = children.start(
             ["roslaunch", "kurumaisu", "record.launch", f"bag:={self._bag}"],
             start_new_session=True,
             stdout=subprocess.DEVNULL,
@@ -77,7 +77,7 @@ class BagRecorder:
     def _stop(self) -> None:
         process, self._process = self._process, None
         if process is not None:
-            interrupt(process, _PATIENCE)
+            children.interrupt(process, _PATIENCE)
 
     def _wait(self, condition: Callable[[], bool]) -> None:
         deadline = time.monotonic() + _PATIENCE

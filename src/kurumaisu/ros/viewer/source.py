@@ -81,10 +81,10 @@ class RosSource:
             if self._sticks is not None:
                 self._sticks.rest()
 
-    def run(self, rate: float) -> None:
-        """Show a moment at a rate [Hz], while somebody looks, until ROS ends."""
+    def run(self, rate: float, asked: threading.Event) -> None:
+        """Show a moment at a rate [Hz], while somebody looks, until asked to end."""
         period, due = 1 / rate, time.monotonic()
-        while not rospy.is_shutdown():
+        while not asked.is_set():
             if self._watched.is_set() != self._open:
                 self._turn(self._watched.is_set())
             if not self._open:

@@ -102,7 +102,7 @@ class PlanarTransforms:
 
     def open(self) -> None:
         """Listen."""
-        self._subscriber = rospy.Subscriber("tf", rospy.AnyMsg, self._hear, queue_size=10, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber("/tf", rospy.AnyMsg, self._hear, queue_size=10, tcp_nodelay=True)
 
     def close(self) -> None:
         """Listen no longer."""

@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from kurumaisu import children
 from kurumaisu.bench.faults.base.cases import Case, Seen
 from kurumaisu.bench.faults.base.chain import Chain, Setup
 from kurumaisu.bench.guard_rig import changed
@@ -65,7 +66,7 @@ def _guard(stage: Chain, guard: Mapping[str, Any], device: Mapping[str, Any]) ->
         paths.append(stage.rig.folder / f"another_{name}.yaml")
         paths[-1].write_text(yaml.safe_dump(changed(tree, changes)))
     command = [program("guard"), str(paths[1]), str(paths[0])]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+    with children.start(command, stderr=subprocess.PIPE, text=True) as process:
         try:
             return process.wait(1.0), process.communicate()[1]
         except subprocess.TimeoutExpired:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from kurumaisu import children
 from kurumaisu.bench.processes import PATIENCE, free_port
 from kurumaisu.errors import Error
 
@@ -49,7 +50,7 @@ class Graph:
     def run(self, command: list[str], **options: Any) -> subprocess.Popen[str]:
         """Start a process; it is killed at the end, if it still runs."""
         environment = self.environment | options.pop("environment", {})
-        process = subprocess.Popen(command, env=environment, text=True, **options)
+        process = children.start(command, env=environment, text=True, **options)
         self._stack.callback(end, process)
         return process
 

@@ -18,6 +18,7 @@ from typing import Any
 
 import yaml
 
+from kurumaisu import children
 from kurumaisu.bench.processes import PATIENCE, master, running
 from kurumaisu.bench.speed.stageros import world_of
 from kurumaisu.bench.speed.viewer.page import Page
@@ -128,7 +129,7 @@ def rig_of(simulator: str, robots: int, clocked: Path | None = None) -> Iterator
         subprocess.run(["rosparam", "load", str(parameters)], env=environment, check=True)
         with running(command, environment=environment) as one, running(viewer, environment=environment) as other:
             questions = _ASK.format(pause=f"{services}pause", simulator=one.pid, viewer=other.pid, patience=PATIENCE)
-            with subprocess.Popen(
+            with children.start(
                 [sys.executable, "-c", questions],
                 env=environment,
                 stdin=subprocess.PIPE,
@@ -157,6 +158,7 @@ def _chair() -> dict[str, Any]:
         "laser": "direct",
         "laser_port": "urg",
         "image_extents": False,
+        "base_frame": "base_link",
         "seed": 1,
         "speed": 0.0,
     }
@@ -171,6 +173,8 @@ def _viewer(simulator: str) -> dict[str, Any]:
         "control": False,
         "simulator": simulator,
         "base": "none",
+        "odom_frame": "odom",
+        "base_frame": "base_link",
         "drive": {**shown["drive"], "topic": "none"},
         "model": str(shipped("launch/md100.yaml")),
     }
