@@ -75,13 +75,14 @@ CPP_RULES = [
     Rule(
         r"(?!.*_node\.cpp|kurumaisu/bench/drivers/|.*/messages\.(cpp|h)|params\.h"
         r"|base/node/((command|odometry|diagnostics)_(in|out)put|limits_server|master_watch|stop_request|topic_dac)\.(cpp|h)"
-        r"|slam/nodes/((mapping_output|scan_feed)\.(cpp|h)|mapping_parameters\.h))",
+        r"|plausible/transform_input\.(cpp|h)|slam/nodes/((mapping_output|scan_feed)\.(cpp|h)|mapping_parameters\.h))",
         ROS_CPP,
         "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, params.h, and peers of benchmarks",
     ),
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
     Rule(r"(?!.*bindings(\.(cpp|h)|/))", r"<pybind11/", "pybind11 only in bindings"),
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
+    Rule(r"plausible/", r'"(?!model/|plausible/|bindings\.h)', "what makes sense rests on the equations only"),
     Rule(r"follow/", r'"(?!follow/|bindings\.h)', "following rests on nothing"),
     Rule(r"scip/", r'"(?!scip/)', "the protocol rests on nothing"),
     Rule(r"guard/", rf'"(?!dac/|guard/|yaml\.h|{SHARED})', "the guard rests on the D/A converter only"),
