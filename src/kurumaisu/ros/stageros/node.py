@@ -93,6 +93,7 @@ def main() -> int:
         values = {name: str(value) for name, value in settings.parameters.items()}
         world = load_world(arguments.world, image_extents=settings.image_extents, values=values)
         speed = _speed(world, settings, arguments.headless)
+        pacer = Pacer(speed)
         session = Session(world, settings, arguments.use_model_names)
         for warning in (*settings.unknown, *session.warnings):
             rospy.logwarn(f"STAGEROS_WORLD {warning}")
@@ -101,7 +102,6 @@ def main() -> int:
         return 1
     rospy.set_param("/use_sim_time", True)
     requests = Requests()
-    pacer = Pacer(speed)
     StagerosServices(session, requests, pacer)
     _run(session, requests, pacer, world, stopped)
     rospy.signal_shutdown("the simulation has ended")
@@ -138,10 +138,12 @@ def _run(session: Session, requests: Requests, pacer: Pacer, world: World, stopp
             session.show(pacer.speed)
             requests.wait(0.1)
             continue
+        if not pacer.wait(requests):
+            continue
         session.step()
         session.show(pacer.speed)  # before the pause: a step that is due when its scans are noted is due when shown
         if 0 < world.quit_time <= session.time:
             rospy.loginfo(f"{world.path}: quit_time {world.quit_time:g} s is reached")
             break
-        pacer.wait(world.interval)
+        pacer.step(world.interval)
     requests.close()

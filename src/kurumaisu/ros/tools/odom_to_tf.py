@@ -9,6 +9,9 @@ from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 
 from kurumaisu import program
+from kurumaisu._core import frame_of
+from kurumaisu.ros.inbox import seconds_of, subscribe
+from kurumaisu.ros.rotation import normed, pose_of
 
 _HELP = """
 Publish the transform that each odometry message holds: for recordings whose tf
@@ -26,15 +29,21 @@ def main() -> int:
     program.no_arguments("odom_to_tf", _HELP)
     rospy.init_node("odom_to_tf")
     broadcaster = tf2_ros.TransformBroadcaster()
-    rospy.Subscriber("odom", Odometry, lambda odom: broadcaster.sendTransform(_transform(odom)), queue_size=100)
+    send = broadcaster.sendTransform
+    heard = subscribe("odom", Odometry, lambda odom: send(_transform(odom)), "ODOM_TO_TF_DROPPED", queue_size=100)
     rospy.spin()
+    del heard
     return 0
 
 
 def _transform(odom: Odometry) -> TransformStamped:
-    transform = TransformStamped(header=odom.header, child_frame_id=odom.child_frame_id)
+    """Return it. Raise Error unless it makes sense, for one transform of nonsense may keep all later ones out of tf."""
+    seconds_of(odom)
     pose = odom.pose.pose
+    pose_of(pose)
+    transform = TransformStamped(header=odom.header, child_frame_id=frame_of(odom.child_frame_id))
+    transform.header.frame_id = frame_of(odom.header.frame_id)
     place = transform.transform.translation
     place.x, place.y, place.z = pose.position.x, pose.position.y, pose.position.z
-    transform.transform.rotation = pose.orientation
+    transform.transform.rotation = normed(pose.orientation)
     return transform
