@@ -64,8 +64,8 @@ Eigen::Matrix3d planarOf(const boost::array<double, 36>& values) {
   return out;
 }
 
-void requireScan(const sensor_msgs::LaserScan& scan) {
-  requireStamp(scan.header.stamp);
+void requireScan(const sensor_msgs::LaserScan& scan, const ros::Time& now) {
+  requireStamp(scan.header.stamp, now);
   require(plausible::kAngle, "angle_min", scan.angle_min);
   require(plausible::kAngle, "angle_increment", scan.angle_increment);
   require(plausible::kDuration, "time_increment, times the number of readings",

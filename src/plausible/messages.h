@@ -18,6 +18,9 @@ namespace kurumaisu {
 /// A clock that much behind itself [s] was set back: a new beginning.
 constexpr double kTimeJump = 1.0;
 
+/// What is stamped farther in the future [s] is of another clock: one such transform would keep all others out of tf.
+constexpr double kOtherClock = 86400;
+
 /// [s] from one time to another, exact to the nanosecond where it is short.
 double secondsFrom(const ros::Time& from, const ros::Time& to);
 
@@ -28,7 +31,7 @@ void requireStamp(const ros::Time& stamp);
 
 /// A stamp that is not of the future by more than a while [s], as far as the clock is known: it is 0 before the first
 /// of simulated time.
-void requireStamp(const ros::Time& stamp, const ros::Time& now, double ahead);
+void requireStamp(const ros::Time& stamp, const ros::Time& now, double ahead = kOtherClock);
 
 /// x, y, yaw of a pose.
 Pose2D planarOf(const geometry_msgs::Pose& pose);
@@ -37,7 +40,7 @@ Pose2D planarOf(const geometry_msgs::Pose& pose);
 Eigen::Matrix3d planarOf(const boost::array<double, 36>& values);
 
 /// Whatever of a scan is not a reading.
-void requireScan(const sensor_msgs::LaserScan& scan);
+void requireScan(const sensor_msgs::LaserScan& scan, const ros::Time& now);
 
 /// Size, cells and origin of a map.
 void requireMap(const nav_msgs::OccupancyGrid& map);

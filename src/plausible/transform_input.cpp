@@ -11,12 +11,10 @@ namespace {
 
 constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
 constexpr std::uint32_t kQueue = 100;   // messages that may wait, as with tf2_ros
-constexpr double kAhead = 86400;        // [s] a transform stamped farther in the future is of another clock
 
 geometry_msgs::TransformStamped checked(geometry_msgs::TransformStamped transform, const ros::Time& now,
                                         bool is_static) {
-  if (!is_static) requireStamp(transform.header.stamp, now, kAhead);
-  if (is_static) requireStamp(transform.header.stamp);
+  requireStamp(transform.header.stamp, is_static ? ros::Time() : now);
   const auto& place = transform.transform.translation;
   require(plausible::kPosition, "translation.x", place.x);
   require(plausible::kPosition, "translation.y", place.y);

@@ -170,7 +170,7 @@ void LocalizationNode::advertise(ros::NodeHandle& nh) {
 
 void LocalizationNode::onOdometry(const nav_msgs::Odometry& odometry) try {
   const ros::Time stamp = odometry.header.stamp;
-  k::requireStamp(stamp);
+  k::requireStamp(stamp, ros::Time::now());
   const Eigen::Matrix3d covariance = k::planarOf(odometry.pose.covariance);
   if (!(covariance(0, 0) > 0)) return;  // it has none
   covariances_[stamp] = covariance;
@@ -225,7 +225,8 @@ void LocalizationNode::begin() {
   bad_map_.clear();
   if (!map_) return;
   try {
-    localizer_.emplace(settings_.localizer, settings_.chair, settings_.seed, k::gridOf(*map_),
+    k::OccupancyGrid grid = k::gridOf(*map_);
+    localizer_.emplace(settings_.localizer, settings_.chair, settings_.seed, std::move(grid),
                        k::planarOf(map_->info.origin));
     if (settings_.known_start) localizer_->setPose(settings_.start);
   } catch (const std::exception& error) {

@@ -29,7 +29,7 @@ ScanFeed::ScanFeed(ros::NodeHandle& nh, FeedSettings settings, Use use, Reset re
       scan_(nh.subscribe("scan", kQueue, &ScanFeed::onScan, this)) {}
 
 void ScanFeed::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) try {
-  requireScan(*scan);
+  requireScan(*scan, ros::Time::now());
   if (isOld(scan->header.stamp)) return;
   came_ = ros::SteadyTime::now();
   frame_ = frameOf(scan->header.frame_id);
