@@ -91,8 +91,8 @@ CPP_RULES = [
     ),
     Rule(
         r"laser/",
-        r'"(?!scip/|serial/|laser/|params\.h|command_line\.h)',
-        "the driver rests on the protocol and the port only",
+        r'"(?!scip/|serial/|laser/|plausible/|params\.h|command_line\.h)',
+        "the driver rests on the protocol, the port and what makes sense",
     ),
     Rule(r"serial/", rf'"(?!serial/|{SHARED})', "a port rests on nothing"),
     # a virtual board is plugged in and out as a virtual sensor is

@@ -27,7 +27,7 @@ inline constexpr Quantity kDuration{"duration", "s", -10, 10};        ///< of a 
 inline constexpr Quantity kRange{"range", "m", 0, 1000};              ///< of a laser
 inline constexpr Quantity kResolution{"resolution", "m", 1e-4, 100};  ///< edge of a map's cell
 /// Simulated seconds per second; beside 0, which means as fast as possible.
-inline constexpr Quantity kPace{"simulation speed", "1", 1e-6, 1e6};
+inline constexpr Quantity kPace{"simulation speed", "s/s", 1e-6, 1e6};
 
 inline constexpr Quantity kAll[] = {kPosition, kAngle,    kVariance, kSpeed,      kYawRate, kVoltage,
                                     kStamp,    kDuration, kRange,    kResolution, kPace};
