@@ -19,10 +19,14 @@ void bindPlausible(py::module_& m) {
         require(quantityOf(quantity), what, value);
       },
       py::arg("quantity"), py::arg("what"), py::arg("value"),
-      "Raise ValueError with what is expected and what came unless a number is in its quantity's plausible range.");
+      "Raise ValueError with what is expected and what came unless a number is in its quantity's plausible "
+      "range.");
   m.def(
-      "yaw_of", [](double x, double y, double z, double w) { return yawOf({x, y, z, w}); }, py::arg("x"),
-      py::arg("y"), py::arg("z"), py::arg("w"),
+      "yaw_of",
+      [](double x, double y, double z, double w) {
+        return yawOf({x, y, z, w});
+      },
+      py::arg("x"), py::arg("y"), py::arg("z"), py::arg("w"),
       "The yaw [rad] of a quaternion of any length. Raise ValueError for one that has none.");
   m.def("require_covariance", &requireCovariance, py::arg("covariance"),
         "Raise ValueError unless this (3, 3) can be the covariance of x, y [m], heading [rad].");

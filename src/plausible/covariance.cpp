@@ -27,8 +27,8 @@ void requireCovariance(const Eigen::Matrix3d& covariance) {
       const double other = covariance(j, i);
       if (std::abs(one - other) <= slack) continue;
       std::ostringstream text;
-      text << "covariance of " << kNames[j] << " and " << kNames[i] << ": must be the same number twice: " << other
-           << " and " << one;
+      text << "covariance of " << kNames[j] << " and " << kNames[i]
+           << ": must be the same number twice: " << other << " and " << one;
       throw std::invalid_argument(text.str());
     }
   }

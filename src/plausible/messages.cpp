@@ -43,8 +43,8 @@ void requireStamp(const ros::Time& stamp, const ros::Time& now, double ahead) {
   if (now.isZero() || secondsFrom(now, stamp) <= ahead) return;
   std::ostringstream text;
   text.precision(15);
-  text << "stamp: must be at most " << ahead << " s ahead of this clock, " << now.toSec() << " s: " << stamp.toSec()
-       << " s";
+  text << "stamp: must be at most " << ahead << " s ahead of this clock, " << now.toSec()
+       << " s: " << stamp.toSec() << " s";
   throw std::invalid_argument(text.str());
 }
 

@@ -16,13 +16,15 @@ struct Quantity {
 
 namespace plausible {
 
-inline constexpr Quantity kPosition{"position", "m", -1e7, 1e7};  ///< the earth's quarter: as far as UTM counts
-inline constexpr Quantity kAngle{"angle", "rad", -1e4, 1e4};      ///< 1600 turns; the sine still has 12 digits
-inline constexpr Quantity kVariance{"variance", "m^2 or rad^2", 0, 1e6};  ///< who knows nothing says 1e6 at most
+inline constexpr Quantity kPosition{"position", "m", -1e7,
+                                    1e7};                     ///< the earth's quarter: as far as UTM counts
+inline constexpr Quantity kAngle{"angle", "rad", -1e4, 1e4};  ///< 1600 turns; the sine still has 12 digits
+inline constexpr Quantity kVariance{"variance", "m^2 or rad^2", 0,
+                                    1e6};  ///< who knows nothing says 1e6 at most
 inline constexpr Quantity kSpeed{"speed", "m/s", -100, 100};
 inline constexpr Quantity kYawRate{"yaw rate", "rad/s", -100, 100};  ///< a gyro of 2000 deg/s ends at 35
-inline constexpr Quantity kVoltage{"voltage", "V", -30, 30};         ///< two batteries of 12 V while they charge
-inline constexpr Quantity kStamp{"stamp", "s", 0, 4e9};  ///< ros::Time ends at 4.29e9, and throws beyond
+inline constexpr Quantity kVoltage{"voltage", "V", -30, 30};  ///< two batteries of 12 V while they charge
+inline constexpr Quantity kStamp{"stamp", "s", 0, 4e9};       ///< ros::Time ends at 4.29e9, and throws beyond
 inline constexpr Quantity kDuration{"duration", "s", -10, 10};        ///< of a scan's sweep
 inline constexpr Quantity kRange{"range", "m", 0, 1000};              ///< of a laser
 inline constexpr Quantity kResolution{"resolution", "m", 1e-4, 100};  ///< edge of a map's cell

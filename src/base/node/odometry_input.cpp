@@ -14,7 +14,7 @@ namespace kurumaisu {
 namespace {
 
 constexpr double kGyroWarningPeriod = 1.0;  // [s] of throttled warnings
-constexpr std::uint32_t kGyroQueue = 100;  // samples of a gyro that is much quicker than the loop
+constexpr std::uint32_t kGyroQueue = 100;   // samples of a gyro that is much quicker than the loop
 
 std::optional<YawRate> yawRateOf(const sensor_msgs::Imu& imu, const Eigen::Vector3d& axis) {
   std::array<double, 9> covariance{};
@@ -26,7 +26,8 @@ std::optional<YawRate> yawRateOf(const sensor_msgs::Imu& imu, const Eigen::Vecto
 
 /// Apart, because the macro counts as a handful of branches.
 void warnRefused(std::uint64_t refused, const std::string& why) {
-  ROS_WARN_THROTTLE(kGyroWarningPeriod, "BASE_GYRO_REFUSED: imu: a sample, %lu so far: %s", refused, why.c_str());
+  ROS_WARN_THROTTLE(kGyroWarningPeriod, "BASE_GYRO_REFUSED: imu: a sample, %lu so far: %s", refused,
+                    why.c_str());
 }
 
 }  // namespace

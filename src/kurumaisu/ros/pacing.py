@@ -50,4 +50,4 @@ class Pacer:
 
 def checked_speed(speed: float) -> float:
     """Return a speed. Raise Error unless it is 0, as fast as possible, or makes sense."""
-    return speed if speed == 0 else require("simulation speed", "speed, if not 0 for as fast as possible", speed)
+    return speed if speed == 0 else require("simulation speed", "speed (0: as fast as possible)", speed)

@@ -63,7 +63,7 @@ constexpr double kAskPeriod = 1.0;        // [s] between two calls of static_map
 constexpr std::size_t kQueue = 100;       // odometry that may wait
 constexpr double kOdometryMemory = 10.0;  // [s] of covariances
 constexpr double kOdometryGap = 0.2;      // [s] a covariance holds for scans so near at most
-constexpr double kAhead = 10.0;         // [s] an initial pose stamped farther in the future is of another clock
+constexpr double kAhead = 10.0;  // [s] an initial pose stamped farther in the future is of another clock
 constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
 
 // Apart, because the macro counts as a handful of branches.
@@ -178,7 +178,8 @@ void LocalizationNode::onOdometry(const nav_msgs::Odometry& odometry) try {
     return std::abs(k::secondsFrom(item.first, stamp)) > kOdometryMemory;
   };
   while (is_far(*covariances_.begin())) covariances_.erase(covariances_.begin());
-  while (is_far(*covariances_.rbegin())) covariances_.erase(std::prev(covariances_.end()));  // of another time
+  while (is_far(*covariances_.rbegin()))
+    covariances_.erase(std::prev(covariances_.end()));  // of another time
 } catch (const std::invalid_argument& error) {
   warnOdometry(++refused_odometry_, error.what());
 }

@@ -49,7 +49,8 @@ inline double periodOf(Section& top, const std::string& key) {
 
 inline double readVariance(Section& top, const std::string& key) {
   const double value = top.above(key, 0);
-  if (value > plausible::kVariance.most) throw top.error(key, "must be at most 1e6: " + std::to_string(value));
+  if (value > plausible::kVariance.most)
+    throw top.error(key, "must be at most 1e6: " + std::to_string(value));
   return value;
 }
 
