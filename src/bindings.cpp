@@ -170,6 +170,7 @@ PYBIND11_MODULE(_core, m) {
   k::bindContact(m);
   k::bindBase(m);
   k::bindFollow(m);
+  k::bindPlausible(m);
   k::bindRaycast(m);
   k::bindCamera(m);
   k::bindVirtualUrg(m);

@@ -11,6 +11,7 @@ using Array = pybind11::array_t<double, pybind11::array::c_style | pybind11::arr
 
 void bindBase(pybind11::module_& m);
 void bindFollow(pybind11::module_& m);
+void bindPlausible(pybind11::module_& m);
 void bindRaycast(pybind11::module_& m);
 void bindArena(pybind11::module_& m);
 void bindCellRays(pybind11::module_& m);

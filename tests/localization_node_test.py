@@ -15,8 +15,9 @@ import rostest
 import tf2_msgs.msg
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
-from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.srv import SetMap
+from rosgraph_msgs.msg import Log
 from std_srvs.srv import Empty
 
 from kurumaisu.geometry import wrap
@@ -25,6 +26,41 @@ from kurumaisu.ros.testing.room import BEAMS, STEP, WALLS, Room, ranges_at, tran
 
 DEADLINE = 40.0  # [s] of the wall clock
 EDGE, MARGIN = 0.05, 0.525  # [m] the walls lie in the middle of their cells
+
+
+def _covariance(message, **values):
+    for place, value in values.items():
+        message.pose.covariance[int(place[1:])] = value
+
+
+def _frame(message, name):
+    message.header.frame_id = name
+
+
+def _stamp(message, ahead):
+    message.header.stamp = rospy.Time.now() + rospy.Duration(ahead)
+
+
+def _position(message, x):
+    message.pose.pose.position.x = x
+
+
+def _orientation(message, w):
+    message.pose.pose.orientation.w = w
+
+
+# What localization_node says of an initial pose, and what is wrong with it.
+BAD_POSES = {
+    "frame_id: must be map, or empty: odom": lambda m: _frame(m, "/odom"),
+    "stamp: must be at most 10 s ahead of this clock": lambda m: _stamp(m, 1000),
+    "position.x: must be a number from -1e+07 to 1e+07 m: 1e+300": lambda m: _position(m, 1e300),
+    "position.x: must be a number from -1e+07 to 1e+07 m: nan": lambda m: _position(m, np.nan),
+    "orientation: must be a quaternion of finite numbers, not all 0": lambda m: _orientation(m, 0.0),
+    "variance of x: must be a number from 0 to 1e+06 m^2 or rad^2: 1e+300": lambda m: _covariance(m, c0=1e300),
+    "variance of y: must be a number from 0 to 1e+06 m^2 or rad^2: -1": lambda m: _covariance(m, c7=-1.0),
+    "must be positive semi-definite: its least eigenvalue is -0.99": lambda m: _covariance(m, c1=1.0, c6=1.0),
+    "covariance of x and y: must be the same number twice": lambda m: _covariance(m, c1=0.005),
+}
 
 
 def room_map():
@@ -179,12 +215,60 @@ class LocalizationNode(unittest.TestCase):
         t = self.room.drive(3.0, first=t + 7 * STEP)
         self.assert_close(self.last_pose(t - 0.5))
 
+    def values(self):
+        return {item.key: item.value for item in self.status().values}
+
+    def counted(self, key, least):
+        wait_for(lambda: int(self.values()[key]) >= least, f"{least} counted as {key}", DEADLINE)
+
+    def test_7_stamps_of_another_time_are_counted_and_the_pose_stays(self):
+        odometry = rospy.Publisher("odom", Odometry, queue_size=10)
+        wait_for(odometry.get_num_connections, "odom to be heard", DEADLINE)
+        t = self.room.drive(3.0)
+        begin = len(self.poses.messages)
+        for i in range(3):
+            self.room.of_another_time(t)
+            message = Odometry()
+            message.header.stamp = rospy.Time(4294967295)
+            odometry.publish(message)
+            t = self.room.drive(1.0, first=t + STEP, frame="/laser" if i else "laser")
+        self.assert_close(self.last_pose(t - 0.5))
+        for message in self.room.of_this_test(self.poses.messages[begin:]):
+            self.assert_close(message, 0.15, 0.1)
+        for key, least in (("dropped as too old", 3), ("refused transforms", 6), ("refused odometry", 3)):
+            self.counted(key, least)
+        odometry.unregister()
+
+    def test_8_a_pose_that_makes_no_sense_is_refused_with_the_reason(self):
+        said = Topic("/rosout", Log)
+        wait_for(lambda: said.is_published, "rosout", DEADLINE)
+        last = self.room.drive(2.0)
+        refused = int(self.values()["refused initial poses"])
+        for k, (words, spoil) in enumerate(BAD_POSES.items()):
+            message = PoseWithCovarianceStamped()
+            message.header.frame_id = "/map"
+            message.pose.pose.position.x, message.pose.pose.position.y = truth(2.0)[:2]
+            message.pose.pose.orientation.w = 1.0
+            message.pose.covariance = [0.01 if i in (0, 7, 35) else 0.0 for i in range(36)]
+            spoil(message)
+            begin = len(said.messages)
+            self.initial.publish(message)
+            said.wait(lambda m, words=words: words in m.msg, words, DEADLINE, since=begin)
+            self.counted("refused initial poses", refused + k + 1)
+        last = self.room.drive(2.0, first=last + STEP)
+        self.assert_close(self.last_pose(last - 0.5))
+        said.close()
+
     def test_8_a_map_that_makes_no_sense_is_refused_and_said(self):
         bad = room_map()
         bad.data = bad.data[:-1]
         set_map = rospy.ServiceProxy("set_map", SetMap)
         assert not set_map(bad, PoseWithCovarianceStamped()).success
         self.wait_for_status(2, "LOCALIZATION_BAD_MAP")
+        bad = room_map()
+        bad.info.origin.orientation.w = np.nan
+        assert not set_map(bad, PoseWithCovarianceStamped()).success
+        self.wait_for_status(2, "LOCALIZATION_BAD_MAP: info.origin.orientation")
         good = PoseWithCovarianceStamped()
         good.pose.pose.position.x, good.pose.pose.position.y = truth(0)[:2]
         good.pose.pose.orientation.z, good.pose.pose.orientation.w = np.sin(0.8), np.cos(0.8)
@@ -201,6 +285,8 @@ class LocalizationNode(unittest.TestCase):
             ("min_particels", 30, "/bad_localization/min_particels: is not a known key"),
             ("odom_frame_id", 3, "/bad_localization/odom_frame_id: must be a string"),
             ("initial_cov_xx", 0.0, "/bad_localization/initial_cov_xx: must be above 0"),
+            ("initial_cov_xx", 1e300, "/bad_localization/initial_cov_xx: must be at most"),
+            ("initial_pose_x", 1e300, "/bad_localization/initial_pose_x: must be from -1e+07 to 1e+07: 1e+300"),
             ("save_pose_rate", 0.0, "/bad_localization/save_pose_rate: must be above 0, or -1"),
         ):
             rospy.set_param("/bad_localization", {**good, key: value})

@@ -295,6 +295,25 @@ class MappingNode(unittest.TestCase):
         self.wait_for_status(1, "MAPPING_")
         self.wait_for_pose(self.room.drive(3.0, first=t + 7 * STEP), 0.08, 0.03)
 
+    def test_6_stamps_of_another_time_are_counted_and_the_map_stays(self):
+        t = self.room.drive(3.0)
+        for i in range(3):
+            self.room.of_another_time(t)
+            t = self.room.drive(1.0, first=t + STEP, frame="/laser" if i else "laser")
+        self.wait_for_pose(t)
+        for key, least in (("dropped as too old", 3), ("refused transforms", 6), ("dropped as senseless", 6)):
+            wait_for(lambda key=key, least=least: int(self.values()[key]) >= least, f"{least} {key}", DEADLINE)
+        paths = Topic("trajectory", PathMessage)
+        wait_for(lambda: paths.last and self.room.time_of(paths.last.poses[0]) < 1.0, "the whole trajectory", DEADLINE)
+        paths.close()
+
+    def test_6_several_old_scans_begin_anew(self):
+        self.room.drive(2.0)
+        wait_for(self.mapped, "a map", DEADLINE)
+        for _ in range(3):
+            self.room.scan.publish(self.room.sweep(0.0, rospy.Time.from_sec(self.room.begin - 5.0)))
+        wait_for(lambda: not self.mapped(), "a new beginning", DEADLINE)
+
     def test_7_a_laser_upside_down_and_yawed(self):
         mount = np.array([-0.1, 0.2, 2.0])
         self.room.place_laser("under_the_seat", mount, upside_down=True)

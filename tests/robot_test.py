@@ -137,6 +137,16 @@ class Robot(unittest.TestCase):
         assert not is_neutral(self.voltages.last)
         pose.pose.orientation.w = math.nan
         assert "quaternion" in put(pose).message
+        pose.pose.orientation.w = 1.0
+        for x, variance, words in (
+            (1e308, 0.04, "position.x: must be a number from -1e+07 to 1e+07 m: 1e+308"),
+            (5.0, 1e308, "variance of x: must be"),
+            (5.0, -1.0, "variance of x: must be"),
+        ):
+            pose.pose.position.x, pose.covariance[0] = x, variance
+            answer = put(pose)
+            assert not answer.success
+            assert words in answer.message
 
 
 if __name__ == "__main__":

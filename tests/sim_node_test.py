@@ -5,6 +5,7 @@
 import math
 import subprocess
 import sys
+import time
 import unittest
 from pathlib import Path
 
@@ -13,9 +14,11 @@ import pytest
 import rospy
 import tf2_ros
 from kurumaisu.msg import Voltages
+from kurumaisu.srv import Speed
 from nav_msgs.msg import Odometry
-from rosgraph_msgs.msg import Clock
+from rosgraph_msgs.msg import Clock, Log
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Header
 from std_srvs.srv import Empty, SetBool
 
 from kurumaisu.params import load_model
@@ -127,6 +130,31 @@ class SimNodeTest(BadConfiguration, unittest.TestCase):
         turned = w * seconds
         expected = [1.5 + v / w * math.sin(turned), 2.0 + v / w * (1 - math.cos(turned)), turned]
         np.testing.assert_allclose(pose_of(rest), expected, atol=1e-9)
+
+    def test_voltages_that_make_no_sense_are_refused_and_the_next_good_ones_used(self):
+        said = Topic("/rosout", Log)
+        wait_for(lambda: said.is_published, "rosout")
+        start = self.reset() + rospy.Duration(4)
+        for volts in (1e308, -1e30, math.nan):
+            self.voltages.publish(Voltages(Header(stamp=start), volts, 0.0, 2.5, 0.0, 0.0))
+        self.voltages.publish(Voltages(Header(stamp=rospy.Time(4294967295)), 0.0, 0.0, 2.5, 0.0, 0.0))
+        self.send(start, 0.2, 0.0)
+        moving = self.truth.wait(lambda m: m.header.stamp > start + rospy.Duration(1), "the truth after them")
+        assert moving.twist.twist.linear.x == pytest.approx(0.2, abs=1e-9)
+        said.wait(lambda m: "SIM_VOLTAGES_DROPPED /voltages: refused, 1 so far: translation: " in m.msg, "why", since=0)
+        said.close()
+
+    def test_a_slow_speed_can_be_undone(self):
+        speed = rospy.ServiceProxy("speed", Speed)
+        rospy.wait_for_service("speed", PATIENCE)
+        assert not speed(1e-300).success
+        assert "speed (0: as fast as possible): must be" in speed(math.nan).message
+        assert speed(1e-6).success
+        begin = time.monotonic()
+        assert speed(4.0).success
+        assert time.monotonic() - begin < 5
+        last = self.clock.wait(lambda _: True, "the clock").clock
+        self.clock.wait(lambda m: m.clock > last + rospy.Duration(1), "time to go on")
 
     def test_silence_holds_the_last_voltages(self):
         start = self.reset() + rospy.Duration(0, 500_000_000)

@@ -71,7 +71,7 @@ class Services(Case):
         assert not nobody.success
         assert "'nobody'" in nobody.message
         bad = geometry_msgs.msg.Pose()  # an orientation of zeros is none
-        assert "pose: must be finite" in self.ask("set_pose", SetPose, "era", bad).message
+        assert "orientation: must be" in self.ask("set_pose", SetPose, "era", bad).message
         assert (
             "'target'"
             in self.ask("spawn", Spawn, "era", "target", geometry_msgs.msg.Pose(None, quaternion_of(0))).message

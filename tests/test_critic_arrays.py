@@ -104,7 +104,19 @@ def test_a_window_stays_within_its_memory_and_begins_anew_when_the_clock_is_set_
     window.add("scan", 998.5, np.zeros(682))  # late, no more
     assert window.heard("scan").rows > 10
     window.add("scan", 5.0, np.zeros(682))
-    assert window.heard("scan") == Heard(1, 0.0, 5.0)
+    window.add("scan", 1000.0, np.zeros(682))
+    window.add("scan", 5.0, np.zeros(682))  # single ones are left out
+    assert window.heard("scan").newest == 1000.0
+    for t in (5.1, 5.2):
+        window.add("scan", t, np.zeros(682))
+    assert window.heard("scan") == Heard(1, 0.0, 5.2)
+
+
+def test_one_row_of_the_future_does_not_keep_a_window_empty():
+    window = Window(("scan",), 10.0, 100_000)
+    for t in (1.0, 2.0, 1e6, 3.0, 4.0, 5.0, 6.0):
+        window.add("scan", t, np.zeros(10))
+    assert window.heard("scan") == Heard(2, 1.0, 6.0)
 
 
 def test_a_rolling_verdict_outlives_its_process():

@@ -76,13 +76,14 @@ CPP_RULES = [
     Rule(
         r"(?!.*_node\.cpp|kurumaisu/bench/drivers/|.*/messages\.(cpp|h)|params\.h|clock_watch\.h"
         r"|base/node/((command|odometry|diagnostics)_(in|out)put|limits_server|host_gate|master_watch|stop_request|topic_dac)\.(cpp|h)"
-        r"|slam/nodes/((mapping_output|scan_feed)\.(cpp|h)|mapping_parameters\.h))",
+        r"|plausible/transform_input\.(cpp|h)|slam/nodes/((mapping_output|scan_feed)\.(cpp|h)|mapping_parameters\.h))",
         ROS_CPP,
         "ROS headers only in *_node.cpp, its messages.h, input.h and output.h, params.h and clock_watch.h, and peers",
     ),
     Rule(r"(?!laser/|slam/)", r"<mrpt/", "MRPT only in laser/ and slam/"),
     Rule(r"(?!.*bindings(\.(cpp|h)|/))", r"<pybind11/", "pybind11 only in bindings"),
     Rule(r"model/", r'"(?!model/)', "the equations rest on nothing"),
+    Rule(r"plausible/", r'"(?!model/|plausible/|bindings\.h)', "what makes sense rests on the equations only"),
     Rule(r"follow/", r'"(?!follow/|bindings\.h)', "following rests on nothing"),
     Rule(r"scip/", r'"(?!scip/)', "the protocol rests on nothing"),
     Rule(r"guard/", rf'"(?!dac/|guard/|yaml\.h|{SHARED})', "the guard rests on the D/A converter only"),
@@ -91,8 +92,8 @@ CPP_RULES = [
     ),
     Rule(
         r"laser/",
-        rf'"(?!scip/|serial/|laser/|params\.h|{SHARED})',
-        "the driver rests on the protocol and the port only",
+        rf'"(?!scip/|serial/|laser/|plausible/|params\.h|{SHARED})',
+        "the driver rests on the protocol, the port and what makes sense",
     ),
     Rule(r"serial/", rf'"(?!serial/|{SHARED})', "a port rests on nothing"),
     # a virtual board is plugged in and out as a virtual sensor is

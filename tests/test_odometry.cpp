@@ -191,14 +191,14 @@ TEST_F(GyroTest, WhatIsNoSampleIsRefusedAndCounted) {
   still(5);
   const double now = next;
   const std::uint64_t before = gyro.counts().samples;
-  EXPECT_FALSE(gyro.add(kNan, 0, now, now));
-  EXPECT_FALSE(gyro.add(kInfinity, 0, now, now));
-  EXPECT_FALSE(gyro.add(0.1, -1, now, now));
-  EXPECT_FALSE(gyro.add(0.1, kNan, now, now));
-  EXPECT_FALSE(gyro.add(0.1, 0, kNan, now));
-  EXPECT_FALSE(gyro.add(0.1, 0, now - 5, now));     // of the past
-  EXPECT_FALSE(gyro.add(0.1, 0, now + 5, now));     // of the future
-  EXPECT_FALSE(gyro.add(0.1, 0, now - 0.05, now));  // out of order
+  EXPECT_NE(gyro.add(kNan, 0, now, now), "");
+  EXPECT_NE(gyro.add(kInfinity, 0, now, now), "");
+  EXPECT_NE(gyro.add(0.1, -1, now, now), "");
+  EXPECT_NE(gyro.add(0.1, kNan, now, now), "");
+  EXPECT_NE(gyro.add(0.1, 0, kNan, now), "");
+  EXPECT_NE(gyro.add(0.1, 0, now - 5, now), "");     // of the past
+  EXPECT_NE(gyro.add(0.1, 0, now + 5, now), "");     // of the future
+  EXPECT_NE(gyro.add(0.1, 0, now - 0.05, now), "");  // out of order
   EXPECT_EQ(gyro.counts().refused, 8U);
   EXPECT_EQ(gyro.counts().samples, before + 8);
   EXPECT_NEAR(gyro.turn(t, t + kTick)->angle, 0, 1e-12);  // and none of them has turned anything

@@ -102,6 +102,20 @@ TEST_F(ScanQueue, WhatThrowsIsDroppedOnceAndTheNextOneServed) {
   EXPECT_EQ(queue_.size(), 0U);
 }
 
+TEST_F(ScanQueue, AFramesSlashIsTakenOff) {
+  const auto old_style = scan(101);
+  old_style->header.frame_id = "/laser";
+  queue_.push(old_style);
+  EXPECT_TRUE(queue_.next());
+}
+
+TEST_F(ScanQueue, ALaserWithoutALimitHasOneThatIsANumber) {
+  const auto limitless = scan(101);
+  limitless->range_max = std::numeric_limits<float>::infinity();
+  queue_.push(limitless);
+  EXPECT_EQ(queue_.next()->scan.fan.range_max, 1000);
+}
+
 TEST_F(ScanQueue, AFullQueueLosesItsOldest) {
   for (int i = 0; i < 6; ++i) queue_.push(scan(101 + i));
   EXPECT_EQ(queue_.size(), 4U);

@@ -122,7 +122,7 @@ class ViewerTest(unittest.TestCase):
         self.page.state(lambda state: state["rtf"] < 0.5, "slow motion")
         self.do("speed", value=3.0)
         self.page.state(lambda state: state["rtf"] > 1.3, "faster than the wall's clock, as far as a busy machine can")
-        assert "at least 0" in self.refused("speed", value=-1.0)
+        assert "must be a number from 1e-06" in self.refused("speed", value=-1.0)
 
     def test_set_pose_moves_what_can_be_moved_and_physics_knows(self):
         self.do("set_pose", body=self.body("box"), x=2.0, y=0.2, yaw=0.5)
@@ -136,7 +136,7 @@ class ViewerTest(unittest.TestCase):
         refusal = self.refused("set_pose", body=self.body("chair"), x=-4.0, y=1.0, yaw=0.0)
         assert refusal.startswith("chair: does not fit")  # by its name, not by its id
         assert "no body" in self.refused("set_pose", body="moon", x=0.0, y=0.0, yaw=0.0)
-        assert "within" in self.refused("set_pose", body=self.body("box"), x=1e300, y=0.0, yaw=0.0)
+        assert "position.x: must be" in self.refused("set_pose", body=self.body("box"), x=1e300, y=0.0, yaw=0.0)
         self.page.send(
             f'{{"type":"command","id":77,"name":"set_pose","body":"{self.body("box")}","x":NaN,"y":0,"yaw":0}}'
         )

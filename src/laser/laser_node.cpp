@@ -21,6 +21,7 @@
 #include "laser/self_test.h"
 #include "laser/settings.h"
 #include "laser/shipped.h"
+#include "plausible/quantity.h"
 #include "standard_streams.h"
 
 namespace {
@@ -179,8 +180,10 @@ void LaserNode::publish(const k::Scan& scan) {
     stamp += settings_.time_offset;
     rhythm_.add(now());
   }
-  if (stamp < 0) {  // at the start of simulated time; ROS has no such time
-    ROS_WARN_THROTTLE(kWarningPeriod, "LASER_STAMP: a scan with a stamp before 0, %g s, is dropped", stamp);
+  try {  // below 0 at the start of simulated time; ROS has no such time, and throws beyond its last one
+    kurumaisu::require(kurumaisu::plausible::kStamp, "stamp", stamp);
+  } catch (const std::invalid_argument& error) {
+    ROS_WARN_THROTTLE(kWarningPeriod, "LASER_STAMP: a scan is dropped: %s", error.what());
     return;
   }
   message.header.stamp = ros::Time(stamp);

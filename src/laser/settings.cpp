@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "plausible/quantity.h"
+
 namespace kurumaisu::laser {
 namespace {
 
@@ -159,9 +161,9 @@ void validate(const LiveSettings& live) {
 }
 
 std::string frame(const std::string& frame_id) {
-  const std::size_t start = frame_id.find_first_not_of('/');
-  if (start == std::string::npos) throw std::invalid_argument("frame_id must not be empty: " + frame_id);
-  return frame_id.substr(start);
+  std::string frame = frameOf(frame_id);
+  if (frame.empty()) throw std::invalid_argument("frame_id must not be empty: " + frame_id);
+  return frame;
 }
 
 double finite(const std::string& key, double value) {

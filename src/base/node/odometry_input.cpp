@@ -4,46 +4,30 @@
 #include <ros/console.h>
 #include <tf2/exceptions.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <utility>
 
 #include "base/odometry/yaw_rate.h"
+#include "plausible/messages.h"
 
 namespace kurumaisu {
 namespace {
 
 constexpr double kGyroWarningPeriod = 1.0;  // [s] of throttled warnings
-constexpr std::size_t kAxes[] = {0, 1, 5};  // x, y, yaw of x, y, z, roll, pitch, yaw
-constexpr double kPlanar = 1.0e-3;          // of a quaternion's length that roll, pitch or scale may take
 constexpr std::uint32_t kGyroQueue = 100;   // samples of a gyro that is much quicker than the loop
 
-bool isPose(const geometry_msgs::Pose& pose) {
-  const auto& q = pose.orientation;
-  const double length = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
-  return std::isfinite(pose.position.x) && std::isfinite(pose.position.y) && std::abs(length - 1) < kPlanar &&
-         std::hypot(q.x, q.y) < kPlanar;
-}
-
-Eigen::Matrix3d planar(const geometry_msgs::PoseWithCovariance::_covariance_type& covariance) {
-  Eigen::Matrix3d result;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column)
-      result(row, column) = covariance[6 * kAxes[row] + kAxes[column]];
-  }
-  return result;
-}
-
-bool isCovariance(const Eigen::Matrix3d& matrix) {
-  if (!matrix.allFinite() || !matrix.isApprox(matrix.transpose(), 1e-9)) return false;
-  return Eigen::LDLT<Eigen::Matrix3d>(matrix).isPositive();
+std::optional<YawRate> yawRateOf(const sensor_msgs::Imu& imu, const Eigen::Vector3d& axis) {
+  std::array<double, 9> covariance{};
+  std::copy(imu.angular_velocity_covariance.begin(), imu.angular_velocity_covariance.end(),
+            covariance.begin());
+  const auto& rates = imu.angular_velocity;
+  return yawRate(axis, {rates.x, rates.y, rates.z}, covariance);
 }
 
 /// Apart, because the macro counts as a handful of branches.
-void warnRefused(double age, const std::optional<YawRate>& yaw) {
-  ROS_WARN_THROTTLE(kGyroWarningPeriod,
-                    "BASE_GYRO_REFUSED: imu: a sample %g s old with yaw rate %g rad/s, %s", age,
-                    yaw ? yaw->rate : NAN, yaw ? "not finite, out of order or of another time" : "no gyro");
+void warnRefused(std::uint64_t refused, const std::string& why) {
+  ROS_WARN_THROTTLE(kGyroWarningPeriod, "BASE_GYRO_REFUSED: imu: a sample, %lu so far: %s", refused,
+                    why.c_str());
 }
 
 }  // namespace
@@ -57,7 +41,7 @@ OdometryInput::OdometryInput(ros::NodeHandle& nh, Drive& drive, const OdometrySe
   using Axis = ImuSettings::Axis;
   if (settings.imu->axis == Axis::kTf) {
     tf_ = std::make_unique<tf2_ros::Buffer>();
-    listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_);
+    transforms_ = std::make_unique<TransformInput>(*tf_, "BASE");
   } else {
     axis_ = Eigen::Vector3d(0, 0, settings.imu->axis == Axis::kUp ? 1 : -1);
   }
@@ -79,17 +63,14 @@ bool OdometryInput::onReset(std_srvs::Trigger::Request& /*request*/, std_srvs::T
 }
 
 bool OdometryInput::onSet(SetOdometry::Request& request, SetOdometry::Response& response) {
-  const geometry_msgs::Pose& pose = request.pose.pose;
-  const Eigen::Matrix3d covariance = planar(request.pose.covariance);
-  response.success = isPose(pose) && isCovariance(covariance);
-  if (!response.success) {
-    response.message = isPose(pose) ? "the covariance of x, y, yaw is invalid"
-                                    : "the pose must be finite, its quaternion of length 1 and about z";
-    return true;
+  try {
+    const Pose2D pose = planarOf(request.pose.pose);
+    drive_.place(pose, planarOf(request.pose.covariance), clock_(ros::Time::now()));
+    response.success = 1U;
+  } catch (const std::invalid_argument& error) {
+    response.message = error.what();
+    ROS_WARN("BASE_BAD_ODOMETRY: ~set_odometry: refused: %s", error.what());
   }
-  const double theta = 2 * std::atan2(pose.orientation.z, pose.orientation.w);
-  drive_.place({pose.position.x, pose.position.y, std::remainder(theta, 2 * M_PI)}, covariance,
-               clock_(ros::Time::now()));
   return true;
 }
 
@@ -108,17 +89,20 @@ std::optional<Eigen::Vector3d> OdometryInput::axisOf(const std::string& frame) {
 }
 
 void OdometryInput::onImu(const sensor_msgs::Imu& imu) {
-  const std::optional<Eigen::Vector3d> axis = axisOf(imu.header.frame_id);
+  const std::optional<Eigen::Vector3d> axis = axisOf(frameOf(imu.header.frame_id));
   if (!axis) return;
-  std::array<double, 9> covariance{};
-  std::copy(imu.angular_velocity_covariance.begin(), imu.angular_velocity_covariance.end(),
-            covariance.begin());
-  const auto& rates = imu.angular_velocity;
-  const std::optional<YawRate> yaw = yawRate(*axis, {rates.x, rates.y, rates.z}, covariance);
+  Gyro& gyro = *drive_.reckoning().gyro();
   const ros::Time now = ros::Time::now();
-  const double t = clock_(now);
-  const double age = (now - imu.header.stamp).toSec();
-  if (!yaw || !drive_.reckoning().gyro()->add(yaw->rate, yaw->variance, t - age, t)) warnRefused(age, yaw);
+  const double age = secondsFrom(imu.header.stamp, now);
+  std::string why = "no gyro: the first number of its covariance is -1";
+  if (const std::optional<YawRate> yaw = yawRateOf(imu, *axis)) {
+    const double t = clock_(now);
+    why = gyro.add(yaw->rate, yaw->variance, t - age, t);
+    if (why.empty()) return;
+  } else {
+    gyro.refuse();
+  }
+  warnRefused(gyro.counts().refused, why);
 }
 
 }  // namespace kurumaisu

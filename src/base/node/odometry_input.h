@@ -6,7 +6,7 @@
 #include <ros/node_handle.h>
 #include <sensor_msgs/Imu.h>
 #include <std_srvs/Trigger.h>
-#include <tf2_ros/transform_listener.h>
+#include <tf2_ros/buffer.h>
 
 #include <functional>
 #include <memory>
@@ -15,6 +15,7 @@
 
 #include "base/drive.h"
 #include "base/node/odometry_settings.h"
+#include "plausible/transform_input.h"
 
 namespace kurumaisu {
 
@@ -41,7 +42,7 @@ class OdometryInput {
   std::string axis_frame_;
   std::uint64_t fallbacks_ = 0;  // said so far
   std::unique_ptr<tf2_ros::Buffer> tf_;
-  std::unique_ptr<tf2_ros::TransformListener> listener_;
+  std::unique_ptr<TransformInput> transforms_;
   ros::ServiceServer reset_;
   ros::ServiceServer set_;
   ros::Subscriber imu_;

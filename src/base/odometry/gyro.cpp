@@ -2,6 +2,10 @@
 #include "base/odometry/gyro.h"
 
 #include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "plausible/quantity.h"
 
 namespace kurumaisu {
 namespace {
@@ -11,19 +15,40 @@ constexpr double kFar = 5.0;  // standard deviations at rest that no sample is a
 
 }  // namespace
 
-bool Gyro::add(double w, double variance, double t, double now) {
-  ++counts_.samples;
-  const bool good = std::isfinite(w) && std::isfinite(variance) && variance >= 0 && std::isfinite(t);
-  if (!good || std::abs(now - t) > settings_.timeout || (last_ && t <= last_->t)) {
-    ++counts_.refused;
-    return false;
+/// Throws std::invalid_argument for what is no sample.
+void Gyro::check(double w, double variance, double t, double now) const {
+  require(plausible::kYawRate, "yaw rate", w);
+  require(plausible::kVariance, "variance of the yaw rate", variance);
+  std::ostringstream text;
+  if (!(std::abs(now - t) <= settings_.timeout)) {
+    text << "stamp: must be at most " << settings_.timeout << " s away from now: " << now - t << " s old";
+    throw std::invalid_argument(text.str());
   }
+  if (last_ && t <= last_->t) {
+    text << "stamp: must be later than that of the last sample: " << last_->t - t << " s before it";
+    throw std::invalid_argument(text.str());
+  }
+}
+
+void Gyro::refuse() {
+  ++counts_.samples;
+  ++counts_.refused;
+}
+
+std::string Gyro::add(double w, double variance, double t, double now) {
+  try {
+    check(w, variance, t, now);
+  } catch (const std::invalid_argument& error) {
+    refuse();
+    return error.what();
+  }
+  ++counts_.samples;
   if (last_ && t - last_->t > settings_.timeout) restart();
   const double dt = last_ ? t - last_->t : 0;
   const double before = last_ ? last_->integral + 0.5 * (last_->w + w) * dt : 0;
   last_ = Sample{w, t, before, (variance > 0 ? variance : settings_.variance) * dt};
   watch(w, t);
-  return true;
+  return "";
 }
 
 void Gyro::setNeutral(bool neutral, double from) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "base/odometry/odometry.h"
 
@@ -23,7 +24,7 @@ struct GyroSettings {
 /// Events since the start, for diagnostics.
 struct GyroCounts {
   std::uint64_t samples = 0;    ///< received
-  std::uint64_t refused = 0;    ///< of those, not finite, out of order, or of another time than now
+  std::uint64_t refused = 0;    ///< of those, not plausible, out of order, or of another time than now
   std::uint64_t fallbacks = 0;  ///< times that odometry had to do without
   std::uint64_t biases = 0;     ///< estimates of the bias
 };
@@ -39,8 +40,11 @@ class Gyro {
 
   explicit Gyro(const GyroSettings& settings) : settings_(settings) {}
 
-  /// Takes the yaw rate w [rad/s] of time t; variance 0: unknown. False, and counted, for what is no sample.
-  bool add(double w, double variance, double t, double now);
+  /// Takes the yaw rate w [rad/s] of time t; variance 0: unknown. Says why not, and counts it, for what is no sample.
+  std::string add(double w, double variance, double t, double now);
+
+  /// Counts a sample without a yaw rate.
+  void refuse();
 
   /// Says whether neutral was put out from a time on. Only then can the chair stand.
   void setNeutral(bool neutral, double from);
@@ -73,6 +77,7 @@ class Gyro {
   };
 
   double angleAt(double t) const { return last_->integral + last_->w * (t - last_->t); }
+  void check(double w, double variance, double t, double now) const;
   void watch(double w, double t);
   void close(double t);
   void moved(double t);

@@ -12,6 +12,7 @@ from sensor_msgs.msg import LaserScan
 
 from kurumaisu.msg import Voltages
 from kurumaisu.params import Laser
+from kurumaisu.plausible import require
 from kurumaisu.ros.rotation import quaternion_of
 from kurumaisu.sim.chair.simulator import Command
 from kurumaisu.types import FloatArray
@@ -63,8 +64,13 @@ def laser_transform(stamp: rospy.Time, laser: Laser, base_frame: str) -> Transfo
 
 
 def command_of(message: Voltages) -> Command:
-    """Return voltages with the signs of the rates that they stand for; NaN stays NaN: unknown."""
-    return Command(message.translation, message.steering, _sign(message.v), _sign(message.w))
+    """Return voltages with the signs of the rates that they stand for; NaN stays NaN: unknown.
+
+    Raise Error unless they make sense.
+    """
+    translation = require("voltage", "translation", message.translation)
+    steering = require("voltage", "steering", message.steering)
+    return Command(translation, steering, _sign(message.v), _sign(message.w))
 
 
 def _sign(rate: float) -> float:

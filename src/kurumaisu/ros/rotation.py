@@ -8,7 +8,8 @@ import math
 import numpy as np
 from geometry_msgs.msg import Pose, Quaternion
 
-from kurumaisu.errors import Error
+from kurumaisu import plausible
+from kurumaisu.plausible import require
 from kurumaisu.types import FloatArray
 
 
@@ -30,19 +31,24 @@ def optical(heading: float, pan: float, tilt: float) -> Quaternion:
 
 
 def yaw_of(rotation: Quaternion) -> float:
-    """Return the yaw [rad], in (-pi, pi], of a rotation about z."""
-    return 2 * math.atan2(rotation.z, rotation.w) if rotation.w >= 0 else 2 * math.atan2(-rotation.z, -rotation.w)
+    """Return the yaw [rad], in (-pi, pi]; roll and pitch are dropped. Raise Error for a quaternion that has none."""
+    return plausible.yaw_of(rotation.x, rotation.y, rotation.z, rotation.w)
+
+
+def normed(rotation: Quaternion) -> Quaternion:
+    """Return the same rotation as a quaternion of length 1, which tf2 insists on."""
+    length = math.hypot(rotation.x, rotation.y, rotation.z, rotation.w)
+    return Quaternion(rotation.x / length, rotation.y / length, rotation.z / length, rotation.w / length)
 
 
 def planar(pose: Pose) -> FloatArray:
-    """Return x [m], y [m], yaw [rad]."""
-    return np.array([pose.position.x, pose.position.y, yaw_of(pose.orientation)])
+    """Return x [m], y [m], yaw [rad]. Raise Error unless they make sense."""
+    place = pose.position
+    x, y = require("position", "position.x", place.x), require("position", "position.y", place.y)
+    return np.array([x, y, yaw_of(pose.orientation)])
 
 
 def pose_of(pose: Pose) -> FloatArray:
-    """Return x, y, z [m], heading [rad] of a pose. Raise Error unless it is finite and turns about z."""
-    values = np.array([pose.position.x, pose.position.y, pose.position.z, yaw_of(pose.orientation)])
-    turn = pose.orientation
-    if not np.isfinite(values).all() or turn.z**2 + turn.w**2 == 0:
-        raise Error(f"pose: must be finite and have an orientation, about z: {' '.join(str(pose).split())}")
-    return values
+    """Return x, y, z [m], heading [rad]. Raise Error unless they make sense."""
+    x, y, yaw = planar(pose).tolist()
+    return np.array([x, y, require("position", "position.z", pose.position.z), yaw])

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -102,8 +101,6 @@ class Services:
 
     def _speed(self, request: SpeedRequest) -> tuple[bool, str]:
         def pace() -> None:
-            if not (math.isfinite(request.speed) and request.speed >= 0):
-                raise Error(f"speed: must be a finite number of at least 0: {request.speed:g}")
             self._pacer.speed = request.speed
 
         return self._outcome(pace)

@@ -75,7 +75,9 @@ void validate(const Scan& scan) {
     throw std::invalid_argument("the beams span more than a full turn: " + std::to_string(width) + " rad");
   }
   if (!std::isfinite(fan.time_increment)) throw std::invalid_argument("time_increment must be finite");
-  if (!(fan.range_max > 0)) throw std::invalid_argument("range_max must be positive");
+  if (!(fan.range_max > 0 && std::isfinite(fan.range_max))) {
+    throw std::invalid_argument("range_max must be positive and finite: " + std::to_string(fan.range_max));
+  }
 }
 
 Scan deskew(const Scan& scan, const Pose2D& motion) {

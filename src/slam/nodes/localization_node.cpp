@@ -66,11 +66,20 @@ constexpr std::size_t kQueue = 100;       // odometry that may wait
 constexpr double kOdometryMemory = 10.0;  // [s] of covariances
 constexpr double kOdometryGap = 0.2;      // [s] a covariance holds for scans so near at most
 constexpr double kAhead = 10.0;  // [s] an initial pose stamped farther in the future is of another clock
+constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
 
 // Apart, because the macro counts as a handful of branches.
 void warnFrame(const std::string& frame, const std::string& taken_for) {
   ROS_WARN("LOCALIZATION_MAP_FRAME: the map is in %s, and used as if it were in %s", frame.c_str(),
            taken_for.c_str());
+}
+
+void warnPose(const char* source, std::uint64_t refused, const char* why) {
+  ROS_WARN("LOCALIZATION_BAD_POSE: %s: refused, %lu so far: %s", source, refused, why);
+}
+
+void warnOdometry(std::uint64_t refused, const char* why) {
+  ROS_WARN_THROTTLE(kWarningPeriod, "LOCALIZATION_BAD_ODOMETRY: odom: refused, %lu so far: %s", refused, why);
 }
 
 class LocalizationNode {
@@ -91,7 +100,8 @@ class LocalizationNode {
   void begin();
   void reset();
   std::optional<Eigen::Matrix3d> covarianceAt(const ros::Time& stamp) const;
-  bool setPose(const PoseMessage& message);
+  bool setPose(const char* source, const PoseMessage& message);
+  void requirePose(const PoseMessage& message) const;
   void diagnose(Status& status);
 
   k::LocalizationNodeSettings settings_;
@@ -104,6 +114,7 @@ class LocalizationNode {
   ros::Time last_transform_;
   ros::SteadyTime last_cloud_, last_save_;
   std::uint64_t reported_skipped_ = 0, reported_dropped_ = 0;
+  std::uint64_t refused_poses_ = 0, refused_odometry_ = 0;
   tf2_ros::TransformBroadcaster broadcaster_;
   diagnostic_updater::Updater diagnostics_;
   ros::Publisher pose_, cloud_;
@@ -159,13 +170,20 @@ void LocalizationNode::advertise(ros::NodeHandle& nh) {
   services_.push_back(nh.advertiseService("set_map", &LocalizationNode::setMap, this));
 }
 
-void LocalizationNode::onOdometry(const nav_msgs::Odometry& odometry) {
+void LocalizationNode::onOdometry(const nav_msgs::Odometry& odometry) try {
+  const ros::Time stamp = odometry.header.stamp;
+  k::requireStamp(stamp, ros::Time::now());
   const Eigen::Matrix3d covariance = k::planarOf(odometry.pose.covariance);
-  if (!covariance.allFinite() || !(covariance(0, 0) > 0)) return;  // it has none
-  covariances_[odometry.header.stamp] = covariance;
-  const ros::Time& newest = covariances_.rbegin()->first;
-  while ((newest - covariances_.begin()->first).toSec() > kOdometryMemory)
-    covariances_.erase(covariances_.begin());
+  if (!(covariance(0, 0) > 0)) return;  // it has none
+  covariances_[stamp] = covariance;
+  const auto is_far = [&stamp](const auto& item) {
+    return std::abs(k::secondsFrom(item.first, stamp)) > kOdometryMemory;
+  };
+  while (is_far(*covariances_.begin())) covariances_.erase(covariances_.begin());
+  while (is_far(*covariances_.rbegin()))
+    covariances_.erase(std::prev(covariances_.end()));  // of another time
+} catch (const std::invalid_argument& error) {
+  warnOdometry(++refused_odometry_, error.what());
 }
 
 /// Interpolated; a covariance that grows in steps would grow by none, or by two.
@@ -173,15 +191,16 @@ std::optional<Eigen::Matrix3d> LocalizationNode::covarianceAt(const ros::Time& s
   const auto after = covariances_.lower_bound(stamp);
   if (after == covariances_.end() || after == covariances_.begin()) return std::nullopt;
   const auto before = std::prev(after);
-  const double gap = (after->first - before->first).toSec();
+  const double gap = k::secondsFrom(before->first, after->first);
   if (gap > kOdometryGap) return std::nullopt;
-  const double part = (stamp - before->first).toSec() / gap;
+  const double part = k::secondsFrom(before->first, stamp) / gap;
   return (1 - part) * before->second + part * after->second;
 }
 
 void LocalizationNode::onMap(const nav_msgs::OccupancyGrid& map) {
-  if (settings_.first_map_only && map_) return;
-  if (map.header.frame_id != settings_.map_frame) warnFrame(map.header.frame_id, settings_.map_frame);
+  if (settings_.first_map_only && localizer_) return;
+  const std::string frame = k::frameOf(map.header.frame_id);
+  if (frame != settings_.map_frame) warnFrame(frame, settings_.map_frame);
   const bool tracking = estimate_ && estimate_->knowledge == k::Knowledge::kTracking;
   const k::Gaussian here = tracking ? estimate_->map_from_base : settings_.start;
   map_ = map;
@@ -192,7 +211,7 @@ void LocalizationNode::onMap(const nav_msgs::OccupancyGrid& map) {
 bool LocalizationNode::setMap(nav_msgs::SetMap::Request& request, nav_msgs::SetMap::Response& response) {
   map_ = request.map;
   begin();
-  response.success = localizer_.has_value() && setPose(request.initial_pose);
+  response.success = setPose("set_map", request.initial_pose);
   return true;
 }
 
@@ -209,7 +228,8 @@ void LocalizationNode::begin() {
   bad_map_.clear();
   if (!map_) return;
   try {
-    localizer_.emplace(settings_.localizer, settings_.chair, settings_.seed, k::gridOf(*map_),
+    k::OccupancyGrid grid = k::gridOf(*map_);
+    localizer_.emplace(settings_.localizer, settings_.chair, settings_.seed, std::move(grid),
                        k::planarOf(map_->info.origin));
     if (settings_.known_start) localizer_->setPose(settings_.start);
   } catch (const std::exception& error) {
@@ -218,19 +238,25 @@ void LocalizationNode::begin() {
   }
 }
 
-void LocalizationNode::onInitialPose(const PoseMessage& message) {
-  if (!setPose(message)) ROS_WARN("LOCALIZATION_BAD_POSE: initialpose: refused");
+void LocalizationNode::onInitialPose(const PoseMessage& message) { setPose("initialpose", message); }
+
+bool LocalizationNode::setPose(const char* source, const PoseMessage& message) try {
+  requirePose(message);
+  localizer_->setPose({k::planarOf(message.pose.pose), k::planarOf(message.pose.covariance)});
+  return true;
+} catch (const std::invalid_argument& error) {
+  warnPose(source, ++refused_poses_, error.what());
+  return false;
 }
 
-bool LocalizationNode::setPose(const PoseMessage& message) {
-  const std::string& frame = message.header.frame_id;
-  const k::Gaussian pose{k::planarOf(message.pose.pose), k::planarOf(message.pose.covariance)};
-  const bool finite =
-      std::isfinite(pose.mean.x + pose.mean.y + pose.mean.theta) && pose.covariance.allFinite();
-  if (!localizer_ || !finite || (!frame.empty() && frame != settings_.map_frame)) return false;
-  if (message.header.stamp > ros::Time::now() + ros::Duration(kAhead)) return false;
-  localizer_->setPose(pose);
-  return true;
+/// Throws std::invalid_argument with the reason for a pose that cannot be one in this map, now.
+void LocalizationNode::requirePose(const PoseMessage& message) const {
+  if (!localizer_) throw std::invalid_argument("there is no map yet, or none that makes sense");
+  const std::string frame = k::frameOf(message.header.frame_id);
+  if (!frame.empty() && frame != settings_.map_frame) {
+    throw std::invalid_argument("frame_id: must be " + settings_.map_frame + ", or empty: " + frame);
+  }
+  k::requireStamp(message.header.stamp, ros::Time::now(), kAhead);
 }
 
 void LocalizationNode::add(const k::ScanQueue::Ready& ready) {
@@ -245,7 +271,7 @@ void LocalizationNode::add(const k::ScanQueue::Ready& ready) {
 
 void LocalizationNode::publish(const k::ScanQueue::Ready& ready, const k::Localizer::Estimate& estimate,
                                bool is_news) {
-  const ros::Time until = ready.stamp + ros::Duration(settings_.transform_tolerance);
+  const ros::Time until = k::later(ready.stamp, settings_.transform_tolerance);
   if (settings_.broadcast && until > last_transform_) {  // tf refuses the same time twice
     last_transform_ = until;
     const k::Pose2D map_from_odom =
@@ -293,7 +319,7 @@ void LocalizationNode::reset() {
 
 void LocalizationNode::diagnose(Status& status) {
   const auto& queue = feed_.queue();
-  const std::uint64_t lost = queue.dropped().no_transform + queue.dropped().bad_scan;
+  const std::uint64_t lost = queue.dropped().lost();
   const k::LocalizationState state{map_.has_value(),
                                    bad_map_,
                                    feed_.silence(),
@@ -313,8 +339,12 @@ void LocalizationNode::diagnose(Status& status) {
   status.add("scans", feed_.used());
   status.add("dropped without transform", queue.dropped().no_transform);
   status.add("dropped as senseless", queue.dropped().bad_scan);
+  status.add("dropped as too old", queue.dropped().too_old);
   status.add("skipped", feed_.skipped());
   status.add("last dropped", queue.reason());
+  status.add("refused initial poses", refused_poses_);
+  status.add("refused odometry", refused_odometry_);
+  status.add("refused transforms", feed_.refusedTransforms());
   status.add("processor time per scan [ms]",
              feed_.used() > 0 ? 1000 * feed_.seconds() / static_cast<double>(feed_.used()) : 0);
 }

@@ -47,11 +47,20 @@ inline double periodOf(Section& top, const std::string& key) {
   throw top.error(key, "must be above 0, or -1 for never: " + std::to_string(rate));
 }
 
+inline double readVariance(Section& top, const std::string& key) {
+  const double value = top.above(key, 0);
+  if (value > plausible::kVariance.most)
+    throw top.error(key, "must be at most 1e6: " + std::to_string(value));
+  return value;
+}
+
 inline Gaussian readStart(Section& top) {
-  const Pose2D pose{top.number("initial_pose_x"), top.number("initial_pose_y"), top.number("initial_pose_a")};
+  const Pose2D pose{readWithin(top, "initial_pose_x", plausible::kPosition),
+                    readWithin(top, "initial_pose_y", plausible::kPosition),
+                    readWithin(top, "initial_pose_a", plausible::kAngle)};
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  covariance.diagonal() << top.above("initial_cov_xx", 0), top.above("initial_cov_yy", 0),
-      top.above("initial_cov_aa", 0);
+  covariance.diagonal() << readVariance(top, "initial_cov_xx"), readVariance(top, "initial_cov_yy"),
+      readVariance(top, "initial_cov_aa");
   return {pose, covariance};
 }
 
@@ -60,9 +69,9 @@ inline LocalizationNodeSettings readLocalizationNodeSettings(const std::string& 
   Section top = Section::load(name);
   const Section model = top.section("model");
   LocalizationNodeSettings out{};
-  out.map_frame = top.text("global_frame_id");
-  out.odom_frame = top.text("odom_frame_id");
-  out.base_frame = top.text("base_frame_id");
+  out.map_frame = frameOf(top.text("global_frame_id"));
+  out.odom_frame = frameOf(top.text("odom_frame_id"));
+  out.base_frame = frameOf(top.text("base_frame_id"));
   out.broadcast = top.flag("tf_broadcast");
   out.transform_tolerance = top.atLeast("transform_tolerance", 0);
   out.transform_deadline = top.above("transform_deadline", 0);

@@ -132,7 +132,7 @@ MappingNode::MappingNode(ros::NodeHandle& nh, k::MappingNodeSettings settings,
   every(kPollPeriod, [this] { work(); });
   if (settings_.transform_period > 0) {
     every(settings_.transform_period, [this] {
-      const ros::Time until = ros::Time::now() + ros::Duration(settings_.transform_tolerance);
+      const ros::Time until = k::later(ros::Time::now(), settings_.transform_tolerance);
       if (estimate_) output_.transform(map_from_odom_, until);
     });
   }
@@ -206,9 +206,9 @@ void MappingNode::askForMap() try {
   ros::ServiceClient client = nh_.serviceClient<nav_msgs::GetMap>(k::kStaticMap);
   nav_msgs::GetMap call;
   if (!client.exists() || !client.call(call)) return;
+  k::OccupancyGrid grid = k::gridOf(call.response.map);
   const k::Pose2D corner = k::planarOf(call.response.map.info.origin);
   if (std::abs(corner.theta) > 1e-6) throw std::invalid_argument("its origin is rotated");
-  k::OccupancyGrid grid = k::gridOf(call.response.map);
   grid.x = corner.x;
   grid.y = corner.y;
   start_ = k::SavedMap{std::move(grid), {}};
@@ -272,7 +272,7 @@ void MappingNode::end() {
 
 void MappingNode::diagnose(Status& status) {
   const auto& dropped = feed_.queue().dropped();
-  const std::uint64_t lost = dropped.no_transform + dropped.bad_scan;
+  const std::uint64_t lost = dropped.lost();
   k::MappingState state;
   state.paused = feed_.paused();
   state.start_problem = start_problem_;
@@ -292,7 +292,9 @@ void MappingNode::diagnose(Status& status) {
   status.add("scans", feed_.used());
   status.add("dropped without transform", dropped.no_transform);
   status.add("dropped as senseless", dropped.bad_scan);
+  status.add("dropped as too old", dropped.too_old);
   status.add("last dropped", state.reason);
+  status.add("refused transforms", feed_.refusedTransforms());
   status.add("skipped", feed_.skipped());
   status.add("jumps of odometry", jumps_);
   status.add("deviation [m]", state.deviation);

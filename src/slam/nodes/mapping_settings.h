@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "model_file.h"
+#include "plausible/quantity.h"
 #include "slam/basics/gaussian.h"
 #include "slam/mapping/settings.h"
 
@@ -49,8 +50,14 @@ auto readNamed(Section& section, const std::vector<std::string>& names, const Ma
   }
 }
 
+inline double readWithin(Section& section, const std::string& key, const Quantity& quantity) {
+  return section.within(key, quantity.least, quantity.most);
+}
+
 inline Gaussian readStartIn(Section start) {
-  Gaussian out{{start.number("x"), start.number("y"), start.number("theta")}, Eigen::Matrix3d::Zero()};
+  Gaussian out{{readWithin(start, "x", plausible::kPosition), readWithin(start, "y", plausible::kPosition),
+                readWithin(start, "theta", plausible::kAngle)},
+               Eigen::Matrix3d::Zero()};
   const double distance = start.within("deviation", 0.01, 1);
   const double angle = start.within("angle_deviation", 0.01, 0.5);
   start.end();
@@ -66,9 +73,9 @@ inline MappingNodeSettings readMappingNodeSettings(const std::string& name) {
   MappingNodeSettings out{};
   out.laser_error = readLaserError(top.section("model"));
   top.end();
-  out.map_frame = node.text("map_frame");
-  out.odom_frame = node.text("odom_frame");
-  out.base_frame = node.text("base_frame");
+  out.map_frame = frameOf(node.text("map_frame"));
+  out.odom_frame = frameOf(node.text("odom_frame"));
+  out.base_frame = frameOf(node.text("base_frame"));
   out.map_period = node.above("map_period", 0);
   out.transform_period = node.atLeast("transform_period", 0);
   out.transform_tolerance = node.atLeast("transform_tolerance", 0);

@@ -16,7 +16,6 @@ namespace {
 
 constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
 constexpr double kLevel = 0.99;  // cosine of the tilt beyond which a laser does not measure in the plane
-
 constexpr std::array<int, 3> kRows{0, 1, 5};  // x, y, yaw among six
 
 }  // namespace
@@ -56,23 +55,8 @@ geometry_msgs::PoseWithCovariance messageOf(const Gaussian& pose) {
   return out;
 }
 
-Pose2D planarOf(const geometry_msgs::Pose& pose) {
-  geometry_msgs::Transform transform;
-  transform.translation.x = pose.position.x;
-  transform.translation.y = pose.position.y;
-  transform.rotation = pose.orientation;
-  return planar(transform).pose;
-}
-
-Eigen::Matrix3d planarOf(const boost::array<double, 36>& values) {
-  Eigen::Matrix3d out;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) out(i, j) = values[6 * kRows[i] + kRows[j]];
-  }
-  return out;
-}
-
 OccupancyGrid gridOf(const nav_msgs::OccupancyGrid& map) {
+  requireMap(map);
   // A float: 0.05 comes as 0.0500000007.
   const double resolution = std::nearbyint(static_cast<double>(map.info.resolution) * 1e6) / 1e6;
   return {resolution, 0, 0, static_cast<int>(map.info.width), static_cast<int>(map.info.height), map.data};
@@ -98,7 +82,7 @@ Scan scanOf(const sensor_msgs::LaserScan& message, const Planar& base_from_laser
   const double turn = base_from_laser.up > 0 ? 1 : -1;
   Scan scan{message.header.stamp.toSec(),
             {turn * message.angle_min, turn * message.angle_increment, message.time_increment,
-             message.range_max, base_from_laser.pose},
+             std::fmin(message.range_max, plausible::kRange.most), base_from_laser.pose},
             message.ranges};
   for (float& range : scan.ranges) {
     const bool near = range < message.range_min;
@@ -108,8 +92,7 @@ Scan scanOf(const sensor_msgs::LaserScan& message, const Planar& base_from_laser
 }
 
 ros::Time lastBeam(const sensor_msgs::LaserScan& scan) {
-  return scan.header.stamp +
-         ros::Duration(scan.time_increment * (static_cast<double>(scan.ranges.size()) - 1));
+  return later(scan.header.stamp, scan.time_increment * (static_cast<double>(scan.ranges.size()) - 1));
 }
 
 ScanQueue::ScanQueue(const tf2_ros::Buffer& buffer, ScanFrames frames, LaserError error, std::string prefix,
@@ -128,9 +111,9 @@ void ScanQueue::push(const sensor_msgs::LaserScan::ConstPtr& scan) {
 }
 
 bool ScanQueue::has(const sensor_msgs::LaserScan& scan, std::string* why) const {
-  const auto& header = scan.header;
-  return buffer_->canTransform(frames_.base, header.frame_id, header.stamp, why) &&
-         buffer_->canTransform(frames_.odom, frames_.base, header.stamp, why) &&
+  const ros::Time stamp = scan.header.stamp;
+  return buffer_->canTransform(frames_.base, frameOf(scan.header.frame_id), stamp, why) &&
+         buffer_->canTransform(frames_.odom, frames_.base, stamp, why) &&
          buffer_->canTransform(frames_.odom, frames_.base, lastBeam(scan), why);
 }
 
@@ -152,7 +135,7 @@ std::optional<ScanQueue::Ready> ScanQueue::next() {
                why);
     } catch (const tf2::TransformException& error) {
       drop(dropped_.no_transform, "NO_TRANSFORM", error.what());
-    } catch (const std::exception& error) {  // std::runtime_error: a time out of ros::Time's range
+    } catch (const std::exception& error) {
       refuse(error.what());
     }
   }
@@ -168,7 +151,7 @@ ScanQueue::Ready ScanQueue::ready(const sensor_msgs::LaserScan& message) {
     return pose;
   };
   const ros::Time stamp = message.header.stamp;
-  Scan scan = scanOf(message, at(frames_.base, message.header.frame_id, stamp), error_);
+  Scan scan = scanOf(message, at(frames_.base, frameOf(message.header.frame_id), stamp), error_);
   const Pose2D start = onwards(at(frames_.odom, frames_.base, stamp).pose);
   const Pose2D end = onwards(at(frames_.odom, frames_.base, lastBeam(message)).pose);
   return {std::move(scan), start, end, stamp};
@@ -180,6 +163,8 @@ void ScanQueue::forgetAfter(const ros::Time& latest) {
 }
 
 void ScanQueue::refuse(const std::string& why) { drop(dropped_.bad_scan, "BAD_SCAN", why); }
+
+void ScanQueue::refuseOld(const std::string& why) { drop(dropped_.too_old, "OLD_SCAN", why); }
 
 void ScanQueue::drop(std::uint64_t& count, const char* code, const std::string& why) {
   ++count;

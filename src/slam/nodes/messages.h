@@ -14,14 +14,12 @@
 #include <string>
 
 #include "model/laser_error.h"
+#include "plausible/messages.h"
 #include "slam/basics/gaussian.h"
 #include "slam/basics/occupancy.h"
 #include "slam/basics/scan.h"
 
 namespace kurumaisu {
-
-/// A scan that much behind the last one, or a clock behind itself, is a new beginning [s].
-constexpr double kTimeJump = 1.0;
 
 /// A transform as seen from above.
 struct Planar {
@@ -35,11 +33,8 @@ geometry_msgs::TransformStamped stamped(const Pose2D& pose, const ros::Time& sta
 
 geometry_msgs::Pose messageOf(const Pose2D& pose);
 geometry_msgs::PoseWithCovariance messageOf(const Gaussian& pose);
-Pose2D planarOf(const geometry_msgs::Pose& pose);
-/// x, y, heading of a ROS covariance of 6 x 6.
-Eigen::Matrix3d planarOf(const boost::array<double, 36>& values);
 
-/// The cells, with the lower left corner at the origin: where that is the caller knows.
+/// The cells, with the lower left corner at the origin: where that is the caller knows. Throws as requireMap() does.
 OccupancyGrid gridOf(const nav_msgs::OccupancyGrid& map);
 nav_msgs::OccupancyGrid messageOf(const OccupancyGrid& grid, const ros::Time& stamp,
                                   const std::string& frame);
@@ -67,21 +62,24 @@ class ScanQueue {
     ros::Time stamp;
   };
   struct Dropped {
-    std::uint64_t no_transform = 0, bad_scan = 0, too_slow = 0;
-    std::uint64_t all() const { return no_transform + bad_scan + too_slow; }
+    std::uint64_t no_transform = 0, bad_scan = 0, too_old = 0, too_slow = 0;
+    std::uint64_t lost() const { return no_transform + bad_scan + too_old; }
+    std::uint64_t all() const { return lost() + too_slow; }
   };
 
   /// prefix: of the codes of warnings. capacity: scans that wait. Keeps a reference to the buffer.
   ScanQueue(const tf2_ros::Buffer& buffer, ScanFrames frames, LaserError error, std::string prefix,
             std::size_t capacity);
 
+  /// Of scans that make sense: see requireScan().
   void push(const sensor_msgs::LaserScan::ConstPtr& scan);
   /// The next scan that has its transforms, in order of arrival; none while the first one waits for its own.
   std::optional<Ready> next();
   /// Forgets scans later than a time.
   void forgetAfter(const ros::Time& latest);
-  /// Counts a scan that the caller could not use.
+  /// Counts a scan that the caller could not use; or did not, because it is older than what was used.
   void refuse(const std::string& why);
+  void refuseOld(const std::string& why);
 
   std::size_t size() const { return waiting_.size(); }
   const Dropped& dropped() const { return dropped_; }

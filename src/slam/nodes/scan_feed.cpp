@@ -2,6 +2,7 @@
 #include "slam/nodes/scan_feed.h"
 
 #include <ctime>
+#include <sstream>
 #include <stdexcept>
 
 namespace kurumaisu {
@@ -10,6 +11,7 @@ namespace {
 constexpr double kSlowWarningPeriod = 5.0;  // [s] of throttled warnings
 constexpr double kWorkLimit = 0.1;          // [s] of work in a row before scans that wait are skipped
 constexpr std::size_t kQueue = 100;         // scans that may wait
+constexpr int kSeveral = 3;                 // old scans in a row are no mistake: time began anew
 
 // Apart, because the macro counts as a handful of branches.
 void warnSlow(const std::string& prefix, std::uint64_t skipped) {
@@ -22,21 +24,49 @@ ScanFeed::ScanFeed(ros::NodeHandle& nh, FeedSettings settings, Use use, Reset re
     : settings_(std::move(settings)),
       use_(std::move(use)),
       reset_(std::move(reset)),
+      transforms_(buffer_, settings_.prefix),
       queue_(buffer_, settings_.frames, settings_.error, settings_.prefix, kQueue),
       scan_(nh.subscribe("scan", kQueue, &ScanFeed::onScan, this)) {}
 
-void ScanFeed::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) {
-  if (scan->header.stamp + ros::Duration(kTimeJump) < last_scan_) begin("a scan is older than the last one");
+void ScanFeed::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) try {
+  requireScan(*scan, ros::Time::now());
+  if (isOld(scan->header.stamp)) return;
   came_ = ros::SteadyTime::now();
-  frame_ = scan->header.frame_id;
+  frame_ = frameOf(scan->header.frame_id);
   if (paused_ || came_in_all_++ % settings_.every != 0) return;
   queue_.push(scan);
+} catch (const std::invalid_argument& error) {
+  queue_.refuse(error.what());
+}
+
+/// Whether a scan is to be dropped, because it is older than what has been used.
+bool ScanFeed::isOld(const ros::Time& stamp) {
+  const double age = secondsFrom(stamp, last_scan_);
+  if (age <= kTimeJump) {
+    old_ = 0;
+    return false;
+  }
+  lookAtClock();
+  if (last_scan_.isZero()) return false;
+  if (++old_ >= kSeveral) {
+    begin("several scans in a row are older than the last one");
+    return false;
+  }
+  std::ostringstream why;
+  why << age << " s older than the last one";
+  queue_.refuseOld(why.str());
+  return true;
+}
+
+/// Begins anew if it was set back. It may be, without a word on /clock, before the scans say so.
+void ScanFeed::lookAtClock() {
+  const ros::Time now = ros::Time::now();
+  if (secondsFrom(now, last_clock_) > kTimeJump) begin("time ran backwards");
+  last_clock_ = now;
 }
 
 void ScanFeed::work() {
-  const ros::Time now = ros::Time::now();
-  if (now + ros::Duration(kTimeJump) < last_clock_) begin("time ran backwards");
-  last_clock_ = now;
+  lookAtClock();
   const ros::SteadyTime start = ros::SteadyTime::now();
   while (ros::ok()) {
     const auto ready = queue_.next();
@@ -81,8 +111,9 @@ std::string ScanFeed::missing(double since) const {
 void ScanFeed::begin(const char* why) {
   ROS_WARN("%s_TIME_RESET: %s: it restarts", settings_.prefix.c_str(), why);
   buffer_.clear();
-  queue_.forgetAfter(ros::Time::now() + ros::Duration(kTimeJump));
+  queue_.forgetAfter(later(ros::Time::now(), kTimeJump));
   last_scan_ = ros::Time();
+  old_ = 0;
   reset_(why);
 }
 

@@ -5,12 +5,12 @@
 #include <ros/ros.h>
 #include <sensor_msgs/LaserScan.h>
 #include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <cstdint>
 #include <functional>
 #include <string>
 
+#include "plausible/transform_input.h"
 #include "slam/nodes/messages.h"
 
 namespace kurumaisu {
@@ -23,7 +23,8 @@ struct FeedSettings {
   int every;           ///< only every n-th scan is taken
 };
 
-/// Listens to scan and tf. Calls use() for every scan that has its transforms, and reset() when time has jumped back.
+/// Listens to scan and tf. Calls use() for every scan that has its transforms, and reset() when time has jumped back: the
+/// clock, or several scans in a row. One old scan is dropped.
 class ScanFeed {
  public:
   /// Throws std::invalid_argument for a scan that it cannot use.
@@ -46,12 +47,15 @@ class ScanFeed {
   std::string missing(double since) const;
 
   const ScanQueue& queue() const { return queue_; }
+  std::uint64_t refusedTransforms() const { return transforms_.refused(); }
   std::uint64_t used() const { return used_; }
   std::uint64_t skipped() const { return skipped_ + queue_.dropped().too_slow; }
   double seconds() const { return seconds_; }  ///< of processor time, for all scans used
 
  private:
   void onScan(const sensor_msgs::LaserScan::ConstPtr& scan);
+  bool isOld(const ros::Time& stamp);
+  void lookAtClock();
   void take(const ScanQueue::Ready& ready);
   void begin(const char* why);
 
@@ -62,10 +66,11 @@ class ScanFeed {
   ros::Time last_scan_, last_clock_;  // scans may be ahead of the clock: it comes on a connection of its own
   ros::SteadyTime came_ = ros::SteadyTime::now(), taken_ = came_;  ///< the last scan, and the last one used
   std::string frame_;                                              ///< of the last scan
+  int old_ = 0;                                                    ///< scans in a row that are too old
   std::uint64_t came_in_all_ = 0, used_ = 0, skipped_ = 0;
   double seconds_ = 0;
   tf2_ros::Buffer buffer_;
-  tf2_ros::TransformListener listener_{buffer_};
+  TransformInput transforms_;
   ScanQueue queue_;
   ros::Subscriber scan_;
 };

@@ -16,6 +16,7 @@ from kurumaisu.types import FloatArray
 
 _OVERHEAD = 240  # bytes that a row takes beside its numbers, measured with tracemalloc and rounded up
 _JUMP = 1.0  # [s] back from which the clock was set, or a simulation began anew; less is a late message
+_SEVERAL = 3  # rows of a part in a row that are so old: one alone is a mistake
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,16 @@ class Window:
         self._limit = limit
         self._rows: dict[str, deque[tuple[float, FloatArray]]] = {part: deque() for part in parts}
         self._newest = -np.inf
+        self._old = dict.fromkeys(parts, 0)  # rows in a row that were too old
         self._fan: Fan | None = None
 
     def add(self, part: str, t: float, row: Sequence[float] | FloatArray) -> None:
-        """Take a row measured at t [s]; one of a clock that was set back forgets all others."""
+        """Take a row measured at t [s]; several of a clock that was set back forget all others, one is left out."""
         rows = self._rows[part]
-        if rows and t < rows[-1][0] - _JUMP:
+        self._old[part] = self._old[part] + 1 if rows and t < rows[-1][0] - _JUMP else 0
+        if 0 < self._old[part] < _SEVERAL:
+            return
+        if self._old[part]:
             self.clear()
         values = np.array(row, dtype=np.float64)
         rows.append((t, values))
@@ -73,6 +78,7 @@ class Window:
         """Forget all."""
         for rows in self._rows.values():
             rows.clear()
+        self._old = dict.fromkeys(self._rows, 0)
         self._newest = -np.inf
 
     def heard(self, part: str) -> Heard:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from kurumaisu.critic.values.recording import Fan
+from kurumaisu.errors import Error
+from kurumaisu.plausible import yaw_of
 
 # Parts of a run that have a type of their own; any other topic is a covariate.
 PARTS = ("command", "voltage", "pose", "odom", "scan")
@@ -52,10 +54,11 @@ def _pose(pose: Any) -> tuple[float, ...]:
 
 
 def _yaw(q: Any) -> float:
-    """Return the rotation about z [rad], nan for a quaternion that is none."""
-    if abs(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w - 1.0) > 0.1:
+    """Return the rotation about z [rad], nan for a quaternion that has none."""
+    try:
+        return yaw_of(q.x, q.y, q.z, q.w)
+    except Error:
         return math.nan
-    return math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
 
 
 def _scan(message: Any) -> tuple[Fan, Any, Any]:

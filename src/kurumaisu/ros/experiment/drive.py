@@ -22,6 +22,7 @@ from kurumaisu.msg import Voltages
 from kurumaisu.params import Model
 from kurumaisu.ros.experiment.surroundings import ExperimentSpace
 from kurumaisu.ros.graph import hearers, publishers
+from kurumaisu.ros.inbox import subscribe
 from kurumaisu.ros.recorder import Recorder
 from kurumaisu.ros.rotation import planar
 
@@ -71,7 +72,9 @@ class _Driver:
         self._publisher = rospy.Publisher(topic, kind, queue_size=1, tcp_nodelay=True)
         self._message: Callable[[tuple[float, ...]], Twist | Voltages] = _twist if kind is Twist else self._voltages
         for source in ground.sources():
-            rospy.Subscriber(source, Odometry, partial(self._see, source), queue_size=10, tcp_nodelay=True)
+            subscribe(
+                source, Odometry, partial(self._see, source), "EXPERIMENT_BAD_POSE", queue_size=10, tcp_nodelay=True
+            )
         rospy.Subscriber("collision", Bool, self._touch, queue_size=10)
         rospy.Subscriber(topic, kind, self._overhear, queue_size=10)
         rospy.Subscriber(ACTIVE, String, self._yield, queue_size=10)
@@ -97,8 +100,9 @@ class _Driver:
         self._publisher.publish(self._message(values))
 
     def _see(self, source: str, message: Odometry) -> None:
+        pose = planar(message.pose.pose)
         with self._lock:
-            self._supervisor.see(source, rospy.get_time(), planar(message.pose.pose))
+            self._supervisor.see(source, rospy.get_time(), pose)
 
     def _touch(self, message: Bool) -> None:
         if message.data:

@@ -17,6 +17,7 @@ from kurumaisu.experiments import Script
 from kurumaisu.experiments.supervisor import Care, Rest
 from kurumaisu.experiments.visit import Visit
 from kurumaisu.ros.experiment.surroundings import TRUTH, ExperimentSpace
+from kurumaisu.ros.inbox import subscribe
 from kurumaisu.ros.recorder import Recorder
 from kurumaisu.ros.rotation import planar, quaternion_of
 from kurumaisu.srv import SetPose
@@ -55,7 +56,7 @@ class _Walker:
         self._rest = Rest(care)
         self._pose: FloatArray | None = None
         self._visit: Visit | None = None
-        rospy.Subscriber(TRUTH, Odometry, self._see, queue_size=10)
+        subscribe(TRUTH, Odometry, self._see, "EXPERIMENT_BAD_POSE", queue_size=10)
 
     def standing(self) -> FloatArray | None:
         """Return the pose as soon as the chair has stood for rest_time; None when interrupted."""

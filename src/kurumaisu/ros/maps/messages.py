@@ -12,7 +12,9 @@ from rospy.numpy_msg import numpy_msg
 
 from kurumaisu.errors import Error
 from kurumaisu.map_file import MapFile
-from kurumaisu.ros.rotation import yaw_of
+from kurumaisu.plausible import require
+from kurumaisu.ros.rotation import planar
+from kurumaisu.types import FloatArray
 
 GridMessage = numpy_msg(OccupancyGrid)  # an OccupancyGrid whose data are a numpy array
 
@@ -32,11 +34,20 @@ def message_of(served: MapFile, frame: str, stamp: rospy.Time) -> OccupancyGrid:
 
 
 def map_of(message: OccupancyGrid) -> MapFile:
-    """Return the map of a message. Raise Error where its size and its cells disagree."""
+    """Return the map of a message. Raise Error naming what makes no sense, or where its size and its cells disagree."""
     info = message.info
     cells = np.asarray(message.data, dtype=np.int8)
     if info.width * info.height != cells.size or cells.size == 0:
         raise Error(f"a map of {info.width} x {info.height} cells with {cells.size} values")
-    origin = (info.origin.position.x, info.origin.position.y, yaw_of(info.origin.orientation))
+    x, y, yaw = corner_of(message).tolist()
     resolution = round(float(info.resolution), 9)  # a float32: 0.05 comes as 0.0500000007
-    return MapFile(cells.reshape(info.height, info.width), resolution, origin)
+    return MapFile(cells.reshape(info.height, info.width), resolution, (x, y, yaw))
+
+
+def corner_of(message: OccupancyGrid) -> FloatArray:
+    """Return x, y, yaw of a map's corner. Raise Error unless they and its resolution make sense."""
+    require("resolution", "info.resolution", message.info.resolution)
+    try:
+        return planar(message.info.origin)
+    except Error as error:
+        raise Error(f"info.origin.{error}") from error

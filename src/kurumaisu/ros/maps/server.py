@@ -14,6 +14,7 @@ from nav_msgs.msg import MapMetaData, OccupancyGrid
 from nav_msgs.srv import GetMap, GetMapResponse, LoadMap, LoadMapRequest, LoadMapResponse
 
 from kurumaisu import program, settings
+from kurumaisu._core import frame_of
 from kurumaisu.errors import Error, one_line
 from kurumaisu.map_file import read_map
 from kurumaisu.params import shipped
@@ -92,7 +93,7 @@ def read_settings(given: dict[str, object], where: str) -> str:
     """
     frame_id = settings.load(shipped("launch/map_server.yaml")).text("frame_id")
     top = settings.Section({"frame_id": frame_id, **given}, where)
-    frame = top.text("frame_id")
+    frame = frame_of(top.text("frame_id"))
     top.end()
     return frame
 

@@ -17,6 +17,7 @@ from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.params import EffectSetting
 from kurumaisu.ros import life, messages
+from kurumaisu.ros.inbox import Rates, nanoseconds_of, rates_of, subscribe
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.services import Services
@@ -76,11 +77,15 @@ class SimNode:
         self._given_up: int | None = None  # stamp of the voltages after which no more came in time
         self._laser: LaserOutput = laser_output(settings)
         self._topics = SimTopics(settings, self._laser, self._simulator.robot, self._now)
-        self._voltages = rospy.Subscriber("voltages", Voltages, self._hear, queue_size=100)
-        self._commands: deque[tuple[str, Twist]] = deque()  # heard since the last step, for other robots
+        self._voltages = subscribe("voltages", Voltages, self._hear, "SIM_VOLTAGES_DROPPED", queue_size=100)
+        self._commands: deque[tuple[str, Rates]] = deque()  # heard since the last step, for other robots
         self._others = {
-            name: rospy.Subscriber(
-                f"{re.sub(r'[^A-Za-z0-9_]', '_', name)}/cmd_vel", Twist, partial(self._command, name)
+            name: subscribe(
+                f"{re.sub(r'[^A-Za-z0-9_]', '_', name)}/cmd_vel",
+                Twist,
+                partial(self._command, name),
+                "SIM_COMMAND_DROPPED",
+                queue_size=100,
             )
             for name in self._simulator.others
         }
@@ -115,12 +120,14 @@ class SimNode:
             if self.paused:
                 self._requests.wait(0.1)
                 continue
+            if not self._pacer.wait(self._requests):
+                continue
             self._wait_for_voltages()
             self._laser.wait(self._has_requests)
             if self._requests:
                 continue
             self._advance()
-            self._pacer.wait(self._simulator.step_time)
+            self._pacer.step(self._simulator.step_time)
 
     def step(self) -> None:
         """Go on by one step, as soon as the voltages have come that are due, and the scan that a driver makes."""
@@ -171,15 +178,11 @@ class SimNode:
         return bool(self._requests)
 
     def _command(self, robot: str, twist: Twist) -> None:
-        self._commands.append((robot, twist))
+        self._commands.append((robot, rates_of(twist)))
 
     def _advance(self) -> None:
         while self._commands:
-            robot, twist = self._commands.popleft()
-            try:
-                self._simulator.command(robot, [twist.linear.x, twist.linear.y, twist.angular.z])
-            except Error as error:
-                rospy.logwarn_throttle(5.0, f"SIM_COMMAND_DROPPED {error}")
+            self._simulator.command(*self._commands.popleft())
         with self._lock:
             command = self._holder.at(self._now)
         self._publish(self._simulator.step(command))
@@ -191,14 +194,12 @@ class SimNode:
         self._fan.note(observation, self._epoch)
 
     def _hear(self, message: Voltages) -> None:
+        stamp, command = nanoseconds_of(message), messages.command_of(message)
         with self._lock:
-            try:
-                stamp = message.header.stamp.to_nsec()
-                if stamp > self._now + self._settings.voltage_horizon * _NS:
-                    raise Error(f"voltages: stamp {stamp / _NS:.3f} s is of another clock")
-                self._holder.put(stamp, messages.command_of(message))
-            except Error as error:
-                rospy.logwarn_throttle(5.0, f"SIM_VOLTAGES_DROPPED {error}")
+            horizon = self._now + self._settings.voltage_horizon * _NS
+            if stamp > horizon:
+                raise Error(f"stamp: must be at most {horizon / _NS:.3f} s by /clock: {stamp / _NS:.3f} s")
+            self._holder.put(stamp, command)
             self._lock.notify_all()
 
     def _wait_for_voltages(self) -> None:

@@ -95,12 +95,12 @@ def _simulate(arguments: Arguments, own: life.Life) -> int:
     values = {name: str(value) for name, value in settings.parameters.items()}
     world = load_world(arguments.world, image_extents=settings.image_extents, values=values)
     speed = _speed(world, settings, arguments.headless)
+    pacer = Pacer(speed)
     session = Session(world, settings, arguments.use_model_names)
     for warning in (*settings.unknown, *session.warnings):
         rospy.logwarn(f"STAGEROS_WORLD {warning}")
     rospy.set_param("/use_sim_time", True)
     requests = Requests()
-    pacer = Pacer(speed)
     StagerosServices(session, requests, pacer)
     _run(session, requests, pacer, world, own.asked)
     return 0
@@ -128,10 +128,12 @@ def _run(session: Session, requests: Requests, pacer: Pacer, world: World, stopp
             session.show(pacer.speed)
             requests.wait(0.1)
             continue
+        if not pacer.wait(requests):
+            continue
         session.step()
         session.show(pacer.speed)  # before the pause: a step that is due when its scans are noted is due when shown
         if 0 < world.quit_time <= session.time:
             rospy.loginfo(f"{world.path}: quit_time {world.quit_time:g} s is reached")
             break
-        pacer.wait(world.interval)
+        pacer.step(world.interval)
     requests.close()

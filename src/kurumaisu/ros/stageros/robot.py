@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import rospy
 from geometry_msgs.msg import Pose, PoseStamped, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan, Range
 from std_msgs.msg import Bool
 
+from kurumaisu.ros.inbox import subscribe
 from kurumaisu.ros.outlet import OutletTopic
 from kurumaisu.ros.stageros.devices import DeviceTopic
 from kurumaisu.ros.stageros.plan import RobotPlan, ScanPlan
@@ -22,6 +22,8 @@ from kurumaisu.ros.wire import BoolWire, LaserScanWire, OdometryWire, RangeWire,
 from kurumaisu.sim.rangers.scans import Scan
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Fan
+
+_BAD_POSE = "STAGEROS_POSE_BAD"
 
 
 @dataclass(frozen=True)
@@ -148,10 +150,11 @@ class RobotTopics:
             DeviceTopic(device, base, pace.sensor(kinds[device.kind], device.topic)) for device in plan.devices
         ]
         self.plan = plan
+        twist, pose, stamped = (names.topic(name) for name in ("cmd_vel", "cmd_pose", "cmd_pose_stamped"))
         self._commands = [
-            rospy.Subscriber(names.topic("cmd_vel"), Twist, hear.twist, queue_size=10),
-            rospy.Subscriber(names.topic("cmd_pose"), Pose, hear.pose, queue_size=10),
-            rospy.Subscriber(names.topic("cmd_pose_stamped"), PoseStamped, lambda m: hear.pose(m.pose), queue_size=10),
+            subscribe(twist, Twist, hear.twist, "STAGEROS_COMMAND_BAD", queue_size=10),
+            subscribe(pose, Pose, hear.pose, _BAD_POSE, queue_size=10),
+            subscribe(stamped, PoseStamped, lambda m: hear.pose(m.pose), _BAD_POSE, queue_size=10),
         ]
 
     @property

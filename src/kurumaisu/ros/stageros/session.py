@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,6 +14,7 @@ from geometry_msgs.msg import Pose, Twist
 
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
+from kurumaisu.ros.inbox import Rates, rates_of
 from kurumaisu.ros.rotation import pose_of
 from kurumaisu.ros.stageros.added_models import is_text, renumbered
 from kurumaisu.ros.stageros.names import Names, names_of, names_of_another
@@ -33,7 +33,6 @@ from kurumaisu.world.layout import family
 from kurumaisu.world.model import Model
 
 _NS = 1_000_000_000
-_Command = tuple[float, float, float]
 
 
 class Session:
@@ -52,7 +51,7 @@ class Session:
         self._step_ns = round(world.interval * _NS)
         self._number = 0  # of steps since the start; /clock is that many times the interval
         self._last_command = 0  # [ns]
-        self._heard: deque[tuple[Names, _Command]] = deque()
+        self._heard: deque[tuple[Names, Rates]] = deque()
         self._carried: deque[tuple[Names, FloatArray]] = deque()
         self._home = names_of(world.models, settings, use_model_names)
         self._numbered = len(self._home)  # robots that there have ever been
@@ -116,22 +115,14 @@ class Session:
                 self._simulator.set_pose(self._simulator.robots[self._rows[names]], pose)
 
     def carry(self, names: Names, pose: Pose) -> None:
-        """Put a robot to a pose, from any thread, before the next step."""
-        try:
-            self._carried.append((names, pose_of(pose)))
-        except Error as error:
-            rospy.logwarn_throttle(5.0, f"STAGEROS_POSE_BAD {names.topic('cmd_pose')}: dropped: {error}")
+        """Put a robot to a pose, from any thread, before the next step. Raise Error for one that makes no sense."""
         self.heard += 1
+        self._carried.append((names, pose_of(pose)))
 
     def hear(self, names: Names, message: Twist) -> None:
-        """Take a robot's command, from any thread; the next step heeds it."""
-        command = (message.linear.x, message.linear.y, message.angular.z)
-        if all(map(math.isfinite, command)):
-            self._heard.append((names, command))
-        else:
-            topic = names.topic("cmd_vel")
-            rospy.logwarn_throttle(5.0, f"STAGEROS_COMMAND_NAN {topic}: dropped, not finite: {command}")
+        """Take a robot's command, from any thread; the next step heeds it. Raise Error for one that makes no sense."""
         self.heard += 1
+        self._heard.append((names, rates_of(message)))
 
     def reset(self, seed: int | None = None) -> None:
         """Start again as the file says, with the same or another seed; /clock runs on, as time must not jump back."""

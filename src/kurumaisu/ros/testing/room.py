@@ -107,7 +107,7 @@ class Room:
 
     def wait_for_subscribers(self, count: int = 1) -> None:
         """Return when so many nodes hear all of it."""
-        for publisher in (self.clock, self.scan, self.tf):
+        for publisher in (self.clock, self.scan, self.tf, self._static.pub_tf):
             wait_for(partial(_heard, publisher, count), f"subscriber of {publisher.name}", 40.0)
 
     def connections(self) -> list[set[Any]]:
@@ -145,6 +145,14 @@ class Room:
         stamp = self.at(t)
         if with_tf:
             self.tf.publish([transform("odom", "base_link", self.odom, stamp)])
+        self.scan.publish(self.sweep(t, stamp, ranges=ranges, frame=frame))
+        self.odom = compose(self.odom, between(truth(t), truth(t + STEP)) * SPEED_ERROR)
+
+    @staticmethod
+    def sweep(
+        t: float, stamp: rospy.Time, *, ranges: FloatArray | list[float] | None = None, frame: str = "laser"
+    ) -> LaserScan:
+        """Return a scan of the room at a time of the test, or what is given, with a stamp."""
         message = LaserScan(
             angle_min=ANGLE_MIN,
             angle_increment=INCREMENT,
@@ -154,8 +162,16 @@ class Room:
             ranges=ranges_at(truth(t)) if ranges is None else ranges,
         )
         message.header.stamp, message.header.frame_id = stamp, frame
-        self.scan.publish(message)
-        self.odom = compose(self.odom, between(truth(t), truth(t + STEP)) * SPEED_ERROR)
+        return message
+
+    def of_another_time(self, t: float) -> None:
+        """Publish at a time of the test what has stamps of others: transforms, and three scans, one of them old."""
+        last, year = rospy.Time(4294967295), rospy.Duration(31536000)
+        now = rospy.Time.from_sec(self.begin + t)
+        for stamp in (last, now + year):
+            self.tf.publish([transform("odom", "base_link", np.array([7.0, 7.0, 1.0]), stamp)])
+        for stamp in (last, now + year, now - rospy.Duration(1.5)):
+            self.scan.publish(self.sweep(t, stamp))
 
     def drive(self, seconds: float, first: float = 0.0, **options: Any) -> float:
         """Drive; return the time of the last scan. Paced by the wall clock, so that nothing is skipped."""

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import rospy
 from nav_msgs.msg import Odometry
 
 from kurumaisu.critic.values.recording import Run, Series
@@ -17,8 +16,10 @@ from kurumaisu.msg import Voltages
 from kurumaisu.paper.chair import advice
 from kurumaisu.paper.options import PaperOptions
 from kurumaisu.ros import life
+from kurumaisu.ros.inbox import seconds_of, subscribe
+from kurumaisu.ros.messages import command_of
 from kurumaisu.ros.recorder import Recorder
-from kurumaisu.ros.rotation import yaw_of
+from kurumaisu.ros.rotation import planar
 from kurumaisu.types import FloatArray
 
 _TOPICS = ("voltages", "ground_truth", "odom", "scan", "cmd_vel_out", "/tf_static")
@@ -32,9 +33,9 @@ class Received:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._rows: dict[str, list[tuple[float, ...]]] = {"voltages": [], "ground_truth": [], "odom": []}
-        rospy.Subscriber("voltages", Voltages, self._voltages, queue_size=1000)
+        subscribe("voltages", Voltages, self._voltages, "CALIBRATE_BAD_VOLTAGES", queue_size=1000)
         for topic in ("ground_truth", "odom"):
-            rospy.Subscriber(topic, Odometry, lambda m, name=topic: self._pose(name, m), queue_size=1000)
+            subscribe(topic, Odometry, partial(self._pose, topic), "CALIBRATE_BAD_POSE", queue_size=1000)
 
     def run(self) -> Run | None:
         """Return what was heard as a run, or None while voltages or poses have not come."""
@@ -58,11 +59,11 @@ class Received:
         return bool(self._rows["ground_truth"])
 
     def _voltages(self, m: Voltages) -> None:
-        self._add("voltages", (m.header.stamp.to_sec(), m.translation, m.steering, m.v, m.w))
+        volts = command_of(m)
+        self._add("voltages", (seconds_of(m), volts.v_f, volts.v_s, m.v, m.w))
 
     def _pose(self, name: str, m: Odometry) -> None:
-        place = m.pose.pose.position
-        self._add(name, (m.header.stamp.to_sec(), place.x, place.y, yaw_of(m.pose.pose.orientation)))
+        self._add(name, (seconds_of(m), *planar(m.pose.pose).tolist()))
 
     def _add(self, name: str, row: tuple[float, ...]) -> None:
         with self._lock:

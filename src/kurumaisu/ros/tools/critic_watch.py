@@ -32,6 +32,7 @@ from kurumaisu.errors import Error, one_line
 from kurumaisu.msg import Voltages
 from kurumaisu.params import load_model, shipped
 from kurumaisu.ros import life
+from kurumaisu.ros.inbox import seconds_of, subscribe
 
 _TOPICS = {
     "command": ("cmd_vel", Twist),
@@ -88,7 +89,7 @@ class CriticWatch:
         self._problems: tuple[str, ...] = ()
         self._publisher = rospy.Publisher("diagnostics", DiagnosticArray, queue_size=1)
         self._subscribers = [
-            rospy.Subscriber(name, kind, partial(self._hear, part), queue_size=100)
+            subscribe(name, kind, partial(self._hear, part), "CRITIC_BAD_MESSAGE", queue_size=100)
             for part, (name, kind) in _TOPICS.items()
         ]
 
@@ -200,9 +201,9 @@ def _row(part: str, message: Any) -> Any:
 
 
 def _stamp(message: Any) -> float | None:
-    """Return when a message was measured [s]; None where it does not say so."""
+    """Return when a message was measured [s]; None where it does not say so. Raise Error for a stamp of nonsense."""
     header = getattr(message, "header", None)
-    return float(header.stamp.to_sec()) if header is not None and header.stamp else None
+    return seconds_of(message) if header is not None and header.stamp else None
 
 
 def main(arguments: Sequence[str]) -> int:

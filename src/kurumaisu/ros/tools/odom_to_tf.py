@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
-import rospy
 import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 
 from kurumaisu import program
+from kurumaisu._core import frame_of
 from kurumaisu.ros import life
+from kurumaisu.ros.inbox import seconds_of, subscribe
+from kurumaisu.ros.rotation import normed, pose_of
 
 _HELP = """
 Publish the transform that each odometry message holds: for recordings whose tf
@@ -30,15 +32,21 @@ def main() -> int:
 
 def _serve(node: life.Life) -> int:
     broadcaster = tf2_ros.TransformBroadcaster()
-    rospy.Subscriber("odom", Odometry, lambda odom: broadcaster.sendTransform(_transform(odom)), queue_size=100)
+    send = broadcaster.sendTransform
+    heard = subscribe("odom", Odometry, lambda odom: send(_transform(odom)), "ODOM_TO_TF_DROPPED", queue_size=100)
     node.asked.wait()
+    del heard
     return 0
 
 
 def _transform(odom: Odometry) -> TransformStamped:
-    transform = TransformStamped(header=odom.header, child_frame_id=odom.child_frame_id)
+    """Return it. Raise Error unless it makes sense, for one transform of nonsense may keep all later ones out of tf."""
+    seconds_of(odom)
     pose = odom.pose.pose
+    pose_of(pose)
+    transform = TransformStamped(header=odom.header, child_frame_id=frame_of(odom.child_frame_id))
+    transform.header.frame_id = frame_of(odom.header.frame_id)
     place = transform.transform.translation
     place.x, place.y, place.z = pose.position.x, pose.position.y, pose.position.z
-    transform.transform.rotation = pose.orientation
+    transform.transform.rotation = normed(pose.orientation)
     return transform

@@ -18,7 +18,10 @@ from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper.chair import dead_reckoning
 from kurumaisu.paper.chair.dead_reckoning import Odom, Put, Reckoner
+from kurumaisu.plausible import require
 from kurumaisu.ros import life
+from kurumaisu.ros.inbox import nanoseconds_of, subscribe
+from kurumaisu.ros.rotation import planar
 
 _HELP = """
 Compute base_node's odometry again, from the voltages of a bag that is played.
@@ -45,17 +48,22 @@ class _Again:
         self._recorded: dict[int, Odometry] = {}
         self._reckoner: Reckoner | None = None
         self._publisher = rospy.Publisher("odom", Odometry, queue_size=_QUEUE)
-        rospy.Subscriber("voltages", Voltages, self._hear_voltages, queue_size=_QUEUE)
-        rospy.Subscriber("recorded/odom", Odometry, self._hear_odom, queue_size=_QUEUE)
+        subscribe("voltages", Voltages, self._hear_voltages, "REPLAY_DROPPED", queue_size=_QUEUE)
+        subscribe("recorded/odom", Odometry, self._hear_odom, "REPLAY_DROPPED", queue_size=_QUEUE)
 
     def _hear_voltages(self, message: Voltages) -> None:
+        nanoseconds_of(message)
+        require("speed", "v", message.v)
+        require("yaw rate", "w", message.w)
         with self._lock:
             self._put.append(message)
             self._go_on()
 
     def _hear_odom(self, message: Odometry) -> None:
+        stamp = nanoseconds_of(message)
+        planar(message.pose.pose)
         with self._lock:
-            self._recorded[message.header.stamp.to_nsec()] = message
+            self._recorded[stamp] = message
             self._go_on()
 
     def _go_on(self) -> None:

@@ -13,6 +13,7 @@ from nav_msgs.msg import Odometry
 from kurumaisu import program, settings
 from kurumaisu.driving import Route, RouteFollower, read_route
 from kurumaisu.ros import life
+from kurumaisu.ros.inbox import seconds_of, subscribe
 from kurumaisu.ros.rotation import planar
 
 _HELP = """
@@ -40,17 +41,17 @@ class WaypointNode:
         self._heard: float | None = None
         self._end: float | None = None
         self._publisher = rospy.Publisher("cmd_vel", Twist, queue_size=1)
-        rospy.Subscriber("ground_truth", Odometry, self._on_pose, queue_size=1)
+        subscribe("ground_truth", Odometry, self._on_pose, "WAYPOINT_BAD_POSE", queue_size=1)
 
     def _on_pose(self, message: Odometry) -> None:
-        now = message.header.stamp.to_sec()
+        now, pose = seconds_of(message), planar(message.pose.pose)
         self._start = now if self._start is None else self._start
         # The first word that a base hears must be rest, and it may come to listen late.
         if self._heard is None and self._publisher.get_num_connections() > 0:
             self._heard = now
         command = Twist()
         if self._heard is not None and now - self._heard >= self._route.pause:
-            command.linear.x, command.angular.z = self._driver.command(planar(message.pose.pose))
+            command.linear.x, command.angular.z = self._driver.command(pose)
         self._publisher.publish(command)
         if self._driver.done and self._end is None:
             self._end = now

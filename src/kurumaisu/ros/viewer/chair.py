@@ -15,6 +15,8 @@ from std_srvs.srv import Trigger
 
 from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
+from kurumaisu.ros.inbox import check_odometry, rates_of
+from kurumaisu.ros.messages import command_of
 from kurumaisu.ros.rotation import planar
 from kurumaisu.ros.viewer.calls import call
 from kurumaisu.ros.viewer.topics import Newest
@@ -31,9 +33,9 @@ class Chair:
     def __init__(self, node: str) -> None:
         """node: the base controller's name."""
         self._node = node
-        self.odom = Newest("odom", Odometry)
-        self._volts = Newest("voltages", Voltages)
-        self._asked = Newest("cmd_vel_out", TwistStamped)
+        self.odom = Newest("odom", Odometry, check_odometry)
+        self._volts = Newest("voltages", Voltages, command_of)
+        self._asked = Newest("cmd_vel_out", TwistStamped, lambda message: rates_of(message.twist))
         self._input = Newest("active_input", String)
         self._topics = (self.odom, self._volts, self._asked, self._input)
         self._diagnostics: Any = None

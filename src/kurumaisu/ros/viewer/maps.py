@@ -15,6 +15,8 @@ from PIL import Image
 
 from kurumaisu.geometry import compose
 from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE
+from kurumaisu.ros.inbox import check_covariance
+from kurumaisu.ros.maps.messages import map_of
 from kurumaisu.ros.rotation import planar
 from kurumaisu.ros.viewer.topics import Alignment, Newest, PlanarTransforms
 from kurumaisu.types import FloatArray
@@ -33,9 +35,9 @@ class Maps:
         self._hub = hub
         self._transforms = transforms
         self._frames = map_frame, base_frame
-        self._map = Newest("map", OccupancyGrid)
+        self._map = Newest("map", OccupancyGrid, map_of)
         self._cloud = Newest("particlecloud", PoseArray)
-        self._pose = Newest("amcl_pose", PoseWithCovarianceStamped)
+        self._pose = Newest("amcl_pose", PoseWithCovarianceStamped, lambda m: check_covariance(m.pose.covariance))
         self._topics = (self._map, self._cloud, self._pose)
         self._alignment = Alignment()
         self._drawn = 0.0  # [s] when the last picture was
@@ -86,7 +88,7 @@ class Maps:
             self._hub.particles(compose(offset, _planar_poses(raw)))
         if time.monotonic() - self._drawn < _PAUSE:
             return
-        if (grid := self._map.take()) is not None and grid.info.width and grid.info.height:
+        if (grid := self._map.take()) is not None:
             self._drawn = time.monotonic()
             x, y, yaw = compose(offset, planar(grid.info.origin)).tolist()
             size = grid.info.width, grid.info.height

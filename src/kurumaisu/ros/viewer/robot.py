@@ -11,6 +11,7 @@ from sensor_msgs.msg import LaserScan
 
 from kurumaisu.geometry import compose, interpolate
 from kurumaisu.params import Model
+from kurumaisu.ros.inbox import check_scan
 from kurumaisu.ros.viewer.topics import Newest, Now, PlanarTransforms
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.hub import Hub
@@ -29,7 +30,7 @@ class Robot:
         self._hub = hub
         self._transforms = transforms
         self._map, self._odom, self._base = frames
-        self._scan = Newest("scan", LaserScan)
+        self._scan = Newest("scan", LaserScan, check_scan)
         self._now = Now()
         self._past: deque[tuple[float, FloatArray]] = deque(maxlen=_REMEMBERED)
         mount = model.laser.mount

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from kurumaisu._core import frame_of
 from kurumaisu.settings import Section
 from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.settings import read_settings as read_server
@@ -59,7 +60,7 @@ def read_settings(values: Any, where: str) -> NodeSettings:
         ),
         bags=Path(top.text("bags")),
         notes=top.number("notes", above=0),
-        frames=(top.text("map_frame"), top.text("odom_frame"), top.text("base_frame")),
+        frames=(frame_of(top.text("map_frame")), frame_of(top.text("odom_frame")), frame_of(top.text("base_frame"))),
     )
     driving.end()
     top.end()

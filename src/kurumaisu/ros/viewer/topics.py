@@ -3,25 +3,32 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import rospy
+from geometry_msgs.msg import Point, Pose
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
+from kurumaisu._core import frame_of
+from kurumaisu.errors import Error
 from kurumaisu.geometry import between, compose
-from kurumaisu.ros.rotation import yaw_of
+from kurumaisu.ros.inbox import Refusals
+from kurumaisu.ros.rotation import planar
 from kurumaisu.types import FloatArray
 
 
 class Newest:
     """The newest message of a topic; what nobody asks for is never unpacked."""
 
-    def __init__(self, name: str, kind: type) -> None:
-        """Hear nothing before open."""
-        self._name, self._kind = name, kind
+    def __init__(self, name: str, kind: type, check: Callable[[Any], object] | None = None) -> None:
+        """Hear nothing before open; check: raises Error for a message that makes no sense, which is refused."""
+        self._name, self._kind, self._check = name, kind, check
+        self._refusals = Refusals("VIEWER_BAD_MESSAGE", name)
         self._raw: Any = None
         self._subscriber: Any = None
         self.last: Any = None  # as of the last take
@@ -56,9 +63,16 @@ class Newest:
         raw = self.take_raw()
         if raw is None:
             return None
-        self.last = self._kind()
-        self.last.deserialize_numpy(raw, np)
-        return self.last
+        message = self._kind()
+        message.deserialize_numpy(raw, np)
+        try:
+            if self._check is not None:
+                self._check(message)
+        except Error as error:
+            self._refusals.add(error)
+            return None
+        self.last = message
+        return message
 
     def _hear(self, message: rospy.AnyMsg) -> None:
         self._raw = message
@@ -131,9 +145,10 @@ class PlanarTransforms:
             message = TFMessage()
             message.deserialize(raw)
             for one in message.transforms:
-                place = one.transform.translation
-                pose = np.array([place.x, place.y, yaw_of(one.transform.rotation)])
-                self._parents[one.child_frame_id.lstrip("/")] = one.header.frame_id.lstrip("/"), pose
+                with contextlib.suppress(Error):  # nothing in the plane: a camera's frame, or nonsense
+                    place = one.transform.translation
+                    pose = planar(Pose(Point(place.x, place.y, place.z), one.transform.rotation))
+                    self._parents[frame_of(one.child_frame_id)] = frame_of(one.header.frame_id), pose
 
     def _hear(self, message: Any) -> None:
         self._raw[message._connection_header["callerid"]] = message._buff

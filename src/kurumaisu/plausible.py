@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What makes sense of what comes from outside: the ranges and rules of src/plausible, for Python.
+
+A finite number may still make no sense: 1e300 m is finite, and its square is not.
+"""
+
+from __future__ import annotations
+
+from kurumaisu import _core
+from kurumaisu.errors import Error
+
+
+def require(quantity: str, what: str, value: float) -> float:
+    """Return a number. Raise Error with what is expected and what came unless it is in its quantity's range.
+
+    quantity: a name in src/plausible/quantity.h; what: its name where it came from.
+    """
+    try:
+        _core.require(quantity, what, value)
+    except ValueError as error:
+        raise Error(str(error)) from error
+    return value
+
+
+def yaw_of(x: float, y: float, z: float, w: float) -> float:
+    """Return the yaw [rad], in (-pi, pi], of a quaternion of any length; roll and pitch are dropped.
+
+    Raise Error for one that has none.
+    """
+    try:
+        return _core.yaw_of(x, y, z, w)
+    except ValueError as error:
+        raise Error(str(error)) from error
