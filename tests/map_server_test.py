@@ -16,10 +16,11 @@ from nav_msgs.msg import MapMetaData, OccupancyGrid
 from nav_msgs.srv import GetMap, LoadMap, LoadMapResponse
 from PIL import Image
 
-from kurumaisu.map_file import MapFile, write_map
+from kurumaisu.map_file import MapFile, map_pair
 from kurumaisu.params import shipped
 from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.ros.testing.nodes import Topic, wait_for
+from kurumaisu.whole_files import write_whole
 
 DEADLINE = 60.0  # [s]
 BUILDING = shipped("worlds/maps/building.yaml")
@@ -67,7 +68,9 @@ class MapServerTest(unittest.TestCase):
             assert code == 0, said
             assert np.array_equal(expected(folder / "saved.yaml"), expected(BUILDING))
             drawn = np.array([[0, 100, -1], [100, 100, 0]], dtype=np.int8)
-            _, turned = write_map(MapFile(drawn, 0.1, (1.5, -2.5, 0.6)), folder / "turned", ".png", 65, 19.6)
+            pair = map_pair(MapFile(drawn, 0.1, (1.5, -2.5, 0.6)), folder / "turned", ".png", 65, 19.6)
+            write_whole(pair)
+            _, turned = pair
             answer = change(f"file://{turned}")
             assert answer.result == LoadMapResponse.RESULT_SUCCESS
             new = maps.wait_last(lambda m: m.info.width == 3, "the other map")

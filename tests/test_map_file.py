@@ -11,7 +11,8 @@ import yaml
 from PIL import Image
 
 from kurumaisu.errors import Error
-from kurumaisu.map_file import MapFile, read_map, write_map
+from kurumaisu.map_file import MapFile, map_pair, read_map
+from kurumaisu.whole_files import write_whole
 
 LINES = {
     "image": "image.png",
@@ -115,7 +116,9 @@ def test_a_missing_map_is_named(tmp_path: Path) -> None:
 def test_round_trip(tmp_path: Path, suffix: str) -> None:
     rng = np.random.default_rng(1)
     drawn = rng.choice(np.array([0, 100, -1], dtype=np.int8), (37, 53))
-    image, text = write_map(MapFile(drawn, 0.025, (-3.25, 1.5, -0.7)), tmp_path / "a.b", suffix, 65, 19.6)
+    pair = map_pair(MapFile(drawn, 0.025, (-3.25, 1.5, -0.7)), tmp_path / "a.b", suffix, 65, 19.6)
+    write_whole(pair)
+    image, text = pair
     assert (image.name, text.name) == (f"a.b{suffix}", "a.b.yaml")
     said = yaml.safe_load(text.read_text())
     assert said["image"] == image.name
@@ -130,10 +133,5 @@ def test_round_trip(tmp_path: Path, suffix: str) -> None:
 
 def test_written_by_thresholds(tmp_path: Path) -> None:
     drawn = np.array([[0, 10, 11, 50, 51, 100, -1]], dtype=np.int8)
-    _, text = write_map(MapFile(drawn, 1.0, (0.0, 0.0, 0.0)), tmp_path / "map", ".pgm", 50, 11)
-    assert read_map(text).cells.tolist() == [[0, 0, -1, -1, 100, 100, -1]]
-
-
-def test_what_cannot_be_written_is_named(tmp_path: Path) -> None:
-    with pytest.raises(Error, match="missing"):
-        write_map(MapFile(np.zeros((1, 1), np.int8), 1.0, (0.0, 0.0, 0.0)), tmp_path / "missing/map", ".pgm", 65, 19.6)
+    write_whole(map_pair(MapFile(drawn, 1.0, (0.0, 0.0, 0.0)), tmp_path / "map", ".pgm", 50, 11))
+    assert read_map(tmp_path / "map.yaml").cells.tolist() == [[0, 0, -1, -1, 100, 100, -1]]

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 import warnings
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from kurumaisu import settings
-from kurumaisu.errors import Error
+from kurumaisu.bounded_files import MOST_IMAGE, MOST_TEXT, check_file, read_text
+from kurumaisu.errors import Error, told
 from kurumaisu.settings import Section
 from kurumaisu.types import FloatArray
 
@@ -55,11 +57,10 @@ def read_map(path: Path) -> MapFile:
     return MapFile(np.ascontiguousarray(_cells(said)[::-1]), said.resolution, said.origin)
 
 
-def write_map(written: MapFile, path: Path, suffix: str, occupied: float, free: float) -> tuple[Path, Path]:
-    """Write an image (.pgm or .png) and path.yaml and return their names; path has no suffix.
+def map_pair(written: MapFile, path: Path, suffix: str, occupied: float, free: float) -> dict[Path, str | bytes]:
+    """Return the image (.pgm or .png) and path.yaml, in this order, to be written; path has no suffix.
 
     Cells above occupied [%] are drawn as walls, those below free [%] as free, all others as unknown.
-    Raise Error naming the file that cannot be written.
     """
     shades = np.full(written.cells.shape, _SHADE_UNKNOWN, dtype=np.uint8)
     shades[written.cells > occupied] = _SHADE_WALL
@@ -67,17 +68,14 @@ def write_map(written: MapFile, path: Path, suffix: str, occupied: float, free: 
     image, text = path.with_name(path.name + suffix), path.with_name(path.name + ".yaml")
     x, y, yaw = written.origin
     turn = np.format_float_positional(yaw, precision=9, trim="0")  # YAML takes 1e-9 for a string
-    try:
-        Image.fromarray(np.ascontiguousarray(shades[::-1])).save(image)
-        text.write_text(
-            f"image: {image.name}\nresolution: {written.resolution:.6f}\n"
-            f"origin: [{x:.6f}, {y:.6f}, {turn}]\nnegate: 0\n"
-            f"occupied_thresh: {OCCUPIED_ABOVE / 100}\nfree_thresh: {FREE_BELOW / 100}\n",
-            encoding="utf-8",
-        )
-    except OSError as error:
-        raise Error(f"{error.filename}: {error.strerror}") from error
-    return image, text
+    drawn = BytesIO()
+    Image.fromarray(np.ascontiguousarray(shades[::-1])).save(drawn, {".pgm": "PPM", ".png": "PNG"}[suffix])
+    said = (
+        f"image: {image.name}\nresolution: {written.resolution:.6f}\n"
+        f"origin: [{x:.6f}, {y:.6f}, {turn}]\nnegate: 0\n"
+        f"occupied_thresh: {OCCUPIED_ABOVE / 100}\nfree_thresh: {FREE_BELOW / 100}\n"
+    )
+    return {image: drawn.getvalue(), text: said}
 
 
 def _read_yaml(path: Path) -> _Said:
@@ -92,7 +90,7 @@ def _with_line(path: Path, message: str) -> str:
     match = re.match(re.escape(f"{path}: ") + r"(\w+)[\w.]*: ", message)
     if match is None:
         return message
-    document = yaml.compose(path.read_text(encoding="utf-8"))
+    document = yaml.compose(read_text(path, MOST_TEXT))
     pairs = document.value if isinstance(document, yaml.MappingNode) else []
     lines = [key.start_mark.line + 1 for key, _ in pairs if key.value == match.group(1)]
     return f"{path}:{lines[-1]}:{message[len(str(path)) + 1 :]}" if lines else message
@@ -125,7 +123,7 @@ def _origin(top: Section) -> tuple[float, float, float]:
 def _negate(top: Section) -> bool:
     value = top.take("negate")
     if value not in (0, 1):  # False and True are, too
-        raise top.error("negate", f"must be 0 or 1: {value!r}")
+        raise top.error("negate", f"must be 0 or 1: {told(value)}")
     return bool(value)
 
 
@@ -155,6 +153,7 @@ def _occupancies(said: _Said, shades: FloatArray) -> NDArray[np.int8]:
 
 def _pixels(path: Path) -> tuple[NDArray[np.uint16], int, NDArray[np.bool_] | None]:
     """Return the sum of the colours of every pixel, how many colours there are, and where the image is opaque."""
+    check_file(path, MOST_IMAGE)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of large images, for which there is our own limit, and of damaged ones

@@ -113,7 +113,11 @@ def shipped(name: str) -> Path:
 
 def load_model(path: Path) -> Model:
     """Read a model file. Raise Error naming file and key for anything missing, unknown or senseless."""
-    top = settings.load(path)
+    return read_model(settings.load(path))
+
+
+def read_model(top: settings.Section) -> Model:
+    """Take all keys of a model. Raise Error as load_model does."""
     laws = top.section("voltage_laws")
     law_name = top.text("voltage_law", choices=laws.names())
     parsed = {name: _voltage_law(laws.section(name)) for name in laws.names()}

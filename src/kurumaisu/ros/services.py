@@ -36,6 +36,7 @@ from kurumaisu.srv import (
     StateFileRequest,
 )
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 
 class Simulation(Protocol):
@@ -135,7 +136,7 @@ class Services:
 
 def _write(file: Path, saved: bytes) -> None:
     try:
-        file.write_bytes(saved)
+        write_whole({file: saved})
     except OSError as error:
         raise Error(f"{file}: {error.strerror}") from error
 

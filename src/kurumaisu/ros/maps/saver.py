@@ -10,8 +10,9 @@ import rospy
 
 from kurumaisu import program
 from kurumaisu.errors import Error, failed
-from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, write_map
+from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, map_pair
 from kurumaisu.ros.maps.messages import GridMessage, map_of
+from kurumaisu.whole_files import write_whole
 
 _HELP = """
 Save the next map as an image and its YAML file, and end.
@@ -42,11 +43,12 @@ def main() -> int:
     try:
         served = map_of(rospy.wait_for_message("map", GridMessage, options.wait))
         suffix = ".png" if options.png else ".pgm"
-        image, text = write_map(served, options.name, suffix, options.occ, options.free)
+        pair = map_pair(served, options.name, suffix, options.occ, options.free)
+        write_whole(pair)
     except rospy.ROSException:
         print(f"map_saver: {rospy.resolve_name('map')}: no map came within {options.wait:g} s", file=sys.stderr)
         return 1
     except Error as error:
         return failed("map_saver", error)
-    print(f"written: {image}, {text}")
+    print(f"written: {', '.join(map(str, pair))}")
     return 0
