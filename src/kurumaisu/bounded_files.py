@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import stat
-from contextlib import closing
 from io import FileIO
 from pathlib import Path
 
@@ -30,7 +29,7 @@ _KINDS = (
 def read_bytes(path: Path, most: int) -> bytes:
     """Return what is in a file. Raise Error naming it if it is no regular file, too large, or cannot be read."""
     try:
-        with closing(_opened(path)) as file:
+        with FileIO(str(path), opener=_open_at_once) as file:
             _check(path, os.fstat(file.fileno()), most)
             data = _at_most(file, most + 1)
     except (OSError, ValueError) as error:  # ValueError: a null byte in the name
@@ -57,9 +56,9 @@ def check_file(path: Path, most: int) -> None:
         raise Error(f"{path}: {getattr(error, 'strerror', None) or error}") from error
 
 
-def _opened(path: Path) -> FileIO:
+def _open_at_once(name: str, flags: int) -> int:
     """Open without waiting: a pipe would wait for who writes into it."""
-    return FileIO(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY))
+    return os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY)
 
 
 def _check(path: Path, found: os.stat_result, most: int) -> None:

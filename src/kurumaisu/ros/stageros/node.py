@@ -102,7 +102,7 @@ def main() -> int:
     rospy.set_param("/use_sim_time", True)
     requests = Requests()
     pacer = Pacer(speed)
-    StagerosServices(session, requests, pacer)
+    StagerosServices(session, requests, pacer, settings.states)
     _run(session, requests, pacer, world, stopped)
     rospy.signal_shutdown("the simulation has ended")
     return 0
