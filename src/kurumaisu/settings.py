@@ -13,6 +13,7 @@ import yaml
 from kurumaisu.bounded_files import MOST_TEXT, read_text
 from kurumaisu.errors import Error, told
 
+_LARGEST = 2**32 - 1  # of integers that have no bound of their own
 _MOST_VALUES = 100_000  # of a document, anchors written out; more is made to fill memories
 
 
@@ -52,11 +53,13 @@ class Section:
             raise self.error(key, f"must be a finite number{bound}: {told(given)}")
         return value
 
-    def integer(self, key: str, at_least: int) -> int:
+    def integer(self, key: str, at_least: int, at_most: int = _LARGEST) -> int:
         """Return a required integer."""
         value = self.take(key)
-        if isinstance(value, bool) or not isinstance(value, int) or value < at_least:
-            raise self.error(key, f"must be an integer of at least {at_least}: {told(value)}")
+        if isinstance(value, bool) or not isinstance(value, int) or not at_least <= value <= at_most:
+            too_large = isinstance(value, int) and value > at_most
+            bounds = f"{at_least} to {at_most}" if too_large or at_most < _LARGEST else f"at least {at_least}"
+            raise self.error(key, f"must be an integer of {bounds}: {told(value)}")
         return value
 
     def text(self, key: str, choices: Sequence[str] = ()) -> str:
@@ -152,7 +155,7 @@ def _float(value: int | float) -> float:
     try:
         return float(value)
     except OverflowError:
-        return math.copysign(math.inf, value)
+        return math.inf if value > 0 else -math.inf
 
 
 def _kind(value: Any) -> str:

@@ -79,11 +79,16 @@ class World:
         return self.starts[0].pose
 
     @property
+    def has_walls(self) -> bool:
+        """Whether there is anything solid that stands still."""
+        return bool(len(self.segments) + len(self.obstacles))
+
+    @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Smallest x, smallest y, largest x, largest y [m] of the walls. Raise Error if there are none."""
-        both = np.concatenate([self.segments, self.obstacles]).reshape(-1, 2)
-        if not len(both):
+        if not self.has_walls:
             raise Error(f"{self.path}: has no walls")
+        both = np.concatenate([self.segments, self.obstacles]).reshape(-1, 2)
         (x0, y0), (x1, y1) = both.min(axis=0).tolist(), both.max(axis=0).tolist()
         return x0, y0, x1, y1
 

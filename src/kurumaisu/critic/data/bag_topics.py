@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import bz2
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,17 +11,20 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import lz4.frame
 import numpy as np
 from rosbags.rosbag1 import Reader
-from rosbags.rosbag1.reader import IndexData
+from rosbags.rosbag1.reader import Chunk, Compression, IndexData, decompressors
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from kurumaisu.bounded_files import MOST_RECORDING, check_file
 from kurumaisu.critic.data import messages
 from kurumaisu.critic.data.bag_parts import parts_of
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 
 _HEADER = "std_msgs/msg/Header"
+_MOST_UNPACKED = 2**28  # [bytes] of a chunk; rosbag's have some 800 kB and at most one message more
 
 
 @dataclass
@@ -63,6 +67,7 @@ def read_topics(
 def _read_into(
     found: dict[str, Topic], path: Path, parts: dict[str, str], instead: Mapping[str, Callable[[Any], Any]]
 ) -> None:
+    check_file(path, MOST_RECORDING)
     try:
         with _Reader(path) as reader:
             chosen = [connection for connection in reader.connections if _absolute(connection.topic) in parts]
@@ -87,7 +92,15 @@ def _read_into(
 
 
 class _Reader(Reader):
-    """Also reads bags of 2010, whose index records state a wrong length; the count of entries is right."""
+    """Also reads bags of 2010, whose index records state a wrong length; the count of entries is right.
+
+    Nothing is unpacked beyond a limit: a kilobyte can be made to hold gigabytes.
+    """
+
+    def read_chunk(self) -> Chunk:
+        chunk = super().read_chunk()
+        unpack = _UNPACKERS.get(chunk.decompressor)
+        return chunk if unpack is None else chunk._replace(decompressor=unpack)
 
     def read_index_data(self, pos: int, indexes: dict[int, list[IndexData]]) -> None:
         assert self.bio
@@ -102,6 +115,26 @@ class _Reader(Reader):
             connection, count = (struct.unpack_from("<I", header, at)[0] for at in self.index_data_header_offsets)
             for seconds, ns, offset in struct.iter_unpack("<III", self.bio.read(12 * count)):
                 indexes[connection].append(IndexData(seconds * 1_000_000_000 + ns, pos, offset))
+
+
+def _unpack_bz2(data: bytes) -> bytes:
+    return _within_limit(bz2.BZ2Decompressor().decompress(data, _MOST_UNPACKED + 1))
+
+
+def _unpack_lz4(data: bytes) -> bytes:
+    return _within_limit(lz4.frame.LZ4FrameDecompressor().decompress(data, _MOST_UNPACKED + 1))
+
+
+def _within_limit(unpacked: bytes) -> bytes:
+    if len(unpacked) > _MOST_UNPACKED:
+        raise ValueError(f"a chunk has more than {_MOST_UNPACKED} bytes unpacked")
+    return unpacked
+
+
+_UNPACKERS: Mapping[Callable[[bytes], bytes], Callable[[bytes], bytes]] = {
+    decompressors[Compression.BZ2.value]: _unpack_bz2,
+    decompressors[Compression.LZ4.value]: _unpack_lz4,
+}
 
 
 def _absolute(topic: str) -> str:

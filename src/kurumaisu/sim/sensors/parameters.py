@@ -20,6 +20,8 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Bumper, Camera, Fiducial
 
 _TURN = 2 * math.pi
+_MOST_RAYS = 10_000  # of a sonar's cone
+_MOST_PIXELS = 10_000  # of a camera, in a row or a column
 
 Parameters = ImuSettings | BatterySettings | SonarSettings | BumperSettings | Camera | Fiducial
 
@@ -99,7 +101,7 @@ def _sonar(section: settings.Section, mount: FloatArray) -> SonarSettings:
     sonar = SonarSettings(
         mounts=attached(mount, np.array(mounts)),
         field_of_view=_angle(section, "field_of_view", _TURN),
-        rays=section.integer("rays", at_least=1),
+        rays=section.integer("rays", at_least=1, at_most=_MOST_RAYS),
         range_min=section.number("range_min", at_least=0),
         range_max=section.number("range_max", above=0),
         deviation=section.number("deviation", at_least=0),
@@ -118,8 +120,8 @@ def _angle(section: settings.Section, key: str, most: float) -> float:
 
 def _camera(section: settings.Section, _mount: FloatArray) -> Camera:
     camera = Camera(
-        width=section.integer("width", at_least=1),
-        height=section.integer("height", at_least=1),
+        width=section.integer("width", at_least=1, at_most=_MOST_PIXELS),
+        height=section.integer("height", at_least=1, at_most=_MOST_PIXELS),
         fov_h=_angle(section, "fov_h", 0.99 * math.pi),
         fov_v=_angle(section, "fov_v", 0.99 * math.pi),
         near=section.number("near", above=0),
