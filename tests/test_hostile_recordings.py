@@ -2,7 +2,6 @@
 """Recordings made to hang, or to fill the memory: refused, or called wrong data, in few words and in little of both."""
 
 import bz2
-import gzip
 import math
 import os
 import resource
@@ -16,7 +15,6 @@ import pytest
 from recordings import full_run, write_bag
 from rosbags.rosbag1 import Writer
 
-from kurumaisu.bounded_files import check_unpacked
 from kurumaisu.critic.data import bag_topics
 from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
@@ -139,19 +137,6 @@ def test_a_pipe_is_no_recording(tmp_path, name):
     os.mkfifo(tmp_path / name)
     with pytest.raises(Error, match=name):
         read_recording(tmp_path / name)
-
-
-def test_a_packed_file_is_unpacked_to_a_limit(tmp_path):
-    path = tmp_path / "a.rawlog.gz"
-    path.write_bytes(gzip.compress(bytes(3_000_000)) * 2)
-    check_unpacked(path, 6_000_000)
-    with pytest.raises(Error, match=r"a\.rawlog\.gz: has more than 5999999 bytes unpacked"):
-        check_unpacked(path, 5_999_999)
-    path.write_bytes(gzip.compress(bytes(1000))[:-9])
-    with pytest.raises(Error, match="is damaged"):
-        check_unpacked(path, 10**6)
-    path.write_bytes(b"not packed")
-    check_unpacked(path, 100)
 
 
 @pytest.mark.parametrize(

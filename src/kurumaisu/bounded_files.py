@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import gzip
 import os
 import stat
-import zlib
 from io import FileIO
 from pathlib import Path
 
@@ -15,13 +13,11 @@ from kurumaisu.errors import Error
 MOST_TEXT = 2**20  # [bytes] of a file of settings or of a model, which have some thousand
 MOST_TABLE = 2**30  # [bytes] of a table: a day of scans has a third of it
 MOST_RECORDING = 2**38  # [bytes] of a bag, which is read piece by piece
-MOST_RAWLOG = 2**33  # [bytes] of a rawlog, unpacked: all of its scans are kept
+MOST_RAWLOG = 2**33  # [bytes] of a rawlog; src/slam/mapping/rawlog.cpp has the same limit for it unpacked
 MOST_IMAGE = 2**29  # [bytes] of an image's file; its pixels have a limit, too
 MOST_STATE = 2**30  # [bytes] of a saved state of the simulator
 MOST_PAGE = 2**28  # [bytes] of a page and its pictures
 
-_GZIP = b"\x1f\x8b"  # begins what it packed
-_PIECE = 2**20  # [bytes] that are unpacked at a time
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
@@ -59,27 +55,6 @@ def check_file(path: Path, most: int) -> None:
         _check(path, path.stat(), most)
     except (OSError, ValueError) as error:
         raise Error(f"{path}: {getattr(error, 'strerror', None) or error}") from error
-
-
-def check_unpacked(path: Path, most: int) -> None:
-    """Raise Error as read_bytes does, of a file that a library is to read, for more bytes than most once unpacked.
-
-    A file that gzip did not pack is not.
-    """
-    check_file(path, most)
-    count = 0
-    try:
-        with path.open("rb") as raw:
-            if raw.read(2) != _GZIP:
-                return
-            raw.seek(0)
-            with gzip.GzipFile(fileobj=raw) as file:
-                while (more := len(file.read(_PIECE))) and count <= most:
-                    count += more
-    except (OSError, EOFError, zlib.error) as error:
-        raise Error(f"{path}: is damaged: {error}") from error
-    if count > most:
-        raise Error(f"{path}: has more than {most} bytes unpacked, which is all that is read of such a file")
 
 
 def _open_at_once(name: str, flags: int) -> int:

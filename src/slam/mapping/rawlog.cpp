@@ -12,11 +12,11 @@
 #include <mrpt/serialization/CArchive.h>
 
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <optional>
 #include <stdexcept>
 
+#include "regular_file.h"
 #include "slam/basics/pose.h"
 #include "slam/mapping/observation.h"
 
@@ -25,10 +25,13 @@ namespace {
 
 using mrpt::obs::CObservation2DRangeScan;
 
+constexpr std::size_t kMost = std::size_t{1} << 33U;  // bytes, packed or not; a day of scans has a quarter of it
+
 /// The decompressed bytes. In memory, because only there the end of the last object can be told from a file
 /// that was cut off.
 std::vector<std::uint8_t> contents(const std::string& path) {
-  if (!std::ifstream(path).good()) throw std::runtime_error("cannot be read");
+  const std::string why = whyNotRead(path, kMost);
+  if (!why.empty()) throw std::runtime_error(why);
   mrpt::io::CFileGZInputStream file;
   if (!file.open(path)) throw std::runtime_error("cannot be read");
   std::vector<std::uint8_t> bytes;
@@ -38,6 +41,7 @@ std::vector<std::uint8_t> contents(const std::string& path) {
     got = file.Read(bytes.data() + bytes.size() - kChunk, kChunk);
     if (got > kChunk) throw std::runtime_error("is damaged: it cannot be decompressed");
     bytes.resize(bytes.size() - kChunk + got);
+    if (bytes.size() > kMost) throw std::runtime_error("has more than " + std::to_string(kMost) + " bytes unpacked");
   }
   if (bytes.empty()) throw std::runtime_error("is empty");
   return bytes;

@@ -200,7 +200,7 @@ def _slam(item: dict[str, Any] | None) -> SlamGain | None:
 
 def _check(content: Any, where: str) -> None:
     for name, value in _numbers(content, ""):
-        if not math.isfinite(value):
+        if not -math.inf < value < math.inf:  # of integers, too, whatever their length
             raise Error(f"{where}: {name}: must be a finite number: {value}")
     schema = json.loads(Path(__file__).with_name("verdict.schema.json").read_text(encoding="utf-8"))
     fault = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(content))
