@@ -83,8 +83,8 @@ class Section:
         value = self.take(key)
         if not isinstance(value, list) or len(value) != count:
             raise self.error(key, f"must be a list of {count} numbers")
-        items = Section({str(i): item for i, item in enumerate(value)}, self._where, f"{self._path}.{key}")
-        return tuple(items.number(str(i)) for i in range(count))
+        items = Section({f"{key}[{i}]": item for i, item in enumerate(value)}, self._where, self._path)
+        return tuple(items.number(f"{key}[{i}]") for i in range(count))
 
     def items(self, key: str) -> list[Section]:
         """Return a required list of mappings."""
