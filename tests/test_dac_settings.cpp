@@ -124,7 +124,8 @@ TEST(Yaml, ScalarsAreWhatYamlTakesThemFor) {
 
 TEST(Yaml, RefusesFilesThatAreNotRegularOrTooLargeAndCutsValues) {
   for (const char* name : {"/dev/zero", "/tmp"}) {
-    EXPECT_TRUE(has(complaint<std::invalid_argument>([&] { k::YamlValue::load(name); }), "must be a regular file"));
+    EXPECT_TRUE(
+        has(complaint<std::invalid_argument>([&] { k::YamlValue::load(name); }), "must be a regular file"));
   }
   EXPECT_TRUE(has(Read(std::string(2000000, '#')).refusal([](auto&) {}), "at most 1048576 are read"));
   const std::string said =

@@ -20,7 +20,7 @@ from kurumaisu.errors import Error, told
 from kurumaisu.settings import Section
 from kurumaisu.types import FloatArray
 
-_MOST_CELLS = 400_000_000  # 10^4 x 10^4 cells fit four times
+_MOST_CELLS = 10**8  # some 600 MB while it is read
 _MODES = ("trinary", "scale", "raw")
 _WALL = 100  # occupancy [%]
 _OPAQUE = 255

@@ -25,7 +25,8 @@ namespace {
 
 using mrpt::obs::CObservation2DRangeScan;
 
-constexpr std::size_t kMost = std::size_t{1} << 33U;  // bytes, packed or not; a day of scans has a quarter of it
+constexpr std::size_t kMost = std::size_t{1}
+                              << 33U;  // bytes, packed or not; a day of scans has a quarter of it
 
 /// The decompressed bytes. In memory, because only there the end of the last object can be told from a file
 /// that was cut off.
@@ -41,7 +42,8 @@ std::vector<std::uint8_t> contents(const std::string& path) {
     got = file.Read(bytes.data() + bytes.size() - kChunk, kChunk);
     if (got > kChunk) throw std::runtime_error("is damaged: it cannot be decompressed");
     bytes.resize(bytes.size() - kChunk + got);
-    if (bytes.size() > kMost) throw std::runtime_error("has more than " + std::to_string(kMost) + " bytes unpacked");
+    if (bytes.size() > kMost)
+      throw std::runtime_error("has more than " + std::to_string(kMost) + " bytes unpacked");
   }
   if (bytes.empty()) throw std::runtime_error("is empty");
   return bytes;

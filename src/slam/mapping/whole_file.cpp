@@ -50,15 +50,13 @@ int writeError(const std::string& part, const std::function<bool(const std::stri
 void replaceWhole(const std::vector<WholeFile>& files) {
   std::size_t at = 0;
   int error = 0;
-  for (; at < files.size() && error == 0; ++at)
-    error = writeError(partOf(files[at].path), files[at].write);
+  for (; at < files.size() && error == 0; ++at) error = writeError(partOf(files[at].path), files[at].write);
   for (std::size_t i = 0; i < files.size() && error == 0; ++i) {
     at = i + 1;
     if (std::rename(partOf(files[i].path).c_str(), files[i].path.c_str()) != 0) error = errno;
   }
   if (error == 0) return;
-  for (const WholeFile& file : files)
-    std::remove(partOf(file.path).c_str());
+  for (const WholeFile& file : files) std::remove(partOf(file.path).c_str());
   throw std::runtime_error(files[at - 1].path + ": cannot be written: " + std::strerror(error));
 }
 

@@ -10,7 +10,8 @@ namespace kurumaisu {
 
 struct WholeFile {
   std::string path;
-  std::function<bool(const std::string&)> write;  // writes the file of the name it is given; false: it could not
+  std::function<bool(const std::string&)>
+      write;  // writes the file of the name it is given; false: it could not
 };
 
 /// Has the files of one result written under other names beside their own, and gives them their own when all are
