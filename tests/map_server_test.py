@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """map_server and map_saver as a launch file and rosrun start them; the map's file is read here by PIL and PyYAML."""
 
+import resource
 import subprocess
 import sys
 import tempfile
@@ -88,6 +89,24 @@ class MapServerTest(unittest.TestCase):
         served = rospy.ServiceProxy("static_map", GetMap)().map
         assert cells_of(served).tolist() == drawn.tolist()  # the one there was
         assert change(f"package://kurumaisu/worlds/maps/{BUILDING.name}").result == LoadMapResponse.RESULT_SUCCESS
+
+    def test_2_a_full_disk_leaves_the_old_pair(self):
+        with tempfile.TemporaryDirectory() as name:
+            pair = Path(name, "map.pgm"), Path(name, "map.yaml")
+            for path in pair:
+                path.write_text("old")
+            room = 20_000  # [bytes] that a file may have: a disk that is full after so many looks the same
+            saver = subprocess.run(
+                [program("map_saver"), "-f", str(pair[0].with_suffix(""))],
+                capture_output=True,
+                text=True,
+                timeout=DEADLINE,
+                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
+            )
+            assert saver.returncode == 1
+            assert "map.pgm: cannot be written: File too large" in saver.stderr
+            assert [path.read_text() for path in pair] == ["old", "old"]
+            assert len(list(Path(name).iterdir())) == 2
 
     def test_3_what_cannot_be_served_stops_it(self):
         code, said = run(program("map_server"), "/none.yaml", "__name:=bad_server")
