@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from recordings import full_run, write_bag
 from rosbags.rosbag1 import Writer
+from rosbags.rosbag1.reader import Compression, decompressors
 
 from kurumaisu.critic.data import bag_topics
 from kurumaisu.critic.data.csv_writer import write_csv_run
@@ -174,21 +175,24 @@ def test_hostile_meta_is_refused_in_few_words(tmp_path, text, words):
     assert words in refusal(folder)
 
 
-@pytest.mark.parametrize("unpack", [bag_topics._unpack_bz2, bag_topics._unpack_lz4])
-def test_a_chunk_of_a_bag_is_unpacked_to_a_limit(monkeypatch, unpack):
-    monkeypatch.setattr(bag_topics, "_MOST_UNPACKED", 10_000)
-    pack = bz2.compress if unpack is bag_topics._unpack_bz2 else lz4.frame.compress
-    assert unpack(pack(bytes(10_000))) == bytes(10_000)
-    with pytest.raises(ValueError, match="more than 10000 bytes"):
-        unpack(pack(bytes(10_000_000)))
-
-
 @pytest.mark.parametrize("compression", [Writer.CompressionFormat.BZ2, Writer.CompressionFormat.LZ4])
-def test_the_reader_of_bags_unpacks_with_that_limit(tmp_path, monkeypatch, compression):
+def test_a_bag_is_unpacked_to_a_limit(tmp_path, monkeypatch, compression):
     write_bag(tmp_path / "a.bag", full_run(), compression=compression)
     assert read_recording(tmp_path).runs
+    monkeypatch.setattr(bag_topics, "_LEAST_UNPACKED", 100)
+    monkeypatch.setattr(bag_topics, "_TIMES_UNPACKED", 1)
+    assert "a.bag: has more than" in refusal(tmp_path)
     monkeypatch.setattr(bag_topics, "_MOST_UNPACKED", 1000)
-    assert "a chunk has more than 1000 bytes unpacked" in refusal(tmp_path)
+    assert "a.bag: a chunk has more than 1000 bytes unpacked" in refusal(tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["bz2", "lz4"])
+def test_a_bomb_is_not_unpacked(kind):
+    pack, wanted = (bz2.compress, Compression.BZ2) if kind == "bz2" else (lz4.frame.compress, Compression.LZ4)
+    unpack = bag_topics._UNPACKERS[decompressors[wanted.value]]
+    bomb = pack(bytes(100_000_000))
+    assert len(bomb) < 500_000
+    assert len(unpack(bomb, 10_000)) == 10_000
 
 
 def test_values_are_told_in_few_characters():

@@ -13,7 +13,7 @@ from kurumaisu.errors import Error
 MOST_TEXT = 2**20  # [bytes] of a file of settings or of a model, which have some thousand
 MOST_TABLE = 2**30  # [bytes] of a table: a day of scans has a third of it
 MOST_RECORDING = 2**38  # [bytes] of a bag, which is read piece by piece
-MOST_RAWLOG = 2**33  # [bytes] of a rawlog; src/slam/mapping/rawlog.cpp has the same limit for it unpacked
+MOST_RAWLOG = 8 * 10**9  # [bytes] of a rawlog; src/slam/mapping/rawlog.cpp has the same limit for it unpacked
 MOST_IMAGE = 2**29  # [bytes] of an image's file; its pixels have a limit, too
 MOST_STATE = 2**30  # [bytes] of a saved state of the simulator
 MOST_PAGE = 2**28  # [bytes] of a page and its pictures

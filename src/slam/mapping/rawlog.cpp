@@ -11,7 +11,10 @@
 #include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/serialization/CArchive.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -25,8 +28,9 @@ namespace {
 
 using mrpt::obs::CObservation2DRangeScan;
 
-constexpr std::size_t kMost = std::size_t{1}
-                              << 33U;  // bytes, packed or not; a day of scans has a quarter of it
+constexpr std::uintmax_t kMost = 8'000'000'000;  // bytes, packed or not; a day of scans has a quarter of it
+constexpr std::uintmax_t kLeast = 64'000'000;    // bytes that any file may have unpacked,
+constexpr std::uintmax_t kTimes = 200;           // and times its size: scans are packed 2 to 20 times
 
 /// The decompressed bytes. In memory, because only there the end of the last object can be told from a file
 /// that was cut off.
@@ -35,6 +39,7 @@ std::vector<std::uint8_t> contents(const std::string& path) {
   if (!why.empty()) throw std::runtime_error(why);
   mrpt::io::CFileGZInputStream file;
   if (!file.open(path)) throw std::runtime_error("cannot be read");
+  const std::uintmax_t most = std::min(kMost, kLeast + kTimes * std::filesystem::file_size(path));
   std::vector<std::uint8_t> bytes;
   constexpr std::size_t kChunk = 1U << 20U;
   for (std::size_t got = kChunk; got > 0;) {
@@ -42,8 +47,8 @@ std::vector<std::uint8_t> contents(const std::string& path) {
     got = file.Read(bytes.data() + bytes.size() - kChunk, kChunk);
     if (got > kChunk) throw std::runtime_error("is damaged: it cannot be decompressed");
     bytes.resize(bytes.size() - kChunk + got);
-    if (bytes.size() > kMost)
-      throw std::runtime_error("has more than " + std::to_string(kMost) + " bytes unpacked");
+    if (bytes.size() > most)
+      throw std::runtime_error("has more than " + std::to_string(most) + " bytes unpacked");
   }
   if (bytes.empty()) throw std::runtime_error("is empty");
   return bytes;

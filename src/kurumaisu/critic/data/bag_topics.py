@@ -7,6 +7,7 @@ import bz2
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -25,6 +26,10 @@ from kurumaisu.types import FloatArray
 
 _HEADER = "std_msgs/msg/Header"
 _MOST_UNPACKED = 2**28  # [bytes] of a chunk; rosbag's have some 800 kB and at most one message more
+_LEAST_UNPACKED, _TIMES_UNPACKED = (
+    2**26,
+    200,
+)  # [bytes] and times its size, of a whole bag: scans are packed 2 to 20 times
 
 
 @dataclass
@@ -97,10 +102,24 @@ class _Reader(Reader):
     Nothing is unpacked beyond a limit: a kilobyte can be made to hold gigabytes.
     """
 
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._sizes: dict[int, int] = {}  # [bytes] of chunks, unpacked, by their places
+        self._most = _LEAST_UNPACKED + _TIMES_UNPACKED * path.stat().st_size  # [bytes] of all of them
+
     def read_chunk(self) -> Chunk:
         chunk = super().read_chunk()
         unpack = _UNPACKERS.get(chunk.decompressor)
-        return chunk if unpack is None else chunk._replace(decompressor=unpack)
+        return chunk if unpack is None else chunk._replace(decompressor=partial(self._unpacked, chunk.datapos, unpack))
+
+    def _unpacked(self, place: int, unpack: Callable[[bytes, int], bytes], data: bytes) -> bytes:
+        unpacked = unpack(data, _MOST_UNPACKED + 1)
+        self._sizes[place] = len(unpacked)
+        if len(unpacked) > _MOST_UNPACKED:
+            raise Error(f"{self.path}: a chunk has more than {_MOST_UNPACKED} bytes unpacked")
+        if sum(self._sizes.values()) > self._most:
+            raise Error(f"{self.path}: has more than {self._most} bytes unpacked: {_TIMES_UNPACKED} times its size")
+        return unpacked
 
     def read_index_data(self, pos: int, indexes: dict[int, list[IndexData]]) -> None:
         assert self.bio
@@ -117,23 +136,10 @@ class _Reader(Reader):
                 indexes[connection].append(IndexData(seconds * 1_000_000_000 + ns, pos, offset))
 
 
-def _unpack_bz2(data: bytes) -> bytes:
-    return _within_limit(bz2.BZ2Decompressor().decompress(data, _MOST_UNPACKED + 1))
-
-
-def _unpack_lz4(data: bytes) -> bytes:
-    return _within_limit(lz4.frame.LZ4FrameDecompressor().decompress(data, _MOST_UNPACKED + 1))
-
-
-def _within_limit(unpacked: bytes) -> bytes:
-    if len(unpacked) > _MOST_UNPACKED:
-        raise ValueError(f"a chunk has more than {_MOST_UNPACKED} bytes unpacked")
-    return unpacked
-
-
-_UNPACKERS: Mapping[Callable[[bytes], bytes], Callable[[bytes], bytes]] = {
-    decompressors[Compression.BZ2.value]: _unpack_bz2,
-    decompressors[Compression.LZ4.value]: _unpack_lz4,
+# Each returns so many bytes at most.
+_UNPACKERS: Mapping[Callable[[bytes], bytes], Callable[[bytes, int], bytes]] = {
+    decompressors[Compression.BZ2.value]: lambda data, most: bz2.BZ2Decompressor().decompress(data, most),
+    decompressors[Compression.LZ4.value]: lambda data, most: lz4.frame.LZ4FrameDecompressor().decompress(data, most),
 }
 
 

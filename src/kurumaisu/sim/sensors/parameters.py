@@ -21,7 +21,6 @@ from kurumaisu.world.model import Bumper, Camera, Fiducial
 
 _TURN = 2 * math.pi
 _MOST_RAYS = 10_000  # of a sonar's cone
-_MOST_PIXELS = 10_000  # of a camera, in a row or a column
 
 Parameters = ImuSettings | BatterySettings | SonarSettings | BumperSettings | Camera | Fiducial
 
@@ -120,8 +119,8 @@ def _angle(section: settings.Section, key: str, most: float) -> float:
 
 def _camera(section: settings.Section, _mount: FloatArray) -> Camera:
     camera = Camera(
-        width=section.integer("width", at_least=1, at_most=_MOST_PIXELS),
-        height=section.integer("height", at_least=1, at_most=_MOST_PIXELS),
+        width=section.integer("width", at_least=1),
+        height=section.integer("height", at_least=1),
         fov_h=_angle(section, "fov_h", 0.99 * math.pi),
         fov_v=_angle(section, "fov_v", 0.99 * math.pi),
         near=section.number("near", above=0),
