@@ -2,14 +2,20 @@
 #include "yaml.h"
 
 #include <charconv>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <regex>
 #include <stdexcept>
 #include <system_error>
 
+#include "regular_file.h"
+
 namespace kurumaisu {
 namespace {
+
+constexpr std::uintmax_t kMostBytes = 1U << 20U;  // of a file
+constexpr std::size_t kMostTold = 100;            // characters of a value in a message
 
 std::string placeOf(const std::string& file, const YAML::Mark& mark) {
   return file + ":" + (mark.is_null() ? "" : std::to_string(mark.line + 1) + ":") + " ";
@@ -40,6 +46,11 @@ std::optional<double> asNumber(const std::string& text) {
   return value;
 }
 
+/// A value for a message, which has no room for a long one.
+std::string cut(const std::string& text) {
+  return text.size() <= kMostTold ? text : text.substr(0, kMostTold) + "...";
+}
+
 Kind kindOfPlain(const std::string& text) {
   if (text.empty() || text == "~" || text == "null" || text == "Null" || text == "NULL") return Kind::kNone;
   for (const char* flag : {"true", "True", "TRUE", "false", "False", "FALSE"}) {
@@ -53,6 +64,8 @@ Kind kindOfPlain(const std::string& text) {
 }  // namespace
 
 YamlValue YamlValue::load(const std::string& file) {
+  const std::string why = whyNotRead(file, kMostBytes);
+  if (!why.empty()) throw std::invalid_argument(file + ": " + why);
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAllFromFile(file);
     if (documents.size() == 1) return {documents.front(), file};
@@ -97,7 +110,7 @@ std::map<std::string, YamlValue> YamlValue::mapping() const {
     const YamlValue key(item.first, file_);
     if (!item.first.IsScalar()) throw std::invalid_argument(key.place() + "a key must be a word");
     if (result.emplace(key.text(), YamlValue(item.second, file_)).second) continue;
-    throw std::invalid_argument(key.place() + key.text() + ": is given twice");
+    throw std::invalid_argument(key.place() + cut(key.text()) + ": is given twice");
   }
   return result;
 }
@@ -106,7 +119,7 @@ std::string YamlValue::shown() const {
   if (node_.IsMap()) return "a mapping";
   if (node_.IsSequence()) return "a list";
   if (!node_.IsScalar()) return "nothing";
-  return node_.Scalar();
+  return cut(node_.Scalar());
 }
 
 }  // namespace kurumaisu

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """map_server and map_saver as a launch file and rosrun start them; the map's file is read here by PIL and PyYAML."""
 
+import resource
 import subprocess
 import sys
 import tempfile
@@ -16,10 +17,11 @@ from nav_msgs.msg import MapMetaData, OccupancyGrid
 from nav_msgs.srv import GetMap, LoadMap, LoadMapResponse
 from PIL import Image
 
-from kurumaisu.map_file import MapFile, write_map
+from kurumaisu.map_file import MapFile, map_pair
 from kurumaisu.params import shipped
 from kurumaisu.ros.rotation import yaw_of
 from kurumaisu.ros.testing.nodes import Topic, wait_for
+from kurumaisu.whole_files import write_whole
 
 DEADLINE = 60.0  # [s]
 BUILDING = shipped("worlds/maps/building.yaml")
@@ -67,7 +69,9 @@ class MapServerTest(unittest.TestCase):
             assert code == 0, said
             assert np.array_equal(expected(folder / "saved.yaml"), expected(BUILDING))
             drawn = np.array([[0, 100, -1], [100, 100, 0]], dtype=np.int8)
-            _, turned = write_map(MapFile(drawn, 0.1, (1.5, -2.5, 0.6)), folder / "turned", ".png", 65, 19.6)
+            pair = map_pair(MapFile(drawn, 0.1, (1.5, -2.5, 0.6)), folder / "turned", ".png", 65, 19.6)
+            write_whole(pair)
+            _, turned = pair
             answer = change(f"file://{turned}")
             assert answer.result == LoadMapResponse.RESULT_SUCCESS
             new = maps.wait_last(lambda m: m.info.width == 3, "the other map")
@@ -85,6 +89,24 @@ class MapServerTest(unittest.TestCase):
         served = rospy.ServiceProxy("static_map", GetMap)().map
         assert cells_of(served).tolist() == drawn.tolist()  # the one there was
         assert change(f"package://kurumaisu/worlds/maps/{BUILDING.name}").result == LoadMapResponse.RESULT_SUCCESS
+
+    def test_2_a_full_disk_leaves_the_old_pair(self):
+        with tempfile.TemporaryDirectory() as name:
+            pair = Path(name, "map.pgm"), Path(name, "map.yaml")
+            for path in pair:
+                path.write_text("old")
+            room = 20_000  # [bytes] that a file may have: a disk that is full after so many looks the same
+            saver = subprocess.run(
+                [program("map_saver"), "-f", str(pair[0].with_suffix(""))],
+                capture_output=True,
+                text=True,
+                timeout=DEADLINE,
+                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
+            )
+            assert saver.returncode == 1
+            assert "map.pgm: cannot be written: File too large" in saver.stderr
+            assert [path.read_text() for path in pair] == ["old", "old"]
+            assert len(list(Path(name).iterdir())) == 2
 
     def test_3_what_cannot_be_served_stops_it(self):
         code, said = run(program("map_server"), "/none.yaml", "__name:=bad_server")

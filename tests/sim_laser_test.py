@@ -3,9 +3,9 @@
 """The scan that laser_node makes of the virtual URG against the one that the simulator fed it with, beam by beam."""
 
 import sys
-import tempfile
 import time
 import unittest
+import uuid
 from pathlib import Path
 
 import numpy as np
@@ -91,11 +91,12 @@ class SimLaserTest(unittest.TestCase):
 
     @classmethod
     def save_and_load(cls):
-        with tempfile.TemporaryDirectory() as folder:
-            file = str(Path(folder) / "state")
-            assert cls.call["save"](file).success
-            cls.go_on(0.53)  # amid a scan
-            assert cls.call["load"](file).success
+        name = f"test-{uuid.uuid4().hex}"
+        saved = cls.call["save"](name)
+        assert saved.success, saved.message
+        cls.go_on(0.53)  # amid a scan
+        assert cls.call["load"](name).success
+        Path(saved.message.split(": ", 1)[1]).unlink()
 
     def setUp(self):
         """Pair both by stamp; the driver's is worked out of a clock of milliseconds and a constant."""

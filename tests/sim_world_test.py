@@ -6,6 +6,7 @@ import math
 import sys
 import tempfile
 import unittest
+import uuid
 from pathlib import Path
 
 import numpy as np
@@ -141,22 +142,36 @@ class SimWorldTest(unittest.TestCase):
     def test_save_and_load(self):
         self.drive(0.4)
         self.truth.wait(lambda m: pose_of(m)[0] > 0.7, "the chair to move")
+        name = f"test-{uuid.uuid4().hex}"
+        self.done("pause", True)
+        told = self.done("save", name)
+        file = Path(told.split(": ", 1)[1])
+        self.addCleanup(file.unlink)
+        saved = self.simulated_pose(told)
+        self.done("pause", False)
+        moved = self.truth.wait(lambda m: pose_of(m)[0] > saved[0] + 0.3, "the chair to move on")
+        self.done("pause", True)
+        loaded = self.done("load", name)
+        assert self.time_of(loaded) > moved.header.stamp
+        again = self.simulated_pose(loaded)
+        self.done("pause", False)
+        # the truth is told within five steps after each of the two, one of them perhaps of before the pause
+        np.testing.assert_allclose(again, saved, atol=0.0201)  # five steps of 0.4 m/s
+        assert file.name == name
+        file.write_bytes(file.read_bytes()[:-9])
+        assert "is damaged or cut" in self.call["load"](name).message
+        assert "No such file" in self.call["load"](name + "-none").message
+
+    def test_states_are_in_one_folder(self):
         with tempfile.TemporaryDirectory() as folder:
-            file = f"{folder}/state"
-            self.done("pause", True)
-            saved = self.simulated_pose(self.done("save", file))
-            self.done("pause", False)
-            moved = self.truth.wait(lambda m: pose_of(m)[0] > saved[0] + 0.3, "the chair to move on")
-            self.done("pause", True)
-            loaded = self.done("load", file)
-            assert self.time_of(loaded) > moved.header.stamp
-            again = self.simulated_pose(loaded)
-            self.done("pause", False)
-            # the truth is told within five steps after each of the two, one of them perhaps of before the pause
-            np.testing.assert_allclose(again, saved, atol=0.0201)  # five steps of 0.4 m/s
-            Path(file).write_bytes(b"nonsense")
-            assert not self.call["load"](file).success
-            assert "nowhere" in self.call["load"](f"{folder}/nowhere").message
+            victim = Path(folder, "notes.txt")
+            victim.write_text("not a state")
+            for service in ("save", "load"):
+                for name in (str(victim), "../../etc/passwd", "", "."):
+                    answer = self.call[service](name)
+                    assert not answer.success
+                    assert "the folder of saved states" in answer.message
+            assert victim.read_text() == "not a state"
 
     def simulated_pose(self, said):
         """Step on from a pause, in which a service was asked, until the truth is told; return it."""

@@ -61,7 +61,7 @@ class Stageros:
         PIL.Image.fromarray(pixels).save(self.world.parent / "square.png")
         (program,) = roslib.packages.find_node("kurumaisu", "stageros")
         self.process = subprocess.Popen(
-            [program, *arguments, str(self.world)],
+            [program, *arguments, f"_states:={self.world.parent}", str(self.world)],
             env={**os.environ, **(environment or {})},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import tempfile
-
 import geometry_msgs.msg
 import pytest
 from kurumaisu.srv import Delete, Seed, SetPose, Spawn, StateFile
@@ -54,17 +52,20 @@ class Services(Case):
         assert place(self.truth.last) == (1, 0.5, 0)
 
     def test_save_and_load(self):
-        with tempfile.TemporaryDirectory() as folder:
-            file = f"{folder}/state"
-            self.set_pose("era", 0, 0, 1)
-            assert self.ask("save", StateFile, file).success
-            self.ask("reset", Empty)
-            assert self.ask("load", StateFile, file).success
-            self.step()
-            assert place(self.truth.last) == (0, 0, 1)
-            missing = self.ask("load", StateFile, f"{folder}/none")
-            assert not missing.success
-            assert f"{folder}/none: No such file" in missing.message
+        folder = self.node.world.parent
+        self.set_pose("era", 0, 0, 1)
+        assert str(folder / "turned") in self.ask("save", StateFile, "turned").message
+        self.ask("reset", Empty)
+        assert self.ask("load", StateFile, "turned").success
+        self.step()
+        assert place(self.truth.last) == (0, 0, 1)
+        missing = self.ask("load", StateFile, "none")
+        assert not missing.success
+        assert f"{folder}/none: No such file" in missing.message
+        over = self.ask("save", StateFile, self.node.world.name)
+        assert not over.success
+        assert "is no saved state" in over.message
+        assert self.node.world.read_text() == self.WORLD
 
     def test_services_say_what_is_wrong(self):
         nobody = self.set_pose("nobody", 0, 0, 0)
@@ -86,13 +87,12 @@ class Services(Case):
         assert place(truth.last) == (-1, -2, 0)
         self.step()
         assert ("/robot_1/odom", "/robot_1/base_footprint") in self.transforms()
-        with tempfile.TemporaryDirectory() as folder:
-            assert self.ask("save", StateFile, f"{folder}/state").success
-            assert self.ask("delete", Delete, "second").success
-            self.step()
-            assert len(self.transforms()) == 3
-            loaded = self.ask("load", StateFile, f"{folder}/state")
-            assert loaded.success, loaded.message
+        assert self.ask("save", StateFile, "two").success
+        assert self.ask("delete", Delete, "second").success
+        self.step()
+        assert len(self.transforms()) == 3
+        loaded = self.ask("load", StateFile, "two")
+        assert loaded.success, loaded.message
         self.step()
         assert ("/robot_1/odom", "/robot_1/base_footprint") in self.transforms()
         assert place(self.truth.last) == (1, 0.5, 0)

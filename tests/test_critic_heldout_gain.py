@@ -33,9 +33,10 @@ from kurumaisu.critic.values.verdict import (
     SlamGain,
     Verdict,
     read_verdict,
-    write_verdict,
+    verdict_text,
 )
 from kurumaisu.params import EffectSetting, load_model, shipped
+from kurumaisu.whole_files import write_whole
 
 MODEL = load_model(shipped("launch/md100.yaml"))
 NOISE = noise_of(USUAL)
@@ -230,7 +231,7 @@ def test_a_verdict_of_before_is_still_read(tmp_path):
     path = tmp_path / "verdict.json"
     error = RmseGain(2.0, 1.0, 1.0, 0.5, 1.5, "m", 0.9)
     whole = Gain(NONE, {"position": error}, {"dx": drive_gain.ChannelGain(NONE, error)}, SlamGain("r", 9, error, error))
-    write_verdict(path, Verdict("none", gain=whole))
+    write_whole({path: verdict_text(Verdict("none", gain=whole))})
     assert read_verdict(path).gain == whole
     content = json.loads(path.read_text())
     del content["gain"]["channels"], content["gain"]["slam"], content["gain"]["rmse"]["position"]["achievable"]

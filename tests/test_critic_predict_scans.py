@@ -82,8 +82,7 @@ def test_rows_are_in_the_order_of_the_queries(tmp_path):
     made = list(predictions.predictions(asked, MODEL, None, ()))
     assert [(one.t0, one.t1) for one in made] == [tuple(row) for row in mixed.tolist()]
     assert [len(one.means) for one in made] == [682, 3, 682]
-    predictions.write_predictions(tmp_path / "prediction.csv", made)
-    lines = (tmp_path / "prediction.csv").read_text().splitlines()
+    lines = predictions.prediction_table(made).splitlines()
     assert len(lines) == 1 + 682 + 3 + 682
     assert lines[1].split(",")[:2] == ["test", "range"]
     assert [line.split(",")[4] for line in lines[1:683]] == [str(i) for i in range(682)]

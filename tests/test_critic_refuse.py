@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from recordings import Bag
 
+from kurumaisu.critic import pipeline
 from kurumaisu.critic.app.arrays import criticise_arrays
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.judge import explain
 from kurumaisu.errors import Error
+from kurumaisu.params import load_model, shipped
 
 TRUTH = Meta(truth=(0.003, 0.003))
 
@@ -132,6 +135,7 @@ import sys, numpy as np
 from pathlib import Path
 from kurumaisu.critic.data import long_runs
 from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.judge import explain
 from kurumaisu.critic.sanity import examination
 from kurumaisu.params import load_model, shipped
 folder = Path(sys.argv[1])
@@ -168,3 +172,27 @@ def _bag(path):
         bag.write("/ground_truth", bag.pose_stamped(1000.0 + 0.1 * k, (0.03 * k, 0.0, 0.01 * k)), 1000.0 + 0.1 * k)
     bag.writer.close()
     return path
+
+
+def test_an_answer_that_cannot_be_written_leaves_the_older_one(tmp_path):
+    model_file = shipped("launch/md100.yaml")
+    write(tmp_path / "in", drive(20.0))
+    data, model = read_recording(tmp_path / "in"), load_model(model_file)
+    criticism = explain.invalid(data, model, ["a clock jumps"])
+    out = tmp_path / "out"
+    pipeline.write(criticism, model_file, out)
+    (out / "prediction.csv").write_text("of the older answer")
+    older = {path.name: path.read_bytes() for path in out.iterdir()}
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    room = len(older["report.html"]) // 2  # [bytes]: the report is the largest; a disk that is full looks the same
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, before[1]))
+    try:
+        with pytest.raises(Error, match=r"report\.html: cannot be written: File too large"):
+            pipeline.write(
+                explain.invalid(read_recording(tmp_path / "in"), load_model(model_file), ["b"]), model_file, out
+            )
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == older
+    pipeline.write(criticism, model_file, out)
+    assert sorted(path.name for path in out.iterdir()) == ["extended.yaml", "report.html", "verdict.json"]

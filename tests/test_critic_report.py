@@ -18,12 +18,13 @@ from kurumaisu.critic.app.job import Job, Outcome
 from kurumaisu.critic.app.results import summary, table
 from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.report.figures import misfit_svg, shown_points
-from kurumaisu.critic.report.page import write_report
+from kurumaisu.critic.report.page import report_page
 from kurumaisu.critic.report.pictures import comparison_picture, misfit_picture, overlay_picture, thinned
 from kurumaisu.critic.values.binned_means import explained
 from kurumaisu.critic.values.digits import odds, quantities, with_interval
 from kurumaisu.critic.values.story import Bins, Comparison, Moments, Overlay
 from kurumaisu.critic.values.verdict import Cause, Estimate, Verdict, grouped
+from kurumaisu.whole_files import write_whole
 
 NOWHERE = ["", "", "", ""]  # a mean is of no single moment
 NBSP = "\N{NO-BREAK SPACE}"
@@ -52,13 +53,13 @@ def long_story():
 
 
 def test_an_hour_makes_a_small_page(tmp_path):
-    write_report(tmp_path / "report.html", full_verdict(), long_story())
+    write_whole({tmp_path / "report.html": report_page(full_verdict(), long_story())})
     assert (tmp_path / "report.html").stat().st_size < 2e6
 
 
 def test_runs_beyond_a_dozen_are_counted_not_drawn(tmp_path):
     story = full_story()
-    write_report(tmp_path / "report.html", full_verdict(), replace(story, overlays=story.overlays * 3))
+    write_whole({tmp_path / "report.html": report_page(full_verdict(), replace(story, overlays=story.overlays * 3))})
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.count('role="img"') == 12 + len(story.misfits)
     assert "6 more runs are not shown" in page

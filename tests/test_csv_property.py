@@ -13,14 +13,15 @@ from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
 
-NUMBER = st.floats(allow_nan=False, allow_infinity=False)
-ROWS = st.lists(st.tuples(NUMBER, NUMBER, NUMBER), min_size=1, max_size=20, unique_by=lambda row: row[0])
+NUMBER = st.floats(-0.99e12, 0.99e12)
+TIME = st.floats(0.0, 86_000.0)
+ROWS = st.lists(st.tuples(TIME, NUMBER, NUMBER), min_size=1, max_size=20, unique_by=lambda row: row[0])
 TEXT = st.text(alphabet=st.sampled_from('0123456789.,-+enaift \n\r"#\tx,,\n\n'), max_size=200)
 
 
 @settings(max_examples=60)
 @given(ROWS)
-def test_any_finite_numbers_survive(rows):
+def test_any_numbers_of_sane_size_survive(rows):
     table = np.array(sorted(rows))
     voltage = Series(table[:, 0], table[:, 1:], ("v_f", "v_s"))
     scan = Series(table[:, 0], np.abs(table[:, 1:]) + 1e-3, ("r0", "r1"))

@@ -122,6 +122,18 @@ TEST(Yaml, ScalarsAreWhatYamlTakesThemFor) {
   }
 }
 
+TEST(Yaml, RefusesFilesThatAreNotRegularOrTooLargeAndCutsValues) {
+  for (const char* name : {"/dev/zero", "/tmp"}) {
+    EXPECT_TRUE(
+        has(complaint<std::invalid_argument>([&] { k::YamlValue::load(name); }), "must be a regular file"));
+  }
+  EXPECT_TRUE(has(Read(std::string(2000000, '#')).refusal([](auto&) {}), "at most 1048576 are read"));
+  const std::string said =
+      Read("key: " + std::string(50000, 'x')).refusal([](auto& top) { top.number("key"); });
+  EXPECT_TRUE(has(said, "xxx..."));
+  EXPECT_LT(said.size(), 400U);
+}
+
 TEST(Yaml, RefusesFilesThatAreNone) {
   EXPECT_TRUE(
       has(complaint<std::invalid_argument>([] { k::YamlValue::load("/no/such.yaml"); }), "/no/such.yaml"));

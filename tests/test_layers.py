@@ -27,7 +27,10 @@ ABSTRACT = {"base", "mechanism", "laser"}
 MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - ABSTRACT | {r"laser\.\w+"}
 CONCRETE = rf"kurumaisu\.effects\.({'|'.join([*MODULES, *(effect.__name__ for effect in effects.ALL)])})(\.|$)"
 # C++ that rests on nothing
-SHARED = r"clock_watch\.h|command_line\.h|file_descriptor\.h|signals\.h|sleep_watch\.h|standard_streams\.h|steady\.h"
+SHARED = (
+    r"clock_watch\.h|command_line\.h|file_descriptor\.h|regular_file\.h|signals\.h|sleep_watch\.h|standard_streams\.h"
+    r"|steady\.h"
+)
 IDS = {effect.id for effect in effects.ALL}
 LARGEST = 25  # files in a folder of src/; a C++ header and its source are one
 ONE_PER_EFFECT = "kurumaisu/effects"  # as many files as there are effects

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ import yaml
 from PIL import Image
 
 from kurumaisu.errors import Error
-from kurumaisu.map_file import MapFile, read_map, write_map
+from kurumaisu.map_file import MapFile, map_pair, read_map
+from kurumaisu.whole_files import write_whole
 
 LINES = {
     "image": "image.png",
@@ -115,7 +117,9 @@ def test_a_missing_map_is_named(tmp_path: Path) -> None:
 def test_round_trip(tmp_path: Path, suffix: str) -> None:
     rng = np.random.default_rng(1)
     drawn = rng.choice(np.array([0, 100, -1], dtype=np.int8), (37, 53))
-    image, text = write_map(MapFile(drawn, 0.025, (-3.25, 1.5, -0.7)), tmp_path / "a.b", suffix, 65, 19.6)
+    pair = map_pair(MapFile(drawn, 0.025, (-3.25, 1.5, -0.7)), tmp_path / "a.b", suffix, 65, 19.6)
+    write_whole(pair)
+    image, text = pair
     assert (image.name, text.name) == (f"a.b{suffix}", "a.b.yaml")
     said = yaml.safe_load(text.read_text())
     assert said["image"] == image.name
@@ -130,10 +134,38 @@ def test_round_trip(tmp_path: Path, suffix: str) -> None:
 
 def test_written_by_thresholds(tmp_path: Path) -> None:
     drawn = np.array([[0, 10, 11, 50, 51, 100, -1]], dtype=np.int8)
-    _, text = write_map(MapFile(drawn, 1.0, (0.0, 0.0, 0.0)), tmp_path / "map", ".pgm", 50, 11)
-    assert read_map(text).cells.tolist() == [[0, 0, -1, -1, 100, 100, -1]]
+    write_whole(map_pair(MapFile(drawn, 1.0, (0.0, 0.0, 0.0)), tmp_path / "map", ".pgm", 50, 11))
+    assert read_map(tmp_path / "map.yaml").cells.tolist() == [[0, 0, -1, -1, 100, 100, -1]]
 
 
-def test_what_cannot_be_written_is_named(tmp_path: Path) -> None:
-    with pytest.raises(Error, match="missing"):
-        write_map(MapFile(np.zeros((1, 1), np.int8), 1.0, (0.0, 0.0, 0.0)), tmp_path / "missing/map", ".pgm", 65, 19.6)
+def odd_words(tmp_path: Path, pixels: Any, **changes: str) -> list[str]:
+    """Return what is said of a map of these pixels."""
+    Image.fromarray(pixels).save(tmp_path / "drawn.png")
+    keys = {"image": "drawn.png", "resolution": "0.1", "origin": "[0, 0, 0]", "negate": "0"}
+    keys |= {"occupied_thresh": "0.65", "free_thresh": "0.196", **changes}
+    (tmp_path / "odd.yaml").write_text("".join(f"{key}: {value}\n" for key, value in keys.items()))
+    return list(read_map(tmp_path / "odd.yaml").odd)
+
+
+def test_what_was_hardly_meant_is_told(tmp_path: Path) -> None:
+    drawn = np.full((20, 20), 205, dtype=np.uint8)
+    drawn[3:10] = 254
+    assert odd_words(tmp_path, drawn) == []
+    assert odd_words(tmp_path, drawn, free_thresh="0.25", mode="scale") == []
+    (words,) = odd_words(tmp_path, drawn, free_thresh="0.25")
+    assert words.startswith(
+        f"{tmp_path}/odd.yaml: 260 pixels of the shade 205, which map_saver writes for unknown, are free"
+    )
+    (words,) = odd_words(tmp_path, drawn, negate="1")
+    assert "are walls by occupied_thresh 0.65 and negate" in words
+    black = np.zeros((20, 20, 4), dtype=np.uint8)
+    black[4:6, :, 3] = 255
+    (words,) = odd_words(tmp_path, black)
+    assert "360 transparent pixels of drawn.png are walls" in words
+    black[..., :3] = np.where(black[..., 3:] == 0, 255, 0)
+    assert odd_words(tmp_path, black) == []
+
+
+def test_an_item_of_a_list_is_named_with_its_line(tmp_path: Path) -> None:
+    with pytest.raises(Error, match=r"odd\.yaml:3: origin\[2\]: must be a number, not str '-nan'"):
+        odd_words(tmp_path, np.zeros((2, 2), dtype=np.uint8), origin="[0, 0, -nan]")

@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How the mapper goes on from what it saved, and files that are wrong.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <functional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "mapper_values.h"
 #include "mapping_drive.h"
+#include "slam/mapping/rawlog.h"
 
 namespace test_mapping_files {
 
@@ -44,6 +48,26 @@ class Files : public testing::Test {
   static bool exists(const std::string& path) { return access(path.c_str(), F_OK) == 0; }
 
   std::string folder_;
+};
+
+/// Files may have so many bytes: a disk that is full after them looks the same.
+class LittleRoom {
+ public:
+  explicit LittleRoom(std::size_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit little{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &little);
+  }
+  ~LittleRoom() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  LittleRoom(const LittleRoom&) = delete;
+  LittleRoom& operator=(const LittleRoom&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
 };
 
 std::string problemOf(const std::function<void()>& call) {
@@ -181,6 +205,50 @@ TEST_F(Files, WhatCannotBeWrittenIsNamedAndTheOldFileStays) {
   ASSERT_EQ(mkdir((folder_ + "/map.pgm.part").c_str(), 0700), 0);  // for root as well
   EXPECT_NE(problemOf([&] { k::writeMapPair(folder_ + "/map", grid); }), "");
   EXPECT_EQ(contents(folder_ + "/map.pgm"), "old");
+}
+
+TEST_F(Files, APairChangesAsAPairOrNot) {
+  const k::OccupancyGrid grid{0.05, 0, 0, 1, 1, {0}};
+  const std::string map = folder_ + "/map";
+  std::ofstream(map + ".pgm") << "old";
+  ASSERT_EQ(mkdir((map + ".yaml.part").c_str(), 0700), 0);
+  EXPECT_NE(problemOf([&] { k::writeMapPair(map, grid); }).find("map.yaml: cannot be written"),
+            std::string::npos);
+  EXPECT_EQ(contents(map + ".pgm"), "old");
+  EXPECT_FALSE(exists(map + ".pgm.part"));
+}
+
+TEST_F(Files, AFullDiskIsHeardOfAndTheOldFileStays) {
+  k::Mapper mapper(room::settings(), 1);
+  k::LaserLog log{};
+  drive(mapper, 0, 5, [&log](Moment& moment) {
+    log.fan = moment.scan.fan;
+    log.beams = moment.scan.ranges.size();
+    log.times.push_back(1 + moment.t);
+    log.odom.push_back(moment.start);
+    log.ranges.push_back(moment.scan.ranges);
+  });
+  for (const auto& write : std::vector<std::function<void(const std::string&)>>{
+           [&](const std::string& path) { k::writeSimplemap(path, mapper.keys()); },
+           [&](const std::string& path) { k::writeRawlog(path, log); },
+       }) {
+    const std::string path = folder_ + "/file";
+    std::ofstream(path) << "old";
+    for (const std::size_t bytes : {0, 100, 2000}) {
+      const LittleRoom limit(bytes);
+      EXPECT_NE(problemOf([&] { write(path); }).find("file: cannot be written"), std::string::npos) << bytes;
+      EXPECT_EQ(contents(path), "old");
+      EXPECT_FALSE(exists(path + ".part"));
+    }
+    EXPECT_EQ(problemOf([&] { write(path); }), "");
+  }
+}
+
+TEST_F(Files, OnlyRegularFilesAreRead) {
+  const std::string pipe = folder_ + "/pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(problemOf([&] { k::readSimplemap(pipe); }), pipe + ": must be a regular file");
+  EXPECT_EQ(problemOf([&] { k::readRawlog(folder_); }), folder_ + ": must be a regular file");
 }
 
 }  // namespace test_mapping_files

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rawlogs: rates from poses, and the way from MRPT's file to a recording."""
 
+import gzip
 import importlib.util
 from pathlib import Path
 
@@ -42,3 +43,11 @@ def test_a_real_rawlog_is_read(tmp_path):
     (tmp_path / "cut.rawlog").write_bytes(b"no rawlog")
     with pytest.raises(Error, match=r"cut\.rawlog"):
         read_recording(tmp_path / "cut.rawlog")
+
+
+@pytest.mark.skipif(importlib.util.find_spec("kurumaisu._slam") is None, reason="built without kurumaisu._slam")
+def test_a_packed_rawlog_is_unpacked_to_a_limit(tmp_path):
+    path = tmp_path / "bomb.rawlog.gz"
+    path.write_bytes(gzip.compress(bytes(200_000_000)))
+    with pytest.raises(Error, match=r"bomb\.rawlog\.gz: has more than \d+ bytes unpacked"):
+        read_recording(path)

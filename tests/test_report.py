@@ -11,11 +11,10 @@ import pytest
 from stories import full_story, full_verdict
 
 from kurumaisu.critic.report.figures import MOST_POINTS, shown_points
-from kurumaisu.critic.report.page import quantities, write_report
+from kurumaisu.critic.report.page import quantities, report_page
 from kurumaisu.critic.report.pictures import LARGEST
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import Verdict
-from kurumaisu.errors import Error
 
 NBSP = "\N{NO-BREAK SPACE}"
 VOID = {"meta", "br", "img", "link"}
@@ -50,9 +49,7 @@ class Page(HTMLParser):
 
 
 def page_of(tmp_path, verdict, story):
-    path = tmp_path / "report.html"
-    write_report(path, verdict, story)
-    text = path.read_text(encoding="utf-8")
+    text = report_page(verdict, story)
     return text, Page(text)
 
 
@@ -195,8 +192,3 @@ def test_a_picture_stays_small_and_shows_means_whatever_the_outliers():
 )
 def test_numbers_are_said_to_three_digits_in_a_unit_that_suits(values, unit, said):
     assert [text.replace(NBSP, " ") for text in quantities(values, unit)] == said
-
-
-def test_a_report_that_cannot_be_written_is_an_error(tmp_path):
-    with pytest.raises(Error, match="No such file or directory"):
-        write_report(tmp_path / "nowhere" / "report.html", full_verdict(), full_story())

@@ -75,7 +75,7 @@ def test_every_key_is_required_and_every_other_is_refused(path: tuple[Any, ...])
         ((1, "parameters", "curve"), [{"charge": 0.0, "voltage": 24.0}], "must rise"),
         ((1, "parameters", "curve", 1, "voltage"), 30.0, "must rise"),
         ((2, "parameters", "mounts"), [], "one sonar at least"),
-        ((2, "parameters", "rays"), 0, "at least 1"),
+        ((2, "parameters", "rays"), 0, "of 1 to 10000"),
         ((2, "parameters", "range_min"), 5.0, "must be less than range_max"),
         ((2, "parameters", "field_of_view"), 7.0, "must not exceed"),
         ((3, "parameters", "strips", 0, "length"), 0.0, "above 0"),

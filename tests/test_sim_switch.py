@@ -9,8 +9,8 @@ import pytest
 from kurumaisu import effects
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
-from kurumaisu.sim import state
 from kurumaisu.sim.chair.simulator import ChairSimulator, Command
+from kurumaisu.sim.robots import state
 from kurumaisu.sim.sensors.settings import load_sensors
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.world import load_world

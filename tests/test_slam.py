@@ -18,6 +18,7 @@ from kurumaisu.errors import Error
 from kurumaisu.geometry import compose
 from kurumaisu.params import shipped
 from kurumaisu.ros.tools import map_command
+from kurumaisu.whole_files import write_whole
 
 DATASETS = Path("/usr/share/mrpt/datasets")
 SENA = DATASETS / "2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog"
@@ -130,7 +131,7 @@ def test_a_scan_that_makes_no_sense_is_named(sena: slam.ScanLog) -> None:
 @pytest.mark.parametrize(
     ("source", "keep", "message"),
     [
-        (None, 0, "cannot be read"),
+        (None, 0, "No such file"),
         ("RO-SLAM_demo.rawlog", None, "has no laser scan"),
         ("README_directory.txt", None, "is not a rawlog"),
         (SENA.name, 100_000, "cut off"),
@@ -170,7 +171,9 @@ def test_bad_settings_name_file_and_key(tmp_path: Path, change, message: str) ->
 
 def test_saved_map_is_what_map_server_reads(tmp_path: Path) -> None:
     cells = np.array([[0, 100, -1], [19, 66, 50]], dtype=np.int8)
-    image, text = maps.save_map(maps.Grid(cells, 0.05, -1.5, 2.0), tmp_path / "office.1")
+    pair = maps.grid_pair(maps.Grid(cells, 0.05, -1.5, 2.0), tmp_path / "office.1")
+    write_whole(pair)
+    image, text = pair
     assert (image.name, text.name) == ("office.1.pgm", "office.1.yaml")
     assert image.read_bytes() == b"P5\n3 2\n255\n" + bytes([254, 0, 205, 254, 0, 205])
     meta = yaml.safe_load(text.read_text(encoding="utf-8"))
@@ -178,8 +181,6 @@ def test_saved_map_is_what_map_server_reads(tmp_path: Path) -> None:
     assert meta["resolution"] == 0.05
     assert meta["origin"] == [-1.5, 2.0, 0.0]
     assert (meta["negate"], meta["occupied_thresh"], meta["free_thresh"]) == (0, 0.65, 0.196)
-    with pytest.raises(Error, match="missing"):
-        maps.save_map(maps.Grid(cells, 0.05, 0, 0), tmp_path / "missing" / "map")
 
 
 def test_command_writes_map_picture_and_path(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -246,7 +247,7 @@ def test_command_refuses_bad_input(tmp_path: Path, capfd: pytest.CaptureFixture[
     demo = str(DATASETS / "localization_demo.rawlog")
     for arguments, message in (
         ([str(tmp_path / "a.rawlog")], "a.rawlog: has no laser scan"),
-        ([str(tmp_path / "none")], "none: cannot be read"),
+        ([str(tmp_path / "none")], "none: No such file"),
         ([demo, "--settings", str(tmp_path / "none.yaml")], "none.yaml: No such file"),
         ([demo, "-o", str(blocked / "folder")], "folder: Not a directory"),
         ([demo, "--start", str(tmp_path / "none.simplemap")], "none.simplemap: cannot be read"),

@@ -12,9 +12,10 @@ from kurumaisu.errors import Error
 from kurumaisu.ros.stageros.added_models import renumbered
 from kurumaisu.ros.stageros.names import Names
 from kurumaisu.ros.stageros.rates import Pace
-from kurumaisu.ros.stageros.saved_names import packed_names, unpacked_names
+from kurumaisu.ros.stageros.saved_names import with_names, without_names
 from kurumaisu.ros.stageros.settings import read_settings
 from kurumaisu.ros.stageros.truth import GroundTruth
+from kurumaisu.sim.robots import state
 from kurumaisu.world.layout import family
 
 
@@ -82,17 +83,26 @@ def test_a_reference_has_its_own_place_and_time(tmp_path):
 
 def test_names_are_saved():
     names = [Names(None, False, False), Names("robot_4", True, False)]
-    line = packed_names(names, 5)
-    assert unpacked_names(line + b"state\n") == ([None, "robot_4"], 5, b"state\n")
+    assert without_names(with_names(b"state\n", names, 5)) == ([None, "robot_4"], 5, b"state\n")
 
 
-@pytest.mark.parametrize("damage", [
-    *(b"", b"kurumaisu state 1\n", b"kurumaisu stageros 1 \n", b"kurumaisu stageros 1 {}\n"),
-    *(b'kurumaisu stageros 1 {"robots": [1], "numbered": 1}\n', b'kurumaisu stageros 1 {"robots": 3, "numbered": 1}\n'),
-])  # fmt: skip
-def test_other_files_are_refused(damage):
-    with pytest.raises(Error, match="state: is not one that stageros saved"):
-        unpacked_names(damage + b"state")
+GOOD = {"robots": [None], "numbered": 1, "simulator": np.zeros(3, dtype=np.uint8)}
+
+
+@pytest.mark.parametrize(
+    ("known", "message"),
+    [
+        ({"world": "a"}, "is not one that stageros saved: it holds .'world'."),
+        ({**GOOD, "robots": [1]}, "robots: must be names"),
+        ({**GOOD, "robots": ["a b"]}, "robots: must be names"),
+        ({**GOOD, "robots": 3}, "robots: must be names"),
+        ({**GOOD, "numbered": True}, "numbered"),
+        ({**GOOD, "simulator": "x"}, "simulator"),
+    ],
+)
+def test_other_states_are_refused(known, message):
+    with pytest.raises(Error, match=f"state: .*{message}"):
+        without_names(state.pack(known))
 
 
 def test_a_copy_is_numbered_from_0(tmp_path):

@@ -10,21 +10,21 @@ import pytest
 from recordings import PACKAGE
 from stories import full_verdict
 
-from kurumaisu.critic.values.verdict import Cause, Verdict, read_verdict, to_json, write_verdict
+from kurumaisu.critic.values.verdict import Cause, Verdict, read_verdict, to_json, verdict_text
 from kurumaisu.errors import Error
+from kurumaisu.whole_files import write_whole
 
 
 def test_a_verdict_reads_back_as_it_was_written(tmp_path):
     for verdict in (full_verdict(), Verdict("none"), Verdict("invalid_data", problems=("a clock jumps",))):
-        write_verdict(tmp_path / "verdict.json", verdict)
+        write_whole({tmp_path / "verdict.json": verdict_text(verdict)})
         assert read_verdict(tmp_path / "verdict.json") == verdict
 
 
-def test_the_schema_is_a_schema_and_the_file_has_the_contracts_fields(tmp_path):
+def test_the_schema_is_a_schema_and_the_file_has_the_contracts_fields():
     schema = json.loads((PACKAGE / "src/kurumaisu/critic/values/verdict.schema.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator.check_schema(schema)
-    write_verdict(tmp_path / "verdict.json", full_verdict())
-    content = json.loads((tmp_path / "verdict.json").read_text(encoding="utf-8"))
+    content = json.loads(verdict_text(full_verdict()))
     assert content["schema"] == 1
     assert content["causes"][0] == {
         "id": "base.lag_w",
@@ -57,10 +57,9 @@ def cause(**changes):
         ({"verdict": "unknown", "unknown": ()}, "unknown: "),
     ],
 )
-def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, changes, message):
+def test_what_makes_no_sense_is_refused(changes, message):
     with pytest.raises(Error, match=f"verdict: {message}"):
-        write_verdict(tmp_path / "verdict.json", replace(full_verdict(), **changes))
-    assert not (tmp_path / "verdict.json").exists()
+        verdict_text(replace(full_verdict(), **changes))
 
 
 def test_an_interval_with_its_ends_swapped_is_refused():

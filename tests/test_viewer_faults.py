@@ -2,11 +2,11 @@
 """What clients, and networks, do wrong to the viewer's server."""
 
 import asyncio
+import contextlib
 import json
 import socket
 import time
 
-import aiohttp
 import numpy as np
 import pytest
 from hypothesis import given
@@ -40,6 +40,9 @@ from kurumaisu.viewer.server import Server
         ('{"type": "command", "id": 1, "name": "speed", "value": NaN}', "not JSON"),
         ('{"type": "command", "id": 1, "name": "speed", "value": 1e999}', "finite number"),
         ('{"type": "command", "id": 1, "name": "speed", "value": "1"}', "finite number"),
+        (f'{{"type": "command", "id": 1, "name": "speed", "value": {"9" * 400}}}', "finite number"),
+        (f'{{"type": "command", "id": 1, "name": "speed", "value": {"9" * 5000}}}', "not JSON"),
+        (f'{{"type": "command", "id": {"9" * 400}, "name": "step"}}', "id: must be"),
         ('{"type": "command", "id": 1, "name": "seed", "value": 1.5}', "integer"),
         (
             '{"type": "command", "id": 1, "name": "effect", "effect": "a", "enabled": true, "values": [1]}',
@@ -112,17 +115,88 @@ def test_binary_messages_end_the_connection(page):
     page.wait(lambda: page.closed, "the end of the connection")
 
 
-def test_more_connections_than_allowed_are_refused(running):
-    with Running(most_clients=3) as few:
+def test_more_pages_than_there_are_seats_are_told(running):
+    with Running(most_clients=3, patience=1.0) as few:
         pages = [Page(few.server.address) for _ in range(3)]
-        with pytest.raises(aiohttp.WSServerHandshakeError) as refusal:
-            Page(few.server.address)
-        assert refusal.value.status == 503
+        for page in pages:
+            page.wait(lambda page=page: "hello" in page.newest, "a seat")
+        late = Page(few.server.address)
+        late.wait(lambda: late.closed, "the end of the connection")
+        assert late.newest == {}
+        assert few.hub.clients == 3
         pages[0].close()
         pages[1].wait(lambda: few.hub.clients == 2, "room")
-        Page(few.server.address).close()
-        for page in pages:
+        next_one = Page(few.server.address)
+        next_one.wait(lambda: "hello" in next_one.newest, "a seat")
+        for page in (*pages, next_one, late):
             page.close()
+
+
+def test_who_may_command_finds_a_seat_however_many_look():
+    with Running(most_clients=3) as few:
+        lookers = [Page(few.server.address) for _ in range(3)]
+        for page in lookers:
+            page.wait(lambda page=page: "hello" in page.newest, "a seat")
+        waiting = [Page(few.server.address) for _ in range(7)]  # who shows nothing holds no place for long
+        owners = []
+        for _ in range(3):
+            address = few.server.new_address()
+            owners.append(Page(address))
+            owners[-1].let_in(address)
+            owners[-1].state(lambda _: True, "a picture")
+        assert owners[0].ask("estop", on=True)["ok"]
+        again = Page(few.server.address)
+        again.say(type="session", session=owners[0].newest["hello"]["session"])
+        again.wait(lambda: again.replies.get(None), "an answer")
+        assert "3 pages that may command are open already" in again.replies[None]["message"]
+        owners[1].close()
+        once_more = Page(few.server.address)
+        few_owners = lambda: few.hub.clients == 5  # noqa: E731
+        lookers[0].wait(few_owners, "a seat that is free")
+        once_more.say(type="session", session=owners[0].newest["hello"]["session"])
+        once_more.wait(lambda: once_more.newest.get("hello", {}).get("control"), "control")
+        for page in (*lookers, *waiting, *owners, again, once_more):
+            page.close()
+
+
+def test_a_looker_who_shows_a_token_frees_his_seat():
+    with Running(most_clients=1) as few:
+        address = few.server.new_address()
+        owner = Page(address)
+        owner.wait(lambda: "hello" in owner.newest, "a seat")
+        owner.let_in(address)
+        looker = Page(few.server.address)
+        looker.wait(lambda: "hello" in looker.newest, "a seat")
+        owner.close()
+        looker.close()
+
+
+def test_wrong_tokens_at_the_door_end_the_connection():
+    with Running(most_clients=1) as few:
+        looker = Page(few.server.address)
+        looker.wait(lambda: "hello" in looker.newest, "a seat")
+        guesser = Page(few.server.address)
+        for _ in range(5):
+            guesser.say(type="token", token="guess")
+        guesser.wait(lambda: guesser.closed, "the end of the connection")
+        looker.close()
+        guesser.close()
+
+
+@pytest.mark.parametrize("said", [b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: localhost\r\nX-Slow: "])
+def test_a_request_that_never_ends_is_ended(said):
+    with Running(patience=0.5) as quick:
+        host, port = quick.server.address[7:].rstrip("/").split(":")
+        with socket.create_connection((host, int(port)), timeout=20) as connection:
+            connection.sendall(said)
+            with contextlib.suppress(ConnectionResetError):
+                assert connection.recv(100) == b""
+        page = Page(quick.server.address)  # which lasts, though it asks for nothing
+        page.wait(lambda: page.counts["state"] > 3, "pictures")
+        begin = time.monotonic()
+        page.wait(lambda: time.monotonic() > begin + 1.5, "a while")
+        assert not page.closed
+        page.close()
 
 
 def test_a_port_that_is_taken_is_said():

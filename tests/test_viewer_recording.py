@@ -14,13 +14,14 @@ from view_rig import Look, drive, meta, on_circle, room_ranges, stamp_of
 
 from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.critic.judge.overlays import overlays
-from kurumaisu.critic.report.page import write_report
+from kurumaisu.critic.report.page import report_page
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.view.tape import laid
 from kurumaisu.errors import Error
 from kurumaisu.params import follow_commands, load_model, shipped
 from kurumaisu.viewer.playback import CHAIR
 from kurumaisu.viewer.tape import Track
+from kurumaisu.whole_files import write_whole
 
 DATA = Path(__file__).resolve().parents[2] / "shared/data"
 
@@ -136,7 +137,7 @@ def test_the_simulated_drive_is_the_reports(two_runs):
 def test_the_reports_model_drives_too(two_runs, tmp_path):
     folder = tmp_path / "criticism"  # where it is found without being named
     folder.mkdir()
-    write_report(folder / "report.html", full_verdict(), full_story())
+    write_whole({folder / "report.html": report_page(full_verdict(), full_story())})
     text = shipped("launch/md100.yaml").read_text()
     custom = "{positive: {slope: 1.0, intercept: 0.0}, negative: {slope: 1.0, intercept: 0.0}}"
     text = text.replace("voltage_law: published", "voltage_law: identity")

@@ -15,10 +15,11 @@ from viewer_page_rig import Visit, until
 from viewer_rig import viewer_settings
 
 from kurumaisu.critic.data.csv_writer import write_csv_run
-from kurumaisu.critic.report.page import write_report
+from kurumaisu.critic.report.page import report_page
 from kurumaisu.critic.values.story import Moments, Overlay
 from kurumaisu.critic.view.command import opened
 from kurumaisu.viewer import report
+from kurumaisu.whole_files import write_whole
 
 NAMES = ("early", 'late, "again" & <b>more')  # what a folder may be called
 
@@ -47,7 +48,7 @@ def recording(tmp_path_factory):
         overlays=(Overlay(NAMES[1], path, path, None, False, 10.0, times=poses[1].t),),
     )
     (folder / "criticism").mkdir()
-    write_report(folder / "criticism" / "report.html", full_verdict(), story)
+    write_whole({folder / "criticism" / "report.html": report_page(full_verdict(), story)})
     return folder
 
 

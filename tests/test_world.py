@@ -172,7 +172,7 @@ def test_line_ends(tmp_path: Path, line_end: str) -> None:
         ("block ( )", "1:1: a block belongs in a model, not in the world"),
         ("model ( sensor ( ) )", "1:9: a sensor belongs in a ranger, not in a model"),
         ("model ( block ( points -1 ) )", "1:17: points must be 0 to"),
-        ('model ( bitmap "none.png" )', "1:9: .*none.png: is not a readable image"),
+        ('model ( bitmap "none.png" )', "1:9: .*none.png: No such file"),
         ('include "none.inc"\n', "1:9: .*none.inc: No such file"),
         ("include none\n", "1:9: include needs a string, not a word none"),
         ('include "t.world"\n', "1:1: more than 64 levels"),

@@ -171,7 +171,7 @@ def test_a_ros_map_as_a_bitmap(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("image: map.pgm", "image: none.pgm", r"none\.pgm: is not a readable image"),
+        ("image: map.pgm", "image: none.pgm", r"none\.pgm: No such file"),
         ("image: map.pgm", "picture: map.pgm", "names no image"),
         ("resolution: 0.5", "resolution: 0", "resolution must be above 0, not 0"),
         ("resolution: 0.5", "resolution: .nan", "resolution must be a number"),

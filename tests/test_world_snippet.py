@@ -52,7 +52,7 @@ def test_a_text_may_include_and_have_bitmaps_from_beside_the_world(tmp_path: Pat
     (tmp_path / "more.inc").write_text("define tower model ( size [10 10 300] )")
     (model,) = read_snippet('include "more.inc"\ntower ( )', world(tmp_path).vocabulary).models
     assert model.size[2] == pytest.approx(3.0)
-    with pytest.raises(Error, match=r"text:1:9: .*none\.png: is not a readable image"):
+    with pytest.raises(Error, match=r"text:1:9: .*none\.png: No such file"):
         read_snippet('model ( bitmap "none.png" )', world(tmp_path).vocabulary)
 
 

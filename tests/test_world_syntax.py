@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Stage's language to the letter, our additions to it, and its limits."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +126,28 @@ def test_includes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_includes_that_are_not_there(tmp_path: Path, name: str) -> None:
     with pytest.raises(Error, match=r"t\.world:2:9: .*"):
         read(tmp_path, f'model ( )\ninclude "{name}"')
+
+
+@pytest.mark.parametrize("text", ['include "pipe"', 'model ( bitmap "pipe" )', 'model ( bitmap "pipe.yaml" )'])
+def test_a_pipe_is_no_file_of_a_world(tmp_path: Path, text: str) -> None:
+    for name in ("pipe", "pipe.yaml"):
+        os.mkfifo(tmp_path / name)
+    with pytest.raises(Error, match=r"pipe.*: must be a regular file, and is a pipe"):
+        read(tmp_path, text)
+    with pytest.raises(Error, match=r"pipe: must be a regular file, and is a pipe"):
+        load_world(tmp_path / "pipe")
+
+
+@pytest.mark.parametrize("text", ["pose [20000000 0 0 0]", "size [30000000 1 1]"])
+def test_a_model_beyond_what_is_known_is_refused_at_its_place(tmp_path: Path, text: str) -> None:
+    with pytest.raises(Error, match=r"t\.world:2:1: the model reaches .*e\+07 m"):
+        read(tmp_path, f"\nmodel ( {text} )")
+
+
+def test_warnings_are_cut(tmp_path: Path) -> None:
+    (tmp_path / "a.inc").write_text("")
+    (warning,) = read(tmp_path, f'include "a.inc" {"x" * 100_000}').warnings
+    assert len(warning) < 500 + len(str(tmp_path))
 
 
 def test_lenient_numbers_are_told(tmp_path: Path) -> None:
@@ -279,7 +302,7 @@ def test_include_bombs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_endless_files(tmp_path: Path) -> None:
-    with pytest.raises(Error, match="larger than"):
+    with pytest.raises(Error, match="must be a regular file, and is a device"):
         load_world(Path("/dev/zero"))
     with pytest.raises(Error, match="directory"):
         load_world(tmp_path)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 import warnings
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +15,16 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from kurumaisu import settings
-from kurumaisu.errors import Error
+from kurumaisu.bounded_files import MOST_IMAGE, MOST_TEXT, check_file, read_text
+from kurumaisu.errors import Error, told
 from kurumaisu.settings import Section
 from kurumaisu.types import FloatArray
 
-_MOST_CELLS = 400_000_000  # 10^4 x 10^4 cells fit four times
+_MOST_CELLS = 10**8  # some 600 MB while it is read
 _MODES = ("trinary", "scale", "raw")
 _WALL = 100  # occupancy [%]
 _OPAQUE = 255
+_MANY = 0.01  # share of an image's pixels
 _SHADE_WALL, _SHADE_FREE, _SHADE_UNKNOWN = 0, 254, 205  # map_saver's
 OCCUPIED_ABOVE, FREE_BELOW = 65, 19.6  # [%] what map_saver's files say
 
@@ -30,12 +33,14 @@ OCCUPIED_ABOVE, FREE_BELOW = 65, 19.6  # [%] what map_saver's files say
 class MapFile:
     """Occupancy: cells (height, width) from the lower left corner, 0 free to 100 occupied, -1 unknown.
 
-    resolution: edge of a cell [m]; origin: x, y [m] and yaw [rad] of the lower left corner.
+    resolution: edge of a cell [m]; origin: x, y [m] and yaw [rad] of the lower left corner; odd: what in its files is
+    likely not what was meant, in words.
     """
 
     cells: NDArray[np.int8]
     resolution: float
     origin: tuple[float, float, float]
+    odd: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -52,14 +57,15 @@ class _Said:
 def read_map(path: Path) -> MapFile:
     """Read a map. Raise Error naming the file, and the key, that is wrong."""
     said = _read_yaml(path)
-    return MapFile(np.ascontiguousarray(_cells(said)[::-1]), said.resolution, said.origin)
+    cells, odd = _cells(said)
+    words = tuple(f"{path}: {each}" for each in odd)
+    return MapFile(np.ascontiguousarray(cells[::-1]), said.resolution, said.origin, words)
 
 
-def write_map(written: MapFile, path: Path, suffix: str, occupied: float, free: float) -> tuple[Path, Path]:
-    """Write an image (.pgm or .png) and path.yaml and return their names; path has no suffix.
+def map_pair(written: MapFile, path: Path, suffix: str, occupied: float, free: float) -> dict[Path, str | bytes]:
+    """Return the image (.pgm or .png) and path.yaml, in this order, to be written; path has no suffix.
 
     Cells above occupied [%] are drawn as walls, those below free [%] as free, all others as unknown.
-    Raise Error naming the file that cannot be written.
     """
     shades = np.full(written.cells.shape, _SHADE_UNKNOWN, dtype=np.uint8)
     shades[written.cells > occupied] = _SHADE_WALL
@@ -67,17 +73,14 @@ def write_map(written: MapFile, path: Path, suffix: str, occupied: float, free: 
     image, text = path.with_name(path.name + suffix), path.with_name(path.name + ".yaml")
     x, y, yaw = written.origin
     turn = np.format_float_positional(yaw, precision=9, trim="0")  # YAML takes 1e-9 for a string
-    try:
-        Image.fromarray(np.ascontiguousarray(shades[::-1])).save(image)
-        text.write_text(
-            f"image: {image.name}\nresolution: {written.resolution:.6f}\n"
-            f"origin: [{x:.6f}, {y:.6f}, {turn}]\nnegate: 0\n"
-            f"occupied_thresh: {OCCUPIED_ABOVE / 100}\nfree_thresh: {FREE_BELOW / 100}\n",
-            encoding="utf-8",
-        )
-    except OSError as error:
-        raise Error(f"{error.filename}: {error.strerror}") from error
-    return image, text
+    drawn = BytesIO()
+    Image.fromarray(np.ascontiguousarray(shades[::-1])).save(drawn, {".pgm": "PPM", ".png": "PNG"}[suffix])
+    said = (
+        f"image: {image.name}\nresolution: {written.resolution:.6f}\n"
+        f"origin: [{x:.6f}, {y:.6f}, {turn}]\nnegate: 0\n"
+        f"occupied_thresh: {OCCUPIED_ABOVE / 100}\nfree_thresh: {FREE_BELOW / 100}\n"
+    )
+    return {image: drawn.getvalue(), text: said}
 
 
 def _read_yaml(path: Path) -> _Said:
@@ -89,10 +92,10 @@ def _read_yaml(path: Path) -> _Said:
 
 def _with_line(path: Path, message: str) -> str:
     """Return a message of settings.Section with the line of the key that it names, if it names one that is there."""
-    match = re.match(re.escape(f"{path}: ") + r"(\w+)[\w.]*: ", message)
+    match = re.match(re.escape(f"{path}: ") + r"(\w+)[\w.\[\]]*: ", message)
     if match is None:
         return message
-    document = yaml.compose(path.read_text(encoding="utf-8"))
+    document = yaml.compose(read_text(path, MOST_TEXT))
     pairs = document.value if isinstance(document, yaml.MappingNode) else []
     lines = [key.start_mark.line + 1 for key, _ in pairs if key.value == match.group(1)]
     return f"{path}:{lines[-1]}:{message[len(str(path)) + 1 :]}" if lines else message
@@ -125,19 +128,44 @@ def _origin(top: Section) -> tuple[float, float, float]:
 def _negate(top: Section) -> bool:
     value = top.take("negate")
     if value not in (0, 1):  # False and True are, too
-        raise top.error("negate", f"must be 0 or 1: {value!r}")
+        raise top.error("negate", f"must be 0 or 1: {told(value)}")
     return bool(value)
 
 
-def _cells(said: _Said) -> NDArray[np.int8]:
-    """Return the image's cells, row 0 at the top."""
+def _cells(said: _Said) -> tuple[NDArray[np.int8], list[str]]:
+    """Return the image's cells, row 0 at the top, and what is odd about them, in words."""
     sums, channels, opaque = _pixels(said.image)
     table = _occupancies(said, np.arange(255 * channels + 1) / channels)
     cells: NDArray[np.int8] = table[sums]
     if opaque is not None and said.mode != "raw":
         # What shines through is not known, but for walls and free space in plain sight.
         cells[~opaque & (cells > 0) & (cells < _WALL)] = -1
-    return cells
+    odd = [_unknown_made_known(said, table, sums == _SHADE_UNKNOWN * channels, channels)]
+    if opaque is not None:
+        odd.append(_transparent_walls(said, ~opaque & (cells == _WALL)))
+    return cells, [words for words in odd if words]
+
+
+def _unknown_made_known(said: _Said, table: NDArray[np.int8], unknown: NDArray[np.bool_], channels: int) -> str:
+    """Return words for many pixels of map_saver's shade for unknown that are something else here, or none."""
+    meant = int(table[_SHADE_UNKNOWN * channels])
+    if said.mode != "trinary" or meant == -1 or unknown.mean() < _MANY:
+        return ""
+    became, key = ("free", "free_thresh") if meant == 0 else ("walls", "occupied_thresh")
+    given = f"{key} {said.free if meant == 0 else said.occupied:g}" + (" and negate" if said.negate else "")
+    count, usual = int(unknown.sum()), f"{OCCUPIED_ABOVE / 100} and {FREE_BELOW / 100}"
+    return (
+        f"{count} pixels of the shade {_SHADE_UNKNOWN}, which map_saver writes for unknown, are {became} by {given}; "
+        f"map_saver's own thresholds are {usual}"
+    )
+
+
+def _transparent_walls(said: _Said, walls: NDArray[np.bool_]) -> str:
+    """Return words for pixels that nobody sees and that are walls, or none."""
+    if not walls.any():
+        return ""
+    count = int(walls.sum())
+    return f"{count} transparent pixels of {said.image.name} are walls: their colour counts, whatever their alpha"
 
 
 def _occupancies(said: _Said, shades: FloatArray) -> NDArray[np.int8]:
@@ -155,6 +183,7 @@ def _occupancies(said: _Said, shades: FloatArray) -> NDArray[np.int8]:
 
 def _pixels(path: Path) -> tuple[NDArray[np.uint16], int, NDArray[np.bool_] | None]:
     """Return the sum of the colours of every pixel, how many colours there are, and where the image is opaque."""
+    check_file(path, MOST_IMAGE)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of large images, for which there is our own limit, and of damaged ones

@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kurumaisu.errors import Error
-from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, MapFile, write_map
+from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, MapFile, map_pair
 from kurumaisu.types import FloatArray
 
 
@@ -33,26 +33,16 @@ class Grid:
         return (self.x, self.x + width * self.resolution, self.y, self.y + height * self.resolution)
 
 
-def save_map(grid: Grid, path: Path, suffix: str = ".pgm") -> tuple[Path, Path]:
-    """Write an image (.pgm or .png) and path.yaml for map_server and return their names; path has no suffix.
-
-    Raise Error naming the file that cannot be written.
-    """
+def grid_pair(grid: Grid, path: Path, suffix: str = ".pgm") -> dict[Path, str | bytes]:
+    """Return an image (.pgm or .png) and path.yaml for map_server, in this order, to be written; path has no suffix."""
     written = MapFile(grid.cells, grid.resolution, (grid.x, grid.y, 0.0))
-    return write_map(written, path, suffix, OCCUPIED_ABOVE, FREE_BELOW)
+    return map_pair(written, path, suffix, OCCUPIED_ABOVE, FREE_BELOW)
 
 
-def draw_map(
-    grid: Grid,
-    trajectory: FloatArray,
-    path: Path,
-    other: FloatArray | None = None,
-    other_name: str = "",
-) -> None:
-    """Write a picture of a map and the trajectory (n, 4) of t, x, y, theta.
+def picture(grid: Grid, trajectory: FloatArray, other: FloatArray | None = None, other_name: str = "") -> bytes:
+    """Return a PNG picture of a map and the trajectory (n, 4) of t, x, y, theta.
 
     other (m, 4), with its name for the legend, is drawn for comparison. Both must be in the map's frame.
-    Raise Error naming the file that cannot be written.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -71,7 +61,6 @@ def draw_map(
     axes.plot(*trajectory[-1, 1:3], "s", color="tab:red", label="end")
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=(left, right), ylim=(bottom, top))
     axes.legend(loc="upper right", framealpha=0.9)
-    try:
-        figure.savefig(path, dpi=130)
-    except OSError as error:
-        raise Error(f"{path}: {error.strerror}") from error
+    drawn = BytesIO()
+    figure.savefig(drawn, dpi=130, format="png")
+    return drawn.getvalue()

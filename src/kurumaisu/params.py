@@ -13,6 +13,8 @@ from kurumaisu._core import AxisLaw, Branch, LaserError
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 
+MOST_BEAMS = 100_000  # of a laser
+
 
 @dataclass(frozen=True)
 class Chassis:
@@ -113,7 +115,11 @@ def shipped(name: str) -> Path:
 
 def load_model(path: Path) -> Model:
     """Read a model file. Raise Error naming file and key for anything missing, unknown or senseless."""
-    top = settings.load(path)
+    return read_model(settings.load(path))
+
+
+def read_model(top: settings.Section) -> Model:
+    """Take all keys of a model. Raise Error as load_model does."""
     laws = top.section("voltage_laws")
     law_name = top.text("voltage_law", choices=laws.names())
     parsed = {name: _voltage_law(laws.section(name)) for name in laws.names()}
@@ -215,7 +221,7 @@ def _laser(section: settings.Section) -> Laser:
         mount=Mount(**{name: mount.number(name) for name in ("x", "y", "z", "yaw")}),
         angle_min=section.number("angle_min"),
         angle_increment=section.number("angle_increment"),
-        beams=section.integer("beams", at_least=1),
+        beams=section.integer("beams", at_least=1, at_most=MOST_BEAMS),
         scan_time=section.number("scan_time", above=0),
         time_increment=section.number("time_increment", at_least=0),
         error=law,

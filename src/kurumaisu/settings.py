@@ -10,7 +10,11 @@ from typing import Any
 
 import yaml
 
-from kurumaisu.errors import Error
+from kurumaisu.bounded_files import MOST_TEXT, read_text
+from kurumaisu.errors import Error, told
+
+_LARGEST = 2**32 - 1  # of integers that have no bound of their own
+_MOST_VALUES = 100_000  # of a document, anchors written out; more is made to fill memories
 
 
 class Section:
@@ -39,21 +43,23 @@ class Section:
 
     def number(self, key: str, at_least: float = -math.inf, above: float = -math.inf) -> float:
         """Return a required finite number, at_least and above being its bounds."""
-        value = self.take(key)
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise self.error(key, f"must be a number, not {_kind(value)} (YAML wants 1.0e-3, not 1e-3)")
+        given = self.take(key)
+        if isinstance(given, bool) or not isinstance(given, (int, float)):
+            raise self.error(key, f"must be a number, not {_kind(given)} (YAML wants 1.0e-3, not 1e-3)")
+        value = _float(given)
         if not math.isfinite(value) or value < at_least or value <= above:
             bound = f" above {above:g}" if above > -math.inf else f" of at least {at_least:g}"
-            raise self.error(
-                key, f"must be a finite number{bound if max(above, at_least) > -math.inf else ''}: {value}"
-            )
-        return float(value)
+            bound = bound if max(above, at_least) > -math.inf else ""
+            raise self.error(key, f"must be a finite number{bound}: {told(given)}")
+        return value
 
-    def integer(self, key: str, at_least: int) -> int:
+    def integer(self, key: str, at_least: int, at_most: int = _LARGEST) -> int:
         """Return a required integer."""
         value = self.take(key)
-        if isinstance(value, bool) or not isinstance(value, int) or value < at_least:
-            raise self.error(key, f"must be an integer of at least {at_least}: {value!r}")
+        if isinstance(value, bool) or not isinstance(value, int) or not at_least <= value <= at_most:
+            too_large = isinstance(value, int) and value > at_most
+            bounds = f"{at_least} to {at_most}" if too_large or at_most < _LARGEST else f"at least {at_least}"
+            raise self.error(key, f"must be an integer of {bounds}: {told(value)}")
         return value
 
     def text(self, key: str, choices: Sequence[str] = ()) -> str:
@@ -62,14 +68,14 @@ class Section:
         if not isinstance(value, str) or not value:
             raise self.error(key, f"must be a string, not {_kind(value)}")
         if choices and value not in choices:
-            raise self.error(key, f"must be one of {', '.join(choices)}: {value!r}")
+            raise self.error(key, f"must be one of {', '.join(choices)}: {told(value)}")
         return value
 
     def flag(self, key: str) -> bool:
         """Return a required true or false."""
         value = self.take(key)
         if not isinstance(value, bool):
-            raise self.error(key, f"must be true or false: {value!r}")
+            raise self.error(key, f"must be true or false: {told(value)}")
         return value
 
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
@@ -77,8 +83,8 @@ class Section:
         value = self.take(key)
         if not isinstance(value, list) or len(value) != count:
             raise self.error(key, f"must be a list of {count} numbers")
-        items = Section({str(i): item for i, item in enumerate(value)}, self._where, f"{self._path}.{key}")
-        return tuple(items.number(str(i)) for i in range(count))
+        items = Section({f"{key}[{i}]": item for i, item in enumerate(value)}, self._where, self._path)
+        return tuple(items.number(f"{key}[{i}]") for i in range(count))
 
     def items(self, key: str) -> list[Section]:
         """Return a required list of mappings."""
@@ -93,7 +99,7 @@ class Section:
 
     def names(self) -> list[str]:
         """Return the keys not yet taken."""
-        return [str(key) for key in self._values]
+        return [key if isinstance(key, str) else told(key) for key in self._values]
 
     def end(self) -> None:
         """Raise unless every key has been taken."""
@@ -103,19 +109,54 @@ class Section:
 
 def load(path: Path) -> Section:
     """Read a YAML file. Raise Error naming file and line when it cannot be read."""
+    return Section(parsed(read_text(path, MOST_TEXT), str(path)), str(path))
+
+
+def parsed(text: str, where: str) -> Any:
+    """Return the value of a YAML document. Raise Error naming where, and the line, when it makes no sense."""
     try:
-        with path.open(encoding="utf-8") as stream:
-            return Section(yaml.safe_load(stream), str(path))
-    except OSError as error:
-        raise Error(f"{path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise Error(f"{path}: is not UTF-8 text") from error
+        loader = yaml.SafeLoader(text)
+        try:
+            node = loader.get_single_node()
+            if node is None:
+                return None
+            _count(node, {}, where)
+            return loader.construct_document(node)
+        finally:
+            loader.dispose()
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 0
-        raise Error(f"{path}:{line}: {error.problem}") from error
-    except yaml.YAMLError as error:
-        raise Error(f"{path}: {error}") from error
+        raise Error(f"{where}:{line}: {error.problem}") from error
+    except (yaml.YAMLError, ValueError, OverflowError) as error:  # a number or a date that is none
+        raise Error(f"{where}: {error}") from error
+    except RecursionError as error:
+        raise Error(f"{where}: has too many levels") from error
+
+
+def _count(node: yaml.Node, known: dict[int, int], where: str) -> int:
+    """Return how many values a node has with all anchors written out. Raise Error for too many."""
+    if id(node) in known:
+        return known[id(node)]
+    known[id(node)] = _MOST_VALUES  # of an anchor inside itself
+    parts = node.value if isinstance(node, yaml.CollectionNode) else []
+    children = [child for part in parts for child in (part if isinstance(part, tuple) else (part,))]
+    count = 1
+    for child in children:
+        count += _count(child, known, where)
+        if count > _MOST_VALUES:
+            line = node.start_mark.line + 1
+            raise Error(f"{where}:{line}: has more than {_MOST_VALUES} values, with what its anchors stand for")
+    known[id(node)] = count
+    return count
+
+
+def _float(value: int | float) -> float:
+    """Return a number as a float, infinite for an integer that is too large for one."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
 
 
 def _kind(value: Any) -> str:
-    return f"{type(value).__name__} {value!r}" if value is not None else "nothing"
+    return f"{type(value).__name__} {told(value)}" if value is not None else "nothing"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kurumaisu import _slam, settings
 from kurumaisu._slam import Fan as Fan
+from kurumaisu.bounded_files import MOST_RAWLOG, check_file
 from kurumaisu.errors import Error
 from kurumaisu.geometry import interpolate
 from kurumaisu.maps import Grid
@@ -110,6 +111,7 @@ def read_rawlog(path: Path) -> ScanLog:
 
     Rawlogs say neither when a beam was taken nor how the chair moved meanwhile.
     """
+    check_file(path, MOST_RAWLOG)
     try:
         times, odom, ranges, fan = _slam.read_rawlog(str(path))
     except RuntimeError as error:

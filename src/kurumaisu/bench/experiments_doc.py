@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from kurumaisu.bench.table import MarkdownTable
 from kurumaisu.experiments import Script, names, nominal_path, shipped_script
+from kurumaisu.whole_files import write_whole
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,4 +60,6 @@ def _draw(scripts: Sequence[Script], path: Path) -> None:
         axis.set_title(f"{script.name}, {script.seconds:.0f} s")
         axis.set_aspect("equal")
     figure.supxlabel("x [m] ahead of the start; grey: the box")
-    figure.savefig(path, metadata={"Date": None})
+    drawn = io.StringIO()
+    figure.savefig(drawn, format="svg", metadata={"Date": None})
+    write_whole({path: drawn.getvalue()})

@@ -24,6 +24,7 @@ from kurumaisu.bench.guard_client import Favour
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
+from kurumaisu.whole_files import write_whole
 
 NS = 1e-9  # [s]
 _ARMING = 0.2  # [s] in place of what ships, to save time; nothing else differs
@@ -109,7 +110,7 @@ class Rig:
 
     def _write(self, name: str, tree: dict[str, object]) -> Path:
         path = self.folder / name
-        path.write_text(yaml.safe_dump(tree))
+        write_whole({path: yaml.safe_dump(tree)})
         return path
 
     @contextlib.contextmanager

@@ -26,6 +26,7 @@ from pathlib import Path
 from kurumaisu import children
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
+from kurumaisu.whole_files import write_whole
 
 _AWAY = re.compile(r"src/kurumaisu/(bench|demo)/")  # what measures or shows
 _AGAIN, _BUILD = 300.0, 7200.0  # [s] for a check without a mutation; for a build of all
@@ -88,7 +89,7 @@ class Copy:
         path = self.root / mutation.path
         lines = path.read_text().split("\n")
         lines[mutation.line] = text
-        path.write_text("\n".join(lines))
+        write_whole({path: "\n".join(lines)})
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -9,13 +9,13 @@ from __future__ import annotations
 import os
 import re
 import shlex
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
+from kurumaisu.whole_files import write_whole
 
 _END = "<!-- end -->"
 _SECTION = re.compile(rf"^(<!-- (\w+) (\w+) -->)\n(.*?)^({re.escape(_END)})$", re.MULTILINE | re.DOTALL)
@@ -61,7 +61,7 @@ def write(path: Path, program: str, name: str, arguments: Sequence[str], tables:
         begin, one, other, _, end = match.groups()
         return f"{begin}\n{body}\n{end}" if (one, other) == (program, name) else match.group()
 
-    _write_whole(path, _SECTION.sub(replaced, _read(path)))
+    write_whole({path: _SECTION.sub(replaced, _read(path))})
 
 
 def shown(arguments: Sequence[str]) -> list[str]:
@@ -89,11 +89,3 @@ def _read(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except OSError as error:
         raise Error(f"{path}: {error.strerror}") from error
-
-
-def _write_whole(path: Path, text: str) -> None:
-    """Write a file that is never half written."""
-    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as file:
-        file.write(text)
-    Path(file.name).chmod(path.stat().st_mode)
-    Path(file.name).replace(path)

@@ -13,6 +13,7 @@ from kurumaisu._core import Scene
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 from kurumaisu.world import World, load_world
 
 _ROBOT = 0.1  # edge of a robot [m]
@@ -70,7 +71,7 @@ def write_world(path: Path, place: Map, fan: Fan, poses: FloatArray) -> Path:
         f'robot ( name "r{i}" pose [{x:.4f} {y:.4f} 0 {math.degrees(heading):.4f}] )'
         for i, (x, y, heading) in enumerate(poses)
     ]
-    path.write_text("\n".join(lines) + "\n")
+    write_whole({path: "\n".join(lines) + "\n"})
     return path
 
 

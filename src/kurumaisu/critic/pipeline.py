@@ -13,20 +13,21 @@ from kurumaisu.critic.data.long_runs import bounded
 from kurumaisu.critic.heldout.extension_gain import with_gains
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, withheld
-from kurumaisu.critic.judge.extended_model import write_extended
+from kurumaisu.critic.judge.extended_model import extended_text
 from kurumaisu.critic.judge.merge import with_scans
 from kurumaisu.critic.judge.reference_point import from_base_link
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
 from kurumaisu.critic.processes.laser_process import criticise_in_own_process
-from kurumaisu.critic.report.page import write_report
+from kurumaisu.critic.report.page import report_page
 from kurumaisu.critic.sanity import examination
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
-from kurumaisu.critic.values.verdict import write_verdict
+from kurumaisu.critic.values.verdict import verdict_text
 from kurumaisu.errors import Error
+from kurumaisu.whole_files import write_whole
 
 
 def criticise(
@@ -77,7 +78,7 @@ def criticise(
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
-    """Write verdict.json, extended.yaml, report.html and, if asked for, prediction.csv.
+    """Write verdict.json, extended.yaml, report.html and, if asked for, prediction.csv: all of them or none.
 
     Raise Error naming what cannot be written.
     """
@@ -85,8 +86,13 @@ def write(criticism: Criticism, model_file: Path, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise Error(f"{folder}: {error.strerror}") from error
-    write_verdict(folder / "verdict.json", criticism.verdict)
-    write_report(folder / "report.html", criticism.verdict, criticism.story)
-    write_extended(folder / "extended.yaml", model_file, criticism.model, criticism.settings, criticism.story.recording)
+    story = criticism.story
+    contents = {
+        folder / "extended.yaml": extended_text(model_file, criticism.model, criticism.settings, story.recording),
+        folder / "report.html": report_page(criticism.verdict, story),
+        folder / "verdict.json": verdict_text(criticism.verdict),
+    }
+    predicted = folder / predictions.FILE
     if criticism.predictions:
-        predictions.write_predictions(folder / predictions.FILE, criticism.predictions)
+        contents[predicted] = predictions.prediction_table(criticism.predictions)
+    write_whole(contents, gone=[] if criticism.predictions else [predicted])

@@ -18,6 +18,7 @@ from kurumaisu.params import EffectSetting, Model, load_model, shipped
 from kurumaisu.sim.chair.joystick import joystick
 from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator, Command
 from kurumaisu.sim.settings import load_dynamics, with_effects
+from kurumaisu.whole_files import write_whole
 from kurumaisu.world import load_world
 
 # Effects that drives like these tell from all others, each by itself; of others the critic would answer with a set.
@@ -63,7 +64,7 @@ def record(folder: Path, secret: EffectSetting, rng: np.random.Generator) -> Non
         print(f"  driving {i + 1} of {_DRIVES} ...", flush=True)
         write_csv_run(folder / f"drive_{i + 1}", _drive(f"drive_{i + 1}", simulator, model, rng))
     meta = {"truth": {"position_sd": _POSE_SD[0], "heading_sd": _POSE_SD[2]}}
-    (folder / "meta.yaml").write_text(yaml.safe_dump(meta), encoding="utf-8")
+    write_whole({folder / "meta.yaml": yaml.safe_dump(meta)})
 
 
 def _drive(name: str, simulator: ChairSimulator, model: Model, rng: np.random.Generator) -> Run:

@@ -14,9 +14,10 @@ from kurumaisu.critic.data.reference import map_run, scan_log
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.demo.processes import roslaunch
 from kurumaisu.errors import Error
-from kurumaisu.maps import Grid, draw_map, save_map
+from kurumaisu.maps import Grid, grid_pair, picture
 from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 from kurumaisu.world import load_world
 
 _DEADLINE = 200.0  # [s] of wall time for the drive
@@ -41,8 +42,8 @@ def run(folder: Path, seed: int, *, gui: bool) -> None:
     _print_figures(drive, result.trajectory, truth, result.grid, world_from_map)
     map_from_world = geometry.between(world_from_map, np.zeros(3))
     seen = np.column_stack([result.trajectory[:, 0], geometry.compose(np.tile(map_from_world, (len(truth), 1)), truth)])
-    draw_map(result.grid, result.trajectory, folder / "map.png", seen, "true path")
-    save_map(result.grid, folder / "map")
+    drawn = picture(result.grid, result.trajectory, seen, "true path")
+    write_whole({**grid_pair(result.grid, folder / "map"), folder / "map.png": drawn})
 
 
 def _print_figures(

@@ -14,6 +14,7 @@ import numpy as np
 
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 MEASURED, LINE, PAPER, FAINT = "#1f5f8b", "#c0392b", "#444444", "#b9c4cc"
 _STYLE = {
@@ -61,6 +62,6 @@ def write(path: Path, text: str) -> None:
     """Write a file and its folder. Raise Error naming it."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise Error(f"{path}: {error.strerror}") from error
+    write_whole({path: text})

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import yaml
 
+from kurumaisu.bounded_files import MOST_TEXT, read_text
 from kurumaisu.errors import Error
+from kurumaisu.whole_files import write_whole
 
 Key = tuple[str, ...]
 
@@ -19,10 +21,7 @@ class ModelFile:
     def __init__(self, path: Path) -> None:
         """Read it. Raise Error naming the file."""
         self._path = path
-        try:
-            self._text = path.read_text(encoding="utf-8")
-        except OSError as error:
-            raise Error(f"{path}: {error.strerror}") from error
+        self._text = read_text(path, MOST_TEXT)
 
     def replace(self, key: Key, value: str) -> None:
         """Put other text in a value's place; what stands behind it on the line stays. Raise Error for another key."""
@@ -43,10 +42,7 @@ class ModelFile:
 
     def write(self, path: Path) -> None:
         """Write the file. Raise Error naming it."""
-        try:
-            path.write_text(self._text, encoding="utf-8")
-        except OSError as error:
-            raise Error(f"{path}: {error.strerror}") from error
+        write_whole({path: self._text})
 
     def _drop_orphan_comment(self, key: Key) -> None:
         """Take away a comment beside the key, which spoke of the values that were there."""

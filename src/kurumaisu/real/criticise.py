@@ -16,6 +16,7 @@ from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 
 def recording(folder: Path, runs: Mapping[str, Mapping[str, FloatArray]], **meta: object) -> Path:
@@ -25,7 +26,7 @@ def recording(folder: Path, runs: Mapping[str, Mapping[str, FloatArray]], **meta
     """
     for name, tables in runs.items():
         write_csv_run(folder / name, run_of(name, tables, Faults()))
-    (folder / "meta.yaml").write_text(yaml.safe_dump(meta, sort_keys=False), encoding="utf-8")
+    write_whole({folder / "meta.yaml": yaml.safe_dump(meta, sort_keys=False)})
     return folder
 
 

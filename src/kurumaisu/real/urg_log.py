@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kurumaisu.bounded_files import MOST_TABLE, read_bytes
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 
@@ -32,7 +33,7 @@ def load(path: Path) -> UrgLog:
 
     Raise Error naming the file and the place of a record that is cut, or a scan whose checksum is wrong.
     """
-    content = path.read_bytes()
+    content = read_bytes(path, MOST_TABLE)
     stream, times, at = b"", [], 0
     while at < len(content):
         if len(content) < at + 12:

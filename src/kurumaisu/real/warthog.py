@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import csv
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from kurumaisu.bounded_files import MOST_TABLE, read_text
 from kurumaisu.real.by_hand import least_squares
 from kurumaisu.real.criticise import criticise, recording, there
 from kurumaisu.types import BoolArray, FloatArray
@@ -39,8 +41,7 @@ class Log:
 def load(data: Path) -> Log:
     """Read the log. Raise Error where it is not there."""
     path = there(data / "norlab_drive/warthog_asphalt_2024_9_20_8h13_raw.csv")
-    with path.open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = list(csv.DictReader(io.StringIO(read_text(path, MOST_TABLE), newline="")))
 
     def column(name: str) -> FloatArray:
         return np.array([float(row[name]) for row in rows])

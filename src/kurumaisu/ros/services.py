@@ -24,6 +24,7 @@ from kurumaisu.errors import Error
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.rotation import pose_of
+from kurumaisu.sim.robots.state_folder import StateFolder
 from kurumaisu.srv import (
     Seed,
     SeedRequest,
@@ -65,10 +66,13 @@ class Simulation(Protocol):
 class Services:
     """Advertises reset, pause, step, speed, seed, set_pose, save and load."""
 
-    def __init__(self, simulation: Simulation, requests: Requests, pacer: Pacer, prefix: str) -> None:
-        """prefix: of the names, `~` for private ones."""
+    def __init__(
+        self, simulation: Simulation, requests: Requests, pacer: Pacer, states: StateFolder, prefix: str
+    ) -> None:
+        """states: where they are saved; prefix: of the names, `~` for private ones."""
         self._simulation = simulation
         self._pacer = pacer
+        self._states = states
         self._requests = requests
         self._services = [
             rospy.Service(prefix + "reset", Empty, self._reset),
@@ -112,33 +116,19 @@ class Services:
         return self._outcome(lambda: self._simulation.set_pose(request.name, pose_of(request.pose)))
 
     def _save(self, request: StateFileRequest) -> tuple[bool, str]:
-        return self._outcome(lambda: _write(Path(request.file), self._simulation.save()))
+        return self._outcome(lambda: self._states.write(request.file, self._simulation.save()))
 
     def _load(self, request: StateFileRequest) -> tuple[bool, str]:
-        return self._outcome(lambda: self._simulation.load(_read(Path(request.file))))
+        return self._outcome(lambda: self._simulation.load(self._states.read(request.file)))
 
     def _outcome(self, action: Callable[[], Any]) -> tuple[bool, str]:
-        """Return whether it was done, and when or why not."""
+        """Return whether it was done, and when, and into which file, or why not."""
         try:
-            self._requests.ask(action)
+            result = self._requests.ask(action)
         except Error as error:
             return False, str(error)
-        return True, self._done()
+        return True, f"{self._done()}: {result}" if isinstance(result, Path) else self._done()
 
     def _done(self) -> str:
         """Return what is said of a thing that was done."""
         return f"at {self._simulation.time:.3f} s"
-
-
-def _write(file: Path, saved: bytes) -> None:
-    try:
-        file.write_bytes(saved)
-    except OSError as error:
-        raise Error(f"{file}: {error.strerror}") from error
-
-
-def _read(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise Error(f"{file}: {error.strerror}") from error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What plants and effects remember, as plain values: saved and read back without a method in each of them."""
+"""What plants, effects and sensors remember, as plain values: saved and read back without a method in each of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from kurumaisu._core import AxisInverse
 
 _PLAIN = (bool, int, float, str, np.ndarray, np.generic, type(None))
-_OURS = ("kurumaisu.effects", "kurumaisu.sim.plant")
+_OURS = ("kurumaisu.effects", "kurumaisu.sim.plant", "kurumaisu.sim.sensors")
 
 
 def remember(value: Any) -> Any:

@@ -82,7 +82,7 @@ def read_options(section: settings.Section) -> Options:
         collision=section.text("collision", COLLISIONS),
         ray_casting=section.text("ray_casting", RAY_CASTING),
         timing=section.text("timing", TIMINGS),
-        threads=section.integer("threads", at_least=1),
+        threads=section.integer("threads", at_least=1, at_most=1024),
         limit_acceleration=section.text("limit_acceleration", ("on", "off")) == "on",
         scan_sweep=section.number("scan_sweep", at_least=0),
         odometry_walk=_walk(section.section("odometry_walk")),

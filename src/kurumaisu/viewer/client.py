@@ -19,6 +19,7 @@ from kurumaisu.viewer import commands, protocol
 from kurumaisu.viewer.access import AccessTokens
 from kurumaisu.viewer.commands import Credential, Request
 from kurumaisu.viewer.hub import Hub, Mailbox, Payload
+from kurumaisu.viewer.seats import Seats
 from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
 
@@ -49,6 +50,7 @@ class Client:
         source: Source,
         keys: AccessTokens | None,
         workers: Mapping[str, Executor],
+        seats: Seats,
     ) -> None:
         """keys: None where nobody may command; workers: who does each urgent command, and under "" all others."""
         self._settings = settings
@@ -56,12 +58,13 @@ class Client:
         self._source = source
         self._keys = keys
         self._workers = workers
+        self._seats = seats
         self._control = False
         self._wrong = 0
         self._socket = web.WebSocketResponse(
             max_msg_size=settings.longest_message, compress=False, timeout=1.0, heartbeat=settings.patience
         )
-        self._transport: asyncio.Transport | None = None
+        self.transport: asyncio.Transport | None = None
         self._news = asyncio.Event()
         self._asked = asyncio.Event()
         self._waiting: deque[Request] = deque()
@@ -73,12 +76,17 @@ class Client:
     async def serve(self, request: web.Request) -> web.WebSocketResponse:
         """Send and hear until the connection ends."""
         await self._socket.prepare(request)
-        self._transport = request.transport
-        if self._transport is not None:
-            link = self._transport.get_extra_info("socket")
+        self.transport = request.transport
+        if self.transport is not None:
+            link = self.transport.get_extra_info("socket")
             link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
         loop = asyncio.get_running_loop()
-        self._say(self._hello(None))
+        if self._seats.look(self):
+            self._say(self._hello(None))
+        elif not await self._shows_that_it_may_command():
+            full = f"{self._settings.most_clients} pages look already"
+            await self._socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=full.encode())
+            return self._socket
 
         def notify() -> None:
             loop.call_soon_threadsafe(self._news.set)
@@ -97,10 +105,25 @@ class Client:
             self.abort()
         return self._socket
 
+    async def _shows_that_it_may_command(self) -> bool:
+        """Return whether, all seats being taken, it shows at once what it may command by."""
+        self._seats.wait(self, self.abort)
+        try:
+            async with asyncio.timeout(self._settings.patience):
+                while not self._control:
+                    message = await self._socket.receive()
+                    if message.type != WSMsgType.TEXT or not self._heard(message.data):
+                        return False
+                    while self._replies and not self._control:
+                        await self._socket.send_str(self._replies.popleft())
+        except (TimeoutError, ConnectionError):
+            return False
+        return True
+
     def abort(self) -> None:
         """End the connection at once, whatever is still to be sent."""
-        if self._transport is not None:
-            self._transport.abort()
+        if self.transport is not None:
+            self.transport.abort()
 
     def account(self) -> Account | None:
         """Return what it has had; None before its handshake is over."""
@@ -112,8 +135,8 @@ class Client:
     def _cut_off(self) -> None:
         """End the connection, and have the kernel throw away what was to be sent: it would keep it for minutes."""
         self.stalled = True
-        if self._transport is not None and not self._transport.is_closing():
-            link = self._transport.get_extra_info("socket")
+        if self.transport is not None and not self.transport.is_closing():
+            link = self.transport.get_extra_info("socket")
             link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         self.abort()
 
@@ -146,13 +169,17 @@ class Client:
             if message.type != WSMsgType.TEXT:
                 await self._socket.close(code=WSCloseCode.UNSUPPORTED_DATA)
                 return
-            try:
-                self._take(commands.read(message.data))
-            except Error as error:
-                self._answer(commands.number_of(message.data), False, str(error))
-            if self._wrong >= _MOST_WRONG or len(self._replies) > _MOST_REPLIES:
+            if not self._heard(message.data):
                 await self._socket.close(code=WSCloseCode.POLICY_VIOLATION)
                 return
+
+    def _heard(self, text: str) -> bool:
+        """Take a message; return whether more of them are welcome."""
+        try:
+            self._take(commands.read(text))
+        except Error as error:
+            self._answer(commands.number_of(text), False, str(error))
+        return self._wrong < _MOST_WRONG and len(self._replies) <= _MOST_REPLIES
 
     def _take(self, said: Request | Credential) -> None:
         if isinstance(said, Credential):
@@ -192,6 +219,7 @@ class Client:
         except Error:
             self._wrong += 1
             raise
+        self._seats.command(self)
         self._control = True
         self._say(self._hello(session))
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from aiohttp import ETag, web
 
+from kurumaisu.bounded_files import MOST_PAGE, read_bytes
+
 _TYPES = {
     ".html": "text/html",
     ".css": "text/css",
@@ -23,7 +25,7 @@ def served(request: web.Request, path: Path) -> web.Response:
     kind = _TYPES.get(path.suffix)
     if kind is None or not path.is_file():
         raise web.HTTPNotFound
-    body = path.read_bytes()
+    body = read_bytes(path, MOST_PAGE)
     # by content, as files of an upgraded package may have older dates; weak, as the squeezed one is not the same bytes
     tag = ETag(hashlib.sha256(body).hexdigest()[:32], is_weak=True)
     known = request.if_none_match or ()

@@ -6,17 +6,20 @@ from __future__ import annotations
 import asyncio
 import re
 import threading
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Container, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from aiohttp import web
 
+from kurumaisu.bounded_files import MOST_PAGE, read_bytes
 from kurumaisu.errors import Error
 from kurumaisu.viewer import access, files, report
 from kurumaisu.viewer.access import AccessTokens
 from kurumaisu.viewer.client import URGENT, Account, Client
 from kurumaisu.viewer.hub import Hub
+from kurumaisu.viewer.patience import Patience
+from kurumaisu.viewer.seats import Seats
 from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.source import Source
 
@@ -44,6 +47,9 @@ class Server:
         self._workers = {name: ThreadPoolExecutor(1, f"viewer_{name}") for name in URGENT}
         self._workers[""] = ThreadPoolExecutor(_WORKERS, "viewer_command")
         self._open: set[Client] = set()
+        self._seats = Seats(settings.most_clients)
+        self._patience: Patience | None = None
+        self._looking: asyncio.Task[None] | None = None
         self._stalled = 0
         self._runner: web.AppRunner | None = None
         self._port = 0
@@ -88,7 +94,7 @@ class Server:
             [
                 web.get("/", self._index),
                 web.get("/page/{name:.+}", self._file),
-                web.get(r"/map/{number:\d+}.png", self._map),
+                web.get(r"/map/{number:\d{1,9}}.png", self._map),
                 web.get("/report/{name}", self._report),
                 web.get("/ws", self._socket),
             ]
@@ -96,6 +102,9 @@ class Server:
         # access_log: a line for each request would fill the log
         self._runner = web.AppRunner(app, access_log=None, handle_signals=False)
         await self._runner.setup()
+        assert self._runner.server is not None
+        self._patience = Patience(self._runner.server, self._sockets, self._settings.patience)
+        self._looking = asyncio.create_task(self._patience.run())
         site = web.TCPSite(self._runner, self._settings.host, self._settings.port)
         try:
             await site.start()
@@ -107,7 +116,12 @@ class Server:
             ) from error
         self._port = self._runner.addresses[0][1]
 
+    def _sockets(self) -> Container[object]:
+        return {client.transport for client in self._open}
+
     async def _end(self) -> None:
+        if self._looking is not None:
+            self._looking.cancel()
         for client in list(self._open):
             client.abort()
         if self._runner is not None:
@@ -115,6 +129,8 @@ class Server:
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
+        assert self._patience is not None
+        self._patience.begun(request)
         try:
             access.check_host(request.headers.get("Host"), self._settings.names)
             response = await handler(request)
@@ -146,14 +162,13 @@ class Server:
         path = self.reports.get(request.match_info["name"])
         if path is None:
             raise web.HTTPNotFound
-        body, headers = report.page(path.read_bytes())
+        body, headers = report.page(read_bytes(path, MOST_PAGE))
         return web.Response(body=body, headers=headers, content_type="text/html", charset="utf-8")
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         access.check_origin(request.headers.get("Origin"), request.headers.get("Host"))
-        if len(self._open) >= self._settings.most_clients:
-            raise web.HTTPServiceUnavailable(reason=f"{self._settings.most_clients} pages are open already")
-        client = Client(self._settings, self._hub, self._source, self._keys if self._control else None, self._workers)
+        keys = self._keys if self._control else None
+        client = Client(self._settings, self._hub, self._source, keys, self._workers, self._seats)
         self._open.add(client)
         try:
             if len(self._open) == 1:
@@ -161,6 +176,7 @@ class Server:
             return await client.serve(request)
         finally:
             self._open.discard(client)
+            self._seats.leave(client)
             self._stalled += client.stalled
             if not self._open:
                 self._source.watch(False)

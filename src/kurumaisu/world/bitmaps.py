@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 from PIL import Image
 
-from kurumaisu.errors import Error
+from kurumaisu.bounded_files import MOST_IMAGE, MOST_TEXT, check_file, read_text
+from kurumaisu.errors import Error, one_line, told
+from kurumaisu.settings import parsed
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 Pixels = NDArray[Any]  # (height, width), row 0 at the top, of whatever type the image has
@@ -22,7 +23,6 @@ Pixels = NDArray[Any]  # (height, width), row 0 at the top, of whatever type the
 _MOST_PIXELS = 10**8  # of an image: 100 MB
 _MOST_RUNS = 5_000_000  # of an outline: 160 MB; a map of a building has some thousand
 _DARKEST_FREE = 128  # first channel of a pixel that is not a wall, as in libstage/stage.cc
-_MOST_YAML = 100_000  # bytes
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,7 @@ def _bitmap(path: Path, occupied: BoolArray) -> Bitmap:
 
 def _pixels(path: Path, every_channel: bool) -> Pixels:
     """Return the first channel, or the mean of the colours, of all pixels (height, width), row 0 at the top."""
+    check_file(path, MOST_IMAGE)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of large images, for which there is our own limit, and of damaged ones
@@ -145,17 +146,16 @@ class _Map:
 
 def _read_yaml(path: Path) -> _Map:
     try:
-        with path.open("rb") as file:
-            keys = yaml.safe_load(file.read(_MOST_YAML))
-    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
-        raise Error(f"{path}: is not a readable map: {' '.join(str(error).split())}") from error
+        keys = parsed(read_text(path, MOST_TEXT), str(path))
+    except Error as error:
+        raise Error(f"{path}: is not a readable map: {one_line(error)}") from error
     if not isinstance(keys, dict) or not isinstance(keys.get("image"), str):
         raise Error(f"{path}: is not a map of map_server: it names no image")
     if keys.get("mode", "trinary") == "raw":
         raise Error(f"{path}: mode raw is not supported, only trinary and scale")
     origin = keys.get("origin")
     if not isinstance(origin, list) or len(origin) != 3:
-        raise Error(f"{path}: origin must be [x, y, yaw], not {origin!r}")
+        raise Error(f"{path}: origin must be [x, y, yaw], not {told(origin)}")
     resolution = _finite(path, "resolution", keys.get("resolution"))
     if resolution <= 0:
         raise Error(f"{path}: resolution must be above 0, not {resolution:g}")
@@ -173,8 +173,8 @@ def _finite(path: Path, key: str, value: object) -> float:
     """Return a number of a map's keys; YAML takes 1e-3 for a string, map_server does not."""
     try:
         number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
-        raise Error(f"{path}: {key} must be a number, not {value!r}")
+        raise Error(f"{path}: {key} must be a number, not {told(value)}")
     return number

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from kurumaisu import program
 from kurumaisu.errors import Error
-from kurumaisu.maps import save_map
+from kurumaisu.maps import grid_pair
+from kurumaisu.whole_files import write_whole
 from kurumaisu.world.check import findings
 from kurumaisu.world.contents import contents
 from kurumaisu.world.drawing import to_svg
@@ -64,15 +65,14 @@ def export_world(arguments: list[str] | None = None) -> int:
         world = _load(options)
         options.output.mkdir(parents=True, exist_ok=True)
         path = options.output / options.world.stem
-        image, text = save_map(
-            occupancy(world, options.resolution, options.height), path, ".png" if options.png else ".pgm"
-        )
-        drawing = path.with_name(path.name + ".svg")
-        drawing.write_text(to_svg(world), encoding="utf-8")
+        grid = occupancy(world, options.resolution, options.height)
+        drawing, drawn = path.with_name(path.name + ".svg"), to_svg(world)
+        pair = grid_pair(grid, path, ".png" if options.png else ".pgm")
+        write_whole({**pair, drawing: drawn})
     except (Error, OSError) as error:
         print(f"export-world: {error}", file=sys.stderr)
         return 1
-    print(f"written: {image}, {text}, {drawing}")
+    print(f"written: {', '.join(map(str, [*pair, drawing]))}")
     return 0
 
 

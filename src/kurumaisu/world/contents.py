@@ -17,11 +17,14 @@ _MOST_ROBOTS = 10  # that contents() tells of one by one
 
 def contents(world: World) -> Iterator[str]:
     """Yield lines that say what the world consists of."""
-    x0, y0, x1, y1 = world.bounds
-    yield f"{world.name}: {x1 - x0:.2f} x {y1 - y0:.2f} m, x {x0:.2f} to {x1:.2f}, y {y0:.2f} to {y1:.2f}"
+    if world.has_walls:
+        x0, y0, x1, y1 = world.bounds
+        yield f"{world.name}: {x1 - x0:.2f} x {y1 - y0:.2f} m, x {x0:.2f} to {x1:.2f}, y {y0:.2f} to {y1:.2f}"
+    else:
+        yield f"{world.name}: no walls"
     yield f"step {1000 * world.interval:g} ms, resolution {world.resolution:g} m, {len(world.segments)} wall segments"
     kinds = {kind: sum(model.type == kind for model in world.models) for kind in {m.type for m in world.models}}
-    yield "models: " + ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
+    yield "models: " + (", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or "none")
     robots = [(model, model.device) for model in world.models if isinstance(model.device, Position)]
     for model, position in robots[:_MOST_ROBOTS]:
         yield _robot(world, model, position)

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from kurumaisu.bounded_files import read_bytes
 from kurumaisu.errors import Error
 from kurumaisu.names import hint, nearest
 from kurumaisu.world.notes import Notes
@@ -112,14 +113,11 @@ class Reader:
 
     def _read(self, path: Path, asked: Token | None) -> SourceText:
         try:
-            with path.open("rb") as file:
-                data = file.read(_MOST_BYTES + 1)
-        except (OSError, ValueError) as error:
-            near = _near(path) if isinstance(error, FileNotFoundError) else ""
-            reason = f"{path}: {getattr(error, 'strerror', None) or error}{near}"
+            data = read_bytes(path, _MOST_BYTES)
+        except Error as error:
+            near = _near(path) if isinstance(error.__cause__, FileNotFoundError) else ""
+            reason = f"{error}{near}"
             raise asked.error(reason) if asked else Error(reason) from error
-        if len(data) > _MOST_BYTES:
-            raise Error(f"{path}: is larger than {_MOST_BYTES} bytes")
         return SourceText(path, data.decode(errors="surrogateescape"))
 
     def _fill_in(self, source: SourceText) -> SourceText:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from kurumaisu.world.tokens import Token
 
 _MOST = 200  # more are not read
+_LONGEST = 300  # characters of one: a file's words have no limit
 
 
 @dataclass
@@ -19,6 +20,7 @@ class Notes:
 
     def add(self, token: Token, text: str, kind: str | None = None) -> None:
         """Add a warning, unless there was one of this kind (by default: with the same text) before."""
+        text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
         if (kind or text) in self._seen or len(self.texts) > _MOST:
             return
         self._seen.add(kind or text)

@@ -26,6 +26,7 @@ from kurumaisu.world.values import Units, Values
 
 _RESOLUTION = 0.02  # [m], as in Stage
 _INTERVAL = 100.0  # [ms], as in Stage
+_FARTHEST = 1e7  # [m] or [rad] as src/raycast/arena.cpp has it
 _FINEST = 1e-5  # [m]
 _SHORTEST = 1e-3  # [ms]
 _WALL_HEIGHT = 2.5  # [m] of a map's walls if nothing says how high they are: that of a room
@@ -79,11 +80,16 @@ class World:
         return self.starts[0].pose
 
     @property
+    def has_walls(self) -> bool:
+        """Whether there is anything solid that stands still."""
+        return bool(len(self.segments) + len(self.obstacles))
+
+    @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Smallest x, smallest y, largest x, largest y [m] of the walls. Raise Error if there are none."""
-        both = np.concatenate([self.segments, self.obstacles]).reshape(-1, 2)
-        if not len(both):
+        if not self.has_walls:
             raise Error(f"{self.path}: has no walls")
+        both = np.concatenate([self.segments, self.obstacles]).reshape(-1, 2)
         (x0, y0), (x1, y1) = both.min(axis=0).tolist(), both.max(axis=0).tolist()
         return x0, y0, x1, y1
 
@@ -146,6 +152,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values, vocabulary: Voca
     if interval < _SHORTEST:
         raise said.error("interval_sim", f"interval_sim must be at least {_SHORTEST:g} ms, not {interval:g}")
     poses = global_poses(models)
+    _check_reach(models, poses)
     walls = [model for model in models if not travels(model, models)]
     starts = (model for model in models if model.type == "position")
     return World(
@@ -164,6 +171,17 @@ def _world(path: Path, models: tuple[Model, ...], said: Values, vocabulary: Voca
         starts=tuple(Start(m.name or "chair", poses[m.index, PLANAR]) for m in starts),
         warnings=tuple(said.notes.texts),
     )
+
+
+def _check_reach(models: tuple[Model, ...], poses: FloatArray) -> None:
+    """Raise Error for a model so far from the map's origin that its place is not known well any more."""
+    for model, pose in zip(models, poses, strict=True):
+        reach = float(np.abs(pose).max() + np.abs(model.shape.segments).max(initial=0.0))
+        if not reach < _FARTHEST:
+            words = (
+                f"reaches {reach:g} m (or rad) from the map's origin; the simulator knows no more than {_FARTHEST:g}"
+            )
+            raise Error(f"{model.place}: the model {words}")
 
 
 def _semantics(said: Values) -> str:

@@ -46,8 +46,7 @@ void writeMapPair(const std::string& path, const OccupancyGrid& grid) {
   std::string image = path.substr(path.find_last_of('/') + 1) + ".pgm";
   for (std::size_t at = 0; (at = image.find('\'', at)) != std::string::npos; at += 2)
     image.insert(at, 1, '\'');
-  writeWhole(path + ".pgm", imageOf(grid));  // before the file that names it
-  writeWhole(path + ".yaml", textOf(grid, image));
+  replaceWhole({textFile(path + ".pgm", imageOf(grid)), textFile(path + ".yaml", textOf(grid, image))});
 }
 
 }  // namespace kurumaisu

@@ -11,12 +11,15 @@
 #include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/serialization/CArchive.h>
 
+#include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <optional>
 #include <stdexcept>
 
+#include "regular_file.h"
 #include "slam/basics/pose.h"
 #include "slam/mapping/observation.h"
 
@@ -25,12 +28,18 @@ namespace {
 
 using mrpt::obs::CObservation2DRangeScan;
 
+constexpr std::uintmax_t kMost = 8'000'000'000;  // bytes, packed or not; a day of scans has a quarter of it
+constexpr std::uintmax_t kLeast = 64'000'000;    // bytes that any file may have unpacked,
+constexpr std::uintmax_t kTimes = 200;           // and times its size: scans are packed 2 to 20 times
+
 /// The decompressed bytes. In memory, because only there the end of the last object can be told from a file
 /// that was cut off.
 std::vector<std::uint8_t> contents(const std::string& path) {
-  if (!std::ifstream(path).good()) throw std::runtime_error("cannot be read");
+  const std::string why = whyNotRead(path, kMost);
+  if (!why.empty()) throw std::runtime_error(why);
   mrpt::io::CFileGZInputStream file;
   if (!file.open(path)) throw std::runtime_error("cannot be read");
+  const std::uintmax_t most = std::min(kMost, kLeast + kTimes * std::filesystem::file_size(path));
   std::vector<std::uint8_t> bytes;
   constexpr std::size_t kChunk = 1U << 20U;
   for (std::size_t got = kChunk; got > 0;) {
@@ -38,6 +47,8 @@ std::vector<std::uint8_t> contents(const std::string& path) {
     got = file.Read(bytes.data() + bytes.size() - kChunk, kChunk);
     if (got > kChunk) throw std::runtime_error("is damaged: it cannot be decompressed");
     bytes.resize(bytes.size() - kChunk + got);
+    if (bytes.size() > most)
+      throw std::runtime_error("has more than " + std::to_string(most) + " bytes unpacked");
   }
   if (bytes.empty()) throw std::runtime_error("is empty");
   return bytes;

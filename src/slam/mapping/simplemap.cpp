@@ -8,10 +8,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <stdexcept>
 
+#include "regular_file.h"
 #include "slam/mapping/extent.h"
 #include "slam/mapping/grid.h"
 #include "slam/mapping/observation.h"
@@ -22,6 +22,8 @@ namespace kurumaisu {
 namespace {
 
 using mrpt::obs::CObservation2DRangeScan;
+
+constexpr std::uintmax_t kMostBytes = std::uintmax_t{1} << 30U;  // of a simplemap
 
 // As CPose3DPDF: MRPT 2.5.8 does not take a CPosePDF here, though it says so.
 mrpt::poses::CPose3DPDF::Ptr gaussianOf(const KeyScan& key) {
@@ -55,6 +57,12 @@ std::vector<KeyScan> keysOf(const mrpt::maps::CSimpleMap& map) {
   return keys;
 }
 
+/// Writes a map, and reads it again: MRPT does not hear of a disk that is full when it closes the file.
+bool wholeSimplemap(const mrpt::maps::CSimpleMap& map, const std::string& name) {
+  mrpt::maps::CSimpleMap again;
+  return map.saveToFile(name) && again.loadFromFile(name) && again.size() == map.size();
+}
+
 }  // namespace
 
 void writeSimplemap(const std::string& path, const std::vector<KeyScan>& keys) {
@@ -65,11 +73,12 @@ void writeSimplemap(const std::string& path, const std::vector<KeyScan>& keys) {
     frame->insert(keptObservation(key.scan));
     map.insert(gaussianOf(key), frame);
   }
-  replaceWhole(path, [&map](const std::string& name) { return map.saveToFile(name); });
+  replaceWhole({{path, [&map](const std::string& name) { return wholeSimplemap(map, name); }}});
 }
 
 std::vector<KeyScan> readSimplemap(const std::string& path) {
-  if (!std::ifstream(path).good()) throw std::runtime_error(path + ": cannot be read");
+  const std::string why = whyNotRead(path, kMostBytes);
+  if (!why.empty()) throw std::runtime_error(path + ": " + why);
   std::vector<KeyScan> keys;
   try {
     mrpt::maps::CSimpleMap map;

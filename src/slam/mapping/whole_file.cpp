@@ -29,25 +29,43 @@ int syncError(const std::string& path) {
   return error;
 }
 
-}  // namespace
+std::string partOf(const std::string& path) { return path + ".part"; }
 
-void replaceWhole(const std::string& path, const std::function<bool(const std::string&)>& write) {
-  const std::string other = path + ".part";
-  int error = openError(other);
-  if (error == 0 && !write(other)) error = errno != 0 ? errno : EIO;
-  if (error == 0) error = syncError(other);
-  if (error == 0 && std::rename(other.c_str(), path.c_str()) != 0) error = errno;
-  if (error == 0) return;
-  std::remove(other.c_str());
-  throw std::runtime_error(path + ": cannot be written: " + std::strerror(error));
+int writeError(const std::string& part, const std::function<bool(const std::string&)>& write) {
+  const int error = openError(part);
+  if (error != 0) return error;
+  errno = 0;
+  bool written = false;
+  try {
+    written = write(part);
+  } catch (const std::exception&) {  // MRPT's, whose text is a call stack
+    written = false;
+  }
+  if (!written) return errno != 0 ? errno : EIO;
+  return syncError(part);
 }
 
-void writeWhole(const std::string& path, const std::string& contents) {
-  replaceWhole(path, [&contents](const std::string& name) {
-    std::ofstream file(name, std::ios::binary);
-    file << contents << std::flush;
-    return file.good();
-  });
+}  // namespace
+
+void replaceWhole(const std::vector<WholeFile>& files) {
+  std::size_t at = 0;
+  int error = 0;
+  for (; at < files.size() && error == 0; ++at) error = writeError(partOf(files[at].path), files[at].write);
+  for (std::size_t i = 0; i < files.size() && error == 0; ++i) {
+    at = i + 1;
+    if (std::rename(partOf(files[i].path).c_str(), files[i].path.c_str()) != 0) error = errno;
+  }
+  if (error == 0) return;
+  for (const WholeFile& file : files) std::remove(partOf(file.path).c_str());
+  throw std::runtime_error(files[at - 1].path + ": cannot be written: " + std::strerror(error));
+}
+
+WholeFile textFile(const std::string& path, const std::string& contents) {
+  return {path, [contents](const std::string& name) {
+            std::ofstream file(name, std::ios::binary);
+            file << contents << std::flush;
+            return file.good();
+          }};
 }
 
 }  // namespace kurumaisu

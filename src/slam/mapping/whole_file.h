@@ -4,13 +4,20 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace kurumaisu {
 
-/// Has a file written under another name beside its own, and gives it its own when it is whole and on the disk.
-/// write: writes the file of the name it is given; false: it could not. Throws std::runtime_error naming path.
-void replaceWhole(const std::string& path, const std::function<bool(const std::string&)>& write);
+struct WholeFile {
+  std::string path;
+  std::function<bool(const std::string&)>
+      write;  // writes the file of the name it is given; false: it could not
+};
 
-void writeWhole(const std::string& path, const std::string& contents);
+/// Has the files of one result written under other names beside their own, and gives them their own when all are
+/// whole and on the disk. Throws std::runtime_error naming the one that cannot be written.
+void replaceWhole(const std::vector<WholeFile>& files);
+
+WholeFile textFile(const std::string& path, const std::string& contents);
 
 }  // namespace kurumaisu

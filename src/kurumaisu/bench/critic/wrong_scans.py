@@ -13,6 +13,7 @@ import numpy as np
 from kurumaisu.bench.critic.drives import Tables
 from kurumaisu.critic.values.recording import LaserMount
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 MOUNT = LaserMount(0.3, 0.0, 0.0, -2.086214, 4 * 0.006135923, 171)
 _MOST = 4.0  # [m]
@@ -82,7 +83,7 @@ def write_world(path: Path, walls: FloatArray) -> None:
         if size > 0.01:
             where = f"pose [{(x0 + x1) / 2:.6f} {(y0 + y1) / 2:.6f} 0 {angle:.6f}] size [{size:.6f} 0.01 1.0]"
             lines.append(f"wall ( {where} )")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_whole({path: "\n".join(lines) + "\n"})
 
 
 _Spoil = Callable[[Sight, np.random.Generator], Sight]

@@ -17,6 +17,7 @@ from pathlib import Path
 from kurumaisu.bench.faults.fuzz_seeds import seeds
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
+from kurumaisu.whole_files import write_whole
 
 TARGETS = {"scip": 1024, "stream": 2048, "device": 128, "dac": 512, "guard": 512}  # longest input [bytes]
 _ONE_INPUT = 5  # [s] one that takes longer is a failure
@@ -64,7 +65,7 @@ def run(target: str, runs: int, seed: int, log: Path | None = None) -> Outcome:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for number, data in enumerate(seeds(target, log)):
-            (folder / f"seed{number}").write_bytes(data)
+            write_whole({folder / f"seed{number}": data})
         command = [str(_program(target)), f"-runs={runs}", f"-seed={seed}", f"-max_len={TARGETS[target]}"]
         command += [
             "-len_control=0",

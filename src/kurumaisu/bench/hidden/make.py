@@ -20,6 +20,7 @@ from kurumaisu.bench.hidden.unknown.cases import make_unknown_base, make_unknown
 from kurumaisu.bench.hidden.unknown.forms import UNKNOWN_BASE, UNKNOWN_LASER
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
+from kurumaisu.whole_files import write_whole
 
 
 def make(ask: Ask, seed: int, folder: Path | None = None) -> Case:
@@ -91,7 +92,7 @@ def _make_wrong(ask: Ask, seed: int, folder: Path | None, rng: np.random.Generat
     found = spoilt(right.null, name, rng)
     if name == "wrong map":
         other = _given(folder, ask) / f"hidden_{seed}_wrong.world"
-        other.write_text(world_text("another room", draw_room(np.random.default_rng([seed, 41]))), encoding="utf-8")
+        write_whole({other: world_text("another room", draw_room(np.random.default_rng([seed, 41])))})
         found = replace(found, world=other)
     truth = Truth("wrong", problem=name, background=right.truth.background)
     return Case(found, right.null, truth, seed)

@@ -15,6 +15,7 @@ from kurumaisu.bench.hidden.generator.case import Truth
 from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.errors import Error
+from kurumaisu.whole_files import write_whole
 
 Lines = list[str]
 
@@ -61,15 +62,15 @@ def write_case(folder: Path, recording: Recording, truth: Truth | None = None, d
         if damage:
             table = folder / run.name / "pose.csv"
             head, *lines = table.read_text(encoding="utf-8").splitlines()
-            table.write_text("\n".join([head, *TABLES[damage](lines, rng)]) + "\n", encoding="utf-8")
+            write_whole({table: "\n".join([head, *TABLES[damage](lines, rng)]) + "\n"})
     meta: dict[str, object] = {"train": list(recording.train)}
     if recording.world is not None:
-        (folder / recording.world.name).write_text(recording.world.read_text(encoding="utf-8"), encoding="utf-8")
+        write_whole({folder / recording.world.name: recording.world.read_text(encoding="utf-8")})
         meta["world"] = recording.world.name
     if recording.laser is not None:
         meta["laser"] = asdict(recording.laser)
     if recording.truth is not None:
         meta["truth"] = dict(zip(("position_sd", "heading_sd"), recording.truth, strict=True))
-    (folder / "meta.yaml").write_text(yaml.safe_dump(meta), encoding="utf-8")
+    write_whole({folder / "meta.yaml": yaml.safe_dump(meta)})
     if truth is not None:
-        folder.with_name(folder.name + ".truth.json").write_text(json.dumps(asdict(truth), indent=1), encoding="utf-8")
+        write_whole({folder.with_name(folder.name + ".truth.json"): json.dumps(asdict(truth), indent=1)})

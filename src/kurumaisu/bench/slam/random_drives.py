@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from kurumaisu.errors import Error
 from kurumaisu.map_file import MapFile
 from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.whole_files import write_whole
 from kurumaisu.world import World, load_world
 
 _STEP = 0.2  # [m] of the planner's grid
@@ -88,17 +90,18 @@ def world_of(grid: MapFile, start: FloatArray, heading: float, folder: Path) -> 
     rows, columns = np.flatnonzero(walls.any(axis=1)), np.flatnonzero(walls.any(axis=0))
     # Stage's bitmaps are as large as what is drawn on them.
     walls = walls[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    Image.fromarray(np.where(walls[::-1], 0, 255).astype(np.uint8)).save(folder / "walls.png")
+    drawn = BytesIO()
+    Image.fromarray(np.where(walls[::-1], 0, 255).astype(np.uint8)).save(drawn, "PNG")
     size = np.array(walls.shape[::-1]) * grid.resolution
     middle = np.array(grid.origin[:2]) + np.array([columns[0], rows[0]]) * grid.resolution + size / 2
     inc = shipped("worlds/md100.inc").read_text(encoding="utf-8")
-    (folder / "map.world").write_text(
+    text = (
         f'name "map"\nsemantics "physical"\n{inc}\n'
         f'model ( name "walls" bitmap "walls.png" boundary 0 size [{size[0]} {size[1]} 2] '
         f"pose [{middle[0]} {middle[1]} 0 0] )\n"
-        f'md100 ( name "chair" pose [{start[0]} {start[1]} 0 {np.degrees(heading)}] )\n',
-        encoding="utf-8",
+        f'md100 ( name "chair" pose [{start[0]} {start[1]} 0 {np.degrees(heading)}] )\n'
     )
+    write_whole({folder / "walls.png": drawn.getvalue(), folder / "map.world": text})
     return load_world(folder / "map.world")
 
 

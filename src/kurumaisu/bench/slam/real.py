@@ -14,10 +14,11 @@ from kurumaisu.bench.slam import peers
 from kurumaisu.bench.slam.ours import ours
 from kurumaisu.bench.slam.sharpness import sharpness
 from kurumaisu.bench.table import Table
-from kurumaisu.maps import Grid, draw_map
+from kurumaisu.maps import Grid, picture
 from kurumaisu.real import mines, sena
 from kurumaisu.slam import ScanLog
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 SENA = sena.FOLDER / sena.LOG
 _URG_RANGE = 5.6  # [m]
@@ -66,4 +67,4 @@ def _row(table: Table, name: str, run: Run, poses: FloatArray, grid: Grid, log: 
     if pictures is not None:
         pictures.mkdir(parents=True, exist_ok=True)
         path = pictures / f"{name.replace(', ', '-').replace(' ', '_')}.png"
-        draw_map(grid, np.column_stack([log.times, poses]), path)
+        write_whole({path: picture(grid, np.column_stack([log.times, poses]))})

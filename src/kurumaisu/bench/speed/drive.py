@@ -23,6 +23,7 @@ from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 _INPUT = "experiment_vel"  # of base_node.yaml: its limits let a small step through at once
 _RATES = ((50.0, 50.0), (50.0, 1000.0), (1000.0, 1000.0))  # [Hz] of the loop, of commands
@@ -114,7 +115,7 @@ def _load(loop: float, guard: Path | None, folder: Path, environment: dict[str, 
     settings["guard"] = _yaml(guard or shipped("launch/guard.yaml"))
     settings["model"] = _yaml(shipped("launch/md100.yaml"))
     file = folder / "parameters.yaml"
-    file.write_text(yaml.safe_dump(settings), encoding="utf-8")
+    write_whole({file: yaml.safe_dump(settings)})
     subprocess.run(["rosparam", "load", str(file), "/base_node"], env=environment, check=True, timeout=PATIENCE)
 
 

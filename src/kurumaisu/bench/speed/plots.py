@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import time
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ from kurumaisu.bench.peers import Stage
 from kurumaisu.bench.scenes import URG, Map, free_poses, walls
 from kurumaisu.bench.speed import robots
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 _BEAMS = (16, 64, 256, 682, 1081, 2048, 4096)
 _ROBOTS = (1, 3, 10, 30, 100, 300, 1000)
@@ -97,5 +99,7 @@ def _plot(path: Path, x: str, y: str, curves: Sequence[Curve]) -> None:
     axes.set_ylim(bottom=10 ** math.floor(math.log10(min(min(curve.y) for curve in curves))))
     axes.grid(visible=True, which="both", alpha=0.3)
     axes.legend()
-    figure.savefig(path, bbox_inches="tight", metadata={"Date": None})
+    drawn = io.StringIO()
+    figure.savefig(drawn, format="svg", bbox_inches="tight", metadata={"Date": None})
     pyplot.close(figure)
+    write_whole({path: drawn.getvalue()})

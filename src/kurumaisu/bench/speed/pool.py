@@ -15,6 +15,7 @@ import numpy as np
 from kurumaisu.bench.table import Table
 from kurumaisu.params import shipped
 from kurumaisu.sim import Simulator, SimulatorPool, load_options
+from kurumaisu.whole_files import write_whole
 from kurumaisu.world import World, load_world
 
 _SIMULATIONS = 8
@@ -63,5 +64,5 @@ def _world(path: Path, robots: int, beams: int) -> World:
     laser = f"ranger ( sensor ( range [0 5.6] fov 240 samples {beams} ) )"
     rows = (f"pose [{1 + 0.2 * (i % 40):g} {0.8 + 0.3 * (i // 40):g} 0 {i}]" for i in range(robots))
     lines = [f"position ( {row} size [0.1 0.1 0.4] obstacle_return 0 {laser} )" for row in rows]
-    path.write_text("\n".join([f'include "{shipped("worlds/building.world")}"', *lines]))
+    write_whole({path: "\n".join([f'include "{shipped("worlds/building.world")}"', *lines])})
     return load_world(path)

@@ -19,6 +19,7 @@ from kurumaisu import children
 from kurumaisu.bench.processes import PATIENCE, cpu, master, memory, program
 from kurumaisu.bench.table import Table
 from kurumaisu.errors import Error
+from kurumaisu.whole_files import write_whole
 
 _INTERVAL = 0.1  # [s] of the world
 _SIDE = 16.0  # [m] of the room or the map, as of Stage's cave
@@ -65,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as folder, master() as environment:
         for robots in options.robots:
             world = Path(folder) / f"{robots}.world"
-            world.write_text(world_of(robots, options.map))
+            write_whole({world: world_of(robots, options.map)})
             costs = _in_turn(nodes, world, robots, options, environment)
             for name, cost in costs.items():
                 ratio = cost.cpu / costs["stage_ros"].cpu if "stage_ros" in costs else math.nan

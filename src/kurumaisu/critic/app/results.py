@@ -15,6 +15,7 @@ from kurumaisu.critic.app.job import Outcome
 from kurumaisu.critic.values.digits import bare, quantities
 from kurumaisu.critic.values.verdict import Gain, Verdict, grouped, to_json
 from kurumaisu.errors import Error
+from kurumaisu.whole_files import write_whole
 
 _NARROWEST = 12  # cells of a recording's name in a table
 COLUMNS = (
@@ -113,12 +114,10 @@ def write_table(path: Path, outcomes: Sequence[Outcome]) -> None:
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
     writer.writeheader()
     writer.writerows(_row(outcome) for outcome in outcomes)
-    partial = path.with_name(f".{path.name}.partial")
     try:
-        partial.write_text(text.getvalue(), encoding="utf-8")
-        partial.replace(path)
-    except OSError as error:
-        raise Error(f"--table: {path}: {error.strerror}") from error
+        write_whole({path: text.getvalue()})
+    except Error as error:
+        raise Error(f"--table: {error}") from error
 
 
 def _row(outcome: Outcome) -> dict[str, str | float | int]:

@@ -3,24 +3,33 @@
 
 from __future__ import annotations
 
+import bz2
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import lz4.frame
 import numpy as np
 from rosbags.rosbag1 import Reader
-from rosbags.rosbag1.reader import IndexData
+from rosbags.rosbag1.reader import Chunk, Compression, IndexData, decompressors
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from kurumaisu.bounded_files import MOST_RECORDING, check_file
 from kurumaisu.critic.data import messages
 from kurumaisu.critic.data.bag_parts import parts_of
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 
 _HEADER = "std_msgs/msg/Header"
+_MOST_UNPACKED = 2**28  # [bytes] of a chunk; rosbag's have some 800 kB and at most one message more
+_LEAST_UNPACKED, _TIMES_UNPACKED = (
+    2**26,
+    200,
+)  # [bytes] and times its size, of a whole bag: scans are packed 2 to 20 times
 
 
 @dataclass
@@ -63,6 +72,7 @@ def read_topics(
 def _read_into(
     found: dict[str, Topic], path: Path, parts: dict[str, str], instead: Mapping[str, Callable[[Any], Any]]
 ) -> None:
+    check_file(path, MOST_RECORDING)
     try:
         with _Reader(path) as reader:
             chosen = [connection for connection in reader.connections if _absolute(connection.topic) in parts]
@@ -87,7 +97,29 @@ def _read_into(
 
 
 class _Reader(Reader):
-    """Also reads bags of 2010, whose index records state a wrong length; the count of entries is right."""
+    """Also reads bags of 2010, whose index records state a wrong length; the count of entries is right.
+
+    Nothing is unpacked beyond a limit: a kilobyte can be made to hold gigabytes.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._sizes: dict[int, int] = {}  # [bytes] of chunks, unpacked, by their places
+        self._most = _LEAST_UNPACKED + _TIMES_UNPACKED * path.stat().st_size  # [bytes] of all of them
+
+    def read_chunk(self) -> Chunk:
+        chunk = super().read_chunk()
+        unpack = _UNPACKERS.get(chunk.decompressor)
+        return chunk if unpack is None else chunk._replace(decompressor=partial(self._unpacked, chunk.datapos, unpack))
+
+    def _unpacked(self, place: int, unpack: Callable[[bytes, int], bytes], data: bytes) -> bytes:
+        unpacked = unpack(data, _MOST_UNPACKED + 1)
+        self._sizes[place] = len(unpacked)
+        if len(unpacked) > _MOST_UNPACKED:
+            raise Error(f"{self.path}: a chunk has more than {_MOST_UNPACKED} bytes unpacked")
+        if sum(self._sizes.values()) > self._most:
+            raise Error(f"{self.path}: has more than {self._most} bytes unpacked: {_TIMES_UNPACKED} times its size")
+        return unpacked
 
     def read_index_data(self, pos: int, indexes: dict[int, list[IndexData]]) -> None:
         assert self.bio
@@ -102,6 +134,13 @@ class _Reader(Reader):
             connection, count = (struct.unpack_from("<I", header, at)[0] for at in self.index_data_header_offsets)
             for seconds, ns, offset in struct.iter_unpack("<III", self.bio.read(12 * count)):
                 indexes[connection].append(IndexData(seconds * 1_000_000_000 + ns, pos, offset))
+
+
+# Each returns so many bytes at most.
+_UNPACKERS: Mapping[Callable[[bytes], bytes], Callable[[bytes, int], bytes]] = {
+    decompressors[Compression.BZ2.value]: lambda data, most: bz2.BZ2Decompressor().decompress(data, most),
+    decompressors[Compression.LZ4.value]: lambda data, most: lz4.frame.LZ4FrameDecompressor().decompress(data, most),
+}
 
 
 def _absolute(topic: str) -> str:

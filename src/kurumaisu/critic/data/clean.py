@@ -18,6 +18,13 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 HICCUP_SHARE = 0.05
 # A stamp further back than this was not delayed on its way: the clock was set [s].
 HICCUP_TIME = 0.5
+# Rows further from all others than this, and than so many usual steps, have stamps of another time [s].
+FURTHEST_STEP = 86_400.0
+_USUAL_STEPS = 1e4
+# No chair, and no room, has larger numbers than this; squares of larger ones are not numbers any more [m, rad, V, s].
+LARGEST = 1e12
+_LARGEST_COVARIATE = 1e30
+_KNOWN = frozenset({"x", "y", "theta", "v", "w", "v_f", "v_s"})
 # Between two samples, a turn above this may as well have been one the other way round [rad].
 LARGEST_TURN = 2.5
 
@@ -66,7 +73,10 @@ def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | Non
     """
     keep = np.isfinite(table.t) & (ranges | np.isfinite(table.values).all(axis=1))
     _report(table, ~keep, faults, "not a number: dropped", "has no number in most rows", 0.5)
-    kept = np.flatnonzero(keep)
+    sane = _of_sane_size(table, ranges=ranges)
+    _report(table, keep & ~sane, faults, "too large to be true: dropped", "has numbers too large to be true")
+    kept = np.flatnonzero(keep & sane)
+    kept = kept[~_astray(table, kept, faults)]
     kept = kept[~_repeated(table, kept, faults)]
     _out_of_order(table, kept, faults)
     if not len(kept):
@@ -76,6 +86,31 @@ def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | Non
     if ranges:
         return _ranges(table.where, series, faults)
     return _unwrapped(table.where, series, faults) if "theta" in table.columns else series
+
+
+def _of_sane_size(table: Table, *, ranges: bool) -> BoolArray:
+    """Return which rows have no number that is beyond all that there is, (n,); inf and nan are none."""
+    largest = _LARGEST_COVARIATE if _KNOWN.isdisjoint(table.columns) else LARGEST
+    size = np.abs(table.values)
+    sane: BoolArray = ~((size > largest) & np.isfinite(size)).any(axis=1) | ranges  # a range is left out by itself
+    return sane
+
+
+def _astray(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
+    """Return which of the kept rows have stamps far from those of most, (k,): some clock was not set yet."""
+    order = np.argsort(table.t[kept], kind="stable")
+    steps = np.diff(table.t[kept][order])
+    usual = np.sort(steps)[(len(steps) - 1) // 2] if len(steps) else 0.0
+    group = np.append(0, np.cumsum(steps > max(FURTHEST_STEP, _USUAL_STEPS * usual)))[: len(order)]
+    astray = np.zeros(len(kept), dtype=bool)
+    astray[order] = group != np.bincount(group).argmax() if len(group) else False
+    if astray.any():
+        faults.add(
+            f"{table.where}: {_rows(int(astray.sum()))} more than a day from the others: dropped "
+            f"(first: {table.place(int(kept[np.argmax(astray)]))}): stamps are wrong",
+            fatal=True,
+        )
+    return astray
 
 
 def _report(table: Table, bad: BoolArray, faults: Faults, noted: str, fatal: str, share: float = HICCUP_SHARE) -> None:
@@ -121,10 +156,13 @@ def _out_of_order(table: Table, kept: IntArray, faults: Faults) -> None:
 
 def _ranges(where: str, series: Series, faults: Faults) -> Series:
     values = np.where(series.values == -np.inf, np.nan, series.values)
-    senseless = values <= 0
-    if senseless.any():
-        faults.add(f"{where}: {int(senseless.sum())} ranges of 0 or less are taken as invalid")
-    values = np.where(senseless, np.nan, values)
+    for senseless, words in (
+        (values <= 0, "0 or less"),
+        ((values > LARGEST) & (values < np.inf), f"over {LARGEST:g} m"),
+    ):
+        if senseless.any():
+            faults.add(f"{where}: {int(senseless.sum())} ranges of {words} are taken as invalid")
+            values = np.where(senseless, np.nan, values)
     if not np.isfinite(values).any():
         faults.add(f"{where}: no reading is valid")
     return Series(series.t, values, series.columns)

@@ -5,15 +5,22 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import replace
+import math
+from array import array
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kurumaisu.bounded_files import MOST_TABLE, read_text
 from kurumaisu.critic.data.clean import Faults, Table, clean
 from kurumaisu.critic.values.recording import Run, Series, run_of_parts
-from kurumaisu.errors import Error
+from kurumaisu.errors import Error, told
 from kurumaisu.types import FloatArray
+
+if TYPE_CHECKING:
+    from _csv import Reader
 
 # Columns beside t that a table must have; scan and covariate have as many as there are.
 REQUIRED: dict[str, tuple[str, ...]] = {
@@ -27,6 +34,9 @@ REQUIRED: dict[str, tuple[str, ...]] = {
 # Columns that belong to a table when it has them; any other one is a covariate.
 OPTIONAL: dict[str, tuple[str, ...]] = {"voltage": ("v", "w")}
 QUERY = "query"
+_MOST_COLUMNS = 20_000  # of a table; a laser has some thousand beams
+_LONGEST_NAME = 200  # characters of a column's name
+_MOST_LISTED = 20  # names of columns in a message
 
 
 def is_csv_run(folder: Path) -> bool:
@@ -47,11 +57,11 @@ def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
     covariates: dict[str, Series] = {}
     for part in REQUIRED:
         path = folder / f"{part}.csv"
-        if path.is_file():
+        if path.exists():
             parts[part], more = _part(path, f"{name}/{path.name}", part, faults)
             _merge(covariates, more, path)
     query = folder / f"{QUERY}.csv"
-    return replace(run_of_parts(name, parts, covariates), queries=read_queries(query) if query.is_file() else None)
+    return replace(run_of_parts(name, parts, covariates), queries=read_queries(query) if query.exists() else None)
 
 
 def read_queries(path: Path) -> FloatArray:
@@ -117,65 +127,88 @@ def _is_beam(name: str) -> bool:
 
 def _read(path: Path, required: tuple[str, ...]) -> tuple[list[str], FloatArray, list[str]]:
     """Return column names, rows (n, columns), and the names of columns without any number, left out."""
+    stream = io.StringIO(read_text(path, MOST_TABLE, "utf-8-sig"), newline="")
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            columns = [name.strip() for name in next(csv.reader(stream), [])]
-            _check_header(path, columns, required)
-            body = stream.read()
-    except OSError as error:
-        raise Error(f"{path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise Error(f"{path}: is not UTF-8 text") from error
-    if not body.strip():
-        return columns, np.empty((0, len(columns))), []
-    try:
-        rows = np.loadtxt(io.StringIO(body), delimiter=",", comments=None, ndmin=2)
-    except ValueError:
-        return _read_cells(path, columns, required)
-    return (columns, rows, []) if rows.shape[1] == len(columns) else _read_cells(path, columns, required)
+        columns = [name.strip() for name in next(csv.reader(stream), [])]
+        _check_header(path, columns, required)
+        begin = stream.tell()
+        if not stream.read().strip():
+            return columns, np.empty((0, len(columns))), []
+        stream.seek(begin)
+        try:
+            rows = np.loadtxt(stream, delimiter=",", comments=None, ndmin=2)
+        except ValueError:
+            rows = np.empty((0, 0))
+        if rows.shape[1] == len(columns):
+            return columns, rows, []
+        stream.seek(0)
+        return _read_cells(path, csv.reader(stream), columns, required)
+    except csv.Error as error:
+        raise Error(f"{path}: is not a table: {error}") from error
 
 
 def _check_header(path: Path, columns: list[str], required: tuple[str, ...]) -> None:
+    if len(columns) > _MOST_COLUMNS:
+        raise Error(f"{path}:1: has {len(columns)} columns, and at most {_MOST_COLUMNS} are read")
     for name in required:
         if name not in columns:
-            raise Error(f"{path}:1: column {name!r} is missing; there are: {', '.join(columns) or 'none'}")
+            raise Error(f"{path}:1: column {name!r} is missing; there are: {_listed(columns)}")
+    seen: set[str] = set()
     for name in columns:
-        if not name or columns.count(name) > 1:
-            raise Error(f"{path}:1: column {name!r} {'occurs twice' if name else 'has no name'}")
+        if not name or name in seen:
+            raise Error(f"{path}:1: column {told(name)} {'occurs twice' if name else 'has no name'}")
+        if len(name) > _LONGEST_NAME:
+            raise Error(f"{path}:1: column {told(name)} has a name of more than {_LONGEST_NAME} characters")
+        seen.add(name)
 
 
-def _read_cells(path: Path, columns: list[str], required: tuple[str, ...]) -> tuple[list[str], FloatArray, list[str]]:
+def _listed(columns: list[str]) -> str:
+    more = f" and {len(columns) - _MOST_LISTED} more" if len(columns) > _MOST_LISTED else ""
+    return (", ".join(name[:_LONGEST_NAME] for name in columns[:_MOST_LISTED]) or "none") + more
+
+
+@dataclass
+class _Column:
+    """What was read of a column; bad: line and cell of the first that is no number."""
+
+    name: str
+    blank: bool  # whether cells may be empty
+    values: array[float] = field(default_factory=lambda: array("d"))
+    bad: tuple[int, str] | None = None
+    numbers: bool = False
+
+    def add(self, cell: str, line: int) -> None:
+        number = _number(cell, self.blank)
+        if number is None and self.bad is None:
+            self.bad = line, cell
+        self.numbers |= number is not None and not math.isnan(number)
+        self.values.append(math.nan if number is None else number)
+
+
+def _read_cells(
+    path: Path, reader: Reader, names: list[str], required: tuple[str, ...]
+) -> tuple[list[str], FloatArray, list[str]]:
     """Read cell by cell: slow, but finds the fault, and takes quotes and the empty cells of covariates."""
-    cells, lines = [], []
-    with path.open(encoding="utf-8-sig", newline="") as stream:
-        reader = csv.reader(stream)
-        next(reader)
-        for row in reader:
-            if row and len(row) != len(columns):
-                raise Error(f"{path}:{reader.line_num}: {len(row)} cells under {len(columns)} columns")
-            if row:
-                cells.append([cell.strip() for cell in row])
-                lines.append(reader.line_num)
-    kept, dropped = [], []
-    values = np.empty((len(cells), len(columns)))
-    for i, name in enumerate(columns):
-        blank = name not in required and not _is_beam(name)
-        column = [row[i] for row in cells]
-        numbers = [_number(cell, blank) for cell in column]
-        bad = [k for k, number in enumerate(numbers) if number is None]
-        if bad and blank and all(number is None or np.isnan(number) for number in numbers):
-            dropped.append(name)
-        elif bad:
-            raise Error(f"{path}:{lines[bad[0]]}: column {name!r}: is not a number: {column[bad[0]]!r}")
-        else:
-            kept.append(i)
-            values[:, i] = np.asarray(numbers, dtype=np.float64)
-    return [columns[i] for i in kept], values[:, kept], dropped
+    next(reader)
+    columns = [_Column(name, name not in required and not _is_beam(name)) for name in names]
+    for row in reader:
+        if row and len(row) != len(columns):
+            raise Error(f"{path}:{reader.line_num}: {len(row)} cells under {len(columns)} columns")
+        for column, cell in zip(columns, row, strict=False):
+            column.add(cell.strip(), reader.line_num)
+    dropped = [column.name for column in columns if column.bad and column.blank and not column.numbers]
+    kept = [column for column in columns if column.name not in dropped]
+    for column in kept:
+        if column.bad is not None:
+            line, cell = column.bad
+            raise Error(f"{path}:{line}: column {column.name!r}: is not a number: {told(cell)}")
+    values = [np.frombuffer(column.values, dtype=np.float64) for column in kept]
+    return [column.name for column in kept], np.column_stack(values) if values else np.empty((0, 0)), dropped
 
 
 def _number(cell: str, blank: bool) -> float | None:
     if blank and not cell:
-        return float("nan")
+        return math.nan
     try:
         return float(cell)
     except ValueError:

@@ -4,29 +4,37 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from kurumaisu.critic.values.recording import Run, Series
+from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 
 def write_csv_run(folder: Path, run: Run) -> None:
     """Write a run into folder, which is made; reading it back gives the same arrays to the last bit.
 
-    The fan of a bag has no place in CSV: put it into meta.yaml.
+    The fan of a bag has no place in CSV: put it into meta.yaml. Raise Error naming what cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Error(f"{folder}: {error.strerror}") from error
+    tables = {}
     for part in ("command", "voltage", "pose", "odom", "scan"):
         series: Series | None = getattr(run, part)
         if series is not None:
-            _write(folder / f"{part}.csv", ("t", *series.columns), np.column_stack([series.t, series.values]))
+            tables[part] = _text(("t", *series.columns), np.column_stack([series.t, series.values]))
     if run.covariates:
-        _write(folder / "covariate.csv", ("t", *run.covariates), _side_by_side(list(run.covariates.values())))
+        tables["covariate"] = _text(("t", *run.covariates), _side_by_side(list(run.covariates.values())))
     if run.queries is not None:
-        _write(folder / "query.csv", ("t0", "t1"), run.queries)
+        tables["query"] = _text(("t0", "t1"), run.queries)
+    write_whole({folder / f"{name}.csv": text for name, text in tables.items()})
 
 
 def _side_by_side(covariates: Sequence[Series]) -> FloatArray:
@@ -39,9 +47,10 @@ def _side_by_side(covariates: Sequence[Series]) -> FloatArray:
     return rows
 
 
-def _write(path: Path, columns: Sequence[str], rows: FloatArray) -> None:
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(columns)
-        # Python floats print with as many digits as it takes to read them back exactly.
-        writer.writerows(rows.tolist())
+def _text(columns: Sequence[str], rows: FloatArray) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    # Python floats print with as many digits as it takes to read them back exactly.
+    writer.writerows(rows.tolist())
+    return text.getvalue()

@@ -10,8 +10,8 @@ from pathlib import Path
 from kurumaisu import settings
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
-from kurumaisu.errors import Error
-from kurumaisu.params import shipped
+from kurumaisu.errors import Error, told
+from kurumaisu.params import MOST_BEAMS, shipped
 
 
 @dataclass(frozen=True)
@@ -63,26 +63,33 @@ def read_meta(path: Path) -> Meta:
     top.end()
     both = sorted(set(meta.train) & set(meta.test))
     if both:
-        raise top.error("test", f"{both[0]!r} is in train too: a run that was fitted cannot judge")
+        raise top.error("test", f"{told(both[0])} is in train too: a run that was fitted cannot judge")
     return meta
 
 
 def _file(top: settings.Section, key: str, folder: Path, package_folder: str) -> Path:
     name = top.text(key)
     path = folder / name
-    if path.is_file():
-        return path
+    try:
+        if path.is_file():
+            if any(
+                place.resolve() in path.resolve().parents for place in (folder, shipped("launch"), shipped("worlds"))
+            ):
+                return path
+            raise top.error(key, f"must be in the recording's folder, or a file of the package: {told(str(path))}")
+    except (OSError, ValueError, RuntimeError):  # a name too long, or with a null byte; a loop of links
+        raise top.error(key, f"is not a file: {told(str(path))}") from None
     if package_folder and Path(name).name == name:
         try:
             return shipped(f"{package_folder}/{name}")
         except Error:
             pass
-    raise top.error(key, f"is not a file: {path}")
+    raise top.error(key, f"is not a file: {told(str(path))}")
 
 
 def _laser(section: settings.Section) -> LaserMount:
     numbers = {name: section.number(name) for name in ("x", "y", "yaw", "angle_min", "angle_increment")}
-    laser = LaserMount(**numbers, beams=section.integer("beams", at_least=1))
+    laser = LaserMount(**numbers, beams=section.integer("beams", at_least=1, at_most=MOST_BEAMS))
     section.end()
     return laser
 
@@ -96,10 +103,10 @@ def _truth(section: settings.Section) -> tuple[float, float]:
 def _names(top: settings.Section, key: str) -> tuple[str, ...]:
     names = top.take(key)
     if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
-        raise top.error(key, f"must be a list of names of runs: {names!r}")
+        raise top.error(key, f"must be a list of names of runs: {told(names)}")
     twice = [name for name in names if names.count(name) > 1]
     if twice:
-        raise top.error(key, f"{twice[0]!r} is listed twice")
+        raise top.error(key, f"{told(twice[0])} is listed twice")
     return tuple(names)
 
 

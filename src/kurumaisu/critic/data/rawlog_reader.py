@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu import geometry
+from kurumaisu.bounded_files import MOST_RAWLOG, check_file
 from kurumaisu.critic.data.clean import Faults, Table, clean
 from kurumaisu.critic.values.recording import LaserMount, Run
 from kurumaisu.errors import Error, one_line
@@ -29,6 +30,7 @@ def rawlog_name(path: Path) -> str:
 
 def read_rawlog_run(path: Path, faults: Faults) -> tuple[Run, LaserMount]:
     """Read a rawlog: the run, and the mounting and fan of its laser. Raise Error for what MRPT cannot read."""
+    check_file(path, MOST_RAWLOG)
     try:
         t, odom, ranges, fan = import_module("kurumaisu._slam").read_rawlog(str(path))
     except ImportError as error:

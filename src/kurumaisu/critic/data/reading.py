@@ -31,7 +31,7 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
     if not path.exists() and not is_split(path):
         raise Error(f"{path}: there is no such file or folder")
     meta_file = path / "meta.yaml"
-    meta = read_meta(meta_file) if meta_file.is_file() else Meta()
+    meta = read_meta(meta_file) if meta_file.exists() else Meta()
     faults = Faults()
     laser = meta.laser
     runs = []

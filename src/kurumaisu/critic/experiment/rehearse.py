@@ -19,6 +19,7 @@ from kurumaisu.experiments import base_limits, load_script, names, shipped_scrip
 from kurumaisu.experiments.timeline import PERIOD
 from kurumaisu.params import load_model, shipped
 from kurumaisu.sim.settings import load_dynamics, with_effects
+from kurumaisu.whole_files import write_whole
 from kurumaisu.world import load_world
 
 
@@ -62,17 +63,14 @@ def manner() -> Manner:
 
 def write(folder: Path, recording: Recording) -> None:
     """Add the runs of a recording to a folder of CSV tables with its meta.yaml. Raise Error for what is in the way."""
-    try:
-        for run in recording.runs:
-            name = run.name if len(recording.runs) == 1 else f"{recording.name}_{run.name}"
-            write_csv_run(folder / name, run)
-        laser, truth = recording.laser, recording.truth
-        meta: dict[str, object] = {} if laser is None else {"laser": vars(laser)}
-        if truth is not None:
-            meta["truth"] = {"position_sd": truth[0], "heading_sd": truth[1]}
-        (folder / "meta.yaml").write_text(yaml.safe_dump(meta, sort_keys=False), encoding="utf-8")
-    except OSError as error:
-        raise Error(f"{error.filename}: {error.strerror}") from error
+    for run in recording.runs:
+        name = run.name if len(recording.runs) == 1 else f"{recording.name}_{run.name}"
+        write_csv_run(folder / name, run)
+    laser, truth = recording.laser, recording.truth
+    meta: dict[str, object] = {} if laser is None else {"laser": vars(laser)}
+    if truth is not None:
+        meta["truth"] = {"position_sd": truth[0], "heading_sd": truth[1]}
+    write_whole({folder / "meta.yaml": yaml.safe_dump(meta, sort_keys=False)})
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -10,9 +10,10 @@ import numpy as np
 import yaml
 
 from kurumaisu import effects
+from kurumaisu.bounded_files import MOST_TEXT, read_text
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.errors import Error
-from kurumaisu.params import EffectSetting, Model, load_model
+from kurumaisu.params import EffectSetting, Model, read_model
+from kurumaisu.settings import Section, parsed
 
 _WIDE = {"min": -100.0, "max": 100.0, "resolution": 0.0}  # [V]
 
@@ -31,31 +32,29 @@ def process_noise(problem: Problem) -> EffectSetting:
     return EffectSetting(random.id, {p.name: min(values[p.name], p.upper) for p in random.parameters})
 
 
-def write_extended(path: Path, original: Path, model: Model, settings: Sequence[EffectSetting], recording: str) -> None:
-    """Write the model file `original` with these effects in place of its own of the same id, and load it again.
+def extended_text(original: Path, model: Model, settings: Sequence[EffectSetting], recording: str) -> str:
+    """Return the model file `original` with these effects in place of its own of the same id; it can be loaded.
 
     model: as criticised; where its voltages are the commands themselves, the file gets that law.
-    Raise Error when the file cannot be read, written, or does not load.
+    Raise Error when the file cannot be read, or the text is no model.
     """
-    try:
-        content = yaml.safe_load(original.read_text(encoding="utf-8"))
-        given = {setting.id for setting in settings}
-        content["effects"] = [own for own in content["effects"] if own["id"] not in given]
-        content["effects"] += [{"id": s.id, "parameters": dict(s.parameters)} for s in settings]
-        if model.law_name not in content["voltage_laws"]:
-            content["name"] = model.name
-            content["voltage_law"] = model.law_name
-            content["voltage_laws"][model.law_name] = {
-                "translation": _axis(model.translation),
-                "steering": _axis(model.steering),
-            }
-            # The bands are in the volts of the file's own law.
-            content["voltages"] |= {"translation": dict(_WIDE), "steering": dict(_WIDE)}
-        text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
-        path.write_text(f"# {original.name} and what the critic found in {recording}.\n{text}", encoding="utf-8")
-    except OSError as error:
-        raise Error(f"{error.filename}: {error.strerror}") from error
-    load_model(path)
+    content = parsed(read_text(original, MOST_TEXT), str(original))
+    given = {setting.id for setting in settings}
+    content["effects"] = [own for own in content["effects"] if own["id"] not in given]
+    content["effects"] += [{"id": s.id, "parameters": dict(s.parameters)} for s in settings]
+    if model.law_name not in content["voltage_laws"]:
+        content["name"] = model.name
+        content["voltage_law"] = model.law_name
+        content["voltage_laws"][model.law_name] = {
+            "translation": _axis(model.translation),
+            "steering": _axis(model.steering),
+        }
+        # The bands are in the volts of the file's own law.
+        content["voltages"] |= {"translation": dict(_WIDE), "steering": dict(_WIDE)}
+    text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
+    where = f"{original} with what was found"
+    read_model(Section(parsed(text, where), where))
+    return f"# {original.name} and what the critic found in {' '.join(recording.split())}.\n{text}"
 
 
 def _axis(law: object) -> dict[str, dict[str, float]]:

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from kurumaisu.critic.ranges.scans.beams import why_not_usable
 from kurumaisu.critic.values.prediction import Prediction
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.settings import Settings
-from kurumaisu.errors import Error
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
@@ -101,16 +100,14 @@ def motions_of(run: Run, forecast: Forecast, queries: FloatArray) -> list[Predic
     return out
 
 
-def write_predictions(path: Path, predictions: Sequence[Prediction]) -> None:
-    """Write prediction.csv, in the order of runs and queries. Raise Error when it cannot be written."""
-    try:
-        with path.open("w", encoding="utf-8", newline="") as stream:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            for one in predictions:
-                writer.writerows(_rows(one))
-    except OSError as error:
-        raise Error(f"{path}: {error.strerror}") from error
+def prediction_table(predictions: Sequence[Prediction]) -> str:
+    """Return the text of prediction.csv, in the order of runs and queries."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for one in predictions:
+        writer.writerows(_rows(one))
+    return text.getvalue()
 
 
 def _rows(one: Prediction) -> Iterator[tuple[str | float | int, ...]]:

@@ -13,7 +13,6 @@ from kurumaisu.critic.report.pictures import comparison_picture, misfit_picture,
 from kurumaisu.critic.values.digits import MINUS, bare, odds, quantities
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import Verdict, grouped
-from kurumaisu.errors import Error
 
 LABELS = {
     "named": "Cause named",
@@ -27,15 +26,15 @@ OVERLAYS_SHOWN = 4
 OVERLAYS_DRAWN = 12
 
 
-def write_report(path: Path, verdict: Verdict, story: Story) -> None:
-    """Write report.html with its pictures, tables and data in the one file. Raise Error if it cannot be written."""
+def report_page(verdict: Verdict, story: Story) -> str:
+    """Return report.html with its pictures, tables and data in the one file."""
     # Runs that no model fitted are what the gain was measured on, so they come first.
     runs = sorted(story.overlays, key=lambda overlay: not overlay.held_out)
     drawn = thinned(runs[:OVERLAYS_DRAWN])
     overlays = [overlay_picture(overlay, f"run{i}") for i, overlay in enumerate(drawn)]
     gain = verdict.gain.log_density_per_sample.gain if verdict.gain else 0.0
     misfits = [misfit_picture(misfit, f"misfit{i}") for i, misfit in enumerate(story.misfits)]
-    page = (
+    return (
         _environment()
         .get_template("report.html")
         .render(
@@ -51,10 +50,6 @@ def write_report(path: Path, verdict: Verdict, story: Story) -> None:
             problems=grouped(verdict.problems),
         )
     )
-    try:
-        path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise Error(f"{path}: {error.strerror}") from error
 
 
 def meaning(name: str) -> str:

@@ -19,6 +19,7 @@ from kurumaisu.critic.sanity import (
     rates,
     rows,
     scans,
+    spans,
     time_units,
     voltage_law,
     voltages,
@@ -92,7 +93,7 @@ def _mean_error(model: Model) -> FloatArray:
 
 
 def _of_run(run: Run, model: Model) -> list[str]:
-    untimely = time_units.problems(run)
+    untimely = time_units.problems(run) or spans.problems(run)
     if untimely or run.pose is None or len(run.pose.t) < 3:
         return untimely
     found = headings.course(run.pose)

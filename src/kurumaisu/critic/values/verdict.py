@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import jsonschema
 
+from kurumaisu.bounded_files import MOST_TEXT, read_text
 from kurumaisu.errors import Error
 
 SCHEMA_VERSION = 1
@@ -146,19 +147,16 @@ def to_json(verdict: Verdict) -> dict[str, Any]:
     return content
 
 
-def write_verdict(path: Path, verdict: Verdict) -> None:
-    """Write verdict.json. Raise Error, and write nothing, where to_json does."""
-    text = json.dumps(to_json(verdict), indent=2, allow_nan=False, ensure_ascii=False)
-    path.write_text(text + "\n", encoding="utf-8")
+def verdict_text(verdict: Verdict) -> str:
+    """Return the text of verdict.json. Raise Error where to_json does."""
+    return json.dumps(to_json(verdict), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def read_verdict(path: Path) -> Verdict:
     """Read verdict.json. Raise Error naming the file, and the field where there is one."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise Error(f"{path}: {error.strerror}") from error
-    except ValueError as error:
+        content = json.loads(read_text(path, MOST_TEXT))
+    except (ValueError, RecursionError) as error:
         raise Error(f"{path}: is not JSON: {error}") from error
     _check(content, str(path))
     return Verdict(
@@ -202,7 +200,7 @@ def _slam(item: dict[str, Any] | None) -> SlamGain | None:
 
 def _check(content: Any, where: str) -> None:
     for name, value in _numbers(content, ""):
-        if not math.isfinite(value):
+        if not -math.inf < value < math.inf:  # of integers, too, whatever their length
             raise Error(f"{where}: {name}: must be a finite number: {value}")
     schema = json.loads(Path(__file__).with_name("verdict.schema.json").read_text(encoding="utf-8"))
     fault = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(content))

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu._core import AxisLaw
+from kurumaisu.bounded_files import MOST_TABLE, read_text
 from kurumaisu.critic.values.recording import Series
-from kurumaisu.errors import Error
+from kurumaisu.errors import Error, told
 from kurumaisu.paper import drawing
 from kurumaisu.types import FloatArray
 
@@ -34,10 +35,7 @@ def read_log(path: Path, offset: float) -> FloatArray:
     Raise Error naming file and line.
     """
     rows = []
-    try:
-        lines = path.read_text(encoding="ascii").splitlines()
-    except OSError as error:
-        raise Error(f"{path}: {error.strerror}") from error
+    lines = read_text(path, MOST_TABLE, "ascii").splitlines()
     for number, line in enumerate(lines, 1):
         words = line.split()
         if len(words) < 2 or words[1] != "volts":
@@ -45,7 +43,7 @@ def read_log(path: Path, offset: float) -> FloatArray:
         try:
             nanoseconds, *volts = int(words[0]), *(float(word) for word in words[2:5])
         except ValueError as error:
-            raise Error(f"{path}:{number}: is not a line of virtual_dac's log: {line}") from error
+            raise Error(f"{path}:{number}: is not a line of virtual_dac's log: {told(line)}") from error
         rows.append((1e-9 * nanoseconds + offset, *volts))
     if not rows:
         raise Error(f"{path}: the D/A converter got no voltages")

@@ -13,6 +13,7 @@ from kurumaisu.critic.values.recording import Recording
 from kurumaisu.paper.chair import drive, identify, law_file
 from kurumaisu.paper.options import load_options
 from kurumaisu.params import load_model
+from kurumaisu.whole_files import write_whole
 
 
 def say(line: str) -> None:
@@ -34,7 +35,7 @@ def figures_drive(
     identify.write(found, chair, out)
     told = identify.lines(found, (chair.translation, chair.steering))
     print("\n".join(told))
-    (out / "equations_1_2.txt").write_text("\n".join(told) + "\n", encoding="utf-8")
+    write_whole({out / "equations_1_2.txt": "\n".join(told) + "\n"})
     kept = set(keep)
     if any(why.split(":")[0] not in kept for why in found.refused):
         print("no law is written: --keep takes a refused branch from the model")

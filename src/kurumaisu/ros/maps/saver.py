@@ -14,9 +14,10 @@ import rospy
 
 from kurumaisu import program
 from kurumaisu.errors import Error, failed
-from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, write_map
+from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE, map_pair
 from kurumaisu.ros import life
 from kurumaisu.ros.maps.messages import GridMessage, map_of
+from kurumaisu.whole_files import write_whole
 
 _HELP = """
 Save the next map as an image and its YAML file, and end.
@@ -60,8 +61,9 @@ def _save(options: argparse.Namespace, node: life.Life) -> int:
         return 1
     try:
         suffix = ".png" if options.png else ".pgm"
-        image, text = write_map(map_of(heard[0]), options.name, suffix, options.occ, options.free)
+        pair = map_pair(map_of(heard[0]), options.name, suffix, options.occ, options.free)
+        write_whole(pair)
     except Error as error:
         return failed("map_saver", error)
-    print(f"written: {image}, {text}")
+    print(f"written: {', '.join(map(str, pair))}")
     return 0

@@ -39,7 +39,7 @@ class MapServer:
 
     def __init__(self, path: Path, frame: str) -> None:
         self._frame = frame
-        self._message: OccupancyGrid = message_of(read_map(path), frame, rospy.Time.now())
+        self._message: OccupancyGrid = _read(path, frame)
         self._map = rospy.Publisher("map", OccupancyGrid, queue_size=1, latch=True)
         self._metadata = rospy.Publisher("map_metadata", MapMetaData, queue_size=1, latch=True)
         self._publish()
@@ -63,7 +63,7 @@ class MapServer:
                 response.result = LoadMapResponse.RESULT_MAP_DOES_NOT_EXIST
                 raise Error(f"{path}: there is no such file")
             response.result = LoadMapResponse.RESULT_INVALID_MAP_DATA
-            self._message = message_of(read_map(path), self._frame, rospy.Time.now())
+            self._message = _read(path, self._frame)
         except Error as error:
             rospy.logerr("MAP_SERVER_BAD_MAP: %s", one_line(error))
             return response
@@ -71,6 +71,14 @@ class MapServer:
         response.map = self._message
         response.result = LoadMapResponse.RESULT_SUCCESS
         return response
+
+
+def _read(path: Path, frame: str) -> OccupancyGrid:
+    """Return the message of a map's files, and warn of what is odd about them. Raise Error as read_map does."""
+    served = read_map(path)
+    for words in served.odd:
+        rospy.logwarn("MAP_SERVER_ODD_MAP: %s", words)
+    return message_of(served, frame, rospy.Time.now())
 
 
 def _path_of(url: str) -> Path:

@@ -91,7 +91,7 @@ class SimNode:
         }
         self._requests = Requests()
         self._pacer = Pacer(settings.speed)
-        self._services = Services(self, self._requests, self._pacer, "")
+        self._services = Services(self, self._requests, self._pacer, settings.states, "")
         self._fan = ChairFan(settings.model.laser, lambda: self._simulator.row)
         self._view = ViewTopics(
             settings.view_rate, settings.map_frame, lambda: self._simulator.machinery, self._fan, self._drives

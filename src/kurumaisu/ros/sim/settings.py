@@ -11,6 +11,7 @@ import numpy as np
 
 from kurumaisu.params import Model, load_model
 from kurumaisu.settings import Section
+from kurumaisu.sim.robots.state_folder import StateFolder
 from kurumaisu.sim.sensors.settings import SensorSettings, load_sensors
 from kurumaisu.sim.settings import Dynamics, load_dynamics, with_effects
 from kurumaisu.world import Start, World, load_world
@@ -43,6 +44,7 @@ class SimSettings:
     clock_every: int  # [steps]
     ground_truth_every: int  # [steps]
     view_rate: float
+    states: StateFolder
     map_frame: str
     base_frame: str
     voltage_timeout: float
@@ -69,6 +71,7 @@ def read_settings(values: Any, where: str) -> SimSettings:
         clock_every=_every(top, "clock_rate", step),
         ground_truth_every=_every(top, "ground_truth_rate", step),
         view_rate=top.number("view_rate", above=0),
+        states=StateFolder(Path(top.text("states"))),
         map_frame=_frame(top, "map_frame"),
         base_frame=_frame(top, "base_frame"),
         voltage_timeout=top.number("voltage_timeout", above=0),

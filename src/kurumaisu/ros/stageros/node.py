@@ -101,7 +101,7 @@ def _simulate(arguments: Arguments, own: life.Life) -> int:
         rospy.logwarn(f"STAGEROS_WORLD {warning}")
     rospy.set_param("/use_sim_time", True)
     requests = Requests()
-    StagerosServices(session, requests, pacer)
+    StagerosServices(session, requests, pacer, settings.states)
     _run(session, requests, pacer, world, own.asked)
     return 0
 

@@ -11,14 +11,15 @@ from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.rotation import pose_of
 from kurumaisu.ros.services import Services
 from kurumaisu.ros.stageros.session import Session
+from kurumaisu.sim.robots.state_folder import StateFolder
 from kurumaisu.srv import Delete, DeleteRequest, Spawn, SpawnRequest
 
 
 class StagerosServices(Services):
     """Advertises the services; what they do is done between two steps."""
 
-    def __init__(self, session: Session, requests: Requests, pacer: Pacer) -> None:
-        super().__init__(session, requests, pacer, "~")
+    def __init__(self, session: Session, requests: Requests, pacer: Pacer, states: StateFolder) -> None:
+        super().__init__(session, requests, pacer, states, "~")
         self._session = session
         self._services += [
             rospy.Service("reset_positions", Empty, self._reset_positions),

@@ -12,7 +12,7 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import Pose, Twist
 
-from kurumaisu.errors import Error
+from kurumaisu.errors import Error, told
 from kurumaisu.names import hint
 from kurumaisu.ros.inbox import Rates, rates_of
 from kurumaisu.ros.rotation import pose_of
@@ -21,7 +21,7 @@ from kurumaisu.ros.stageros.names import Names, names_of, names_of_another
 from kurumaisu.ros.stageros.plan import plan_world
 from kurumaisu.ros.stageros.publish import Publisher
 from kurumaisu.ros.stageros.robot import CommandListener
-from kurumaisu.ros.stageros.saved_names import packed_names, unpacked_names
+from kurumaisu.ros.stageros.saved_names import with_names, without_names
 from kurumaisu.ros.stageros.settings import StagerosSettings
 from kurumaisu.ros.view.fans import FleetFans
 from kurumaisu.ros.view.topics import ViewTopics
@@ -168,17 +168,17 @@ class Session:
     def save(self) -> bytes:
         """Return the whole state, with the names that the robots have here."""
         names = sorted(self._rows, key=self._rows.__getitem__)
-        return packed_names(names, self._numbered) + self._simulator.save()
+        return with_names(self._simulator.save(), names, self._numbered)
 
     def load(self, saved: bytes) -> None:
         """Go back to a state that was saved of this world; /clock runs on."""
-        prefixes, numbered, state = unpacked_names(saved)
+        prefixes, numbered, state = without_names(saved)
         now = self._simulator.save()
         self._simulator.load(state)
         self._view.carried()
         if len(set(prefixes)) != len(self._simulator.robots):
             self._simulator.load(now)
-            raise Error(f"state: does not name each of its robots once: {prefixes}")
+            raise Error(f"state: does not name each of its robots once: {told(prefixes)}")
         switches = self._settings.strip_leading_slash, self._settings.relative_topics
         self._numbered = max(self._numbered, numbered)
         self._take([Names(prefix, *switches) for prefix in prefixes])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from kurumaisu import settings
@@ -13,6 +14,7 @@ from kurumaisu.params import shipped
 from kurumaisu.ros.stageros.rates import PublishRates, read_rates
 from kurumaisu.settings import Section
 from kurumaisu.sim.options import Options, read_options
+from kurumaisu.sim.robots.state_folder import StateFolder
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class StagerosSettings:
     publish_devices: tuple[str, ...]  # types of models: bumper, fiducial
     rates: PublishRates
     view_rate: float
+    states: StateFolder
     headless_rate: float
     seed: int
     options: Options
@@ -84,6 +87,7 @@ def read_settings(values: Any, where: str) -> StagerosSettings:
         publish_devices=devices,
         rates=read_rates(top.section("rates")),
         view_rate=top.number("view_rate", above=0),
+        states=StateFolder(Path(top.text("states"))),
         headless_rate=top.number("headless_rate", at_least=0),
         seed=top.integer("seed", at_least=0),
         options=_options(_mapping(top, "simulator"), where, devices),

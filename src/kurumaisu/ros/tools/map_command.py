@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import io
 import sys
 import time
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -14,9 +16,10 @@ from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.data.reference import scan_log
 from kurumaisu.errors import Error, failed
 from kurumaisu.geometry import interpolate
-from kurumaisu.maps import draw_map, save_map
+from kurumaisu.maps import grid_pair, picture
 from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 _LEAST_POSES = 3  # to fit two paths to each other
 
@@ -94,17 +97,23 @@ def report(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise Error(f"{folder}: {error.strerror}") from error
-    before = time.process_time()
-    result = slam.map_scans(settings, log, seed, show_progress, start, folder / "map.simplemap")
-    seconds = time.process_time() - before
+    with TemporaryDirectory() as scratch:
+        before = time.process_time()
+        result = slam.map_scans(settings, log, seed, show_progress, start, Path(scratch, "map.simplemap"))
+        seconds = time.process_time() - before
+        simplemap = Path(scratch, "map.simplemap").read_bytes()
     path = result.trajectory
-    save_map(result.grid, folder / "map")
-    if start is None:  # odometry's frame is the map's at the first scan
-        draw_map(result.grid, path, folder / "map.png", np.column_stack([log.times, log.odom]), "odometry")
-    else:
-        draw_map(result.grid, path, folder / "map.png")
-    _save_table(folder / "trajectory.csv", path, "t,x,y,theta")
-    _save_table(folder / "uncertainty.csv", result.nodes, "t,x,y,theta,xx,xy,yy,xt,yt,tt")
+    # odometry's frame is the map's at the first scan
+    other = np.column_stack([log.times, log.odom]) if start is None else None
+    write_whole(
+        {
+            **grid_pair(result.grid, folder / "map"),
+            folder / "map.simplemap": simplemap,
+            folder / "map.png": picture(result.grid, path, other, "odometry"),
+            folder / "trajectory.csv": _table(path, "t,x,y,theta"),
+            folder / "uncertainty.csv": _table(result.nodes, "t,x,y,theta,xx,xy,yy,xt,yt,tt"),
+        }
+    )
     way = np.hypot(np.diff(path[:, 1]), np.diff(path[:, 2])).sum()
     left, right, bottom, top = result.grid.extent
     print(
@@ -132,13 +141,11 @@ def error_of(path: FloatArray, truth: FloatArray | None) -> str:
     return f"error: {position:.3f} m, {np.degrees(heading):.2f} degrees (RMS, {inside.sum()} scans)\n"
 
 
-def _save_table(path: Path, table: FloatArray, header: str) -> None:
-    try:
-        np.savetxt(
-            path, table, fmt=["%.6f"] * 4 + ["%.9g"] * (table.shape[1] - 4), delimiter=",", header=header, comments=""
-        )
-    except OSError as error:
-        raise Error(f"{path}: {error.strerror}") from error
+def _table(table: FloatArray, header: str) -> str:
+    text = io.StringIO()
+    formats = ["%.6f"] * 4 + ["%.9g"] * (table.shape[1] - 4)
+    np.savetxt(text, table, fmt=formats, delimiter=",", header=header, comments="")
+    return text.getvalue()
 
 
 def show_progress(done: int, total: int) -> None:

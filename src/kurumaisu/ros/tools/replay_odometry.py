@@ -13,6 +13,7 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from kurumaisu import program
+from kurumaisu.bounded_files import MOST_RECORDING, check_file
 from kurumaisu.critic.data.bag_parts import parts_of
 from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
@@ -128,6 +129,7 @@ def check(path: Path) -> int:
     put: list[Put] = []
     odom: list[Odom] = []
     for part in parts_of(path):
+        check_file(part, MOST_RECORDING)
         try:
             with rosbag.Bag(str(part)) as bag:
                 for topic, message, _ in bag.read_messages(["voltages", "/voltages", "odom", "/odom"]):

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -13,15 +12,16 @@ from dynamic_reconfigure.srv import Reconfigure
 from std_msgs.msg import String
 
 from kurumaisu import effects
+from kurumaisu.bounded_files import MOST_TEXT, read_text
 from kurumaisu.effects import Mechanism
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
-from kurumaisu.params import EffectSetting, effects_of, load_model
+from kurumaisu.params import EffectSetting, effects_of, read_model
 from kurumaisu.ros.sim.effects import NAMESPACE
 from kurumaisu.ros.sim.effects_config import key_of, listed
 from kurumaisu.ros.viewer.calls import call
 from kurumaisu.ros.viewer.topics import Newest
-from kurumaisu.settings import Section
+from kurumaisu.settings import Section, parsed
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.protocol import Group, Value
 from kurumaisu.viewer.source import Outcome
@@ -54,7 +54,8 @@ class EffectSwitches:
         said = self._topic.take()
         if said is None:
             return
-        self._acting = effects_of(Section(yaml.safe_load(said.data), f"{self._node}/effects"))
+        where = f"{self._node}/effects"
+        self._acting = effects_of(Section(parsed(said.data, where), where))
         self._values |= {one.id: one.parameters for one in self._acting}
         on = {one.id for one in self._acting}
         self._hub.effects(tuple(self._group(effect, effect.id in on) for effect in effects.ALL))
@@ -83,14 +84,9 @@ class EffectSwitches:
     def model(self) -> Outcome:
         """Return the model file with the effects that act, as the simulator reads it."""
         self.show()
-        try:
-            text = with_effects(self._model.read_text(encoding="utf-8"), self._acting)
-        except OSError as error:
-            raise Error(f"{self._model}: {error.strerror}") from error
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder, self._model.name)
-            path.write_text(text, encoding="utf-8")
-            load_model(path)
+        text = with_effects(read_text(self._model, MOST_TEXT), self._acting)
+        where = f"{self._model} with the effects that act"
+        read_model(Section(parsed(text, where), where))
         return Outcome(f"{self._model.name} with {len(self._acting)} effects", text)
 
     def _of(self, effect: type[Mechanism]) -> Mapping[str, float]:

@@ -13,7 +13,6 @@ from kurumaisu import effects
 from kurumaisu.effects import Reference, Volts
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, Model
-from kurumaisu.sim import state
 from kurumaisu.sim.chair.body import seat
 from kurumaisu.sim.chair.data import NEUTRAL, Command, Observation
 from kurumaisu.sim.chair.scanner import Scan, Scanner
@@ -21,6 +20,7 @@ from kurumaisu.sim.chair.sight import Sight
 from kurumaisu.sim.chair.walls import Walls
 from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.plant import Plant
+from kurumaisu.sim.robots import state
 from kurumaisu.sim.robots.machinery import Machinery
 from kurumaisu.sim.robots.sensing import Sensing
 from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
@@ -134,11 +134,15 @@ class ChairSimulator:
     def load(self, saved: bytes) -> Observation:
         """Continue from a state that was saved of the same world, chassis, effects and sensors.
 
-        Raise Error for another one. Voltage laws and the laser's law are not compared.
+        Raise Error, with nothing changed, for another one. Voltage laws and the laser's law are not compared.
         """
         known = state.unpack(saved)
         if known.get("world") != self._fingerprint:
             raise Error("state: belongs to another world, chassis, list of effects or of sensors")
+        state.restored(known, self._state, self._restore)
+        return self._seen(None, ())
+
+    def _restore(self, known: dict[str, Any]) -> None:
         self.reset(known["seed"])
         self._steps = known["steps"]
         self._world.restore(known["motion"])
@@ -149,7 +153,6 @@ class ChairSimulator:
         recall(self._plant, known["plant"])
         recall(self._sensor_rng, known["random"])
         self._rates, self._contact = known["rates"], known["contact"]
-        return self._seen(None, ())
 
     def state_hash(self) -> str:
         """Return a digest of the whole state, randomness included."""

@@ -39,7 +39,7 @@ class Sensing:
         return self._devices.read(step) if self._devices is not None else {}
 
     def state(self) -> list[dict[str, Any]]:
-        """Return what the next readings depend on: not copies."""
+        """Return what the next readings depend on: copies."""
         return self._suite.state() if self._suite is not None else []
 
     def restore(self, state: Sequence[dict[str, Any]]) -> None:

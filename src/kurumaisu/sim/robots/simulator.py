@@ -12,12 +12,11 @@ import numpy as np
 
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
-from kurumaisu.sim import state
 from kurumaisu.sim.motion.partition import is_robot
 from kurumaisu.sim.options import Options
 from kurumaisu.sim.rangers.fans import RangerFan
 from kurumaisu.sim.rangers.scans import Scans
-from kurumaisu.sim.robots import snapshot
+from kurumaisu.sim.robots import snapshot, state
 from kurumaisu.sim.robots.devices import Value
 from kurumaisu.sim.robots.drive import without_nonsense
 from kurumaisu.sim.robots.fleet_effects import check_names
@@ -155,10 +154,17 @@ class Simulator:
         return state.pack(self._state())
 
     def load(self, saved: bytes) -> Observation:
-        """Continue from a state that a simulator of the same world and options saved. Raise Error for another one."""
+        """Continue from a state that a simulator of the same world and options saved.
+
+        Raise Error, with nothing changed, for another one.
+        """
         known = state.unpack(saved)
-        if known["world"] != self._fingerprint:
+        if known.get("world") != self._fingerprint:
             raise Error(f"state: belongs to another world than {self._world.path}, or to other options")
+        state.restored(known, self._state, self._restore)
+        return self.observe()
+
+    def _restore(self, known: dict[str, Any]) -> None:
         machinery = self._home
         if known["population"] is not None:
             machinery = self._home.of(known["population"])
@@ -169,7 +175,6 @@ class Simulator:
         self._sensing.restore(known["sensors"])
         for rng, random in zip(self._rngs, known["random"], strict=True):
             rng.bit_generator.state = random
-        return self.observe()
 
     def state_hash(self) -> str:
         """Return a digest of the whole state, randomness included."""

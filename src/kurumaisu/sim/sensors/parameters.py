@@ -20,6 +20,7 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Bumper, Camera, Fiducial
 
 _TURN = 2 * math.pi
+_MOST_RAYS = 10_000  # of a sonar's cone
 
 Parameters = ImuSettings | BatterySettings | SonarSettings | BumperSettings | Camera | Fiducial
 
@@ -99,7 +100,7 @@ def _sonar(section: settings.Section, mount: FloatArray) -> SonarSettings:
     sonar = SonarSettings(
         mounts=attached(mount, np.array(mounts)),
         field_of_view=_angle(section, "field_of_view", _TURN),
-        rays=section.integer("rays", at_least=1),
+        rays=section.integer("rays", at_least=1, at_most=_MOST_RAYS),
         range_min=section.number("range_min", at_least=0),
         range_max=section.number("range_max", above=0),
         deviation=section.number("deviation", at_least=0),

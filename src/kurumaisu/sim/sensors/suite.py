@@ -13,6 +13,7 @@ import numpy as np
 from kurumaisu.errors import Error
 from kurumaisu.geometry import attached
 from kurumaisu.names import hint
+from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.sensors.battery import Battery, BatterySettings
 from kurumaisu.sim.sensors.bumper import BumperSensor, BumperSettings
 from kurumaisu.sim.sensors.camera import CameraSensor, Scenery, mounted_eye
@@ -103,23 +104,23 @@ class SensorSuite:
         )
 
     def state(self) -> list[dict[str, Any]]:
-        """Return what the next readings depend on: not copies."""
+        """Return what the next readings depend on: copies."""
         return [
             {
                 "time": running.time,
                 "random": running.rng.bit_generator.state,
-                "sensor": None if isinstance(running.sensor, _STATELESS) else vars(running.sensor),
+                "sensor": None if isinstance(running.sensor, _STATELESS) else remember(running.sensor),
             }
             for running in self._running
         ]
 
     def restore(self, state: Sequence[dict[str, Any]]) -> None:
-        """Go back to a state of the same sensors; it belongs to the suite from then on."""
+        """Go back to a state of the same sensors, as new."""
         for running, known in zip(self._running, state, strict=True):
             running.time = known["time"]
             running.rng.bit_generator.state = known["random"]
             if known["sensor"] is not None:
-                vars(running.sensor).update(known["sensor"])
+                recall(running.sensor, known["sensor"])
 
     def _read(self, running: _Running, moment: Moment) -> Any:
         dt, running.time = moment.time - running.time, moment.time

@@ -18,6 +18,7 @@ from kurumaisu.params import shipped
 from kurumaisu.sim import Simulator, load_options
 from kurumaisu.sim.motion.partition import is_robot
 from kurumaisu.types import BoolArray, FloatArray, IntArray
+from kurumaisu.whole_files import write_whole
 from kurumaisu.world import World, load_world
 
 _WORLDS = ("simple", "benchmark/cave", "mbicp", "uoa_robotics_lab", "fasr", "fasr2", "lsp_test", "roomba", "autolab")
@@ -146,5 +147,5 @@ def _rooms(path: Path) -> Path:
         shelf = "model ( pose [0.1 0 0 20] size [0.3 0.1 0.2] )" if i % 4 == 1 else ""
         body = f'size [0.4 0.3 0.4] origin [{0.05 * (i % 3):g} 0 0 0] drive "{("diff", "omni")[i % 2]}" {shelf}'
         lines += [f"room ( pose [{x} {y} 0 {turn:g}] )", f"position ( pose [{x} {y} 0 {heading:g}] {body} )"]
-    path.write_text("\n".join(lines) + "\n")
+    write_whole({path: "\n".join(lines) + "\n"})
     return path

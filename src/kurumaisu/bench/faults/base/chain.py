@@ -22,6 +22,7 @@ from kurumaisu.bench.guard_rig import Change, ChipRig, Rig, changed
 from kurumaisu.bench.processes import PATIENCE, program
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
+from kurumaisu.whole_files import write_whole
 
 V, W = 0.5, 0.3  # [m/s, rad/s] at which the chair drives when something breaks
 NODE = "/base_node"
@@ -52,7 +53,7 @@ class BrokenCalls:
 
     def __init__(self, file: Path) -> None:
         """Make the file of the switches, all off."""
-        file.write_bytes(bytes(struct.calcsize(_CONTROL)))
+        write_whole({file: bytes(struct.calcsize(_CONTROL))})
         with file.open("r+b") as opened:
             self._memory = mmap.mmap(opened.fileno(), 0)
         self.environment = {"LD_PRELOAD": program("broken_calls.so"), "BROKEN_CALLS": str(file)}

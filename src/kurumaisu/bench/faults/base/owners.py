@@ -16,6 +16,7 @@ from kurumaisu.bench.faults.base.cases import Case, Seen
 from kurumaisu.bench.faults.base.chain import Chain, Setup
 from kurumaisu.bench.guard_rig import changed
 from kurumaisu.bench.processes import PATIENCE, program
+from kurumaisu.whole_files import write_whole
 
 _SHORT = 0.5  # [V] a device's clamp that is narrower than the model's band
 _WATCH = 0.4  # [s]
@@ -64,7 +65,7 @@ def _guard(stage: Chain, guard: Mapping[str, Any], device: Mapping[str, Any]) ->
     paths = []
     for name, tree, changes in (("guard", stage.guard_values, guard), ("device", stage.device_values, device)):
         paths.append(stage.rig.folder / f"another_{name}.yaml")
-        paths[-1].write_text(yaml.safe_dump(changed(tree, changes)))
+        write_whole({paths[-1]: yaml.safe_dump(changed(tree, changes))})
     command = [program("guard"), str(paths[1]), str(paths[0])]
     with children.start(command, stderr=subprocess.PIPE, text=True) as process:
         try:

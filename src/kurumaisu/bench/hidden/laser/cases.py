@@ -22,6 +22,7 @@ from kurumaisu.bench.hidden.laser.signal import MEANS, LaserScale, odd_z, spread
 from kurumaisu.bench.hidden.laser.usual_effects import BACKDROPS, Backdrop, draw_backdrop
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 MATERIAL = 0.6e-3  # [m] least root mean square of a change of the mean readings, unless a z is asked for
 _TOURS = 8  # drawn at most for a fault to show
@@ -59,7 +60,7 @@ def make_laser(ask: Ask, seed: int, folder: Path) -> Case:
     faults = [LASER[name].fault(sizes[name], ask.form) for name in ids]
     folder.mkdir(parents=True, exist_ok=True)
     draw = Draw(int(how.integers(2**31)), around, folder / f"hidden_{seed}.world")
-    draw.world.write_text(world_text(f"hidden {seed}", tour.room), encoding="utf-8")
+    write_whole({draw.world: world_text(f"hidden {seed}", tour.room)})
     null = recording(f"hidden {seed}", tour, (), draw)
     found = recording(f"hidden {seed}", tour, faults, draw) if faults else null
     return Case(found, null, truth, seed)

@@ -19,6 +19,7 @@ from kurumaisu.bench.hidden.laser.catalogue import LASER
 from kurumaisu.bench.hidden.laser.signal import MEANS, LaserScale
 from kurumaisu.bench.hidden.laser.usual_effects import BACKDROPS, draw_backdrop
 from kurumaisu.bench.hidden.unknown.forms import UNKNOWN_BASE, UNKNOWN_LASER, Unknown
+from kurumaisu.whole_files import write_whole
 
 
 def make_unknown_base(ask: Ask, seed: int) -> Case:
@@ -63,7 +64,7 @@ def make_unknown_laser(ask: Ask, seed: int, folder: Path) -> Case:
     rest = {rival: factor * least for rival, least in rest.items()}
     folder.mkdir(parents=True, exist_ok=True)
     draw = cases.Draw(int(how.integers(2**31)), backdrop, folder / f"hidden_{seed}.world")
-    draw.world.write_text(world_text(f"hidden {seed}", tour.room), encoding="utf-8")
+    write_whole({draw.world: world_text(f"hidden {seed}", tour.room)})
     fault = unknown.fault(sizes, "plain")
     null = cases.recording(f"hidden {seed}", tour, (), draw)
     found = cases.recording(f"hidden {seed}", tour, [fault], draw)

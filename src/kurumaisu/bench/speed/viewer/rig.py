@@ -24,6 +24,7 @@ from kurumaisu.bench.speed.stageros import world_of
 from kurumaisu.bench.speed.viewer.page import Page
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
+from kurumaisu.whole_files import write_whole
 
 _NODE = "from kurumaisu.ros.{}.node import main; main()"
 _VIEWER = "from kurumaisu.ros.viewer.node import main; main()"
@@ -114,7 +115,7 @@ def rig_of(simulator: str, robots: int, clocked: Path | None = None) -> Iterator
     with tempfile.TemporaryDirectory() as folder, master() as environment:
         if simulator == "stageros":
             world = Path(folder) / "bench.world"
-            world.write_text(world_of(robots, None))
+            write_whole({world: world_of(robots, None)})
             arguments, services = ["-g", str(world)], "/stageros/"
         else:
             arguments, services = [], "/"
@@ -125,7 +126,7 @@ def rig_of(simulator: str, robots: int, clocked: Path | None = None) -> Iterator
         viewer = [sys.executable, "-c", _VIEWER]
         parameters = Path(folder) / "parameters.yaml"
         said = {"sim_node": _chair(), "stageros": _FLEET, "viewer_node": _viewer(simulator)}
-        parameters.write_text(yaml.safe_dump(said))
+        write_whole({parameters: yaml.safe_dump(said)})
         subprocess.run(["rosparam", "load", str(parameters)], env=environment, check=True)
         with running(command, environment=environment) as one, running(viewer, environment=environment) as other:
             questions = _ASK.format(pause=f"{services}pause", simulator=one.pid, viewer=other.pid, patience=PATIENCE)

@@ -16,6 +16,7 @@ from kurumaisu.ros.stageros import node as stageros
 from kurumaisu.ros.view.fans import ChairFan, FleetFans
 from kurumaisu.ros.view.topics import ViewTopics
 from kurumaisu.ros.view.wire import ViewWire
+from kurumaisu.whole_files import write_whole
 
 _NODES = {"stageros": stageros.main, "sim_node": sim_node.main}
 
@@ -89,7 +90,7 @@ def main() -> None:
     try:
         _NODES[node]()
     finally:
-        Path(file).write_text(json.dumps(clock.sums))
+        write_whole({Path(file): json.dumps(clock.sums)})
 
 
 if __name__ == "__main__":

@@ -55,11 +55,11 @@ export class Status {
   }
 
   #tellLine() {
-    const {state, seconds} = this.#line;
+    const {state, seconds, why} = this.#line;
     const silent = performance.now() - this.#heard;
     let [text, mark] = ["Connected", "on"];
     if (state === "wrong") [text, mark] = ["Page and server have different versions: reload the page", "off"];
-    else if (state !== "on") [text, mark] = [seconds ? "No connection: retrying" : "Connecting", "off"];
+    else if (state !== "on") [text, mark] = [seconds ? `${why || "No connection"}: retrying` : "Connecting", "off"];
     else if (silent > STALE && this.#expected()) [text, mark] = [`No new data for more than ${STALE / 1000} s`, "stale"];
     const place = byId("connection");
     setText(place, text);

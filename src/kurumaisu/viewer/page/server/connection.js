@@ -8,7 +8,8 @@ const WAITS = [250, 500, 1000, 2000, 4000, 8000]; // [ms] between attempts, the 
 const SESSION = "kurumaisu.session";
 
 /**
- * News: "message" (an object), "binary" (an ArrayBuffer), "line" ({state: "on", "off" or "wrong", seconds to wait}),
+ * News: "message" (an object), "binary" (an ArrayBuffer), "line" ({state: "on", "off" or "wrong", seconds
+ * to wait, why the server ended it, if it said}),
  * "refused" (why a one-time secret is not good).
  */
 export class Connection extends News {
@@ -46,7 +47,7 @@ export class Connection extends News {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => this.#introduce();
     socket.onmessage = (event) => this.#take(event.data);
-    socket.onclose = () => this.#lost(socket);
+    socket.onclose = ({reason}) => this.#lost(socket, reason);
     this.#socket = socket;
   }
 
@@ -100,12 +101,12 @@ export class Connection extends News {
     this.tell("refused", why);
   }
 
-  #lost(socket) {
+  #lost(socket, why) {
     if (socket !== this.#socket) return;
     for (const id of [...this.#pending.keys()]) this.#settle(id, {ok: false, message: "the connection was lost"});
     const wait = WAITS[Math.min(this.#attempt, WAITS.length - 1)];
     this.#attempt += 1;
-    this.tell("line", {state: "off", seconds: wait / 1000});
+    this.tell("line", {state: "off", seconds: wait / 1000, why});
     // somewhat random, or all pages would come back at once
     this.#timer = setTimeout(() => this.start(), wait * (0.75 + 0.5 * Math.random()));
   }
