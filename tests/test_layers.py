@@ -26,7 +26,7 @@ ROS_CPP = r"<(ros\w*|tf2?|tf2_\w+|xmlrpcpp|actionlib|nodelet|diagnostic_updater|
 ABSTRACT = {"base", "mechanism", "laser"}
 MODULES = {module.name for module in pkgutil.iter_modules(effects.__path__)} - ABSTRACT | {r"laser\.\w+"}
 CONCRETE = rf"kurumaisu\.effects\.({'|'.join([*MODULES, *(effect.__name__ for effect in effects.ALL)])})(\.|$)"
-SHARED = r"clock_watch\.h|command_line\.h|file_descriptor\.h|steady\.h"  # C++ that rests on nothing
+SHARED = r"command_line\.h|file_descriptor\.h|steady\.h"  # C++ that rests on nothing
 IDS = {effect.id for effect in effects.ALL}
 LARGEST = 25  # files in a folder of src/; a C++ header and its source are one
 ONE_PER_EFFECT = "kurumaisu/effects"  # as many files as there are effects
@@ -90,7 +90,7 @@ CPP_RULES = [
     ),
     Rule(
         r"laser/",
-        r'"(?!scip/|serial/|laser/|params\.h|command_line\.h)',
+        r'"(?!scip/|serial/|laser/|params\.h|clock_watch\.h|command_line\.h)',
         "the driver rests on the protocol and the port only",
     ),
     Rule(r"serial/", rf'"(?!serial/|{SHARED})', "a port rests on nothing"),
