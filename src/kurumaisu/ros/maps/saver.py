@@ -57,7 +57,7 @@ def _save(options: argparse.Namespace, node: life.Life) -> int:
             return node.code
     subscriber.unregister()
     if not heard:
-        print(f"map_saver: {subscriber.resolved_name}: no map came within {options.wait:g} s", file=sys.stderr)
+        print(f"map_saver: {rospy.resolve_name('map')}: no map came within {options.wait:g} s", file=sys.stderr)
         return 1
     try:
         suffix = ".png" if options.png else ".pgm"
