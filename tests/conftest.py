@@ -35,6 +35,17 @@ def pytest_collection_modifyitems(config, items):
                 item.add_marker(pytest.mark.skip(reason=f"took {known[item.name]} s"))
 
 
+_TOO_LONG = f"takes more than {LONG} s"
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item):
+    """Skip what was interrupted, whatever a library made of it."""
+    report = (yield).get_result()
+    if report.failed and getattr(item, "is_over", False):
+        report.outcome, report.longrepr = "skipped", (str(item.path), item.location[1], _TOO_LONG)
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_setup(item):
     item.begun = time.process_time()
@@ -78,7 +89,8 @@ def _limited(item):
     """Let --quick skip a test that computes for long."""
 
     def over(*_):
-        raise pytest.skip.Exception(f"takes more than {LONG} s")
+        item.is_over = True
+        raise pytest.skip.Exception(_TOO_LONG)
 
     if item.config.getoption("quick"):
         signal.signal(signal.SIGPROF, over)

@@ -212,7 +212,8 @@ TEST(Drive, WhateverIsHeardItKeepsTheLimitsAndTheBands) {
     const bool rest = i % 1000 < 100;  // now and then everybody lets go, or nothing would ever be released
     const k::Rates rates = rest ? k::Rates{} : k::Rates{number(), number()};
     if (random() % 2) chair.drive.command(random() % 3, random() % 200 ? "/a" : "/b", rates, t);
-    if (random() % 3 == 0) chair.drive.arbiter().lock(random() % 2, {random() % 9 ? "/a" : "/b"}, random() % 50 == 0, t);
+    if (random() % 3 == 0)
+      chair.drive.arbiter().lock(random() % 2, {random() % 9 ? "/a" : "/b"}, random() % 50 == 0, t);
     if (random() % 3 == 0) chair.drive.arbiter().lock(2, {"/a"}, random() % 50 == 0, t);
     if (random() % 3 == 0) chair.drive.eStop().hear({"/a"}, random() % 600 == 0, t);
     if (random() % 9 == 0) chair.drive.speedCap().hear("/a", number(), t);

@@ -10,7 +10,6 @@
 
 #include "dac_rig.h"
 #include "steady.h"
-#include "steady.h"
 
 namespace test_dac_faults {
 
@@ -247,8 +246,9 @@ TEST(DacFaults, ABoardThatStaysDeafIsAFaultWhenItMustHaveBooted) {
 }
 
 TEST(DacFaults, ABoardThatSaysNothingGetsItsFirstVoltageWhenItMustHaveBooted) {
-  Rig rig(d::Edits{{"boot: 0.1", "boot: 0.5"}, {"can_identify: true", "can_identify: false"},
-           {R"(expect: "ASCII-DAC *")", R"(expect: "")"}});
+  Rig rig(d::Edits{{"boot: 0.1", "boot: 0.5"},
+                   {"can_identify: true", "can_identify: false"},
+                   {R"(expect: "ASCII-DAC *")", R"(expect: "")"}});
   const double begin = kurumaisu::steadyTime();
   const auto converter = d::open(rig.device);
   EXPECT_THROW(converter->put(d::kMoving), d::Fault) << "it is not prepared";

@@ -24,9 +24,9 @@ struct InputSettings {
 
 struct LockSettings {
   std::string name;
-  int priority;    ///< inputs below it are blocked
-  double timeout;  ///< engages when silent for so long [s]; 0: silence means nothing
-  bool blocks_on;  ///< the word that engages it: true for a lock, false for a dead-man that is held
+  int priority;            ///< inputs below it are blocked
+  double timeout;          ///< engages when silent for so long [s]; 0: silence means nothing
+  bool blocks_on;          ///< the word that engages it: true for a lock, false for a dead-man that is held
   bool from_start = true;  ///< whether silence counts before the first word, too
 };
 

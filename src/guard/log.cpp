@@ -88,8 +88,8 @@ LogWriter::~LogWriter() {
 }
 
 void say(const std::string& code, const std::string& text) {
-  if (dropped > 0 && writeLine("GUARD_LOG_DROPPED: " + std::to_string(dropped) +
-                               " lines: nobody reads this log")) {
+  if (dropped > 0 &&
+      writeLine("GUARD_LOG_DROPPED: " + std::to_string(dropped) + " lines: nobody reads this log")) {
     dropped = 0;
   }
   if (!writeLine(code + ": " + text)) ++dropped;

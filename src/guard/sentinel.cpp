@@ -53,7 +53,7 @@ class Watched {
 
  private:
   Descriptor socket_;
-  double silence_;              ///< [s]
+  double silence_;               ///< [s]
   double heard_ = steadyTime();  ///< [s]
 };
 

@@ -55,8 +55,8 @@ class Server {
   Device device_;
   Descriptor listener_;
   Descriptor client_;
-  Descriptor reserve_;            ///< given up where none is left for one more who connects
-  double accept_at_ = 0;          ///< [s] not to be tried before
+  Descriptor reserve_;                  ///< given up where none is left for one more who connects
+  double accept_at_ = 0;                ///< [s] not to be tried before
   bool client_left_ = false;            ///< says poll(): what it still sent is not to be read
   std::optional<std::uint64_t> asked_;  ///< sequence of a message that is not answered yet
   std::optional<dac::Volts> written_;   ///< what the device was last asked for; none: write at once

@@ -60,9 +60,8 @@ OdometrySettings readOdometry(Section section, const KnownEffects& known) {
   const std::string frame = section.frame("frame");
   const std::string child = section.frame("child_frame");
   if (child == frame) throw section.error("child_frame", "must differ from frame: " + child);
-  OdometrySettings settings{{frame, child, section.flag("publish_tf")},
-                            readNoise(section.section("noise"), known),
-                            std::nullopt};
+  OdometrySettings settings{
+      {frame, child, section.flag("publish_tf")}, readNoise(section.section("noise"), known), std::nullopt};
   Section imu = section.section("imu");
   const bool use = imu.flag("use");
   const ImuSettings read = readImu(imu);
