@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from docs_pages import ROOT, SCENES, Command, End, Step, filled_in
+from docs_pages import NOT_RUN, ROOT, SCENES, Command, End, Step, filled_in
 
 PATIENCE = 300.0  # [s] for anything to come about: a busy machine may take a while
 DRIVE = 10.0  # [s] of simulated time
@@ -194,7 +194,8 @@ class Reader:
 
     def _text(self, step: Step) -> str | None:
         """Return what to run for a step, None where no page has it any more."""
-        found = {filled_in(c.text, self.folder) for c in self._commands if re.search(step.pattern, c.text)}
+        run = [c for c in self._commands if not any(re.search(pattern, c.text) for pattern in NOT_RUN)]
+        found = {filled_in(c.text, self.folder) for c in run if re.search(step.pattern, c.text)}
         assert len(found) <= 1, f"{step.pattern} is several commands: {found}"
         return found.pop() if found else None
 

@@ -8,6 +8,7 @@ import unittest
 import numpy as np
 import rospy
 import tf2_ros
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import OccupancyGrid, Odometry
 
 from kurumaisu import geometry, slam_score
@@ -34,7 +35,12 @@ class MappingLoop(unittest.TestCase):
         )
         commander.silence()
         rest = truth.wait(lambda m: m.twist.twist.linear.x == 0, "the chair at rest").header.stamp
-        wait_for(lambda: maps.last and maps.last.header.stamp > rest, "a map after the drive")
+        mapping = Topic("diagnostics", DiagnosticArray)
+        try:
+            wait_for(lambda: maps.last and maps.last.header.stamp > rest, "a map after the drive")
+        except AssertionError:
+            said = [m.status[0] for m in mapping.messages if m.status[0].name.startswith("mapping_node")]
+            self.fail(f"no map at {rospy.get_time():.1f} s, after {maps.last and maps.last.header.stamp}: {said[-1:]}")
 
         found = wait_for(
             lambda: (

@@ -87,3 +87,10 @@ def test_every_long_process_is_started_so():
     ]
     names = {str(path.relative_to(TREE / "src/kurumaisu")) for path in found}
     assert names == {"children.py", "critic/processes/worker.py"}
+
+
+def test_a_child_has_the_environment_that_it_was_given(tmp_path):
+    given = {**os.environ, "PWD": "/where/roslaunch/was/called"}
+    with children.start(["env"], env=given, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as child:
+        said = dict(line.split("=", 1) for line in child.communicate()[0].splitlines() if "=" in line)
+    assert said["PWD"] == given["PWD"]

@@ -48,6 +48,7 @@ def set_voltages_at(tmp_path, *volts):
     file = tmp_path / "device.yaml"
     text = EXAMPLE.read_text().replace("port: /dev/kurumaisu_dac", f"port: {tmp_path / 'dac'}")
     text = text.replace("reply_timeout: 0.05", "reply_timeout: 2.0")  # this computer may be busy
+    text = text.replace("boot: 3.0", "boot: 0.0")
     file.write_text(text.replace("late_reply: 0.1", "late_reply: 2.0"))
     return [program("set_voltages"), str(file), *map(str, volts)]
 

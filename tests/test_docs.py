@@ -97,7 +97,7 @@ def test_a_command_does_what_its_page_says(command, request):
 @pytest.mark.parametrize(("page", "line", "text"), SNIPPETS, ids=[f"{p.name}:{line}" for p, line, _ in SNIPPETS])
 def test_a_snippet_runs(page, line, text, reader):
     if "RECORDING" in text:
-        reader.outcome(next(c for c in COMMANDS if "record.launch" in c.text))  # which makes it
+        reader.outcome(next(c for c in COMMANDS if "record.launch bag:=$PWD/drive.bag" in c.text))  # which makes it
     snippet = reader.folder / f"out/{page.stem}_{line}.py"
     snippet.write_text(filled_in(text, reader.folder))
     running = reader.start(f"{sys.executable} {snippet}")

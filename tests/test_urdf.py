@@ -64,4 +64,4 @@ def test_wrong_arguments_are_named(arguments, monkeypatch, capsys):
     with pytest.raises(SystemExit):
         urdf.main()
     error = capsys.readouterr().err
-    assert "X Y Z ROLL PITCH YAW" in error
+    assert ("BASE_FRAME" if len(arguments) < 2 else "X Y Z ROLL PITCH YAW") in error

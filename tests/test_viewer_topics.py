@@ -58,7 +58,7 @@ class Topics:
         one.header.frame_id, one.child_frame_id = parent, child
         one.transform.translation.x, one.transform.translation.y = x, y
         one.transform.rotation = turned(yaw)
-        self.publish("tf", TFMessage([one]), caller=f"/{parent}{child}")
+        self.publish("/tf", TFMessage([one]), caller=f"/{parent}{child}")
 
 
 @pytest.fixture

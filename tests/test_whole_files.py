@@ -32,7 +32,7 @@ EXCEPTIONS = {
     "bench/faults/base/chain.py": {"open": "the log of a child process; a file of a virtual board's memory"},
     "bench/faults/base/owners.py": {"open": "the log of a child process"},
     "bench/faults/base/peers.py": {"open": "the log of a child process"},
-    "bench/rigs/guard.py": {"open": "the log of a child process"},
+    "bench/guard_rig.py": {"open": "the log of a child process"},
     "bench/rigs/laser.py": {"open": "the log of a child process"},
     "bench/speed/drive.py": {"open": "the log of a child process"},
     "bench/mutations.py": {"copytree": "a scratch copy of the tree"},

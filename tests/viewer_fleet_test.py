@@ -19,6 +19,7 @@ from kurumaisu.ros.viewer.calls import call
 class ViewerFleetTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
+        rospy.wait_for_service("viewer_node/new_token", PATIENCE)
         cls.address = call("viewer_node/new_token", Trigger).message
         cls.page = Page(cls.address)
         cls.page.let_in(cls.address)

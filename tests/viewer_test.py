@@ -49,6 +49,7 @@ def listens_to(topic):
 class ViewerTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
+        rospy.wait_for_service("viewer_node/new_token", PATIENCE)
         cls.address = call("viewer_node/new_token", Trigger).message
         cls.page = Page(cls.address)
         cls.page.let_in(cls.address)

@@ -24,8 +24,9 @@ namespace dac = kurumaisu::dac;
 
 constexpr const char* kHelp = R"(usage: set_voltages DEVICE.yaml V_F V_S V_REF
 
-Puts out three voltages until Enter or a signal such as Ctrl-C, then neutral: to try a D/A
-converter with a voltmeter. It has no guard: never connect a chair!
+Puts out three voltages until Enter or a signal, Ctrl-C for example, then
+neutral: to try a D/A converter with a voltmeter. It has no guard: never connect
+a chair!
 
   DEVICE.yaml    the D/A converter: launch/dac holds examples
   V_F V_S V_REF  [V]; V_F and V_S count from the reference V_REF

@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from queue import SimpleQueue
 from typing import Any
 
-# The kernel sends SIGINT when the parent dies; one that died before this was asked for is seen by the number.
-_TIED = ("setpriv", "--pdeathsig", "INT", "sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"')
+# The kernel sends SIGINT when the parent dies; one that died before this was asked for is seen by the number. PWD is
+# put back as it was: a shell makes it its own folder.
+_TIED = ("setpriv", "--pdeathsig", "INT", "sh", "-c", '[ "$PPID" = "$0" ] && export PWD="$1" && shift && exec "$@"')
 
 
 def start(command: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
@@ -29,7 +30,8 @@ def start(command: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
 def _keep(command: Sequence[str], options: dict[str, Any], found: SimpleQueue[subprocess.Popen[Any] | OSError]) -> None:
     """Be the parent as long as the process lives: to the kernel a parent is a thread."""
     try:
-        process = subprocess.Popen([*_TIED, str(os.getpid()), *command], **options)
+        folder = (options.get("env") or os.environ).get("PWD", "")
+        process = subprocess.Popen([*_TIED, str(os.getpid()), folder, *command], **options)
         pidfd = os.pidfd_open(process.pid)
     except OSError as error:
         found.put(error)
