@@ -153,7 +153,8 @@ class Reader:
             )
             self._processes.append(self._ear)
             assert self._ear.stdout is not None
-            self._ear.stdout.readline()
+            while self._ear.stdout.readline() not in ("ready\n", ""):  # rospy may say that it waits for the master
+                continue
         assert self._ear.stdin is not None
         assert self._ear.stdout is not None
         print(*question, file=self._ear.stdin, flush=True)
