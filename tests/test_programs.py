@@ -9,6 +9,7 @@ import os
 import re
 import resource
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -271,3 +272,10 @@ def test_launch_files_start_our_rviz():
     text = "".join(path.read_text() for path in launches)
     assert 'pkg="kurumaisu" type="rviz"' in text
     assert 'pkg="rviz"' not in text
+
+
+def test_a_stream_that_was_closed_is_no_files_number(tmp_path):
+    code = "import sys, os; from kurumaisu import program; program.words(); print(os.open(sys.argv[1], os.O_CREAT))"
+    command = ["bash", "-c", '"$@" 2>&- <&-', "-", sys.executable, "-c", code, str(tmp_path / "file")]
+    said = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
+    assert int(said) > 2

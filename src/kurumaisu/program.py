@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -37,7 +38,17 @@ def node_parser(name: str, text: str) -> Parser:
 
 def words(arguments: Sequence[str] | None = None) -> list[str]:
     """Return the command line without what is ROS's: roslaunch gives every node its name."""
+    hold_standard_streams()
     return [word for word in (sys.argv[1:] if arguments is None else arguments) if ":=" not in word]
+
+
+def hold_standard_streams() -> None:
+    """Open /dev/null for those that were closed: else a file or device takes the number, and gets the messages."""
+    for stream in range(3):
+        try:
+            os.fstat(stream)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest number that is free: this one
 
 
 def no_arguments(name: str, text: str) -> None:
