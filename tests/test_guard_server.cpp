@@ -306,6 +306,7 @@ TEST_F(GuardProcess, WithoutDescriptorsItAnswersItsClientAndDoesNotSpin) {
   }
   const std::vector<kurumaisu::Descriptor> more = [&] {
     std::vector<kurumaisu::Descriptor> result;
+    result.reserve(5);
     for (int i = 0; i < 5; ++i) result.push_back(g::connectTo(settings.socket));
     return result;
   }();

@@ -81,8 +81,8 @@ LogWriter::LogWriter() {
 }
 
 LogWriter::~LogWriter() {
-  const Descriptor nothing(open("/dev/null", O_WRONLY | O_CLOEXEC));
-  dup2(nothing.get(), STDERR_FILENO);
+  const Descriptor nothing(::open("/dev/null", O_WRONLY | O_CLOEXEC));
+  if (nothing) dup2(nothing.get(), STDERR_FILENO);
   pollfd ready{done_.get(), 0, 0};
   poll(&ready, 1, kLastLines);
 }

@@ -26,10 +26,7 @@ constexpr std::chrono::seconds kMasterPeriod{5};  // between questions for the m
 /// The C library's own function of a name.
 template <typename Function>
 Function* original(const char* name) {
-  Function* result = nullptr;
-  void* const found = dlsym(RTLD_NEXT, name);
-  std::memcpy(&result, &found, sizeof result);
-  return result;
+  return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
 }
 
 bool isTcp(int fd, const sockaddr& address) {
