@@ -90,16 +90,6 @@ class BasicSection {
     return value.flag();
   }
 
-  /// The name of a frame of tf, without the slash at its front that tf2 refuses.
-  std::string frame(const std::string& key) {
-    const std::string given = text(key);
-    std::string name = given.substr(given.front() == '/' ? 1 : 0);
-    if (name.empty() || name.find_first_of(" \t\n") != std::string::npos) {
-      throw error(key, "must be a frame's name without blanks: " + given);
-    }
-    return name;
-  }
-
   /// A string that is not empty; or, for textOrNone, may be.
   std::string text(const std::string& key) {
     std::string result = textOrNone(key);

@@ -16,6 +16,19 @@
 
 namespace kurumaisu {
 
+/// What the kernel sends to a process for a fault of its own.
+constexpr std::array kCrashes = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP};
+
+inline bool isCrash(int signal) {
+  return std::find(kCrashes.begin(), kCrashes.end(), signal) != kCrashes.end();
+}
+
+/// Whether a signal would end or stop a process that does nothing about it; all such signals mean: end.
+inline bool isToEnd(int signal) {
+  constexpr std::array kHarmless = {SIGCHLD, SIGCONT, SIGURG, SIGWINCH, SIGPIPE};  // the last: a write tells
+  return std::find(kHarmless.begin(), kHarmless.end(), signal) == kHarmless.end();
+}
+
 /// Every signal that can be held back waits to be read in place of ending, or stopping, this process; signalfd(2).
 /// SIGKILL, SIGSTOP and a crash of its own cannot.
 class Signals {
@@ -29,29 +42,19 @@ class Signals {
 
   int fd() const { return descriptor_.get(); }
 
-  /// The next that came; none if there is none.
-  std::optional<int> next() const {
+  /// The next that came and says to end, isToEnd(); none if there is none. The others are passed over.
+  std::optional<int> nextToEnd() const {
     signalfd_siginfo info{};
-    if (read(descriptor_.get(), &info, sizeof info) != sizeof info) return std::nullopt;
-    return static_cast<int>(info.ssi_signo);
+    while (read(descriptor_.get(), &info, sizeof info) == sizeof info) {
+      const int signal = static_cast<int>(info.ssi_signo);
+      if (isToEnd(signal)) return signal;
+    }
+    return std::nullopt;
   }
 
  private:
   Descriptor descriptor_;
 };
-
-/// What the kernel sends to a process for a fault of its own.
-constexpr std::array kCrashes = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP};
-
-inline bool isCrash(int signal) {
-  return std::find(kCrashes.begin(), kCrashes.end(), signal) != kCrashes.end();
-}
-
-/// Whether a signal would end or stop a process that does nothing about it; all such signals mean: end.
-inline bool isToEnd(int signal) {
-  constexpr std::array kHarmless = {SIGCHLD, SIGCONT, SIGURG, SIGWINCH, SIGPIPE};  // the last: a write tells
-  return std::find(kHarmless.begin(), kHarmless.end(), signal) == kHarmless.end();
-}
 
 /// "SIGHUP"
 inline std::string signalName(int signal) {

@@ -39,8 +39,9 @@ class LocalizationInTheSimulator(unittest.TestCase):
         self.commander.silence()
 
     def true_at(self, stamps):
-        times = np.array([m.header.stamp.to_sec() for m in self.truth.messages])
-        poses = np.array([pose_of(m) for m in self.truth.messages])
+        truth = self.truth.messages[:]  # a thread appends meanwhile
+        times = np.array([m.header.stamp.to_sec() for m in truth])
+        poses = np.array([pose_of(m) for m in truth])
         poses[:, 2] = np.unwrap(poses[:, 2])
         return geometry.interpolate(times, poses, np.array(stamps))
 

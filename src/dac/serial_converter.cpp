@@ -85,14 +85,12 @@ bool SerialConverter::greet() {
 }
 
 void SerialConverter::start() {
-  bool first = true;
-  for (const Exchange& each : settings_.start) {
-    const bool is_done = std::exchange(first, false) && each.answered;
-    if (is_done) continue;
-    if (each.answered) {
-      dialogue_->ask(each.send.plain(), each.expect.plain());
+  const bool is_first_done = !settings_.start.empty() && settings_.start.front().answered;
+  for (auto each = settings_.start.begin() + (is_first_done ? 1 : 0); each != settings_.start.end(); ++each) {
+    if (each->answered) {
+      dialogue_->ask(each->send.plain(), each->expect.plain());
     } else {
-      dialogue_->tell(each.send.plain(), "");
+      dialogue_->tell(each->send.plain(), "");
     }
   }
 }

@@ -57,7 +57,7 @@ void run(const std::string& device, const dac::Volts& volts) {
   put(*converter, volts);
   do {
     poll(ends.data(), ends.size(), -1);
-  } while (ends[1].revents == 0 && !kurumaisu::isToEnd(signals.next().value_or(SIGCONT)));
+  } while (ends[1].revents == 0 && !signals.nextToEnd());
   put(*converter, {0, 0, volts.reference});
 }
 

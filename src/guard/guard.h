@@ -35,7 +35,8 @@ void validate(const Limits& limits);
 /// From a client's messages to three voltages.
 ///
 /// Neutral, unless the client has held neutral for `arming` and every message since was valid, in time, and a small
-/// step from the one before, however fast they come. Whatever else happens trips: neutral at once, until neutral has been held again.
+/// step from the one before, however fast they come. Whatever else happens trips: neutral at once, until neutral has
+/// been held again.
 class Guard {
  public:
   explicit Guard(const Limits& limits);

@@ -23,9 +23,9 @@ struct Pipe {
   Descriptor write;
 };
 
-Pipe makePipe(int flags) {
+Pipe makePipe() {
   std::array<int, 2> ends{};
-  checked(pipe2(ends.data(), O_CLOEXEC | flags), "pipe");
+  checked(pipe2(ends.data(), O_CLOEXEC), "pipe");
   return {Descriptor(ends[0]), Descriptor(ends[1])};
 }
 
@@ -66,8 +66,8 @@ void copy(int from, int to) {
 }  // namespace
 
 LogWriter::LogWriter() {
-  Pipe lines = makePipe(0);
-  Pipe done = makePipe(0);
+  Pipe lines = makePipe();
+  Pipe done = makePipe();
   const pid_t between = checked(fork(), "fork");
   if (between == 0) {  // its child is nobody's child: whoever waits for children does not meet it
     if (fork() == 0) serve(std::move(lines), std::move(done));

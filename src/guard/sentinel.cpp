@@ -22,6 +22,7 @@
 #include "guard/notify.h"
 #include "guard/realtime.h"
 #include "guard/server.h"
+#include "guard/socket.h"
 #include "steady.h"
 
 namespace kurumaisu::guard {
@@ -29,15 +30,18 @@ namespace {
 
 constexpr double kNotifyPeriod = 0.1;  // [s] of signs of life to systemd; its WatchdogSec is longer
 
+constexpr char kBeat = 0;
+
 /// Empties a socket of signs of life; whether there were any.
 bool hearBeats(const Descriptor& socket) {
-  std::array<char, 64> bytes{};
+  char byte = 0;
+  std::size_t size = 1;
   bool heard = false;
-  while (read(socket.get(), bytes.data(), bytes.size()) > 0) heard = true;
+  for (; receive(socket, &byte, size) == Heard::kMessage; size = 1) heard = true;
   return heard;
 }
 
-void sendBeat(const Descriptor& socket) { ::send(socket.get(), "", 1, MSG_DONTWAIT | MSG_NOSIGNAL); }
+void sendBeat(const Descriptor& socket) { send(socket, &kBeat, 1); }
 
 /// The guard's end: a sign of its life for each of the sentinel's, which must not be missing for too long.
 class Watched {
@@ -89,7 +93,7 @@ class Sentinel {
   void start();
   int watch();
   bool hear();
-  void pass(int signal);
+  void leave();
   bool rest();
 
   const Settings& settings_;
@@ -121,7 +125,7 @@ int Sentinel::run() {
 
 void Sentinel::start() {
   std::array<int, 2> ends{};
-  checked(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends.data()), "socketpair");
+  checked(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends.data()), "socketpair");
   beats_ = Descriptor(ends[0]);
   Descriptor beating(ends[1]);
   last_beat_ = steadyTime();
@@ -136,7 +140,7 @@ int Sentinel::watch() {
     const double left = std::max(0.0, last_beat_ + settings_.sentinel_silence - steadyTime());
     std::array<pollfd, 2> ready = {{{signals_.fd(), POLLIN, 0}, {beats_.get(), POLLIN, 0}}};
     poll(ready.data(), ready.size(), static_cast<int>(std::ceil(1e3 * left)));
-    while (const auto signal = signals_.next()) pass(*signal);
+    while (signals_.nextToEnd()) leave();
     int status = 0;
     if (waitpid(guard_, &status, WNOHANG) == guard_) return status;
     if (hear() || steadyTime() < last_beat_ + settings_.sentinel_silence) continue;
@@ -159,8 +163,7 @@ bool Sentinel::hear() {
   return true;
 }
 
-void Sentinel::pass(int signal) {
-  if (!isToEnd(signal)) return;
+void Sentinel::leave() {
   if (!is_leaving_) notify("STOPPING=1");
   is_leaving_ = true;
   kill(guard_, SIGTERM);
@@ -172,7 +175,7 @@ bool Sentinel::rest() {
   while (!is_leaving_ && steadyTime() < until) {
     pollfd ready{signals_.fd(), POLLIN, 0};
     poll(&ready, 1, static_cast<int>(std::ceil(1e3 * std::max(0.0, until - steadyTime()))));
-    while (const auto signal = signals_.next()) is_leaving_ |= isToEnd(*signal);
+    while (signals_.nextToEnd()) is_leaving_ = true;
   }
   return !is_leaving_;
 }

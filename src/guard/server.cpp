@@ -86,9 +86,7 @@ void Server::run() {
 }
 
 bool Server::isTold() {
-  while (const auto signal = signals_.next()) {
-    if (isToEnd(*signal)) told_ = *signal;
-  }
+  if (told_ == 0) told_ = signals_.nextToEnd().value_or(0);
   return told_ != 0;
 }
 

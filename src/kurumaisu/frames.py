@@ -17,7 +17,7 @@ must be the same in another file, or be missing there.
 """
 
 
-def frame_of(file: Path, key: str) -> str | None:
+def frame_named(file: Path, key: str) -> str | None:
     """Return the frame that a settings file names, None where it does not. Raise Error for a name that is none."""
     section = settings.load(file)
     *parents, last = key.split("/")
@@ -39,7 +39,7 @@ def base_frame(given: str) -> str:
 
 
 def _required(file: Path, key: str) -> str:
-    name = frame_of(file, key)
+    name = frame_named(file, key)
     if name is None:
         raise Error(f"{file}: {key.replace('/', '.')}: is missing")
     return name
@@ -48,7 +48,7 @@ def _required(file: Path, key: str) -> str:
 def _agreed(options: argparse.Namespace) -> str:
     name = _required(options.file, options.key)
     for file, key in options.same:
-        other = frame_of(Path(file), key)
+        other = frame_named(Path(file), key)
         if other not in (None, name):
             raise Error(
                 f"{file}: {key.replace('/', '.')}: is {other}, but {options.key.replace('/', '.')} of {options.file} "

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "model_file.h"
+#include "plausible/quantity.h"
 
 namespace kurumaisu {
 namespace {
@@ -26,6 +27,13 @@ OdometryNoise readNoise(Section section, const KnownEffects& known) {
   if (known.unfollowed.empty()) noise = {0, 0, 0, 0, 0};
   noise.rates = *known.noise;
   return noise;
+}
+
+std::string readFrame(Section& section, const std::string& key) {
+  const std::string given = section.text(key);
+  std::string name = frameOf(given);
+  if (!name.empty() && name.find_first_of(" \t\n") == std::string::npos) return name;
+  throw section.error(key, "must be a frame's name without blanks: " + given);
 }
 
 ImuSettings readImu(Section& section) {
@@ -57,8 +65,8 @@ KnownEffects readEffects(Section& model) {
 }
 
 OdometrySettings readOdometry(Section section, const KnownEffects& known) {
-  const std::string frame = section.frame("frame");
-  const std::string child = section.frame("child_frame");
+  const std::string frame = readFrame(section, "frame");
+  const std::string child = readFrame(section, "child_frame");
   if (child == frame) throw section.error("child_frame", "must differ from frame: " + child);
   OdometrySettings settings{
       {frame, child, section.flag("publish_tf")}, readNoise(section.section("noise"), known), std::nullopt};

@@ -4,6 +4,7 @@
 #include <ros/xmlrpc_manager.h>
 
 #include <atomic>
+#include <cerrno>
 #include <csignal>
 
 #include "guard/crash.h"
@@ -16,8 +17,10 @@ std::atomic<bool> requested{false};
 
 /// The guard need not wait for this loop's next turn.
 void onSignal(int /*signal*/) {
+  const int error = errno;
   requested = true;
   guard::hangUp();
+  errno = error;
 }
 
 void onShutdownCall(XmlRpc::XmlRpcValue& /*parameters*/, XmlRpc::XmlRpcValue& result) {

@@ -26,10 +26,8 @@ from kurumaisu.types import FloatArray
 
 _HEADER = "std_msgs/msg/Header"
 _MOST_UNPACKED = 2**28  # [bytes] of a chunk; rosbag's have some 800 kB and at most one message more
-_LEAST_UNPACKED, _TIMES_UNPACKED = (
-    2**26,
-    200,
-)  # [bytes] and times its size, of a whole bag: scans are packed 2 to 20 times
+_LEAST_UNPACKED = 2**26  # [bytes] of a whole bag, and
+_TIMES_UNPACKED = 200  # times its size: scans are packed 2 to 20 times
 
 
 @dataclass

@@ -76,7 +76,7 @@ def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | Non
     sane = _of_sane_size(table, ranges=ranges)
     _report(table, keep & ~sane, faults, "too large to be true: dropped", "has numbers too large to be true")
     kept = np.flatnonzero(keep & sane)
-    kept = kept[~_astray(table, kept, faults)]
+    kept = kept[~_stamp_outliers(table, kept, faults)]
     kept = kept[~_repeated(table, kept, faults)]
     _out_of_order(table, kept, faults)
     if not len(kept):
@@ -96,21 +96,21 @@ def _of_sane_size(table: Table, *, ranges: bool) -> BoolArray:
     return sane
 
 
-def _astray(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
+def _stamp_outliers(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
     """Return which of the kept rows have stamps far from those of most, (k,): some clock was not set yet."""
     order = np.argsort(table.t[kept], kind="stable")
     steps = np.diff(table.t[kept][order])
     usual = np.sort(steps)[(len(steps) - 1) // 2] if len(steps) else 0.0
     group = np.append(0, np.cumsum(steps > max(FURTHEST_STEP, _USUAL_STEPS * usual)))[: len(order)]
-    astray = np.zeros(len(kept), dtype=bool)
-    astray[order] = group != np.bincount(group).argmax() if len(group) else False
-    if astray.any():
+    outliers = np.zeros(len(kept), dtype=bool)
+    outliers[order] = group != np.bincount(group).argmax() if len(group) else False
+    if outliers.any():
         faults.add(
-            f"{table.where}: {_rows(int(astray.sum()))} more than a day from the others: dropped "
-            f"(first: {table.place(int(kept[np.argmax(astray)]))}): stamps are wrong",
+            f"{table.where}: {_rows(int(outliers.sum()))} more than a day from the others: dropped "
+            f"(first: {table.place(int(kept[np.argmax(outliers)]))}): stamps are wrong",
             fatal=True,
         )
-    return astray
+    return outliers
 
 
 def _report(table: Table, bad: BoolArray, faults: Faults, noted: str, fatal: str, share: float = HICCUP_SHARE) -> None:

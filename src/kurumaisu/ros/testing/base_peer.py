@@ -84,7 +84,7 @@ class PeerProcess:
     def repeat(self, topic: str, value: Any) -> None:
         """Repeat [v, w], a truth value or a number on a topic from now on; None: nothing any more."""
         if topic not in self._topics:
-            self._topics[topic] = Repeated(topic, _kind(value), _PERIOD)
+            self._topics[topic] = Repeated(topic, _kind(value), _PERIOD, lambda: _tell("joined", topic=topic))
         self._topics[topic].say(None if value is None else _timed(topic, _maker(value)))
 
     def burst(self, topic: str, values: list[Any]) -> None:

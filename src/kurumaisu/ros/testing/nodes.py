@@ -166,8 +166,11 @@ class Commander:
 class Repeated:
     """Repeats what a function makes at a fixed period [s] of wall time, until it is silenced."""
 
-    def __init__(self, topic: str, kind: type, period: float) -> None:
-        self._publisher = rospy.Publisher(topic, kind, queue_size=10, tcp_nodelay=True)
+    def __init__(self, topic: str, kind: type, period: float, joined: Callable[[], None] = lambda: None) -> None:
+        """joined: called whenever somebody begins to hear it."""
+        listener = rospy.SubscribeListener()
+        listener.peer_subscribe = lambda *_: joined()
+        self._publisher = rospy.Publisher(topic, kind, listener, queue_size=10, tcp_nodelay=True)
         self._make: Callable[[], Any] | None = None
         self._repeater = _Repeater(period, self._publish)
 

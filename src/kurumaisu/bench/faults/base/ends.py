@@ -7,20 +7,20 @@ import os
 import signal
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
 from kurumaisu.bench.faults.base.cases import Case, Seen, trips
 from kurumaisu.bench.faults.base.chain import Chain, V, W
 from kurumaisu.bench.faults.base.peers import until
-from kurumaisu.bench.guard_rig import busy
+from kurumaisu.bench.guard_rig import Rig, busy
 
-_DEATH, _HANG, _GUARD = 0.010, 0.020, 0.020  # [s] until neutral; a hang counts from the guard's silence
+CLIENT_BOUND, _HANG, GUARD_BOUND = 0.010, 0.020, 0.020  # [s] until neutral; a hang counts from the guard's silence
 _STOPPED = 0.5  # [s]
 _LOADED = 3.0  # [s] of driving on busy cores
 
 
-def dies(number: signal.Signals, bound: float = _DEATH) -> Callable[[Chain, Seen], None]:
+def dies(number: signal.Signals, bound: float = CLIENT_BOUND) -> Callable[[Chain, Seen], None]:
     """Return how base_node dies of a signal; neutral within the bound [s]."""
 
     def play(stage: Chain, seen: Seen) -> None:
@@ -55,7 +55,7 @@ def _ends(number: signal.Signals) -> Callable[[Chain, Seen], None]:
     def play(stage: Chain, seen: Seen) -> None:
         stage.drive()
         assert stage.node
-        since = seen.neutral(stage, stage.strike(number), stage.period + _DEATH)
+        since = seen.neutral(stage, stage.strike(number), stage.period + CLIENT_BOUND)
         until(lambda: stage.node and stage.node.poll() is not None, "the end of base_node")
         code = stage.node.poll()
         seen.check(code == 0, f"exit status {code}")
@@ -68,23 +68,32 @@ def _ends(number: signal.Signals) -> Callable[[Chain, Seen], None]:
 def guard_dies(stage: Chain, seen: Seen) -> None:
     """Kill the guard."""
     stage.drive()
-    since = seen.neutral(stage, stage.strike(signal.SIGKILL, stage.rig.guard()), _GUARD)
+    since = seen.neutral(stage, stage.strike(signal.SIGKILL, stage.rig.guard()), GUARD_BOUND)
     seen.said(stage, "GUARD_DEAD: killed: Killed")
     seen.latched(stage, since)
 
 
-def _guard_stops(stage: Chain, seen: Seen) -> None:
-    stage.drive()
-    bound = stage.guard_values["sentinel_silence"] + _GUARD
-    since = seen.neutral(stage, stage.strike(signal.SIGSTOP, stage.rig.guard()), bound)
-    seen.said(stage, "GUARD_DEAD: killed: Killed")
-    seen.latched(stage, since)
+def watcher_stops(process: Callable[[Rig], int], words: str) -> Callable[[Chain, Seen], None]:
+    """Return how guard or sentinel is stopped; the other one sees to neutral, and says some words."""
+
+    def play(stage: Chain, seen: Seen) -> None:
+        stage.drive()
+        bound = stage.guard_values["sentinel_silence"] + GUARD_BOUND
+        pid = process(stage.rig)
+        since = seen.neutral(stage, stage.strike(signal.SIGSTOP, pid), bound)
+        seen.said(stage, words)
+        seen.held(stage, since)
+        with suppress(ProcessLookupError):  # a guard was killed
+            stage.strike(signal.SIGCONT, pid)
+        seen.again(stage)
+
+    return play
 
 
 def _sentinel_dies(stage: Chain, seen: Seen) -> None:
     stage.drive()
     guard = stage.rig.guard()
-    since = seen.neutral(stage, stage.strike(signal.SIGKILL, stage.rig.sentinel()), _GUARD)
+    since = seen.neutral(stage, stage.strike(signal.SIGKILL, stage.rig.sentinel()), GUARD_BOUND)
     stage.rig.reap()
     until(lambda: not Path(f"/proc/{guard}").exists(), "the guard's end")
     stage.status("guard", "no guard")
@@ -165,7 +174,7 @@ CASES = (
         "guard hangs",
         "SIGSTOP",
         "neutral within the sentinel's silence + 20 ms; then as above",
-        _guard_stops,
+        watcher_stops(Rig.guard, "GUARD_DEAD: killed: Killed"),
     ),
     Case(
         "4",

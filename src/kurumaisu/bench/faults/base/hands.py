@@ -11,26 +11,15 @@ from kurumaisu.bench.faults.base.braking import SLACK, brakes, braking, limits_o
 from kurumaisu.bench.faults.base.cases import Case, Seen, service
 from kurumaisu.bench.faults.base.chain import Chain, V, W
 from kurumaisu.bench.faults.base.peers import until
+from kurumaisu.bench.faults.base.stops import ONCE, let_go
 
-_ONCE = 0.06  # [s] until what acts at once has: a tick of the commander, and the way
 _RELEASES = 60  # that follow a press at once
 _NO_CAP = 1.5  # [m/s]
 _TINY = 1e-300  # [m/s, rad/s]
 
 
 def _let_go(stage: Chain, seen: Seen) -> None:
-    timeout = float(stage.values["locks"]["dead_man"]["timeout"])
-    for word, after in ((False, 0.0), (None, timeout)):
-        stage.peer.repeat("dead_man", True)
-        stage.drive()
-        begin = time.monotonic()
-        stage.peer.repeat("dead_man", word)
-        since = brakes(stage, seen, begin, after)
-        seen.held(stage, since)
-    seen.said(stage, "BASE_LOCKED: dead_man")
-    stage.peer.repeat("dead_man", True)  # `allow` is held
-    until(lambda: stage.has(V, W), "it goes on")
-    seen.note("held again: goes on")
+    let_go("dead_man", False, None)(stage, seen)
     stage.peer.repeat("dead_man", None)
     stage.start_node()  # one that never heard it
 
@@ -49,6 +38,7 @@ def _two(topic: str, reason: str) -> Callable[[Chain, Seen], None]:
         other.repeat(topic, False)
         stage.peer.repeat(topic, False)
         stage.drive()
+        stage.peer.wait_joined(topic)
         begin = time.monotonic()
         stage.peer.repeat(topic, True)
         since = seen.neutral(stage, begin, SLACK + braking(stage))
@@ -70,9 +60,10 @@ def _two(topic: str, reason: str) -> Callable[[Chain, Seen], None]:
 def _burst(stage: Chain, seen: Seen) -> None:
     stage.peer.repeat("e_stop", False)
     stage.drive()
+    stage.peer.wait_joined("e_stop")
     begin = time.monotonic()
     stage.peer.order(do="burst", topic="e_stop", values=[True, *[False] * _RELEASES])
-    since = seen.neutral(stage, begin, _ONCE)
+    since = seen.neutral(stage, begin, ONCE)
     seen.held(stage, since)
     stage.peer.say(0.0, 0.0)
     until(lambda: stage.peer.call(service("reset"))["success"], "a reset")
@@ -83,6 +74,7 @@ def _cap(value: float) -> Callable[[Chain, Seen], None]:
     def play(stage: Chain, seen: Seen) -> None:
         stage.peer.repeat("speed_cap", _NO_CAP)
         stage.drive()
+        stage.peer.wait_joined("speed_cap")
         limits = limits_of(stage)
         begin = time.monotonic()
         stage.peer.repeat("speed_cap", value)

@@ -162,6 +162,10 @@ class Commander:
         self.said[topic] = value
         self.order(do="repeat", topic=topic, value=value)
 
+    def wait_joined(self, topic: str) -> None:
+        """Wait until somebody hears what is repeated on a topic: a new one takes a moment to be found."""
+        self.wait("joined", lambda event: event["topic"] == topic)
+
     def call(self, name: str) -> Event:
         """Call a service without arguments; return its answer."""
         begin = time.monotonic()

@@ -10,14 +10,14 @@ from pathlib import Path
 
 from kurumaisu.bench.faults.base.cases import Case, Seen
 from kurumaisu.bench.faults.base.chain import Chain, Setup
+from kurumaisu.bench.faults.base.ends import CLIENT_BOUND, GUARD_BOUND, watcher_stops
 from kurumaisu.bench.faults.base.peers import end, until
 from kurumaisu.bench.guard_client import RawClient
+from kurumaisu.bench.guard_rig import Rig
 from kurumaisu.bench.processes import cpu
 
-_CLIENT, _GUARD = 0.010, 0.020  # [s] until neutral
 _HARMLESS = (signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH, signal.SIGPIPE)
 _OWN = (signal.SIGXCPU,)  # base_node's own use: a thread ran for too long at its priority
-_WAITS = (signal.SIGSTOP, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 _LOOK = 3.0  # [s]
 _BUSY = 0.3  # of a processor
 _STEPS = (0.5, 1.0, 1.5, 2.0, 2.2, 0.0, -0.5, -1.0, -1.5, -1.8)  # [V]
@@ -35,7 +35,7 @@ def _base_node(stage: Chain, seen: Seen) -> None:
     for number in _numbers(*_OWN):
         stage.drive()
         assert stage.node
-        seen.neutral(stage, stage.strike(number), _CLIENT)
+        seen.neutral(stage, stage.strike(number), CLIENT_BOUND)
         until(lambda: stage.node and stage.node.poll() is not None, f"the end of base_node by signal {number}")
     seen.note(f"{len(_numbers(*_OWN))} signals")
 
@@ -43,28 +43,18 @@ def _base_node(stage: Chain, seen: Seen) -> None:
 def _guard(stage: Chain, seen: Seen) -> None:
     for number in _numbers():
         stage.drive()
-        since = seen.neutral(stage, stage.strike(number, stage.rig.guard()), _GUARD)
-        seen.check(not stage.moved(since + _GUARD, 0.05), f"moved after signal {number}")
+        since = seen.neutral(stage, stage.strike(number, stage.rig.guard()), GUARD_BOUND)
+        seen.check(not stage.moved(since + GUARD_BOUND, 0.05), f"moved after signal {number}")
     seen.note(f"{len(_numbers())} signals")
 
 
 def _sentinel(stage: Chain, seen: Seen) -> None:
     for number in _numbers():
         stage.drive()
-        seen.neutral(stage, stage.strike(number, stage.rig.sentinel()), _GUARD)
+        seen.neutral(stage, stage.strike(number, stage.rig.sentinel()), GUARD_BOUND)
         stage.rig.reap()
         stage.rig.start()
     seen.note(f"{len(_numbers())} signals")
-
-
-def _sentinel_stops(stage: Chain, seen: Seen) -> None:
-    stage.drive()
-    bound = stage.guard_values["sentinel_silence"] + _GUARD
-    since = seen.neutral(stage, stage.strike(signal.SIGSTOP, stage.rig.sentinel()), bound)
-    seen.said(stage, "GUARD_TRIPPED: the sentinel is silent")
-    seen.held(stage, since)
-    stage.strike(signal.SIGCONT, stage.rig.sentinel())
-    seen.again(stage)
 
 
 def _no_descriptors(stage: Chain, seen: Seen) -> None:
@@ -131,7 +121,13 @@ CASES = (
     Case("E", "base_node is signalled", f"{_BY_NUMBER} and SIGXCPU", "neutral within 10 ms", _base_node),
     Case("E", "guard is signalled", _BY_NUMBER, "neutral within 20 ms; then another guard", _guard),
     Case("E", "sentinel is signalled", _BY_NUMBER, "neutral within 20 ms", _sentinel),
-    Case("E", "sentinel hangs", "SIGSTOP", "neutral within its silence + 20 ms, by the guard", _sentinel_stops),
+    Case(
+        "E",
+        "sentinel hangs",
+        "SIGSTOP",
+        "neutral within its silence + 20 ms, by the guard",
+        watcher_stops(Rig.sentinel, "GUARD_TRIPPED: the sentinel is silent"),
+    ),
     Case(
         "F",
         "guard at its limit of descriptors",

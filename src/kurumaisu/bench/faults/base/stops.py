@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import signal
 import time
+from collections.abc import Callable
 
 from kurumaisu.bench.faults.base.braking import SLACK, brakes
 from kurumaisu.bench.faults.base.cases import Case, Seen, service
 from kurumaisu.bench.faults.base.chain import Chain, Setup, V, W
 from kurumaisu.bench.faults.base.peers import until
 
-_ONCE = 0.06  # [s] until what acts at once has: a tick of the commander, and the way
+ONCE = 0.06  # [s] until what acts at once has: a tick of the commander, and the way
 _WATCHED = 0.3  # [s] timeout of a watched button
 
 
@@ -52,7 +53,7 @@ def _button_pressed(stage: Chain, seen: Seen) -> None:
     stage.drive()
     begin = time.monotonic()
     stage.peer.repeat("e_stop", True)
-    since = _at_once(stage, seen, begin, _ONCE)
+    since = _at_once(stage, seen, begin, ONCE)
     seen.held(stage, since)
     answer = stage.peer.call(service("reset"))
     seen.check(not answer["success"], "reset while it is pressed")
@@ -76,16 +77,25 @@ def _never_watched(stage: Chain, seen: Seen) -> None:
     _released(stage, seen)
 
 
-def _dead_man(stage: Chain, seen: Seen) -> None:
-    stage.peer.repeat("passenger_holds", True)
-    stage.drive()
-    begin = time.monotonic()
-    stage.peer.repeat("passenger_holds", None)
-    brakes(stage, seen, begin, _WATCHED)
-    seen.said(stage, "BASE_LOCKED: passenger")
-    stage.peer.repeat("passenger_holds", True)
-    until(lambda: stage.has(V, W), "it goes on")
-    seen.note("held again: goes on")
+def let_go(name: str, *words: bool | None) -> Callable[[Chain, Seen], None]:
+    """Return how the dead-man of a lock is let go by each of some words (None: silence), and held again."""
+
+    def play(stage: Chain, seen: Seen) -> None:
+        lock = stage.values["locks"][name]
+        for word in words:
+            stage.peer.repeat(lock["topic"], True)
+            stage.drive()
+            stage.peer.wait_joined(lock["topic"])
+            begin = time.monotonic()
+            stage.peer.repeat(lock["topic"], word)
+            since = brakes(stage, seen, begin, float(lock["timeout"]) if word is None else 0.0)
+            seen.held(stage, since)
+        seen.said(stage, f"BASE_LOCKED: {name}")
+        stage.peer.repeat(lock["topic"], True)
+        until(lambda: stage.has(V, W), "it goes on")
+        seen.note("held again: goes on")
+
+    return play
 
 
 def _held_from_the_start(stage: Chain, seen: Seen) -> None:
@@ -135,7 +145,7 @@ CASES = (
         "dead-man",
         "its topic falls silent",
         "brakes after its timeout; held again: goes on",
-        _dead_man,
+        let_go("passenger", None),
         Setup(node={"locks/passenger/timeout": _WATCHED}),
     ),
     Case("11", "commanded from the start", "the stick is held", "neutral until it is let go", _held_from_the_start),
