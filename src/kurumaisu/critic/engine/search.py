@@ -1,51 +1,53 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which effects act: a search over sets, its posterior, and what cannot be told apart."""
+"""Which effects act: single effects propose, the joint evidence of sets decides."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic.engine.catalogue import Key
+from kurumaisu.critic.engine.catalogue import Candidate, Key
 from kurumaisu.critic.engine.confounding import SetPosterior, confounded
+from kurumaisu.critic.engine.curve_search import CurveSearch, SetWithCurve, nearly_same_rates
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
-from kurumaisu.critic.engine.linear_screening import Screen, ScreenedSet
-from kurumaisu.critic.engine.neighbouring_sets import CLOSE, EffectSet, neighbouring_sets
-from kurumaisu.critic.engine.refit import other_step_size, start_is_better
-from kurumaisu.critic.engine.swapped_sets import swapped_sets
-from kurumaisu.critic.values.policy import NAMED, RIVAL
+from kurumaisu.critic.engine.scan import Dictionary, Guess, scan
+from kurumaisu.critic.values.policy import NAMED
+from kurumaisu.critic.values.prior import UNKNOWN_ODDS, log_prior
 
-_REFITS = 10  # sets refitted after each scan
-_FEWER = 4  # of fewer effects than the best set has, besides
-_LINE_ERROR = 0.05  # share of what a set explains by which lines may be off for one effect that does what two do
-_ALTERNATIVES = 2  # likely sets besides the best one from which others are looked for
-_ROUNDS = 8  # scans at most
-_MOST = 200  # refitted sets from which on none is looked for: where ten effects seem to act, each round has a hundred
-NULLS = 2000  # draws of the null calibration
+EffectSet = frozenset[Candidate]
+_WIDTH = 3  # sets that are gone on from in a round
+_NEAR = 8.0  # [nat] behind the best set within which one is gone on from
+_ADDED = 7  # proposals beside a set
+_SWAPPED = 4  # and in the place of each of its effects
+_ASKED = 20.0  # [nat] behind the best set from which on no curve is asked for beside one
+_HOPELESS = 10.0  # [nat] that a proposal may promise less than the best set has
+_ROUNDS = 8
+_CLOSER = 4  # sets beside which curves of other kinds are tried
+_LARGEST = 6  # effects in a set
 
 
 @dataclass(frozen=True)
 class SearchResult:
     """Result of a search.
 
-    fits: all refitted sets, best first; log_posterior of each (not normalised); p: posterior per effect;
-    confounded: sets of effects of which one acts, but the data do not say which; false_alarm: share of null draws,
-    on this very design, with evidence at least as strong as the best single effect's; enough: there are more data than
-    could be fitted by the catalogue as a whole.
+    fits: all sets that were fitted, best first; curves: those with a curve beside them, likewise; p: posterior per
+    effect, and per curve by its id; confounded: sets of effects of which one acts, but the data do not say which;
+    enough: there are more data than could be fitted by the catalogue as a whole.
     """
 
     fits: tuple[Fit, ...]
+    curves: tuple[SetWithCurve, ...]
     p: dict[str, float]
+    p_curves: dict[str, float]
     confounded: tuple[tuple[str, ...], ...]
-    false_alarm: float
     enough: bool = True
 
     @property
     def best(self) -> Fit:
-        """Return the most probable set."""
+        """Return the most probable set without a curve."""
         return self.fits[0]
 
     @property
@@ -57,105 +59,150 @@ class SearchResult:
         """Return the evidence [nat] of a set over nothing, none where data are too few to believe in it."""
         return fit.score - self.empty.score if self.enough else 0.0
 
+    def log_posterior(self, one: Fit | SetWithCurve) -> float:
+        """Return the log posterior [nat] of a set, without or with a curve, not normalised."""
+        if isinstance(one, SetWithCurve):
+            return log_posterior(one.fit, len(self.p)) + one.nats
+        return log_posterior(one, len(self.p)) + float(np.log1p(-UNKNOWN_ODDS))
+
     @property
     def named(self) -> tuple[str, ...]:
         """Return the effects of the best set that are certain enough to be named."""
         return tuple(name for name in sorted(self.best.ids) if self.p[name] >= NAMED)
 
 
-def search(problem: Problem, progress: Callable[[str], None], first: Fit | None = None) -> SearchResult:
-    """Scan sets of effects linearly, refit the promising ones, and go on from the best until it stays the best.
+class Search:
+    """The sets that were fitted, and what they propose."""
 
-    first: a set to begin with, such as an earlier search under another noise has found.
-    """
-    count = len({candidate.id for candidate in problem.candidates})
-    empty = problem.fit_candidates((), {})
-    fits: dict[EffectSet, Fit] = {empty.candidates: empty}
-    begun = set[tuple[EffectSet, float]]()
+    def __init__(self, problem: Problem, progress: Callable[[str], None]) -> None:
+        self.problem, self._progress = problem, progress
+        self.of = len({candidate.id for candidate in problem.candidates})
+        self.fits: dict[EffectSet, Fit] = {}
+        self.curves = CurveSearch(problem)
+        self._dictionary = Dictionary(problem)
+        self._done: set[EffectSet] = set()
 
-    def try_sets(guesses: Iterable[tuple[EffectSet, Mapping[Key, float]]]) -> Fit:
-        for chosen, start in guesses:
-            old = fits.get(chosen)
-            if old is not None and not (other_step_size(old, start, begun) or start_is_better(problem, old, start)):
+    def bare(self, fit: Fit) -> float:
+        """Return the log posterior of a set without a curve."""
+        return log_posterior(fit, self.of) + float(np.log1p(-UNKNOWN_ODDS))
+
+    def score(self, fit: Fit) -> float:
+        """Return the log posterior of a set, with the best curve beside it where that is likelier.
+
+        Curves are asked for beside sets that are no worse than the best one's cause left out.
+        """
+        bare = self.bare(fit)
+        best = max(map(self.bare, self.fits.values()))
+        if bare < best - _ASKED and fit.candidates:
+            return bare
+        curves = self.curves.beside(fit)
+        return max(bare, log_posterior(fit, self.of) + (curves[0].nats if curves else -np.inf))
+
+    def fit(self, chosen: EffectSet, start: Mapping[Key, float]) -> Fit | None:
+        """Return the fit of a set, made now if it was not before."""
+        ids = [candidate.id for candidate in chosen]
+        if len(set(ids)) < len(ids) or len(ids) > _LARGEST:
+            return None
+        if chosen not in self.fits:
+            self._progress(f"fitting {', '.join(sorted(ids)) or 'nothing'}")
+            self.fits[chosen] = self.problem.fit_candidates(chosen, start)
+        return self.fits[chosen]
+
+    def run(self, first: Fit | None) -> None:
+        """Go on from the best sets until none of them proposes anything."""
+        self.fit(frozenset(), {})
+        if first is not None and first.candidates:
+            self.fit(first.candidates, first.start)
+        self._go_on()
+        best = max(self.fits.values(), key=self.score)
+        if not nearly_same_rates(self.problem, best):
+            self.curves = CurveSearch(self.problem, best)
+            self._go_on()
+        near = [fit for fit in self.fits.values() if self.score(fit) > self.score(best) - _NEAR]
+        for fit in sorted(near, key=self.score, reverse=True)[:_CLOSER]:
+            self.curves.closer(fit)
+
+    def _go_on(self) -> None:
+        for _ in range(_ROUNDS):
+            ranked = sorted(self.fits.values(), key=self.score, reverse=True)
+            best = self.score(ranked[0])
+            ahead = [fit for fit in ranked[:_WIDTH] if fit.candidates not in self._done and self.score(fit) > best - _NEAR]
+            if not ahead:
+                break
+            for fit in ahead:
+                self._done.add(fit.candidates)
+                self._expand(fit)
+
+    def _expand(self, fit: Fit) -> None:
+        best = max(self.score(other) for other in self.fits.values())
+        for guess in self._proposals(fit)[:_ADDED]:
+            if self.score(fit) + guess.nats > best - _HOPELESS:
+                self._with(fit, guess)
+        for one in sorted(fit.candidates, key=lambda candidate: (candidate.id, len(candidate.terms))):
+            rest = self.fit(fit.candidates - {one}, fit.start)
+            if rest is None:
                 continue
-            progress(f"fitting {', '.join(sorted(candidate.id for candidate in chosen))}")
-            fit = problem.fit_candidates(chosen, start)
-            if old is None or fit.score > old.score:
-                fits[chosen] = fit
-        return max(fits.values(), key=lambda fit: log_posterior(fit, count))
+            for guess in [g for g in self._proposals(rest) if g.candidate not in fit.candidates][:_SWAPPED]:
+                if self.score(rest) + guess.nats > best - _HOPELESS:
+                    self._with(rest, guess)
 
-    nothing = screen = Screen(problem, empty)
-    centre, screened = empty, set[EffectSet]()
-    if first is not None and first.candidates:
-        centre = try_sets([(first.candidates, first.start)])
-        screen = Screen(problem, centre) if centre is not empty else nothing
-    for _ in range(_ROUNDS):
-        guesses = screen.guesses()
-        near = _promising(guesses, centre, centre.log_likelihood - empty.log_likelihood)
-        best = try_sets((guess.chosen, guess.start) for guess in near)
-        if best is centre:  # the last word is by fits: could others stand in, and does each have to be there?
-            alone: list[tuple[EffectSet, Mapping[Key, float]]] = [
-                (frozenset({other}), {}) for other in screen.fixed if nothing.mends(other)
-            ]
-            best = try_sets([*alone, *neighbouring_sets(problem, screen, nothing, best)])
-        if best is centre:
-            best = try_sets(_about_alternatives(problem, _ranked(fits, count), count, screened))
-        if best is centre or len(fits) > _MOST:
-            break
-        centre = best
-        screen = Screen(problem, centre)
-    try_sets(swapped_sets(_ranked(fits, count), count))
-    ranked = _ranked(fits, count)
-    weights = np.array([log_posterior(fit, count) for fit in ranked])
-    weights = np.exp(weights - logsumexp(weights))
+    def _with(self, fit: Fit, guess: Guess) -> None:
+        self.fit(fit.candidates | {guess.candidate}, {**fit.start, **guess.start})
 
-    posterior = SetPosterior(ranked, weights)
-    p = {name: posterior.p.get(name, 0.0) for name in sorted({candidate.id for candidate in problem.candidates})}
-    return SearchResult(tuple(ranked), p, confounded(posterior), _false_alarm(nothing), nothing.enough)
+    def _proposals(self, fit: Fit) -> list[Guess]:
+        found = [*scan(self._dictionary, fit), *self._steps(fit)]
+        curves = self.curves.found(fit)
+        if curves and curves[0].nats > 0:
+            more = scan(self._dictionary, fit, self.curves.columns(fit, curves[0]))
+            found += [replace(guess, nats=guess.nats + curves[0].nats) for guess in more]
+        price = log_prior(len(fit.ids) + 1, self.of) - log_prior(len(fit.ids), self.of)
+        first: dict[Candidate, Guess] = {}
+        for guess in sorted(found, key=lambda guess: -guess.nats):
+            first.setdefault(guess.candidate, replace(guess, nats=guess.nats + price))
+        return list(first.values())
+
+    def _steps(self, fit: Fit) -> Iterator[Guess]:
+        """Yield what has many likely sizes, such as a converter's steps, with what the best one promises."""
+        for candidate in self.problem.candidates:
+            if candidate.id not in fit.ids and any(term.rough and not term.fixed for term in candidate.terms):
+                nats = self.problem.start_values.step_evidence(candidate.terms, fit.terms, fit.values)
+                yield Guess(candidate, {}, nats - float(np.log(candidate.ways)) - _STEP_COST)
 
 
-def _ranked(fits: Mapping[EffectSet, Fit], of: int) -> list[Fit]:
-    return sorted(fits.values(), key=lambda fit: -log_posterior(fit, of))
+_STEP_COST = 4.0  # [nat] of a size that may be any of many
 
 
-def _promising(guesses: Sequence[ScreenedSet], about: Fit, explained: float) -> list[ScreenedSet]:
-    """Return the guesses that are worth a refit, of those about a fit; explained: what that explains [nat].
-
-    Lines about two effects tell little of one that does what both do: it has the more to gain by a refit, and without
-    one it would never be known that fewer suffice. None is worth one where by their lines all leave their bounds.
-    """
-    best = max((guess.score for guess in guesses), default=0.0)
-    close = [guess for guess in guesses[:_REFITS] if guess.score > best - CLOSE]
-    far = best - max(CLOSE, _LINE_ERROR * explained)
-    size = len(about.candidates)
-    fewer = [guess for guess in guesses[len(close) :] if len(guess.chosen) < size and guess.score > far]
-    # Parts of the fit's set are tried anyway.
-    return close + [guess for guess in fewer if not guess.chosen < about.candidates][:_FEWER]
+def search(problem: Problem, progress: Callable[[str], None], first: Fit | None = None) -> SearchResult:
+    """Return which effects act, and which curves may; first: a set to begin with."""
+    made = Search(problem, progress)
+    made.run(first)
+    return result(made)
 
 
-def _about_alternatives(
-    problem: Problem, ranked: Sequence[Fit], of: int, screened: set[EffectSet]
-) -> Iterator[tuple[EffectSet, Mapping[Key, float]]]:
-    """Yield what promises more than a likely rival of the best set, seen from there; screened: whence it was seen.
+def result(made: Search) -> SearchResult:
+    """Return the posterior over the sets that were fitted, without and with a curve."""
+    of = made.of
+    fits = sorted(made.fits.values(), key=lambda fit: -log_posterior(fit, of))
+    curves = sorted(
+        (one for fit in fits for one in made.curves.found(fit)), key=lambda one: -(one.nats + log_posterior(one.fit, of))
+    )
+    bare = np.array([log_posterior(fit, of) for fit in fits]) + np.log1p(-UNKNOWN_ODDS)
+    curved = np.array([one.nats + log_posterior(one.fit, of) for one in curves])
+    total = logsumexp(np.concatenate([bare, curved]))
+    weights, others = np.exp(bare - total), np.exp(curved - total)
+    names = sorted({candidate.id for candidate in made.problem.candidates})
+    p = dict.fromkeys(names, 0.0)
+    for fit, weight in [*zip(fits, weights, strict=True), *((c.fit, w) for c, w in zip(curves, others, strict=True))]:
+        for name in fit.ids:
+            p[name] += float(weight)
+    p_curves: dict[str, float] = {}
+    for one, weight in zip(curves, others, strict=True):
+        if one.form_of is not None:
+            continue
+        p_curves[one.curve.id] = p_curves.get(one.curve.id, 0.0) + float(weight)
+    posterior = SetPosterior(fits, np.exp(bare - logsumexp(bare)))
+    enough = len(made.fits[frozenset()].beside.residual) > _ENOUGH * len(made.problem.terms)
+    return SearchResult(tuple(fits), tuple(curves), p, p_curves, confounded(posterior, p), enough)
 
-    Where one effect does what two others do together, the best set may be several exchanges away from the second best.
-    """
-    likely = [fit for fit in ranked[1:] if log_posterior(fit, of) > log_posterior(ranked[0], of) + np.log(RIVAL)]
-    for fit in likely[:_ALTERNATIVES]:
-        if fit.candidates and fit.candidates not in screened:
-            screened.add(fit.candidates)
-            guesses = Screen(problem, fit).guesses()
-            own = next((guess.score for guess in guesses if guess.chosen == fit.candidates), -np.inf)
-            yield from ((guess.chosen, guess.start) for guess in guesses[:_REFITS] if guess.score > own)
 
-
-def _false_alarm(screen: Screen) -> float:
-    """Return how often noise alone, b ~ N(0, G), gives a single effect the evidence that the data give the best one."""
-    loud = [i for i, term in enumerate(screen.terms) if not term.shape]
-    if not loud:
-        return 1.0
-    correlation = screen.correlation[np.ix_(loud, loud)]
-    observed = screen.b[loud] / np.sqrt(np.maximum(np.diag(screen.gram)[loud], 1e-18))
-    roots = np.linalg.cholesky(correlation + 1e-6 * np.eye(len(loud)))
-    draws = np.random.default_rng(0).standard_normal((NULLS, len(loud))) @ roots.T
-    return float(np.mean(np.abs(draws).max(axis=1) >= np.abs(observed).max()))
+_ENOUGH = 3  # residuals per parameter of the catalogue, at least

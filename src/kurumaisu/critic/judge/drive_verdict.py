@@ -60,7 +60,7 @@ def criticise_drives(
     progress("planning the next drive")
     scripts = scripted_drives()
     proposal = propose(made.problem, made.found, scripts)
-    judge = explain.criticism if made.beyond.extension is None else explain_unknown.criticism
+    judge = explain.criticism if made.extension is None else explain_unknown.criticism
     judged = excitation.with_shortcomings(judge(recording, made, held, train + test, proposal), made, train, scripts)
     return judged, _extension(made, forecast_of(made, judged.settings, baseline), train)
 

@@ -10,7 +10,6 @@ import numpy as np
 import scipy
 
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine import uncertain_effects
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
@@ -82,7 +81,7 @@ def criticism(
     held, shares, matters = _materiality(made, gain)
     found = replace(made.found, confounded=_told_sets(made.found, matters))
     fitted = {
-        name: uncertain_effects.widened_intervals(found, name, intervals.estimates(problem, found.best, name))
+        name: intervals.estimates(problem, found.best, name)
         for name in sorted(found.best.ids)
     }
     causes = tuple(_cause(problem, found, name, fitted[name]) for name in found.named if name in matters)

@@ -9,7 +9,6 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.heldout.materiality import HORIZON, MATERIAL
@@ -101,9 +100,6 @@ def details(
     n = problem.noise
     wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
     said.append(f"Noise of the yaw rate turns the heading by about {wander:.0f}° in a minute; no model can predict it.")
-    if found.p:  # else no effect was looked for
-        alarm = f"{100 * found.false_alarm:.1f} %" if found.false_alarm > 0 else f"below {100 / search.NULLS:.2f} %"
-        said.append(f"The chance that noise alone looks this much like an effect is {alarm}.")
     return tuple(said)
 
 

@@ -32,8 +32,8 @@ _LOG_WEIGHTS = np.log(np.concatenate([np.full(8, 0.9 / 8), np.full(4, 0.1 / 4)])
 # What a rate's factor may follow: over the rate itself it would be the sum of a rate and a curve again, and so would
 # how the way bends over the speed.
 _BRAKES = {
-    "v_gain": ("w", "abs_w", "v_times_w", "time", "since_command", "since_reversal", "heading", "distance", "x", "y"),
-    "w_gain": ("v", "abs_v", "v_times_w", "time", "since_command", "since_reversal", "heading", "distance", "x", "y"),
+    "v_gain": ("w", "abs_w", "v_times_w", "time", "since_command", "since_rest", "since_reversal", "heading", "distance", "x", "y"),
+    "w_gain": ("v", "abs_v", "v_times_w", "time", "since_command", "since_rest", "since_reversal", "heading", "distance", "x", "y"),
     "curvature": ("time", "since_reversal", "heading", "x", "y"),
     "speed": ("time", "heading", "x", "y"),
 }
@@ -79,6 +79,7 @@ class Design:
                 self.curves.append(Curve(channel, constant_offset(end), slice(at, at + 1)))
                 at += 1
         self.columns = columns(problem, settings, self.curves)
+        self.grams = [self.columns[:, c.columns].T @ self.columns[:, c.columns] for c in self.curves]
 
 
 def _channels(covariate: str) -> Iterator[str]:
@@ -130,13 +131,13 @@ def own_span(problem: Problem, fit: Fit) -> tuple[FloatArray, FloatArray]:
 
 def curve_evidence(gram: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> CurveEvidence:
     """Return how much a curve explains: b = X'y, gram = X'X of its whitened columns; any of the priors may hold."""
-    return curve_evidences(gram[None], b[None], priors)[0]
+    return curve_evidences(gram[None], b[None], np.stack(priors)[None])[0]
 
 
-def curve_evidences(grams: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> list[CurveEvidence]:
-    """Return how much each of several curves (n, k, k), (n, k) explains."""
-    count = len(priors)
-    scaled, axes, sizes = _axes(np.repeat(grams, count, axis=0), np.tile(np.stack(priors), (len(grams), 1, 1)))
+def curve_evidences(grams: FloatArray, b: FloatArray, priors: FloatArray) -> list[CurveEvidence]:
+    """Return how much each of several curves (n, k, k), (n, k) explains; priors (n, p, k, k), any of which may hold."""
+    count = priors.shape[1]
+    scaled, axes, sizes = _axes(np.repeat(grams, count, axis=0), priors.reshape(-1, *priors.shape[2:]))
     nats = _nats(sizes, (axes.transpose(0, 2, 1) @ np.repeat(b, count, axis=0)[..., None])[..., 0])
     weighed = (nats + _LOG_WEIGHTS).reshape(len(grams), -1)
     best = np.argmax(weighed, axis=1)
