@@ -135,22 +135,22 @@ class Search:
 
     def _expand(self, fit: Fit) -> None:
         best = max(self.score(other) for other in self.fits.values())
-        for guess in self._proposals(fit)[:_ADDED]:
+        for guess in self._proposals(fit, steps=True)[:_ADDED]:
             if self.score(fit) + guess.nats > best - _HOPELESS:
                 self._with(fit, guess)
         for one in sorted(fit.candidates, key=lambda candidate: (candidate.id, len(candidate.terms))):
             rest = self.fit(fit.candidates - {one}, fit.start)
             if rest is None:
                 continue
-            for guess in [g for g in self._proposals(rest) if g.candidate not in fit.candidates][:_SWAPPED]:
+            for guess in [g for g in self._proposals(rest, steps=not rest.ids) if g.candidate not in fit.candidates][:_SWAPPED]:
                 if self.score(rest) + guess.nats > best - _HOPELESS:
                     self._with(rest, guess)
 
     def _with(self, fit: Fit, guess: Guess) -> None:
         self.fit(fit.candidates | {guess.candidate}, {**fit.start, **guess.start})
 
-    def _proposals(self, fit: Fit) -> list[Guess]:
-        found = [*scan(self._dictionary, fit), *self._steps(fit)]
+    def _proposals(self, fit: Fit, *, steps: bool) -> list[Guess]:
+        found = [*scan(self._dictionary, fit), *(self._steps(fit) if steps else ())]
         curves = self.curves.found(fit)
         if curves and curves[0].nats > 0:
             more = scan(self._dictionary, fit, self.curves.columns(fit, curves[0]))

@@ -8,6 +8,7 @@ import numpy as np
 from kurumaisu.critic.sanity.rates import Rates
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.types import BoolArray, FloatArray, IntArray
+from kurumaisu.critic.values.digits import moment
 
 _FROZEN = 2.0  # [s] of standing while far more than usual is asked for
 _BLOCK = 8  # rows that repeat earlier ones exactly, in their order
@@ -36,7 +37,7 @@ def frozen(pose: Series, asked: Rates, driven: Rates) -> str | None:
         return None
     return (
         f"the reference pose stands still, to the last bit, for {total:.3g} s while the input commands motion (longest "
-        f"{worst:.3g} s, from t = {at:.6g} s): frozen; cut these rows out"
+        f"{worst:.3g} s, from t = {moment(at)}): frozen; cut these rows out"
     )
 
 
@@ -96,8 +97,8 @@ def blocks(part: Series, name: str) -> str | None:
     k = int(np.argmax(lengths))
     row, source = int(starts[k]) - 1, int(earlier[starts[k]]) - 1
     return (
-        f"rows of {name} repeat earlier ones exactly: {int(lengths[k]) + 1} rows from t = {part.t[row]:.6g} s on equal "
-        f"those from t = {part.t[source]:.6g} s on; {int(follows.sum())} in total; cut them out"
+        f"rows of {name} repeat earlier ones exactly: {int(lengths[k]) + 1} rows from t = {moment(part.t[row])} on equal "
+        f"those from t = {moment(part.t[source])} on; {int(follows.sum())} in total; cut them out"
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.critic.values.recording import LaserMount, Series
 from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.critic.values.digits import moment
 
 _FEW = 0.01  # share of readings that are valid, below which nothing was measured
 _STUCK = 0.5  # share of scans that equal the one before while the robot moves
@@ -47,7 +48,7 @@ def _stuck(scan: Series, pose: Series | None) -> str | None:
         return None
     first = float(scan.t[:-1][moved & same][0])
     return (
-        f"{same[moved].mean():.0%} of the scans equal the one before while the robot moves (first: t = {first:.6g} s)"
+        f"{same[moved].mean():.0%} of the scans equal the one before while the robot moves (first: t = {moment(first)})"
     )
 
 
