@@ -48,7 +48,7 @@ def criticise(
     Raise Error when a run has no reference, or nothing that drove the robot.
     """
     model = model_of(recording, model_file, assume_law=assume_law)
-    recording = masks.set_aside(recording)
+    recording = masks.set_aside(recording, model)
     whole = replace(recording, runs=tuple(run for run in recording.runs if not withheld(recording, run)))
     wrong = [*recording.invalid, *examination.examine(whole, model).invalid]
     if wrong:

@@ -52,7 +52,7 @@ class MarkerYaw(ReferenceEffect):
     """The marker is turned to the left of base_link."""
 
     id = "base.marker_yaw"
-    parameters = (Parameter("yaw", "rad", null=0.0, scale=0.02, lower=-3.2, upper=3.2),)
+    parameters = (Parameter("yaw", "rad", null=0.0, scale=0.02, lower=-1.0, upper=1.0),)
     sentence = "the heading of the reference is not the chair's: what it tracks is turned"
     formula = "pose ⊕ (0, 0, yaw): v · cos yaw + u · sin yaw, u · cos yaw − v · sin yaw"
     source = "geometry; motion capture and scan matching define headings of their own; 0.5-5°"

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -171,6 +171,16 @@ def prepare_all(run: Run, model: Model, until: float) -> Drive:
 def split(drive: Drive, parts: int) -> list[Drive]:
     """Return the drive cut into parts of equally many increments; each keeps all inputs, so effects keep their past."""
     return _cut(drive, np.linspace(0, len(drive.times) - 1, parts + 1).astype(int))
+
+
+def without_spans(drive: Drive, spans: Sequence[tuple[float, float]]) -> list[Drive]:
+    """Return the drive without the increments that lie within spans of time [s]; each piece keeps all inputs."""
+    if not spans:
+        return [drive]
+    since, until = drive.times[:-1], drive.times[1:]
+    held = np.any([(until > a) & (since < b) for a, b in spans], axis=0)
+    edges = np.concatenate([[-1], np.flatnonzero(held), [len(drive.times) - 1]])
+    return [piece for a, b in pairwise(edges) for piece in _cut(drive, np.array([a + 1, b]))]
 
 
 def pieces(drive: Drive, gap: float) -> list[Drive]:

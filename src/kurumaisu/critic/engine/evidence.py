@@ -128,7 +128,7 @@ class Problem:
         self._terms = terms
         self.ids = ids
         self._known = known or replay.Increments(model)
-        self._whiteners: dict[int, tuple[Drive, Whitener]] = {}
+        self._whiteners: dict[int, tuple[Drive, Whitener, Covariance]] = {}
         self._walked: Walked = {}
 
     def changed(
@@ -202,10 +202,16 @@ class Problem:
         return both[:, 0], both[:, 1:]
 
     def whitened(self, drive: Drive, columns: FloatArray) -> FloatArray:
-        """Return columns (3 m, k) of one of the drives, whitened."""
+        """Return columns (3 m, k) of one of the drives, whitened.
+
+        The reference's heading may be off by as much as it errs at any time throughout a drive: that is noise, too.
+        """
         if id(drive) not in self._whiteners:
-            self._whiteners[id(drive)] = drive, whitener(drive, self.noise)
-        return self._whiteners[id(drive)][1].whiten(columns)
+            white = whitener(drive, self.noise)
+            turned = self.noise.heading_sd * self.noise.louder * _turned(drive)
+            self._whiteners[id(drive)] = drive, white, Covariance(white.whiten(turned))
+        _, white, lasting = self._whiteners[id(drive)]
+        return lasting.whiten(white.whiten(columns))
 
     def fit(self, ids: Iterable[str], start: Mapping[Key, float]) -> Fit:
         """Return the nonlinear fit of a set of effects with all their parameters; start: a first guess by term."""
@@ -339,6 +345,12 @@ class Problem:
     def _whitened(self, drive: Drive, settings: tuple[EffectSetting, ...]) -> FloatArray:
         residual = drive.measured - self.simulated(drive, settings)
         return self.whitened(drive, residual.reshape(-1, 1))[:, 0]
+
+
+def _turned(drive: Drive) -> FloatArray:
+    """Return what a turn of all headings by 1 rad changes of the measured increments, (3 m, 1)."""
+    dx, dy, _ = drive.measured.T
+    return np.stack([dy, -dx, np.zeros_like(dx)], axis=1).reshape(-1, 1)
 
 
 def _together(rows: int, blocks: Sequence[Covariance]) -> Covariance:

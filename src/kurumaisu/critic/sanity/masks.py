@@ -3,28 +3,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from kurumaisu.critic.sanity.contacts import TOPIC, contacts
 from kurumaisu.critic.sanity.pose_jumps import jumps
 from kurumaisu.critic.values.digits import moment, quantities
 from kurumaisu.critic.values.recording import Recording, Run, Series
-from kurumaisu.types import BoolArray
+from kurumaisu.params import Model
+from kurumaisu.types import BoolArray, FloatArray
 
 _BACK = 5.0  # [s] within which a reference that was elsewhere is back
 _SAME = 0.5  # share of a jump that is left when it is back
 _MOST = 0.05  # share of a run's rows that may be set aside
 
 
-def set_aside(recording: Recording) -> Recording:
-    """Return a recording without the rows of its references that are off for a moment, with what was left out."""
+def set_aside(recording: Recording, model: Model) -> Recording:
+    """Return a recording without what tells nothing of the chair, with notes of that.
+
+    That are rows of its references that are off for a moment, and times in which the chair was held.
+    """
     runs, notes = [], []
     for run in recording.runs:
         kept, words = _masked(run)
-        runs.append(kept)
-        notes += words
+        held = contacts(kept, model)
+        others = {name: series for name, series in kept.covariates.items() if name != TOPIC}
+        runs.append(replace(kept, contacts=held, covariates=others))
+        notes += [*words, *([_held(kept, held)] if held else [])]
     return replace(recording, runs=tuple(runs), problems=(*recording.problems, *notes))
+
+
+def _held(run: Run, spans: Sequence[tuple[float, float]]) -> str:
+    """Return in words when and where a chair was held."""
+    (first, end), *more = spans
+    place = ""
+    if run.pose is not None and len(run.pose.t):
+        x, y = (float(np.interp(first, run.pose.t, run.pose.values[:, i])) for i in range(2))
+        place = f", at x {x:.2f}, y {y:.2f} m"
+    others = f", and {len(more)} times more" if more else ""
+    seconds = sum(b - a for a, b in spans)
+    return (
+        f"{run.name}: the chair is held from t = {moment(first)} to {moment(end)}{place}{others}: a contact? "
+        f"{seconds:.1f} s set aside"
+    )
 
 
 def _masked(run: Run) -> tuple[Run, list[str]]:
@@ -59,7 +82,7 @@ def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, flo
     return sorted(found)
 
 
-def _is_back(out: np.ndarray, back: np.ndarray) -> bool:
+def _is_back(out: FloatArray, back: FloatArray) -> bool:
     return bool(np.hypot(*(out + back)) < _SAME * np.hypot(*out))
 
 
@@ -73,5 +96,5 @@ def _told(name: str, pose: Series, spans: list[tuple[int, int, float]], off: Boo
     more = f", and {len(spans) - 1} more" if len(spans) > 1 else ""
     return (
         f"{name}: the reference is {quantities([far], 'm')[0]} off at {where}{more}: "
-        f"{int(off.sum())} of its {len(off)} rows set aside ({off.mean():.1%})"
+        f"{int(off.sum())} of its {len(off)} rows set aside ({100 * off.mean():.2g} %)"
     )
