@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,7 @@ from kurumaisu.types import FloatArray
 _DRAWN = 0.8  # share of a signal's square that a curve can draw, from which it is one
 _HINTS = 3  # curves in whose place others are tried: most of a jump shows in a curve that cannot jump
 _BENDING = _JUMPING = 0.2  # share of what is outside the catalogue that bends more often, or jumps
+_ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
 _NO_LEVEL = 0.05  # share of a signal's square beyond a level, below which it is one
 _SAME = 0.1  # share of the rates by which they may differ and be nearly the same
 _WORTH = -2.0  # [nat] below which a curve is not kept
@@ -104,10 +105,10 @@ class CurveSearch:
         totals, best = self._evidences(design, beside, pull, shares)
         found = []
         for curve, nats, evidence in zip(design.curves, totals, best, strict=True):
-            nats += share - float(np.log(curve.basis.ways))
-            if nats > _WORTH:
-                found.append(SetWithCurve(fit, curve, evidence, nats, self._form_of(fit, curve)))
-        return found
+            found.append(SetWithCurve(fit, curve, evidence, nats + share - float(np.log(curve.basis.ways))))
+        found.sort(key=lambda one: -one.nats)
+        kept = found[: max(_HINTS, sum(one.nats > _WORTH for one in found))]
+        return [replace(one, form_of=self._form_of(fit, one.curve)) for one in kept]
 
     def _form_of(self, fit: Fit, curve: Curve) -> str | None:
         """Return the one effect of a set that is a curve over what a curve follows, if there is one.
@@ -122,6 +123,24 @@ class CurveSearch:
         shares = {name: max(_share(span, level, part) for part in self._signals(fit, name).T) for name in fit.ids}
         best = max(shares, key=lambda name: shares[name])
         return best if shares[best] >= _DRAWN else None
+
+    def as_form(self, one: SetWithCurve, more: Sequence[Fit]) -> SetWithCurve:
+        """Return a set with a curve, told as another form of an effect that the curve draws, if there is one.
+
+        more: fits with one effect more than the set has.
+        """
+        if one.form_of is not None:
+            return one
+        beside = one.fit.beside
+        free, prior = without(beside.own, self._columns(one.curve)), one.evidence.prior
+        drawn = free @ np.linalg.solve(np.eye(len(prior)) + prior @ (free.T @ free), prior @ (free.T @ beside.residual))
+        found = {}
+        for fit in more:
+            (name,) = fit.ids - one.fit.ids
+            signal = without(beside.own, self._signals(fit, name).sum(axis=1))
+            found[name] = float(drawn @ signal) / max(float(np.linalg.norm(drawn) * np.linalg.norm(signal)), 1e-12)
+        best = max(found, key=lambda name: found[name], default=None)
+        return replace(one, form_of=best) if best is not None and found[best] >= _ALIKE else one
 
     def _signals(self, fit: Fit, name: str) -> FloatArray:
         """Return what an effect of a fit does to the way, and to the turns, whitened, (rows, 2)."""

@@ -21,6 +21,8 @@ EffectSet = frozenset[Candidate]
 _WIDTH = 3  # sets that are gone on from in a round
 _NEAR = 8.0  # [nat] behind the best set within which one is gone on from
 _ADDED = 7  # proposals beside a set
+_BESIDE_CURVE = 2  # of these, what is proposed beside the best curve
+_SURELY = 4  # of those, tried however little they promise: what an equation misses is not in the promise
 _SWAPPED = 4  # and in the place of each of its effects
 _ASKED = 20.0  # [nat] behind the best set from which on no curve is asked for beside one
 _HOPELESS = 10.0  # [nat] that a proposal may promise less than the best set has
@@ -134,30 +136,36 @@ class Search:
                 self._expand(fit)
 
     def _expand(self, fit: Fit) -> None:
-        best = max(self.score(other) for other in self.fits.values())
-        for guess in self._proposals(fit, steps=True)[:_ADDED]:
-            if self.score(fit) + guess.nats > best - _HOPELESS:
+        best = max(self.bare(other) for other in self.fits.values())
+        for k, guess in enumerate(self._proposals(fit, steps=True)[:_ADDED]):
+            if (k < _SURELY and guess.nats > 0) or self.bare(fit) + guess.nats > best - _HOPELESS:
                 self._with(fit, guess)
         for one in sorted(fit.candidates, key=lambda candidate: (candidate.id, len(candidate.terms))):
             rest = self.fit(fit.candidates - {one}, fit.start)
             if rest is None:
                 continue
-            for guess in [g for g in self._proposals(rest, steps=not rest.ids) if g.candidate not in fit.candidates][:_SWAPPED]:
-                if self.score(rest) + guess.nats > best - _HOPELESS:
+            others = [g for g in self._proposals(rest, steps=not rest.ids) if g.candidate not in fit.candidates]
+            for guess in others[:_SWAPPED]:
+                if self.bare(rest) + guess.nats > best - _HOPELESS:
                     self._with(rest, guess)
 
     def _with(self, fit: Fit, guess: Guess) -> None:
         self.fit(fit.candidates | {guess.candidate}, {**fit.start, **guess.start})
 
     def _proposals(self, fit: Fit, *, steps: bool) -> list[Guess]:
-        found = [*scan(self._dictionary, fit), *(self._steps(fit) if steps else ())]
+        """Return what may act beside a fit, best first; what may act beside its best curve besides, comes behind."""
+        plain = self._priced(fit, [*scan(self._dictionary, fit), *(self._steps(fit) if steps else ())])
         curves = self.curves.found(fit)
-        if curves and curves[0].nats > 0:
-            more = scan(self._dictionary, fit, self.curves.columns(fit, curves[0]))
-            found += [replace(guess, nats=guess.nats + curves[0].nats) for guess in more]
+        if not curves or curves[0].nats <= 0:
+            return plain
+        beside = self._priced(fit, scan(self._dictionary, fit, self.curves.columns(fit, curves[0])))
+        return [*plain[: _ADDED - _BESIDE_CURVE], *beside[:_BESIDE_CURVE], *plain[_ADDED - _BESIDE_CURVE :]]
+
+    def _priced(self, fit: Fit, guesses: Sequence[Guess]) -> list[Guess]:
+        """Return the best guess for each candidate, best first, with the prior of one more effect."""
         price = log_prior(len(fit.ids) + 1, self.of) - log_prior(len(fit.ids), self.of)
         first: dict[Candidate, Guess] = {}
-        for guess in sorted(found, key=lambda guess: -guess.nats):
+        for guess in sorted(guesses, key=lambda guess: -guess.nats):
             first.setdefault(guess.candidate, replace(guess, nats=guess.nats + price))
         return list(first.values())
 
@@ -188,6 +196,9 @@ def result(made: Search) -> SearchResult:
     )
     bare = np.array([log_posterior(fit, of) for fit in fits]) + np.log1p(-UNKNOWN_ODDS)
     curved = np.array([one.nats + log_posterior(one.fit, of) for one in curves])
+    ceiling = max([bare.max(), *curved])
+    likely = curved > ceiling + np.log(_SAID)
+    curves = [_as_form(made, one) if said else one for one, said in zip(curves, likely, strict=True)]
     total = logsumexp(np.concatenate([bare, curved]))
     weights, others = np.exp(bare - total), np.exp(curved - total)
     names = sorted({candidate.id for candidate in made.problem.candidates})
@@ -195,6 +206,9 @@ def result(made: Search) -> SearchResult:
     for fit, weight in [*zip(fits, weights, strict=True), *((c.fit, w) for c, w in zip(curves, others, strict=True))]:
         for name in fit.ids:
             p[name] += float(weight)
+    for one, weight in zip(curves, others, strict=True):
+        if one.form_of is not None and one.form_of not in one.fit.ids:
+            p[one.form_of] += float(weight)
     p_curves: dict[str, float] = {}
     for one, weight in zip(curves, others, strict=True):
         if one.form_of is not None:
@@ -205,4 +219,10 @@ def result(made: Search) -> SearchResult:
     return SearchResult(tuple(fits), tuple(curves), p, p_curves, confounded(posterior, p), enough)
 
 
+def _as_form(made: Search, one: SetWithCurve) -> SetWithCurve:
+    own = one.fit.candidates
+    return made.curves.as_form(one, [fit for chosen, fit in made.fits.items() if own < chosen and len(chosen - own) == 1])
+
+
+_SAID = 1e-3  # posterior from which it is asked what a curve draws
 _ENOUGH = 3  # residuals per parameter of the catalogue, at least

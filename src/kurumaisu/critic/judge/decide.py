@@ -11,7 +11,7 @@ import numpy as np
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine import search
-from kurumaisu.critic.engine.curve_search import SetWithCurve
+from kurumaisu.critic.engine.curve_search import CurveSearch, SetWithCurve
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.noise import base_noise
@@ -24,6 +24,8 @@ from kurumaisu.critic.values.progress import Progress
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
+_HINT = -3.0  # [nat] from which all is judged with the noise about a curve, too
+_LEAST = 3.0  # [nat] by which that must be likelier
 _ANEW = 2  # times that all is judged anew, because other effects act than those about which the noise was taken
 Truth = tuple[float, float] | None
 
@@ -68,25 +70,60 @@ class Decision:
 
 
 def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
-    """Return what acts in drives of which only a first noise is known."""
+    """Return what acts in drives of which only a first noise is known.
+
+    Noise that was estimated without a curve has taken it up. So where one may act, all is judged with the noise about
+    it, too, and the likelier one holds, each heard with its own noise.
+    """
     found = search.search(first, progress)
+    made = _settled(first, found, likelier_curve(found), truth, progress)
+    hint = _hinted_curve(first, found) if made.extension is None and found.enough else None
+    if hint is not None:
+        other = _settled(first, found, hint, truth, progress)
+        if other.extension is not None and _log_density(other) > _log_density(made) + _LEAST:
+            return other
+    return made
+
+
+def _settled(
+    first: Problem, found: search.SearchResult, curve: SetWithCurve | None, truth: Truth, progress: Progress
+) -> Decision:
+    """Return what acts in the noise about what was found, a curve among it or not; anew where other effects act then."""
     for _ in range(_ANEW):
-        curve = likelier_curve(found)
         extension = None if curve is None else fitted_curve(first, curve)
+        about = found.best if curve is None else curve.fit
         progress("estimating the noise again, with the effects found")
-        left = noise_residuals(first, found.best, truth, project=True, beside=extension)
+        left = noise_residuals(first, about, truth, project=True, beside=extension)
         final = left.estimate(first.noise)
         growth = left.growth(final, odds(len(found.p)))
         problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
-        before = found
-        found = search.search(problem, progress, found.best)
-        after = likelier_curve(found)
-        same = found.best.ids == before.best.ids and (after is None) == (curve is None)
-        if same:
+        before, had = found, curve
+        found = search.search(problem, progress, about)
+        curve = likelier_curve(found)
+        if found.best.ids == before.best.ids and (curve is None) == (had is None):
             break
-        first = first.changed(noise=problem.noise)
-    curve = likelier_curve(found)
     return Decision(problem, found, growth, None if curve is None else fitted_curve(problem, curve))
+
+
+def _hinted_curve(problem: Problem, found: search.SearchResult) -> SetWithCurve | None:
+    """Return the best curve beside nothing or what was found, if it may well act were nothing slow in the noise."""
+    noise = problem.noise
+    easy = problem.changed(noise=replace(noise, slow_v=0.0, slow_lateral=0.0, slow_w=0.0, lasting=0.0))
+    curves = CurveSearch(easy)
+    sets = {frozenset(): found.empty, found.best.candidates: found.best}
+    fits = [easy.fit_candidates(chosen, fit.start if chosen else {}) for chosen, fit in sets.items()]
+    tried = [one for fit in fits for one in curves.beside(fit)[:1] if one.form_of is None]
+    best = max(tried, key=lambda one: one.nats, default=None)
+    return best if best is not None and best.nats > _HINT else None
+
+
+def _log_density(made: Decision) -> float:
+    """Return the log posterior density of what acts, with its noise, up to a constant."""
+    volume = sum(
+        float(base_noise.whitener(drive, made.problem.noise).log_determinants.sum()) for drive in made.problem.drives
+    )
+    curve = likelier_curve(made.found)
+    return made.found.log_posterior(made.found.best if curve is None else curve) - 0.5 * volume
 
 
 def likelier_curve(found: search.SearchResult) -> SetWithCurve | None:
