@@ -6,12 +6,8 @@ import unknown_effects as hidden
 import yaml
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.base.covariates import with_covariates
-from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.search import SearchResult
+from kurumaisu.critic.engine.curve_search import CurveSearch
 from kurumaisu.critic.unknown import sentences
-from kurumaisu.critic.unknown.comparison import compare
 from kurumaisu.critic.unknown.joint_fit import fit_with_curve
 from kurumaisu.params import load_model, shipped
 
@@ -20,10 +16,8 @@ from kurumaisu.params import load_model, shipped
 def test_what_follows_nothing_is_no_curve_over_something(channel, name):
     drift = hidden.Kind(channel, "moving", lambda s, a, b: 1.0)
     case = hidden.make(drift, 12.0, 1007, seconds=40.0, runs=2)
-    problem = Problem(
-        [with_covariates(prepare(r, hidden.MODEL), r) for r in case.recording.runs], hidden.MODEL, hidden.USUAL
-    )
-    best = compare(problem, SearchResult((problem.fit_candidates((), {}),), {}, (), 1.0)).rivals[0]
+    problem = hidden.problem_of(case.recording)
+    best = CurveSearch(problem).beside(problem.fit_candidates((), {}))[0]
     assert best.curve.id == f"smooth.{name}.moving"
     extension = fit_with_curve(problem, best.fit, best.curve, best.evidence.prior)
     assert extension.coefficients[0] == pytest.approx(case.size, rel=0.25)
