@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.types import BoolArray, FloatArray, IntArray
-from kurumaisu.critic.values.digits import moment
 
 # More than this share of rows out of order, contradictory or not numbers is no hiccup [1].
 HICCUP_SHARE = 0.05

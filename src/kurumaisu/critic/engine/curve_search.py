@@ -76,7 +76,10 @@ class CurveSearch:
         hints = [one.curve for one in self.beside(fit)[:_HINTS]]
         gains = [curve for curve in gains_over_own_rate(self._design.curves) if curve not in hints]
         share = float(np.log(UNKNOWN_ODDS / max(len(self._design.curves), 1)))
-        kinds = ((_BENDING, fine_curves(self._problem, fit, hints)), (_JUMPING, step_curves(self._problem, fit, [*hints, *gains])))
+        kinds = (
+            (_BENDING, fine_curves(self._problem, fit, hints)),
+            (_JUMPING, step_curves(self._problem, fit, [*hints, *gains])),
+        )
         more = [
             SetWithCurve(fit, curve, evidence, evidence.nats + share + float(np.log(odds)), self._form_of(fit, curve))
             for odds, found in kinds

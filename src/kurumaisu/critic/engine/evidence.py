@@ -350,7 +350,7 @@ class Problem:
 def _turned(drive: Drive) -> FloatArray:
     """Return what a turn of all headings by 1 rad changes of the measured increments, (3 m, 1)."""
     dx, dy, _ = drive.measured.T
-    return np.stack([dy, -dx, np.zeros_like(dx)], axis=1).reshape(-1, 1)
+    return np.asarray(np.stack([dy, -dx, np.zeros_like(dx)], axis=1).reshape(-1, 1))
 
 
 def _together(rows: int, blocks: Sequence[Covariance]) -> Covariance:

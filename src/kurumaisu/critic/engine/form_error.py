@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the equation of a cause may miss, as a part of the noise: no real lag has one pole, no real limit a sharp corner.
+"""What the equation of a cause may miss, as a part of the noise: no real lag has one pole.
 
-A cause that acts adds a Gaussian process to the covariance: its signal times smooth functions of the rates, their changes,
-the time, the time since a command and the heading, and what the same cause would do with other sizes, as a soft corner or
-a second pole does. What its own sizes can do is left out of it, so that it moves no size.
+A cause that acts adds a Gaussian process to the covariance: its signal times smooth functions of the rates, their
+changes, the time, the time since a command and the heading, and what the same cause would do with other sizes, as a
+soft corner or a second pole does. What its own sizes can do is left out of it, so that it moves no size.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from kurumaisu import effects
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.catalogue import Term, settings_of
 from kurumaisu.critic.engine.covariance import without
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.types import FloatArray
 
 if TYPE_CHECKING:
@@ -30,9 +31,7 @@ _LONG = 3.0  # [s] after a change from which on it is long ago
 _BENT = 0.05  # share of a column that must be left of it where sizes have taken theirs, else it is no other form
 
 
-def form_errors(
-    problem: Problem, terms: Sequence[Term], values: FloatArray, own: FloatArray
-) -> dict[str, FloatArray]:
+def form_errors(problem: Problem, terms: Sequence[Term], values: FloatArray, own: FloatArray) -> dict[str, FloatArray]:
     """Return what each cause with these values may miss, whitened, (rows, k): with a share of 1 of its signal's norm.
 
     own (rows, n): an orthonormal basis of what the causes' sizes do.
@@ -78,7 +77,7 @@ def _marks(problem: Problem, drive: Drive, terms: Sequence[Term], values: FloatA
     return problem.whitened(drive, np.concatenate(whole, axis=1))
 
 
-def _other_sizes(terms: Sequence[Term], values: FloatArray, name: str) -> Iterator[tuple]:
+def _other_sizes(terms: Sequence[Term], values: FloatArray, name: str) -> Iterator[Settings]:
     for i, term in enumerate(terms):
         for share in _SIZES if term.id == name and not term.fixed else ():
             value = term.null + share * (values[i] - term.null)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.engine.catalogue import Candidate, Key, Term, settings_of
+from kurumaisu.critic.engine.catalogue import Candidate, Key, Term
 from kurumaisu.critic.engine.covariance import Covariance
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.values.prior import occam
@@ -24,7 +24,7 @@ _NOTHING = 1e-3  # whitened norm of a signal that is none
 
 @dataclass(frozen=True)
 class Signals:
-    """What a candidate does: values (n, terms) and whitened signals (rows, n); of: which amplitude each of them moves."""
+    """What a candidate does: values (n, terms), whitened signals (rows, n); of (n,): which amplitude each moves."""
 
     candidate: Candidate
     values: FloatArray
@@ -106,21 +106,21 @@ class Dictionary:
 
 
 def scan(dictionary: Dictionary, fit: Fit, also: FloatArray | None = None) -> list[Guess]:
-    """Return what each candidate would explain beside a fit, best first; also: columns (rows, k) of a curve beside it."""
+    """Return what each candidate would explain beside a fit, best first; also (rows, k): of a curve beside it."""
     beside = fit.beside
     missed = beside.covariance
     if also is not None:
         missed = Covariance(np.column_stack([missed.columns, also]))
     inverse = beside.residual - missed.directions @ (missed.lost * (missed.directions.T @ beside.residual))
     taken = fit.ids
-    guesses = []
+    guesses: list[Guess] = []
     for signals in dictionary.signals:
         if signals.candidate.id in taken:
             continue
         columns = signals.columns
         pull = columns.T @ inverse
         own = beside.own.T @ columns
-        lost = missed.directions.T @ (columns - beside.own @ own) if len(missed.variances) else np.zeros((0, columns.shape[1]))
+        lost = missed.directions.T @ columns
         square = np.sum(columns**2, axis=0) - np.sum(own**2, axis=0) - missed.lost @ lost**2
         pull = pull - own.T @ (beside.own.T @ inverse)
         whole = np.sum(columns**2, axis=0)

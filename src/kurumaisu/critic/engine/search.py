@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which effects act: single effects propose, the joint evidence of sets decides."""
+"""Which effects act: single effects propose, the joint evidence of sets decides.
+
+Wang, Sarkar, Carbonetto and Stephens 2020 (J. R. Stat. Soc. B 82, 1273) sum single effects. Here they only propose, for
+what two causes do together is no sum: the sets that they propose are fitted by simulation.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from kurumaisu.critic.engine.catalogue import Candidate, Key
-from kurumaisu.critic.engine.confounding import SetPosterior, confounded
-from kurumaisu.critic.engine.curve_search import CurveSearch, SetWithCurve, nearly_same_rates
+from kurumaisu.critic.engine.curve_search import CurveSearch, nearly_same_rates
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
+from kurumaisu.critic.engine.posterior import SearchResult, posterior
 from kurumaisu.critic.engine.scan import Dictionary, Guess, scan
-from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.prior import UNKNOWN_ODDS, log_prior
 
 EffectSet = frozenset[Candidate]
@@ -29,51 +31,17 @@ _HOPELESS = 10.0  # [nat] that a proposal may promise less than the best set has
 _ROUNDS = 8
 _CLOSER = 4  # sets beside which curves of other kinds are tried
 _LARGEST = 6  # effects in a set
+_STEP_COST = 4.0  # [nat] of a size that may be any of many
 
 
-@dataclass(frozen=True)
-class SearchResult:
-    """Result of a search.
-
-    fits: all sets that were fitted, best first; curves: those with a curve beside them, likewise; p: posterior per
-    effect, and per curve by its id; confounded: sets of effects of which one acts, but the data do not say which;
-    enough: there are more data than could be fitted by the catalogue as a whole.
-    """
-
-    fits: tuple[Fit, ...]
-    curves: tuple[SetWithCurve, ...]
-    p: dict[str, float]
-    p_curves: dict[str, float]
-    confounded: tuple[tuple[str, ...], ...]
-    enough: bool = True
-
-    @property
-    def best(self) -> Fit:
-        """Return the most probable set without a curve."""
-        return self.fits[0]
-
-    @property
-    def empty(self) -> Fit:
-        """Return the fit of nothing."""
-        return next(fit for fit in self.fits if not fit.candidates)
-
-    def nats(self, fit: Fit) -> float:
-        """Return the evidence [nat] of a set over nothing, none where data are too few to believe in it."""
-        return fit.score - self.empty.score if self.enough else 0.0
-
-    def log_posterior(self, one: Fit | SetWithCurve) -> float:
-        """Return the log posterior [nat] of a set, without or with a curve, not normalised."""
-        if isinstance(one, SetWithCurve):
-            return log_posterior(one.fit, len(self.p)) + one.nats
-        return log_posterior(one, len(self.p)) + float(np.log1p(-UNKNOWN_ODDS))
-
-    @property
-    def named(self) -> tuple[str, ...]:
-        """Return the effects of the best set that are certain enough to be named."""
-        return tuple(name for name in sorted(self.best.ids) if self.p[name] >= NAMED)
+def search(problem: Problem, progress: Callable[[str], None], first: Fit | None = None) -> SearchResult:
+    """Return which effects act, and which curves may; first: a set to begin with."""
+    made = _Search(problem, progress)
+    made.run(first)
+    return posterior(problem, made.fits, made.curves)
 
 
-class Search:
+class _Search:
     """The sets that were fitted, and what they propose."""
 
     def __init__(self, problem: Problem, progress: Callable[[str], None]) -> None:
@@ -128,7 +96,9 @@ class Search:
         for _ in range(_ROUNDS):
             ranked = sorted(self.fits.values(), key=self.score, reverse=True)
             best = self.score(ranked[0])
-            ahead = [fit for fit in ranked[:_WIDTH] if fit.candidates not in self._done and self.score(fit) > best - _NEAR]
+            ahead = [
+                fit for fit in ranked[:_WIDTH] if fit.candidates not in self._done and self.score(fit) > best - _NEAR
+            ]
             if not ahead:
                 break
             for fit in ahead:
@@ -175,54 +145,3 @@ class Search:
             if candidate.id not in fit.ids and any(term.rough and not term.fixed for term in candidate.terms):
                 nats = self.problem.start_values.step_evidence(candidate.terms, fit.terms, fit.values)
                 yield Guess(candidate, {}, nats - float(np.log(candidate.ways)) - _STEP_COST)
-
-
-_STEP_COST = 4.0  # [nat] of a size that may be any of many
-
-
-def search(problem: Problem, progress: Callable[[str], None], first: Fit | None = None) -> SearchResult:
-    """Return which effects act, and which curves may; first: a set to begin with."""
-    made = Search(problem, progress)
-    made.run(first)
-    return result(made)
-
-
-def result(made: Search) -> SearchResult:
-    """Return the posterior over the sets that were fitted, without and with a curve."""
-    of = made.of
-    fits = sorted(made.fits.values(), key=lambda fit: -log_posterior(fit, of))
-    curves = sorted(
-        (one for fit in fits for one in made.curves.found(fit)), key=lambda one: -(one.nats + log_posterior(one.fit, of))
-    )
-    bare = np.array([log_posterior(fit, of) for fit in fits]) + np.log1p(-UNKNOWN_ODDS)
-    curved = np.array([one.nats + log_posterior(one.fit, of) for one in curves])
-    ceiling = max([bare.max(), *curved])
-    likely = curved > ceiling + np.log(_SAID)
-    curves = [_as_form(made, one) if said else one for one, said in zip(curves, likely, strict=True)]
-    total = logsumexp(np.concatenate([bare, curved]))
-    weights, others = np.exp(bare - total), np.exp(curved - total)
-    names = sorted({candidate.id for candidate in made.problem.candidates})
-    p = dict.fromkeys(names, 0.0)
-    for fit, weight in [*zip(fits, weights, strict=True), *((c.fit, w) for c, w in zip(curves, others, strict=True))]:
-        for name in fit.ids:
-            p[name] += float(weight)
-    for one, weight in zip(curves, others, strict=True):
-        if one.form_of is not None and one.form_of not in one.fit.ids:
-            p[one.form_of] += float(weight)
-    p_curves: dict[str, float] = {}
-    for one, weight in zip(curves, others, strict=True):
-        if one.form_of is not None:
-            continue
-        p_curves[one.curve.id] = p_curves.get(one.curve.id, 0.0) + float(weight)
-    posterior = SetPosterior(fits, np.exp(bare - logsumexp(bare)))
-    enough = len(made.fits[frozenset()].beside.residual) > _ENOUGH * len(made.problem.terms)
-    return SearchResult(tuple(fits), tuple(curves), p, p_curves, confounded(posterior, p), enough)
-
-
-def _as_form(made: Search, one: SetWithCurve) -> SetWithCurve:
-    own = one.fit.candidates
-    return made.curves.as_form(one, [fit for chosen, fit in made.fits.items() if own < chosen and len(chosen - own) == 1])
-
-
-_SAID = 1e-3  # posterior from which it is asked what a curve draws
-_ENOUGH = 3  # residuals per parameter of the catalogue, at least

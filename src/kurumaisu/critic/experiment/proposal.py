@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
-from kurumaisu.critic.engine.search import SearchResult
+from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.experiment import design
 from kurumaisu.critic.experiment.design import Explanation
 from kurumaisu.critic.values.digits import odds

@@ -8,20 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.curve_search import CurveSearch, SetWithCurve
 from kurumaisu.critic.engine.evidence import Fit, Problem
+from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.noise import base_noise
 from kurumaisu.critic.predict import parameter_doubt
 from kurumaisu.critic.unknown import joint_fit
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve
-from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.prior import odds
 from kurumaisu.critic.values.progress import Progress
-from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 _HINT = -3.0  # [nat] from which all is judged with the noise about a curve, too
@@ -39,7 +37,7 @@ class Decision:
     """
 
     problem: Problem
-    found: search.SearchResult
+    found: SearchResult
     growth: base_noise.NoiseGrowth
     extension: FitWithCurve | None = None
     untested: bool = False
@@ -86,9 +84,9 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
 
 
 def _settled(
-    first: Problem, found: search.SearchResult, curve: SetWithCurve | None, truth: Truth, progress: Progress
+    first: Problem, found: SearchResult, curve: SetWithCurve | None, truth: Truth, progress: Progress
 ) -> Decision:
-    """Return what acts in the noise about what was found, a curve among it or not; anew where other effects act then."""
+    """Return what acts in the noise about what was found, a curve among it or not; anew where others act then."""
     for _ in range(_ANEW):
         extension = None if curve is None else fitted_curve(first, curve)
         about = found.best if curve is None else curve.fit
@@ -105,7 +103,7 @@ def _settled(
     return Decision(problem, found, growth, None if curve is None else fitted_curve(problem, curve))
 
 
-def _hinted_curve(problem: Problem, found: search.SearchResult) -> SetWithCurve | None:
+def _hinted_curve(problem: Problem, found: SearchResult) -> SetWithCurve | None:
     """Return the best curve beside nothing or what was found, if it may well act were nothing slow in the noise."""
     noise = problem.noise
     easy = problem.changed(noise=replace(noise, slow_v=0.0, slow_lateral=0.0, slow_w=0.0, lasting=0.0))
@@ -126,7 +124,7 @@ def _log_density(made: Decision) -> float:
     return made.found.log_posterior(made.found.best if curve is None else curve) - 0.5 * volume
 
 
-def likelier_curve(found: search.SearchResult) -> SetWithCurve | None:
+def likelier_curve(found: SearchResult) -> SetWithCurve | None:
     """Return the best set with a curve, where that is likelier than all without one."""
     curves = [curve for curve in found.curves if curve.form_of is None]
     if not curves or not found.enough:
@@ -141,20 +139,9 @@ def fitted_curve(problem: Problem, curve: SetWithCurve) -> FitWithCurve:
 
 
 def noise_residuals(
-    problem: Problem,
-    fit: Fit,
-    truth: Truth,
-    *,
-    project: bool,
-    beside: FitWithCurve | None = None,
-    forms: bool = False,
+    problem: Problem, fit: Fit, truth: Truth, *, project: bool, beside: FitWithCurve | None = None
 ) -> base_noise.NoiseResiduals:
-    """Return what is left about a fit, or an extension, with all that may act projected out or nothing.
-
-    forms: with what the causes of the fit would do in other forms projected out, too, and the chair at rest where they
-    have it rest: a law that swallows small commands must not pass for noise that grows with them. Likewise with what
-    the curve would do if it had more knots.
-    """
+    """Return what is left about a fit, or an extension, with all that may act projected out or nothing."""
     settings = fit.settings if beside is None else beside.settings
     residuals = [drive.measured - problem.simulated(drive, settings) for drive in problem.drives]
 
@@ -162,16 +149,8 @@ def noise_residuals(
         if not project or not problem.terms:
             return np.empty((rows, 0))
         if beside is None:
-            own = problem.simulated_columns(drive, fit)
-            return own
-        return joint_fit.simulated_columns(problem, drive, beside, finer=forms)
+            return problem.simulated_columns(drive, fit)
+        return joint_fit.simulated_columns(problem, drive, beside)
 
     projected = [columns(drive, left.size) for drive, left in zip(problem.drives, residuals, strict=True)]
-    drives = [_resting(drive, problem.model, settings) for drive in problem.drives] if forms else problem.drives
-    return base_noise.NoiseResiduals(drives, residuals, projected, truth)
-
-
-def _resting(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> Drive:
-    """Return a drive that knows where the simulated chair rests although it is asked to move."""
-    motion = replay.motion(drive, model, settings)
-    return replace(drive, still=~motion.moving)
+    return base_noise.NoiseResiduals(problem.drives, residuals, projected, truth)

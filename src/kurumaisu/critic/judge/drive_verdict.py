@@ -125,6 +125,8 @@ def _begun(
     recording: Recording, model: Model, drives: Mapping[str, Sequence[Drive]], ids: frozenset[str] | None
 ) -> tuple[Problem, Problem]:
     """Return the problem of the drives to fit, with any noise and with a first estimate of theirs."""
-    rough = Problem([drive for name in recording.train for drive in drives.get(name, [])], model, base_noise.START, ids=ids)
+    rough = Problem(
+        [drive for name in recording.train for drive in drives.get(name, [])], model, base_noise.START, ids=ids
+    )
     left = noise_residuals(rough, rough.fit((), {}), recording.truth, project=True)
     return rough, rough.changed(noise=left.estimate().noise)

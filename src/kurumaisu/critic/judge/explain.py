@@ -11,7 +11,7 @@ import scipy
 
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.search import SearchResult
+from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.drive_gain import INCREMENT_CHANNELS
 from kurumaisu.critic.heldout.materiality import (
@@ -80,10 +80,7 @@ def criticism(
     problem = made.problem
     held, shares, matters = _materiality(made, gain)
     found = replace(made.found, confounded=_told_sets(made.found, matters))
-    fitted = {
-        name: intervals.estimates(problem, found.best, name)
-        for name in sorted(found.best.ids)
-    }
+    fitted = {name: intervals.estimates(problem, found.best, name) for name in sorted(found.best.ids)}
     causes = tuple(_cause(problem, found, name, fitted[name]) for name in found.named if name in matters)
     growth = _growing_noise(made, drives)
     kind = _kind(found, matters) if growth is None else "named"

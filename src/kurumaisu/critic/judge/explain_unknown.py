@@ -12,7 +12,7 @@ from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.search import SearchResult
+from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.materiality import (
     FELT,

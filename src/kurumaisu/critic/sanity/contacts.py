@@ -28,10 +28,7 @@ _MARGINS = (0.4, 1.0)  # [s] before and after, in which it is stopped, and gets 
 
 def contacts(run: Run, model: Model) -> tuple[tuple[float, float], ...]:
     """Return the spans of time [s] in which the chair was held, by a quantity that says so, else by its motion."""
-    if TOPIC in run.covariates:
-        spans = list(_said(run.covariates[TOPIC]))
-    else:
-        spans = list(_seen(run, model))
+    spans = _said(run.covariates[TOPIC]) if TOPIC in run.covariates else _seen(run, model)
     return _merged([(a - _MARGINS[0], b + _MARGINS[1]) for a, b in spans])
 
 

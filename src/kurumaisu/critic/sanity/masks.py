@@ -54,7 +54,7 @@ def _masked(run: Run) -> tuple[Run, list[str]]:
     pose = run.pose
     if pose is None or run.pose_source != "measured":
         return run, []
-    spans = [span for span in _elsewhere(pose, run.command)]
+    spans = _elsewhere(pose, run.command)
     off = np.zeros(len(pose.t), dtype=np.bool_)
     for first, end, _ in spans:
         off[first:end] = True
@@ -92,7 +92,11 @@ def _without(pose: Series, off: BoolArray) -> Series:
 
 def _told(name: str, pose: Series, spans: list[tuple[int, int, float]], off: BoolArray) -> str:
     first, end, far = spans[0]
-    where = f"t = {moment(float(pose.t[first]))} to {moment(float(pose.t[end - 1]))}" if end > first + 1 else f"t = {moment(float(pose.t[first]))}"
+    where = (
+        f"t = {moment(float(pose.t[first]))} to {moment(float(pose.t[end - 1]))}"
+        if end > first + 1
+        else f"t = {moment(float(pose.t[first]))}"
+    )
     more = f", and {len(spans) - 1} more" if len(spans) > 1 else ""
     return (
         f"{name}: the reference is {quantities([far], 'm')[0]} off at {where}{more}: "

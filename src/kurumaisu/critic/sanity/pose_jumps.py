@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu.critic.sanity.headings import position_noise
+from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.critic.values.robust import third_difference_sd
 from kurumaisu.types import FloatArray
-from kurumaisu.critic.values.digits import moment
 
 _FAR = 10.0  # robust sd of the reference that a jump exceeds
 _TURN = 0.6  # [rad] between two poses, least jump of a heading

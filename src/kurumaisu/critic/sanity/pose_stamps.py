@@ -47,7 +47,8 @@ def problem(pose: Series) -> str | None:
     return (
         f"stamps of the reference pose look like times of arrival: for poses {np.diff(new.t).min():.2g} to "
         f"{np.diff(new.t).max():.2g} s apart, the distance follows their times only by {max(follows, 0.0):.2f} (true "
-        f"stamps: 1), as if each interval were off by {jitter:.2g} s rms; record the time of measurement, or drop delayed poses"
+        f"stamps: 1), as if each interval were off by {jitter:.2g} s rms; record the time of measurement, or drop "
+        f"delayed poses"
     )
 
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu.critic.sanity.rates import Rates
+from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.types import BoolArray, FloatArray, IntArray
-from kurumaisu.critic.values.digits import moment
 
 _FROZEN = 2.0  # [s] of standing while far more than usual is asked for
 _BLOCK = 8  # rows that repeat earlier ones exactly, in their order
@@ -97,8 +97,8 @@ def blocks(part: Series, name: str) -> str | None:
     k = int(np.argmax(lengths))
     row, source = int(starts[k]) - 1, int(earlier[starts[k]]) - 1
     return (
-        f"rows of {name} repeat earlier ones exactly: {int(lengths[k]) + 1} rows from t = {moment(part.t[row])} on equal "
-        f"those from t = {moment(part.t[source])} on; {int(follows.sum())} in total; cut them out"
+        f"rows of {name} repeat earlier ones exactly: {int(lengths[k]) + 1} rows from t = {moment(part.t[row])} on "
+        f"equal those from t = {moment(part.t[source])} on; {int(follows.sum())} in total; cut them out"
     )
 
 

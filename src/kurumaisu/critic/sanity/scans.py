@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu import geometry
+from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import LaserMount, Series
 from kurumaisu.types import FloatArray, IntArray
-from kurumaisu.critic.values.digits import moment
 
 _FEW = 0.01  # share of readings that are valid, below which nothing was measured
 _STUCK = 0.5  # share of scans that equal the one before while the robot moves

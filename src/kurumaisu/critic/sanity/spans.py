@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from kurumaisu.critic.base.drive import LONGEST
-from kurumaisu.critic.values.recording import Run
 from kurumaisu.critic.values.digits import moment
+from kurumaisu.critic.values.recording import Run
 
 _SPARSE = 10.0  # [s] for each row, on the mean: nothing is recorded as rarely
 _ENDLESS = 1e7  # [s] a quarter of a year
