@@ -38,8 +38,7 @@ class Drive:
 
     source: the channel that drives the replay; start [s] of the grid; v, w (n,) rates asked for on the grid;
     times (m + 1,) and poses (m + 1, 3) of the reference; known: what unknown effects may follow, (n,) each on the
-    grid, by the names that effects.Motion has; heading [rad] at the start of the grid, None: that of the first pose;
-    still (n,): where the chair rests although it is asked to move, None: nowhere.
+    grid, by the names that effects.Motion has; heading [rad] at the start of the grid, None: that of the first pose.
     """
 
     name: str
@@ -51,7 +50,6 @@ class Drive:
     poses: FloatArray
     known: Mapping[str, FloatArray] = field(default_factory=dict)
     heading: float | None = None
-    still: BoolArray | None = None
 
     @cached_property
     def measured(self) -> FloatArray:
@@ -105,7 +103,7 @@ class Drive:
     @property
     def _moving(self) -> FloatArray:
         asked = (self.v != 0) | (self.w != 0)
-        return np.asarray(asked if self.still is None else asked & ~self.still, dtype=np.float64)
+        return np.asarray(asked, dtype=np.float64)
 
     def seen_at(self, times: FloatArray, poses: FloatArray) -> Drive:
         """Return the drive with other poses (m + 1, 3) at other times (m + 1,)."""

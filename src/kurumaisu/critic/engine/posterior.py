@@ -73,7 +73,8 @@ def posterior(problem: Problem, fitted: Mapping[frozenset[Candidate], Fit], sear
     curved = np.array([one.nats + log_posterior(one.fit, len(names)) for one in found])
     total = logsumexp(np.concatenate([bare, curved]))
     weights, others = np.exp(bare - total), np.exp(curved - total)
-    curves = [_told(one, fitted, search) if w > _SAID else one for one, w in zip(found, others, strict=True)]
+    asked = (others > _SAID) | (curved > bare.max())
+    curves = [_told(one, fitted, search) if told else one for one, told in zip(found, asked, strict=True)]
     p = dict.fromkeys(names, 0.0)
     for ids, weight in _acting(fits, weights, curves, others):
         for name in ids:

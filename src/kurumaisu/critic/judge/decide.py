@@ -125,11 +125,10 @@ def _log_density(made: Decision) -> float:
 
 
 def likelier_curve(found: SearchResult) -> SetWithCurve | None:
-    """Return the best set with a curve, where that is likelier than all without one."""
-    curves = [curve for curve in found.curves if curve.form_of is None]
-    if not curves or not found.enough:
+    """Return the best set with a curve, where that is likelier than all of the catalogue, in whatever form."""
+    best = next(iter(found.curves), None)
+    if best is None or best.form_of is not None or not found.enough:
         return None
-    best = curves[0]
     return best if found.log_posterior(best) > found.log_posterior(found.best) else None
 
 
