@@ -14,7 +14,7 @@ from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.engine import neighbouring_sets, search
+from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.critic.values.recording import Run, Series
@@ -73,18 +73,6 @@ def test_steps_are_found_although_smooth_effects_together_draw_their_mean():
     found = search.search(Problem(drives, MODEL, noise_of(case.known.regime), ids=ids), lambda _: None)
     assert found.best.ids == {STEP, "base.lag_w"} == set(case.truth.ids)
     assert found.best.start[STEP, "step"] == pytest.approx(case.truth.parameters[STEP]["step"], rel=3e-3)
-
-
-@pytest.mark.parametrize(("step", "gain", "hopeless"), [(0.0367, 0.0, False), (0.02, 0.3, True)])
-def test_a_step_is_not_fitted_alone_where_something_else_explains_far_more(step, gain, hopeless):
-    faults = [BASE[STEP].fault({"size": step, "cut": 0.0}, "plain"), BASE["base.gain_w"].fault({"size": gain}, "plain")]
-    problem = problem_of(5, faults, {STEP, "base.gain_w"})
-    empty, fits = problem.fit_candidates((), {}), {one: problem.fit_candidates([one], {}) for one in problem.candidates}
-    best = max(fits.values(), key=lambda fit: fit.score)
-    steps = [one for one in problem.candidates if one.id == STEP]
-    given_up = [one for one in steps if neighbouring_sets.hopeless_alone(problem, one, empty, best)]
-    assert (given_up == steps) == hopeless
-    assert all(fits[one].log_likelihood < best.log_likelihood - 100 for one in given_up)
 
 
 def replayed(start, settings):
@@ -155,18 +143,6 @@ def test_a_ramp_with_round_corners_is_a_ramp_without_a_delay(act, rounded):
     assert found.best.ids == {"base.accel_limit"}
     assert found.best.start["base.accel_limit", "round"] == rounded
     assert found.p["base.delay"] < 0.5
-
-
-def test_a_search_among_ever_more_sets_is_cut_short(monkeypatch):
-    """A chair unlike its model in every way would be searched for minutes; what was found until then counts."""
-    faults = [BASE[f"base.{name}"].fault({"size": size}, "plain") for name, size in (("gain_v", 0.2), ("lag_w", 0.2))]
-    problem = problem_of(8, faults, {"base.gain_v", "base.lag_w", "base.lag_v", "base.curvature_v"})
-    whole = search.search(problem, lambda _: None)
-    monkeypatch.setattr(search, "_MOST", 1)
-    short = search.search(problem, lambda _: None)
-    assert len(short.fits) < len(whole.fits)
-    assert short.best.score > short.empty.score + 100
-    assert whole.best.ids == {"base.gain_v", "base.lag_w"}
 
 
 def test_what_changes_within_a_step_is_known_and_rests_are_rests():

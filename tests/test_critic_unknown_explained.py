@@ -2,7 +2,6 @@
 """When what is outside the catalogue is told: drives held out confirm it, by density or by where the chair comes to."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 import unknown_effects as hidden
@@ -44,16 +43,6 @@ def test_what_is_not_known_confirms_nothing():
     assert not simulates_nearer(None, ("dx",))
     assert not simulates_nearer(gain(0.01), ("dtheta",))
     assert not simulates_nearer(gain(0.01), ("dy",))
-
-
-@pytest.mark.parametrize(("winner", "nats"), [("a curve", 5.0), (None, 62.0)])
-def test_evidence_is_over_nothing_where_an_effect_may_be_it_as_well(winner, nats):
-    """What lies between a curve and an effect that explain as much is no evidence that neither acts."""
-    fit = object()
-    best = SimpleNamespace(fit=fit, evidence=SimpleNamespace(nats=40.0))
-    rivalry = SimpleNamespace(rivals=(best,), lead=5.0, winner=winner)
-    found = SimpleNamespace(nats={fit: 22.0}.__getitem__)
-    assert explain_unknown._nats(found, SimpleNamespace(rivalry=rivalry)) == nats
 
 
 @pytest.mark.parametrize(("least", "verdict"), [(50.0, "unknown"), (1e9, "none")])
