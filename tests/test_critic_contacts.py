@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from phased_drive import PHASE, PHASES, RATES, phased, recorded
 
+from kurumaisu.critic import criticise
 from kurumaisu.critic.base.drive import prepare, without_spans
 from kurumaisu.critic.sanity import contacts, masks
-from kurumaisu.critic.values.recording import Series
+from kurumaisu.critic.values.recording import Recording, Series
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -90,3 +91,18 @@ def test_nobody_knows_what_a_chair_did_where_it_was_not_seen():
     assert contacts.contacts(replace(run, pose=pose), MODEL) == ()
     assert contacts.contacts(replace(run, pose_source="the odometry"), MODEL) == ()
     assert contacts.contacts(replace(run, command=None), MODEL) == ()
+
+
+def test_a_chair_that_was_held_once_is_told_of_what_it_does_elsewhere():
+    """Three seconds of standing would pass for a slower chair, or for one that slips."""
+    runs = []
+    for seed in range(2):
+        run = phased(np.random.default_rng(seed), held=HELD if seed else None)
+        pose = replace(run.pose, values=run.pose.values * [1.1, 1.1, 1.0])
+        runs.append(replace(run, name=f"run_{seed}", pose=pose))
+    data = Recording("held", tuple(runs), train=("run_0", "run_1"))
+    ids = frozenset({"base.gain_v", "base.gain_w", "base.dead_zone_v"})
+    verdict = criticise(data, shipped("launch/md100.yaml"), lambda _: None, ids=ids).verdict
+    assert (verdict.verdict, [cause.id for cause in verdict.causes]) == ("named", ["base.gain_v"])
+    assert verdict.causes[0].parameters["gain"].estimate == pytest.approx(0.1, abs=0.01)
+    assert any("run_1: the chair is held" in problem for problem in verdict.problems)

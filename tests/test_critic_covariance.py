@@ -34,7 +34,9 @@ def test_it_is_the_identity_and_the_columns(u, seed):
     assert covariance.log_determinant == pytest.approx(np.linalg.slogdet(dense)[1], abs=1e-3)
     assert covariance.square(r) == pytest.approx(r @ np.linalg.solve(dense, r), rel=1e-4, abs=1e-3)
     np.testing.assert_allclose(covariance.columns @ covariance.columns.T, u @ u.T, rtol=1e-6, atol=1e-3)
-    np.testing.assert_allclose(covariance.directions.T @ covariance.directions, np.eye(len(covariance.variances)), atol=1e-3)
+    np.testing.assert_allclose(
+        covariance.directions.T @ covariance.directions, np.eye(len(covariance.variances)), atol=1e-3
+    )
 
 
 @given(columns(), st.integers(0, 999))

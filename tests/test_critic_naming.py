@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is said of an effect that is found but not certain: sets, curves that draw it, other forms of it."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np

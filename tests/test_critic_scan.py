@@ -74,7 +74,9 @@ def test_what_a_curve_draws_speaks_for_no_effect():
     problem = problem_of(1, gain_w=0.1)
     empty, dictionary = nothing(problem), Dictionary(problem)
     (own,) = (signals.columns for signals in dictionary.signals if signals.candidate.id == "base.gain_w")
-    alone, beside = ({guess.candidate.id: guess.nats for guess in scan(dictionary, empty, also)} for also in (None, own))
+    alone, beside = (
+        {guess.candidate.id: guess.nats for guess in scan(dictionary, empty, also)} for also in (None, own)
+    )
     assert alone["base.gain_w"] > 50
     assert beside.get("base.gain_w", 0.0) < 1.0
     assert beside["base.marker_x"] == pytest.approx(alone["base.marker_x"], abs=5.0)

@@ -7,6 +7,8 @@ import pytest
 import unknown_effects as hidden
 
 from kurumaisu.critic import pipeline
+from kurumaisu.critic.engine.curve_search import CurveSearch
+from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.heldout.materiality import simulates_nearer
 from kurumaisu.critic.judge import explain_unknown
 from kurumaisu.critic.values.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
@@ -43,6 +45,17 @@ def test_what_is_not_known_confirms_nothing():
     assert not simulates_nearer(None, ("dx",))
     assert not simulates_nearer(gain(0.01), ("dtheta",))
     assert not simulates_nearer(gain(0.01), ("dy",))
+
+
+def test_a_curve_that_is_another_form_of_an_effect_is_told_as_no_unknown():
+    """Nor does it take the place of the curve that extends the model."""
+    problem = hidden.problem_of(hidden.make(hidden.KINDS["carpet edge"], 30.0, 1003, seconds=30.0, runs=2).recording)
+    empty = problem.fit_candidates((), {})
+    first, *others = CurveSearch(problem).beside(empty)
+    other = next(replace(one, form_of="base.gain_w") for one in others if one.curve.id != first.curve.id)
+    p = {first.curve.id: 0.9}
+    found = SearchResult((empty,), (first, other), {"base.gain_w": 0.1}, p, ())
+    assert [one.p for one in explain_unknown._unknowns(problem, found)] == [0.9]
 
 
 @pytest.mark.parametrize(("least", "verdict"), [(50.0, "unknown"), (1e9, "none")])

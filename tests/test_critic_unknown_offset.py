@@ -28,7 +28,10 @@ def test_what_follows_nothing_is_no_curve_over_something(channel, name):
 def test_a_constant_is_written_for_the_simulator_and_shown(tmp_path):
     drift = hidden.Kind(0, "moving", lambda s, a, b: 1.0)
     recording = hidden.make(drift, 30.0, 1008, seconds=40.0, runs=3).recording
-    found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None)
+    ids = frozenset(
+        {"base.gain_v", "base.gain_w", "smooth"}
+    )  # without the offset of a converter, which does nearly that
+    found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None, ids=ids)
     assert (found.verdict.verdict, found.verdict.unknown[0].covariate) == ("unknown", "constant")
     pipeline.write(found, shipped("launch/md100.yaml"), tmp_path)
     (written,) = (e for e in yaml.safe_load((tmp_path / "extended.yaml").read_text())["effects"] if "smooth" in e["id"])
