@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Curves beside sets of effects: what is in no catalogue is found where it is, another form of a cause is that cause."""
+"""Curves beside sets: what is in no catalogue is found where it is, and another form of a cause is that cause."""
 
 import numpy as np
 import pytest
