@@ -209,7 +209,7 @@ def test_a_recording_too_short_to_hold_anything_back_names_nothing():
     criticism = criticise(replace(data, runs=data.runs[:1], train=data.train[:1]))
     assert criticism.verdict.verdict == "none"
     assert criticism.verdict.gain is None
-    assert criticism.story.headline == "None of the 28 effects can be detected, because only 8.0 s were recorded."
+    assert criticism.story.headline == "None of the 29 effects can be detected, because only 8.0 s were recorded."
 
 
 @pytest.mark.parametrize(
