@@ -10,9 +10,9 @@ from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.engine import search
-from kurumaisu.critic.engine.curve_search import CurveSearch
 from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.search import search
+from kurumaisu.critic.search.curve_search import CurveSearch
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import unknown_effects as hidden
 
-from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.judge import decide
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.noise.base_noise import START, NoiseGrowth
+from kurumaisu.critic.search.posterior import SearchResult
 
 TRUTH = hidden.USUAL.position_sd, hidden.USUAL.heading_sd
 

@@ -10,11 +10,11 @@ from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.covariance import orthonormal
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.engine.form_error import form_errors, smooth_functions
+from kurumaisu.critic.search import search
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

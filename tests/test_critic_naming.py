@@ -14,16 +14,16 @@ from kurumaisu.bench.hidden.generator.motion import drive as hidden_drive
 from kurumaisu.bench.hidden.generator.noise import USUAL, draw_rates, draw_reference
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive, prepare
-from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.catalogue import Term
-from kurumaisu.critic.engine.confounding import SetPosterior, confounded
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
 from kurumaisu.critic.noise.base_noise import Noise, NoiseGrowth, NoiseResiduals, whitener
 from kurumaisu.critic.sanity import examination
+from kurumaisu.critic.search import search
+from kurumaisu.critic.search.confounding import SetPosterior, confounded
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.verdict import Gain, LogDensityGain
 from kurumaisu.effects import Parameter
 from kurumaisu.params import load_model, shipped

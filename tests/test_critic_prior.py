@@ -10,9 +10,9 @@ from kurumaisu.bench.hidden.base import recordings
 from kurumaisu.bench.hidden.base.catalogue import BASE
 from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import Noise
+from kurumaisu.critic.search import search
 from kurumaisu.critic.values import prior
 from kurumaisu.params import load_model, shipped
 

@@ -14,9 +14,9 @@ from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import Noise
+from kurumaisu.critic.search import search
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.effects import LATE
 from kurumaisu.params import EffectSetting, load_model, shipped

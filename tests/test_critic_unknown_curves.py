@@ -17,10 +17,10 @@ from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.covariance import without
-from kurumaisu.critic.engine.curve_search import CurveSearch
 from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.search import search
+from kurumaisu.critic.search.curve_search import CurveSearch
 from kurumaisu.critic.unknown import curves, sentences, shapes
 from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve, fit_with_curve

@@ -7,10 +7,10 @@ import pytest
 import unknown_effects as hidden
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.engine.curve_search import CurveSearch
-from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.heldout.materiality import simulates_nearer
 from kurumaisu.critic.judge import explain_unknown
+from kurumaisu.critic.search.curve_search import CurveSearch
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
 from kurumaisu.params import shipped
 

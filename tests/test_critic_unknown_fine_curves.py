@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import unknown_effects as hidden
 
-from kurumaisu.critic.engine import search
-from kurumaisu.critic.engine.curve_search import CurveSearch
+from kurumaisu.critic.search import search
+from kurumaisu.critic.search.curve_search import CurveSearch
 from kurumaisu.critic.unknown import sentences
 from kurumaisu.critic.unknown.bases import Basis, knots_of
 from kurumaisu.critic.unknown.periods import wave_period

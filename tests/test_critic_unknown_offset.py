@@ -6,7 +6,7 @@ import unknown_effects as hidden
 import yaml
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.engine.curve_search import CurveSearch
+from kurumaisu.critic.search.curve_search import CurveSearch
 from kurumaisu.critic.unknown import sentences
 from kurumaisu.critic.unknown.joint_fit import fit_with_curve
 from kurumaisu.params import load_model, shipped

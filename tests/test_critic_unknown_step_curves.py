@@ -8,8 +8,8 @@ import pytest
 import unknown_effects as hidden
 
 from kurumaisu import effects
-from kurumaisu.critic.engine import search
-from kurumaisu.critic.engine.curve_search import CurveSearch
+from kurumaisu.critic.search import search
+from kurumaisu.critic.search.curve_search import CurveSearch
 from kurumaisu.critic.unknown import sentences, shapes
 from kurumaisu.critic.unknown.curves import Design
 from kurumaisu.critic.unknown.joint_fit import fit_with_curve

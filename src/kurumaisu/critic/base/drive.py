@@ -18,7 +18,7 @@ from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.effects import LATE
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
-from kurumaisu.types import BoolArray, FloatArray, IntArray
+from kurumaisu.types import FloatArray, IntArray
 
 GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
 _CLOCK = 0.02  # share by which the reference's clock may be off, and more

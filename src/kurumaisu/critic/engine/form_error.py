@@ -23,7 +23,7 @@ from kurumaisu.types import FloatArray
 if TYPE_CHECKING:
     from kurumaisu.critic.engine.evidence import Problem
 
-SHARES = (0.1, 0.3, 0.9)  # of a signal's norm that its equation may miss, 1 sd: one of these holds for all causes
+SHARES = (0.1, 0.2, 0.4)  # of a signal's norm that its equation may miss, 1 sd: one of these holds for all causes
 _SIZES = (0.25, 0.5, 1.5, 2.0, 3.0)  # shares of a size whose signals stand for other forms
 _KNOTS = 5  # of a smooth function
 _CHANGE = 0.5  # [s] over which a change of the input is taken

@@ -140,8 +140,11 @@ def _guesses(signals: Signals, z: FloatArray, shares: FloatArray) -> Iterator[Gu
         best = mine[int(np.argmax(z[mine]))]
         if z[best] <= 0 and len(np.unique(signals.of)) == 1:
             return
-        nats += 0.5 * max(float(z[best]), 0.0) ** 2 - (float(occam(max(float(z[best]), 0.0))) if i >= 0 else 0.0)
-        if i >= 0 and z[best] > 0:
+        if i < 0:  # as it is, or not at all
+            nats += (shares[best] - 0.5) * (z[best] / max(shares[best], 1e-9)) ** 2
+            continue
+        nats += 0.5 * max(float(z[best]), 0.0) ** 2 - float(occam(max(float(z[best]), 0.0)))
+        if z[best] > 0:
             p = terms[i].parameter
             size = (signals.values[best, i] - terms[i].null) * float(np.clip(shares[best], *_SHARES))
             values[i] = np.clip(terms[i].null + size, p.lower, p.upper)

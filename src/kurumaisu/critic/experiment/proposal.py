@@ -10,9 +10,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
-from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.experiment import design
 from kurumaisu.critic.experiment.design import Explanation
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.digits import odds
 from kurumaisu.critic.values.policy import RIVAL
 from kurumaisu.critic.values.verdict import NextExperiment

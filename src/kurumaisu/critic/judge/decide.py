@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine import search
-from kurumaisu.critic.engine.curve_search import CurveSearch, SetWithCurve
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.noise import base_noise
 from kurumaisu.critic.predict import parameter_doubt
+from kurumaisu.critic.search import search
+from kurumaisu.critic.search.curve_search import CurveSearch, SetWithCurve
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.unknown import joint_fit
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve
 from kurumaisu.critic.values.prior import odds
@@ -87,6 +87,7 @@ def _settled(
     first: Problem, found: SearchResult, curve: SetWithCurve | None, truth: Truth, progress: Progress
 ) -> Decision:
     """Return what acts in the noise about what was found, a curve among it or not; anew where others act then."""
+    problem: Problem | None = None
     for _ in range(_ANEW):
         extension = None if curve is None else fitted_curve(first, curve)
         about = found.best if curve is None else curve.fit
@@ -94,12 +95,19 @@ def _settled(
         left = noise_residuals(first, about, truth, project=True, beside=extension)
         final = left.estimate(first.noise)
         growth = left.growth(final, odds(len(found.p)))
-        problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
+        noise = growth.noise if growth.p > 1 / 2 else final.noise
+        if problem is not None and base_noise.alike(noise, problem.noise):
+            break
+        if problem is None and curve is None and base_noise.alike(noise, first.noise):
+            problem = first
+            break
+        problem = first.changed(noise=noise)
         before, had = found, curve
         found = search.search(problem, progress, about)
         curve = likelier_curve(found)
         if found.best.ids == before.best.ids and (curve is None) == (had is None):
             break
+    assert problem is not None
     return Decision(problem, found, growth, None if curve is None else fitted_curve(problem, curve))
 
 

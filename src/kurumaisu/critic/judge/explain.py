@@ -11,7 +11,6 @@ import scipy
 
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.drive_gain import INCREMENT_CHANNELS
 from kurumaisu.critic.heldout.materiality import (
@@ -27,6 +26,7 @@ from kurumaisu.critic.judge import intervals, misfit, sentences
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
 from kurumaisu.critic.judge.overlays import overlays
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.recording import Recording

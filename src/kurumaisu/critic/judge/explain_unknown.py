@@ -12,7 +12,6 @@ from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.materiality import (
     FELT,
@@ -30,6 +29,7 @@ from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
 from kurumaisu.critic.judge.misfit import moments
 from kurumaisu.critic.judge.overlays import overlays
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.unknown import sentences, shapes
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve, fit_with_curve
 from kurumaisu.critic.values.binned_means import bins
@@ -191,7 +191,12 @@ def _unknowns(problem: Problem, found: SearchResult) -> Iterator[Unknown]:
     p = found.p_curves
     seen: set[str] = set()
     for rival in found.curves:
-        if rival.curve.id in seen or len(seen) == _LISTED or (seen and p[rival.curve.id] < _PLAUSIBLE):
+        if (
+            rival.form_of is not None
+            or rival.curve.id in seen
+            or len(seen) == _LISTED
+            or (seen and p[rival.curve.id] < _PLAUSIBLE)
+        ):
             continue
         seen.add(rival.curve.id)
         own = fit_with_curve(problem, rival.fit, rival.curve, rival.evidence.prior)
@@ -206,7 +211,7 @@ def _rivals(made: Decision) -> Iterator[Alternative]:
     yield Alternative(" + ".join(sorted(found.best.ids)) or "no effect", -made.lead, "the best of the catalogue")
     seen = {best.curve.id}
     for rival in found.curves:
-        if rival.curve.id not in seen and len(seen) <= _LISTED:
+        if rival.form_of is None and rival.curve.id not in seen and len(seen) <= _LISTED:
             seen.add(rival.curve.id)
             beside = "".join(f" + {name}" for name in sorted(rival.fit.ids))
             name = f"{sentences.channel(rival.curve)} {sentences.followed(rival.curve)}{beside}"

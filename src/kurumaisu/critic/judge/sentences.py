@@ -10,8 +10,8 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.posterior import SearchResult
 from kurumaisu.critic.heldout.materiality import HORIZON, MATERIAL
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.digits import quantities, with_interval
 from kurumaisu.critic.values.policy import NAMED, RIVAL
 from kurumaisu.critic.values.story import Alternative

@@ -62,9 +62,9 @@ def _seen(run: Run, model: Model) -> Iterator[tuple[float, float]]:
 
 def _is_odd(here: FloatArray, asked: FloatArray, wanted: BoolArray, stands: BoolArray) -> bool:
     """Tell whether the chair moves elsewhere when about the same is asked for."""
-    axis = int(np.argmax(np.abs(here).mean(axis=0) / _ASKED))
-    size = float(np.median(np.abs(here[:, axis])))
-    alike = wanted[:, axis] & (np.abs(asked[:, axis]) > _LIKE[0] * size) & (np.abs(asked[:, axis]) < _LIKE[1] * size)
+    size = np.maximum(np.median(np.abs(here), axis=0), _ASKED)
+    as_much = (np.abs(asked) < _LIKE[1] * size).all(axis=1)
+    alike = wanted.any(axis=1) & as_much & (np.abs(asked) > _LIKE[0] * size).any(axis=1)
     return bool(alike.any() and 1 - stands[alike].mean() >= _MOVES)
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Problem, log_posterior
+from kurumaisu.critic.search import search
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.types import FloatArray

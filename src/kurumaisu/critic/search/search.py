@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu.critic.engine.catalogue import Candidate, Key
-from kurumaisu.critic.engine.curve_search import CurveSearch, nearly_same_rates
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
-from kurumaisu.critic.engine.posterior import SearchResult, posterior
 from kurumaisu.critic.engine.scan import Dictionary, Guess, scan
+from kurumaisu.critic.search.curve_search import CurveSearch, nearly_same_rates
+from kurumaisu.critic.search.posterior import SearchResult, posterior
 from kurumaisu.critic.values.prior import UNKNOWN_ODDS, log_prior
 
 EffectSet = frozenset[Candidate]
@@ -59,13 +59,11 @@ class _Search:
     def score(self, fit: Fit) -> float:
         """Return the log posterior of a set, with the best curve beside it where that is likelier.
 
-        Curves are asked for beside sets that are no worse than the best one's cause left out.
+        Curves are asked for beside sets that are near the best one.
         """
         bare = self.bare(fit)
-        best = max(map(self.bare, self.fits.values()))
-        if bare < best - _ASKED and fit.candidates:
-            return bare
-        curves = self.curves.beside(fit)
+        near = bare > max(map(self.bare, self.fits.values())) - _ASKED or not fit.candidates
+        curves = self.curves.beside(fit) if near else self.curves.found(fit)
         return max(bare, log_posterior(fit, self.of) + (curves[0].nats if curves else -np.inf))
 
     def fit(self, chosen: EffectSet, start: Mapping[Key, float]) -> Fit | None:
@@ -114,6 +112,8 @@ class _Search:
             rest = self.fit(fit.candidates - {one}, fit.start)
             if rest is None:
                 continue
+            if any(one.nats > 0 for one in self.curves.found(fit)[:1]):
+                self.curves.beside(rest)  # beside the curve one of them may be needless
             others = [g for g in self._proposals(rest, steps=not rest.ids) if g.candidate not in fit.candidates]
             for guess in others[:_SWAPPED]:
                 if self.bare(rest) + guess.nats > best - _HOPELESS:

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu.critic.engine.catalogue import Candidate
-from kurumaisu.critic.engine.confounding import SetPosterior, confounded
-from kurumaisu.critic.engine.curve_search import CurveSearch, SetWithCurve
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
+from kurumaisu.critic.search.confounding import SetPosterior, confounded
+from kurumaisu.critic.search.curve_search import CurveSearch, SetWithCurve
 from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.prior import UNKNOWN_ODDS
 from kurumaisu.types import FloatArray
