@@ -13,7 +13,8 @@ from kurumaisu.critic.experiment.proposal import drives as scripted_drives
 from kurumaisu.critic.experiment.proposal import propose
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.heldout.extension_gain import Extension
-from kurumaisu.critic.judge import excitation, explain, explain_unknown
+from kurumaisu.critic.heldout.materiality import share_of_way
+from kurumaisu.critic.judge import excitation, explain, explain_unknown, unresolved
 from kurumaisu.critic.judge.decide import Decision, decide, noise_residuals
 from kurumaisu.critic.judge.forecast import forecast_of
 from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
@@ -62,6 +63,9 @@ def criticise_drives(
     proposal = propose(made.problem, made.found, scripts)
     judge = explain.criticism if made.extension is None else explain_unknown.criticism
     judged = excitation.with_shortcomings(judge(recording, made, held, train + test, proposal), made, train, scripts)
+    best = made.found.best.settings
+    shares = {name: share_of_way(made.problem, best, explain.without(best, name)) for name in made.found.best.ids}
+    judged = unresolved.with_unresolved(judged, made, held, shares, test)
     return judged, _extension(made, forecast_of(made, judged.settings, baseline), train)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine.evidence import Fit, Problem
+from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.drive_gain import INCREMENT_CHANNELS
 from kurumaisu.critic.heldout.materiality import (
@@ -118,7 +118,7 @@ def _materiality(made: Decision, gain: Gain | None) -> tuple[bool, dict[str, flo
     # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
     held = confirmed(gain, nats) or (nats >= NO_NOISE and simulates_nearer(gain, tuple(INCREMENT_CHANNELS)))
     gains = made.found.enough and (held or made.untested)
-    others = {name: _without(best, name) for name in sorted(best.ids)}
+    others = {name: without(best.settings, name) for name in sorted(best.ids)}
     shares = {name: share_of_way(problem, best.settings, rest) for name, rest in others.items()}
     felt = {name: share_of_noise(problem, best.settings, rest) for name, rest in others.items()}
     return held, shares, {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
@@ -149,8 +149,9 @@ def _growing_noise(made: Decision, drives: Sequence[Drive]) -> Cause | None:
     return Cause(name, growth.p, {}, growth.gain_nats)
 
 
-def _without(fit: Fit, name: str) -> tuple[EffectSetting, ...]:
-    return tuple(setting for setting in fit.settings if setting.id != name)
+def without(settings: Sequence[EffectSetting], name: str) -> tuple[EffectSetting, ...]:
+    """Return settings without an effect."""
+    return tuple(setting for setting in settings if setting.id != name)
 
 
 def _open(found: SearchResult) -> tuple[str, ...]:

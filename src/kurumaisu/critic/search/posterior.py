@@ -79,6 +79,7 @@ def posterior(problem: Problem, fitted: Mapping[frozenset[Candidate], Fit], sear
     for ids, weight in _acting(fits, weights, curves, others):
         for name in ids:
             p[name] += weight
+    p = {name: min(each, 1.0) for name, each in p.items()}  # but for rounding
     p_curves: dict[str, float] = {}
     for one, weight in zip(curves, others, strict=True):
         if one.form_of is None:
