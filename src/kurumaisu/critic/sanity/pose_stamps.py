@@ -15,8 +15,8 @@ _AROUND = 1.5  # [s] to either side that tell the speed, but
 _HALF = 8  # intervals at least
 _LEAST = 40  # intervals while driving
 _CLEAR = 3.0  # sd of the positions' noise that a usual interval's way exceeds
-_GAPS = 0.03  # share of the intervals, the worst ones, that do not count: a gap or two say nothing of the others
-_JITTER = 0.05  # [s] rms of an interval's error, from which it is more than rows written on a grid
+_MOSTLY = 0.75  # share of the time by whose intervals stamps are judged
+_JITTER = 0.05  # [s] of their error, from which it is more than rows written on a grid
 _TRUE = 0.7  # of the stamps' variation that the way follows, below which
 _SURE = 4.0  # standard errors away from it the stamps are wrong
 
@@ -31,11 +31,11 @@ def problem(pose: Series) -> str | None:
     rows = _intervals(new, _rests(pose, new))
     if rows is None:
         return None
-    longer, further = rows
+    longer, further, lasts = rows
+    # So much are most of the time's intervals off: a gap or two are little of it; many rows may wait for one long one.
     off = np.abs(longer - further)
-    usual = off <= np.quantile(off, 1 - _GAPS)
-    longer, further = longer[usual], further[usual]
-    jitter = float(np.sqrt(np.mean(off[usual] ** 2)))
+    order = np.argsort(off)
+    jitter = float(off[order][np.searchsorted(np.cumsum(lasts[order]), _MOSTLY * lasts.sum())])
     energy = float(longer @ longer)
     if jitter < _JITTER or energy == 0:
         return None
@@ -47,7 +47,7 @@ def problem(pose: Series) -> str | None:
     return (
         f"stamps of the reference pose look like times of arrival: for poses {np.diff(new.t).min():.2g} to "
         f"{np.diff(new.t).max():.2g} s apart, the distance follows their times only by {max(follows, 0.0):.2f} (true "
-        f"stamps: 1), as if each interval were off by {jitter:.2g} s rms; record the time of measurement, or drop "
+        f"stamps: 1), as if intervals were off by {jitter:.2g} s; record the time of measurement, or drop "
         f"delayed poses"
     )
 
@@ -62,8 +62,8 @@ def _rests(pose: Series, new: Series) -> BoolArray:
     return np.asarray(repeated & (way < MOVING * np.diff(new.t)))
 
 
-def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray] | None:
-    """Return how much longer than its neighbours each interval is, and how much further it went [s], both (n,).
+def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return how much longer than its neighbours each interval is, how much further it went, and its length [s], (n,).
 
     rests (len(pose) - 1,): intervals that do not count, nor do those about them.
     """
@@ -83,4 +83,4 @@ def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray] 
     if driving.sum() < _LEAST:
         return None
     usual = time[driving] / len(around)
-    return dt[driving] - usual, way[driving] / speed[driving] - usual
+    return dt[driving] - usual, way[driving] / speed[driving] - usual, dt[driving]
