@@ -167,8 +167,8 @@ def test_the_base_run_again_goes_where_it_went(drive, tmp_path):
     apart = np.abs(np.subtract(*changes))
     assert apart.min() <= TICK + CLOCK + 1e-6
     assert apart.max() < 0.5
-    # What was taken earlier or later, and each of two starts and two ends of commands by half a tick that is not seen.
-    allowed = 0.5 * (apart.sum() + 4 * TICK) + 0.02  # [m] or [rad]; no speed is above 0.5
+    # Each of two starts and two ends of commands was taken earlier or later as seen, and by a tick between samples.
+    allowed = 0.5 * (apart.sum() + 4 * TICK) + 0.02  # [m] or [rad]: no speed is above 0.5 m/s or rad/s
     at = np.interp(then[-1, 0], now[:, 0], now[:, 1]), np.interp(then[-1, 0], now[:, 0], now[:, 2])
     assert math.dist(at, then[-1, 1:3]) < allowed
     heading = np.interp(then[-1, 0], now[:, 0], np.unwrap(now[:, 3])) - np.unwrap(then[:, 3])[-1]

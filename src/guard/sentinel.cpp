@@ -15,7 +15,6 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
-#include <optional>
 #include <utility>
 
 #include "guard/log.h"
@@ -175,7 +174,7 @@ bool Sentinel::rest() {
   while (!is_leaving_ && steadyTime() < until) {
     pollfd ready{signals_.fd(), POLLIN, 0};
     poll(&ready, 1, static_cast<int>(std::ceil(1e3 * std::max(0.0, until - steadyTime()))));
-    while (signals_.nextToEnd()) is_leaving_ = true;
+    is_leaving_ = signals_.nextToEnd().has_value();
   }
   return !is_leaving_;
 }
