@@ -152,16 +152,20 @@ def test_a_bag_has_what_critic_and_mapping_need_and_each_part_can_be_read_alone(
 
 
 def test_the_base_run_again_goes_where_it_went(drive, tmp_path):
-    out = tmp_path / "again.bag"
-    replay(parts_of(drive), out)
+    for attempt in range(3):  # a computer that keeps commands back for longer than the base waits makes it brake between
+        out = tmp_path / f"again{attempt}.bag"
+        replay(parts_of(drive), out)
+        with rosbag.Bag(out) as both:
+            changes = [reached(both, topic) for topic in ("/recorded/voltages", "/voltages")]
+        if len(changes[0]) == len(changes[1]):
+            break
+    assert [len(times) for times in changes] == [2 * len(DRIVES)] * 2
     with rosbag.Bag(out) as both:
         then, now = poses(both, "/recorded/odom"), poses(both, "/odom")
         assert both.get_message_count("/scan") > 10
         frames = {t.child_frame_id for _, m, _ in both.read_messages("/tf") for t in m.transforms}
     assert frames == {"base_link"}  # of the base that runs now; the recorded tf is out of the way
     assert np.hypot(*np.diff(then[:, 1:3], axis=0).T).sum() > 1.0  # it has driven
-    with rosbag.Bag(out) as both:
-        changes = [reached(both, topic) for topic in ("/recorded/voltages", "/voltages")]
     # A tick and a step of the clock, docs/robot.md. What a busy computer delivers later to the one than to the other
     # comes on top now and then, never each time.
     apart = np.abs(np.subtract(*changes))
