@@ -76,12 +76,10 @@ const std::map<std::string, Cost>& streamFaults() {
       {"t0=16776716", free()},
       {"dribble", free()},
       {"vv-badsum", {kPeriod, 0, [](const l::Counts& c) { return c.bad_sums > 0; }, "LASER_BAD_SUM: VV"}},
-      {"vv-badsum vv-deaf",
+      {"vv-badsum vv-deaf=0.5",
        {kPeriod, 0, [](const l::Counts& c) { return c.bad_sums > 0; },
         "LASER_BAD_SUM: VV, which is asked once"}},
       {"t-stands", free()},
-      {"t-stands dup@5",
-       {kPeriod, 0, [](const l::Counts& c) { return c.duplicates == 1; }, "LASER_DUPLICATE"}},
       {"scip1", free()},
   };
   return faults;

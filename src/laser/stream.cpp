@@ -52,12 +52,15 @@ std::optional<Arrival> ScipStream::await(double timeout) {
   }
 }
 
-/// The same again at once; a turn later it is a clock that stands.
-bool ScipStream::isDuplicate(const Arrival& arrival) const {
+/// The same again at once. A turn later it is a clock that stands: then nothing tells a scan from the one before.
+bool ScipStream::isDuplicate(const Arrival& arrival) {
   constexpr double kAtOnce = 0.5;  // of the time from scan to scan
-  if (!last_ || !(last_->rotation == arrival.rotation)) return false;
+  const bool same_clock = last_ && last_->rotation.clock == arrival.rotation.clock;
   const double period = sensor_.parameters.scanTime() * (request_.interval + 1);
-  return std::abs(arrival.first_byte - last_->first_byte) < kAtOnce * period;
+  const bool is_duplicate = same_clock && !stands_ && last_->rotation == arrival.rotation &&
+                            std::abs(arrival.first_byte - last_->first_byte) < kAtOnce * period;
+  if (!is_duplicate) stands_ = same_clock;
+  return is_duplicate;
 }
 
 void ScipStream::rethrow() const {

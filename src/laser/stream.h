@@ -54,7 +54,7 @@ class ScipStream : public mrpt::io::CStream {
   std::uint64_t getPosition() const override { return 0; }
 
  private:
-  bool isDuplicate(const Arrival& arrival) const;
+  bool isDuplicate(const Arrival& arrival);
   void answer(const std::string& command);
   void start(const std::string& command);
   void put(const std::string& command, const std::string& status, const std::vector<std::string>& lines);
@@ -68,6 +68,7 @@ class ScipStream : public mrpt::io::CStream {
   std::string ready_;            // bytes for MRPT
   std::size_t read_ = 0;         // of them
   std::optional<Arrival> last_;  // scan
+  bool stands_ = false;          // the sensor's clock
   std::exception_ptr failure_;
 };
 

@@ -67,8 +67,7 @@ std::uint32_t Device::State::clockAt(double time) const {
 double Device::State::scanTime() const { return 60.0 / motorSpeed(parameters, memory); }
 
 bool Device::State::isDeaf(double now) const {
-  return faults.find("blackhole") != nullptr || now < deaf_until ||
-         (versions > 1 && faults.find("vv-deaf") != nullptr);
+  return faults.find("blackhole") != nullptr || now < deaf_until;
 }
 
 void Device::State::restartClock(double now) {
@@ -86,7 +85,11 @@ void Device::State::powerUp(double now, double boot_time) {
 
 void Device::State::hear(const std::string& line, double now, Output& output) {
   ++counts.commands;
-  if (line == "VV") ++versions;
+  const Fault* deaf = faults.find("vv-deaf");
+  if (deaf != nullptr && line == "VV" && ++versions > 1) {
+    deaf_until = now + *deaf->value;
+    versions = 0;
+  }
   if (isDeaf(now)) return;
   const bool is_repeated = !heard.insert(line.substr(0, 2)).second;
   const bool is_full = waiting.size() >= kMostWaiting && !endsWaiting(line);

@@ -52,7 +52,7 @@ constexpr std::array kKinds{
     Kind{"md0e", kNever, kNever, "measurement commands are unknown"},
     Kind{"no-me", kNever, kNever, "ME and GE are unknown"},
     Kind{"vv-badsum", kNever, kNever, "VV: the sum of SERI is wrong"},
-    Kind{"vv-deaf", kNever, kNever, "asked VV a second time in a connection, it hears nothing more in it"},
+    Kind{"vv-deaf", kNever, kMust, "asked VV twice, it is deaf; value: for so many seconds"},
     Kind{"pp-ares0", kNever, kNever, "PP: ARES is 0"},
     Kind{"pp-crossed", kNever, kNever, "PP: AMIN and AMAX are exchanged"},
 };

@@ -48,7 +48,7 @@ struct Device::State {
   std::deque<std::string> waiting;  // commands behind one that waits for a rotation
   Counts counts;
   std::uint64_t connections = 0;
-  int versions = 0;  // VV, in this connection
+  int versions = 0;  // VV, in this connection, or since it was deaf
 };
 
 }  // namespace kurumaisu::virtual_urg
