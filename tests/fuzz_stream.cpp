@@ -77,9 +77,9 @@ void drive(const std::string& bytes, unsigned choice) {
   l::Link link(
       std::make_unique<Script>(bytes, choice), [&now] { return now += 0.01; }, [] { return false; });
   const s::Request request = s::request(kAsked[choice % kAsked.size()]).value();
-  const l::Sensor sensor = l::handshake(link, {0, kPatience}, [](auto, const std::string& text) {
-    require(text.find("LASER_") == 0, "a warning without a code");
-  });
+  const l::Sensor sensor = l::handshake(
+      link, {0, kPatience, choice % 2 == 1},
+      [](auto, const std::string& text) { require(text.find("LASER_") == 0, "a warning without a code"); });
   l::ScipStream stream(link, sensor, request, kPatience);
   const std::string start = request.form == s::Form::kIntensity ? "ME0000001001000" : "MD0000001001000";
   for (const std::string& command : {std::string("BM"), std::string("PP"), std::string("VV"), start}) {

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 import unittest
 
 import numpy as np
@@ -194,6 +195,20 @@ class LocalizationNode(unittest.TestCase):
             self.room.step(2.0 + i * STEP, ranges=ranges)
         wait_for(lambda: len(self.poses.messages) > begin, "amcl_pose at rest", DEADLINE)
 
+    def test_5_scans_that_show_nothing_are_said_at_rest(self):
+        t = self.room.drive(2.0)
+        rest = self.room.odom
+
+        def said():
+            nonlocal t
+            t += STEP
+            self.room.odom = rest
+            self.room.step(t, ranges=[float("nan")] * BEAMS)
+            time.sleep(0.05)
+            return "LOCALIZATION_BLIND" in self.status().message and self.values()["knowledge"] == "blind"
+
+        wait_for(said, "scans that show nothing said", DEADLINE)
+
     def test_6_scans_without_transforms_are_counted_and_said(self):
         self.room.step_until(
             lambda: self.status() and "NO_TRANSFORM" in self.status().message,
@@ -235,7 +250,7 @@ class LocalizationNode(unittest.TestCase):
         self.assert_close(self.last_pose(t - 0.5))
         for message in self.room.of_this_test(self.poses.messages[begin:]):
             self.assert_close(message, 0.15, 0.1)
-        for key, least in (("dropped as too old", 3), ("refused transforms", 6), ("refused odometry", 3)):
+        for key, least in (("dropped as too old", 3), ("refused transforms", 9), ("refused odometry", 3)):
             self.counted(key, least)
         odometry.unregister()
 
@@ -257,6 +272,16 @@ class LocalizationNode(unittest.TestCase):
             self.counted("refused initial poses", refused + k + 1)
         last = self.room.drive(2.0, first=last + STEP)
         self.assert_close(self.last_pose(last - 0.5))
+        message = PoseWithCovarianceStamped()  # of a sender that does not know of simulated time
+        message.header.stamp = rospy.Time.from_sec(time.time())
+        message.pose.pose.position.x, message.pose.pose.position.y = 4.0, 3.0
+        message.pose.pose.orientation.w = 1.0
+        message.pose.covariance = [0.01 if i in (0, 7, 35) else 0.0 for i in range(36)]
+        begin, start = len(said.messages), len(self.poses.messages)
+        self.initial.publish(message)
+        said.wait(lambda m: "LOCALIZATION_POSE_STAMP: initialpose: stamp" in m.msg, "its stamp said", since=begin)
+        self.room.drive(1.0, first=last + STEP)
+        self.poses.wait(lambda m: np.hypot(*(pose_of(m)[:2] - [4.0, 3.0])) < 0.8, "that pose", DEADLINE, since=start)
         said.close()
 
     def test_8_a_map_that_makes_no_sense_is_refused_and_said(self):

@@ -29,6 +29,7 @@ inline std::map<std::string, double> values() {
           {"slip_gain", 0.1},
           {"resolution", 0.05},
           {"range", 25},
+          {"dropout_beams", 3},
           {"certainty", 0.6},
           {"most_cells", 1e7},
           {"particles", 10},

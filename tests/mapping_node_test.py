@@ -279,6 +279,16 @@ class MappingNode(unittest.TestCase):
         )
         self.wait_for_status(2, "MAPPING_NO_TRANSFORM: scans come, but the mounting of the laser is unknown")
 
+    def test_4_a_clock_that_stands_while_scans_come_is_said(self):
+        last = self.room.drive(1.0)
+
+        def said():
+            self.room.scan.publish(self.room.sweep(last, rospy.Time.from_sec(self.room.begin + last)))
+            time.sleep(0.05)
+            return self.says("MAPPING_NO_CLOCK: /use_sim_time is true, and scans come, but nothing on /clock")
+
+        wait_for(said, "a clock that stands said", DEADLINE)
+
     def test_5_scans_without_transforms_do_not_stop_the_others(self):
         self.room.step(0.0, with_tf=False)
         self.room.odom = np.array([1.0, 2.0, 0.5])
@@ -301,18 +311,40 @@ class MappingNode(unittest.TestCase):
             self.room.of_another_time(t)
             t = self.room.drive(1.0, first=t + STEP, frame="/laser" if i else "laser")
         self.wait_for_pose(t)
-        for key, least in (("dropped as too old", 3), ("refused transforms", 6), ("dropped as senseless", 6)):
+        for key, least in (("dropped as too old", 3), ("refused transforms", 9), ("dropped as senseless", 6)):
             wait_for(lambda key=key, least=least: int(self.values()[key]) >= least, f"{least} {key}", DEADLINE)
         paths = Topic("trajectory", PathMessage)
         wait_for(lambda: paths.last and self.room.time_of(paths.last.poses[0]) < 1.0, "the whole trajectory", DEADLINE)
         paths.close()
 
-    def test_6_several_old_scans_begin_anew(self):
+    def test_6_a_second_laser_whose_clock_is_behind_changes_nothing(self):
+        old = int(self.values()["dropped as too old"])
+        unset = int(self.values()["dropped as senseless"])
+        t = self.room.drive(1.0)
+        for _ in range(30):
+            t += STEP
+            self.room.step(t)
+            for behind in (1.5, 1.45, 1.4, 0.05):
+                self.room.scan.publish(self.room.sweep(t, rospy.Time.from_sec(self.room.begin + t - behind)))
+            self.room.scan.publish(self.room.sweep(t, rospy.Time(0)))
+            time.sleep(0.1)  # all of it takes longer than old scans alone may
+        self.wait_for_pose(t)
+        wait_for(lambda: int(self.values()["dropped as too old"]) >= old + 120, "all of them counted", DEADLINE)
+        assert int(self.values()["dropped as senseless"]) >= unset + 30
+        paths = Topic("trajectory", PathMessage)
+        wait_for(lambda: paths.last and self.room.time_of(paths.last.poses[0]) < 1.0, "the whole trajectory", DEADLINE)
+        paths.close()
+
+    def test_6_old_scans_alone_begin_anew(self):
         self.room.drive(2.0)
         wait_for(self.mapped, "a map", DEADLINE)
-        for _ in range(3):
+
+        def gone():
             self.room.scan.publish(self.room.sweep(0.0, rospy.Time.from_sec(self.room.begin - 5.0)))
-        wait_for(lambda: not self.mapped(), "a new beginning", DEADLINE)
+            time.sleep(0.1)
+            return not self.mapped()
+
+        wait_for(gone, "a new beginning", DEADLINE)
 
     def test_7_a_laser_upside_down_and_yawed(self):
         mount = np.array([-0.1, 0.2, 2.0])

@@ -8,13 +8,13 @@ import math
 import pytest
 import rosgraph
 from kurumaisu.msg import Fiducials
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import CameraInfo, Image, LaserScan, Range
 from stageros_rig import MODELS, STEP, Case, place, since
 from std_msgs.msg import Bool, UInt8MultiArray
 from std_srvs.srv import Empty, Trigger
 
-from kurumaisu.ros.testing.nodes import Topic, wait_for
+from kurumaisu.ros.testing.nodes import PATIENCE, Topic, wait_for
 
 TWO = (
     MODELS
@@ -63,6 +63,16 @@ class SeveralRobots(Case):
 
     def setUp(self):
         self.ask("reset", Empty)
+
+    def test_a_mapper_takes_their_frames_as_they_are(self):
+        maps = Topic("/robot_0/map", OccupancyGrid)
+
+        def mapped():
+            self.step()
+            return maps.last
+
+        assert wait_for(mapped, "a map of robot_0's scans", PATIENCE).info.width > 10
+        maps.close()
 
     def test_frames_start_with_a_slash(self):
         self.step()

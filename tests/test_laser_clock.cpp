@@ -315,6 +315,21 @@ TEST(DeviceClockOfTheHost, SaysWhenItIsNot) {
   }
 }
 
+TEST(DeviceClockThatStands, GivesTheHostsTime) {
+  for (const l::TimeMode mode : {l::TimeMode::kEnvelope, l::TimeMode::kDevice, l::TimeMode::kHost}) {
+    l::DeviceClock clock(mode);
+    for (int i = 0; i < 100; ++i) {
+      ASSERT_NEAR(clock.stamp(50000, 50.07 + 0.1 * i, 0.07), 50.0 + 0.1 * i, 1e-9) << i;
+      EXPECT_EQ(clock.state().stands, i > 0 && mode != l::TimeMode::kHost);
+    }
+    for (int i = 0; i < 100; ++i) {  // it goes on
+      const auto ms = static_cast<std::uint32_t>(50100 + 100 * i);
+      ASSERT_NEAR(clock.stamp(ms, 60.07 + 0.1 * i, 0.07), 60.0 + 0.1 * i, 0.01) << i;
+      EXPECT_FALSE(clock.state().stands);
+    }
+  }
+}
+
 // The driver was stopped while simulated time ran on: it reads what was kept for it before it hears the time, then the
 // time before the rest.
 TEST(DeviceClockOfTheHost, IsTrustedWhileItsReaderWasHeldUp) {

@@ -62,8 +62,8 @@ class LinkTest : public testing::Test {
     peer.emplace(pty.fd(), answer);
   }
 
-  l::Sensor shake() {
-    return l::handshake(*link, {kBaud, 0.3},
+  l::Sensor shake(bool ask_once = false) {
+    return l::handshake(*link, {kBaud, 0.3, ask_once},
                         [this](l::Report::Level, const std::string& text) { told += text + "\n"; });
   }
 
@@ -160,6 +160,19 @@ TEST_F(LinkTest, AWrongSumOfVVIsToldOnly) {
   EXPECT_TRUE(has(told, "LASER_BAD_SUM: VV")) << told;
 }
 
+TEST_F(LinkTest, ASensorThatFallsSilentWhenAskedAgainIsAskedOnce) {
+  std::atomic<int> asked{0};
+  connect([&](const std::string& command) {
+    const bool is_first = command != "VV" || asked++ == 0;
+    if (!is_first) return std::string();
+    return command == "VV" ? reply(command, "00", keyed("VEND:Hokuyo") + "SERI:H1;0\n") : idle(command);
+  });
+  EXPECT_THROW(shake(), l::WentSilent);
+  asked = 0;
+  EXPECT_EQ(scip::keyed(shake(true).version).at("SERI"), "H1");
+  EXPECT_TRUE(has(told, "LASER_BAD_SUM: VV, which is asked once, comes with 1 wrong sums")) << told;
+}
+
 TEST_F(LinkTest, AWrongSumOfPPIsAskedAgain) {
   std::atomic<int> asked{0};
   connect([&](const std::string& command) {
@@ -250,6 +263,8 @@ TEST_F(LinkTest, WhatIsNoGoodScanIsTold) {
   const std::string good = frame(request, 5, ramp);
   EXPECT_EQ(kind(good), Kind::kScan);
   EXPECT_EQ(kind(good), Kind::kDuplicate);
+  EXPECT_EQ(kind(frame(request, 5, [](int beam) { return ramp(beam) + 1; })),
+            Kind::kScan);  // the clock stands
   std::string bad = frame(request, 6, ramp);
   ++bad[40];
   EXPECT_EQ(kind(bad), Kind::kDamaged);

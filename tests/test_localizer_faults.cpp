@@ -179,8 +179,8 @@ TEST(LocalizerFaults, AMapOf10000By10000Cells) {
 }
 
 TEST(LocalizationReport, SaysWhatIsWrong) {
-  k::Localizer::Estimate estimate{around({0, 0, 0}), k::Knowledge::kTracking, 0.9, 0.9, 100, 0, true};
-  const k::LocalizationState good{true, "", 0.1, 2, "", &estimate, 0, 0};
+  k::Localizer::Estimate estimate{around({0, 0, 0}), k::Knowledge::kTracking, 0.9, 0.9, 100, 0, true, false};
+  const k::LocalizationState good{"", true, "", 0.1, 2, "", &estimate, 0, 0};
   EXPECT_EQ(k::judge(good).level, 0);
   const auto expect = [&good](int level, const std::string& code,
                               const std::function<void(k::LocalizationState&)>& change) {
@@ -196,6 +196,9 @@ TEST(LocalizationReport, SaysWhatIsWrong) {
   expect(1, "no scan yet", [](auto& s) { s.estimate = nullptr; });
   expect(1, "LOCALIZATION_DROPPED", [](auto& s) { s.newly_dropped = 3; });
   expect(1, "LOCALIZATION_TOO_SLOW", [](auto& s) { s.newly_skipped = 3; });
+  expect(2, "LOCALIZATION_NO_CLOCK: /clock", [](auto& s) { s.clock_problem = "/clock"; });
+  estimate.blind = true;
+  expect(1, "LOCALIZATION_BLIND", [](auto&) {});
   estimate.knowledge = k::Knowledge::kAmbiguous;
   expect(1, "LOCALIZATION_AMBIGUOUS", [](auto&) {});
   estimate.knowledge = k::Knowledge::kLost;

@@ -96,7 +96,6 @@ TEST(Beams, AreEvenlySpreadAndWithoutTheMotionDuringTheScan) {
   k::Scan scan{0, fan, std::vector<float>(200, 2.0F)};
   scan.ranges[1] = std::nanf("");
   const k::Beams still = k::pick(scan, {0, 0, 0}, kReading);
-  EXPECT_EQ(still.asked, 50U);
   EXPECT_EQ(still.beams.size(), 50U);
   const k::Beams moving = k::pick(scan, {0.1, 0, 0.2}, kReading);
   for (std::size_t i = 0; i < 50; ++i) {
@@ -117,9 +116,20 @@ TEST(Beams, WhatIsNoReadingIsLeftOut) {
   const float inf = std::numeric_limits<float>::infinity();
   const k::Scan scan{0, fan, {std::nanf(""), inf, -inf, 0.0F, -1.0F, 5.1F, 4.9F}};
   const k::Beams beams = k::pick(scan, {0, 0, 0}, kReading);
-  EXPECT_EQ(beams.asked, 7U);
   ASSERT_EQ(beams.beams.size(), 1U);
   EXPECT_FLOAT_EQ(beams.beams[0].range, 4.9F);
+}
+
+// Whichever beams a laser leaves out: as many are weighed as of one that has no others.
+TEST(Beams, AreThoseThatAreThere) {
+  const k::Fan fan{-1.0, 0.01, 0, 5, {0, 0, 0}};
+  for (int every = 2; every <= 4; ++every) {
+    for (int first = 0; first < every; ++first) {
+      k::Scan scan{0, fan, std::vector<float>(200, std::nanf(""))};
+      for (int i = first; i < 200; i += every) scan.ranges[i] = 2.0F;
+      EXPECT_EQ(k::pick(scan, {0, 0, 0}, kReading).beams.size(), 50U) << first << " of " << every;
+    }
+  }
 }
 
 TEST(Sensor, DeviationIsThatOfEquationFour) {
@@ -134,7 +144,7 @@ k::Field wall() {
   return {grid, {0, 0, 0}, 0.4};
 }
 
-k::Beams oneBeam(float range) { return {{0, 0, 0}, {{range, 0, range, 0}}, 1, 1}; }
+k::Beams oneBeam(float range) { return {{0, 0, 0}, {{range, 0, range, 0}}, 1}; }
 
 TEST(Sensor, TellsHitsFromThingsInTheWayAndFromWallsThatWereCrossed) {
   const k::Field field = wall();
@@ -252,7 +262,7 @@ TEST(Doubt, LeadsToASearchWhenTheNeighbourhoodDoesNotFitEither) {
 TEST(Sensor, AlignsToAWallAcrossIt) {
   const k::Field field = wall();
   const k::Sensor sensor(field, kReading, kUrg);
-  k::Beams beams{{0, 0, 0}, {}, 0, 1};
+  k::Beams beams{{0, 0, 0}, {}, 1};
   for (int i = -20; i <= 20; ++i) {  // from (1, 2), heading 0
     const double y = 0.05 * i;
     beams.beams.push_back({1.025F, static_cast<float>(y), static_cast<float>(std::hypot(1.025, y)), 0});

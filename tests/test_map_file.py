@@ -87,6 +87,8 @@ def test_16_bits(tmp_path: Path) -> None:
     [
         ({"resolution": "0"}, "map.yaml:2: resolution: must be a finite number above 0: 0"),
         ({"resolution": "1e-2"}, "map.yaml:2: resolution: must be a number, not str '1e-2'"),
+        ({"resolution": "1.0e+300"}, "map.yaml:2: resolution: must be a number from 0.0001 to 100 m: 1e+300"),
+        ({"origin": "[1.0e+300, 0, 0]"}, "map.yaml:3: origin[0]: must be a number from -1e+07 to 1e+07 m: 1e+300"),
         ({"origin": "[1, 2]"}, "map.yaml:3: origin: must be a list of 3 numbers"),
         ({"negate": "2"}, "map.yaml:4: negate: must be 0 or 1: 2"),
         ({"occupied_thresh": "65"}, "map.yaml:5: occupied_thresh: must be from 0 to 1: 65"),

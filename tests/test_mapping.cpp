@@ -2,6 +2,7 @@
 // What may go wrong around the mapper.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -81,6 +82,30 @@ TEST(Faults, MostReadingsMayBeMissing) {
     for (float& range : moment.scan.ranges) range = dice() % 5 == 0 ? range : std::nanf("");
   });
   EXPECT_LT(errorAt(out.back().map_from_base, 19.9), 0.25);
+}
+
+// A neighbour is the next reading, not the next beam.
+TEST(Faults, WithFiveOfSixBeamsMissingItIsAsWithASixthOfTheBeams) {
+  const auto blind = [](const Mischief& mischief) {
+    k::Mapper mapper(room::settings(), 1);
+    const auto out = drive(mapper, 0, 20, mischief);
+    EXPECT_LT(errorAt(out.back().map_from_base, 19.9), 0.1);
+    return std::count_if(out.begin(), out.end(), [](const auto& estimate) { return estimate.blind; });
+  };
+  const auto missing = blind([](Moment& moment) {
+    for (int i = 0; i < room::kBeams; ++i) {
+      if (i % 6 != 0) moment.scan.ranges[i] = std::nanf("");
+    }
+  });
+  const auto coarse = blind([](Moment& moment) {
+    std::vector<float> ranges;
+    for (int i = 0; i < room::kBeams; i += 6) ranges.push_back(moment.scan.ranges[i]);
+    moment.scan.ranges = ranges;
+    moment.scan.fan.angle_increment *= 6;
+    moment.scan.fan.time_increment *= 6;
+  });
+  EXPECT_LE(missing, coarse + 2);
+  EXPECT_LT(missing, 10);
 }
 
 TEST(Faults, OdometryThatStandsStillIsMadeUpForByTheScans) {
@@ -204,6 +229,7 @@ TEST(MappingReport, SaysTheWorstFirst) {
   using State = k::MappingState;
   EXPECT_EQ(said([](State& s) { s.begun = false; }).summary, "no scan yet");
   const std::vector<std::tuple<std::function<void(State&)>, int, std::string>> cases{
+      {[](State& s) { s.clock_problem = "/clock"; }, 2, "MAPPING_NO_CLOCK: /clock"},
       {[](State& s) { s.start_problem = "explains 3 %"; }, 2, "MAPPING_START: explains 3 %"},
       {[](State& s) { s.silence = 3; }, 2, "MAPPING_NO_SCAN"},
       {[](State& s) { s.paused = true; }, 1, "MAPPING_PAUSED"},

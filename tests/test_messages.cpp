@@ -75,6 +75,9 @@ TEST(Stamps, OfAnotherTimeAreRefusedWithBoth) {
   k::requireStamp(ros::Time(1e9), ros::Time(0), 10);  // there is no time yet
   expectWords("at most 10 s ahead of this clock, 100 s: 111 s",
               [] { k::requireStamp(ros::Time(111), ros::Time(100), 10); });
+  ros::Time::setNow(ros::Time(100));  // simulated
+  expectWords("which is the wall's time, while this clock is /clock",
+              [] { k::requireStamp(ros::Time(ros::WallTime::now().sec), ros::Time(100), 10); });
 }
 
 TEST(Scans, ThatMakeSenseAreTaken) {
@@ -92,6 +95,7 @@ TEST(Scans, ThatMakeNoSenseAreRefusedByTheirField) {
     expectWords(words, [&] { k::requireScan(bad, ros::Time(90)); });
   };
   expect("stamp: ", [](auto& bad) { bad.header.stamp = kLast; });
+  expect("stamp: must be above 0 s", [](auto& bad) { bad.header.stamp = ros::Time(0); });
   expect("stamp: must be at most 86400 s ahead", [](auto& bad) { bad.header.stamp = ros::Time(1e6); });
   expect("angle_min: ", [](auto& bad) { bad.angle_min = kInfinity; });
   expect("angle_increment: ", [](auto& bad) { bad.angle_increment = static_cast<float>(kNan); });

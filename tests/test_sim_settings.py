@@ -9,7 +9,7 @@ import yaml
 
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
-from kurumaisu.ros.sim.settings import SimSettings, read_settings
+from kurumaisu.ros.sim.settings import SimSettings, read_settings, start_outside
 from kurumaisu.sim.chair.simulator import NEUTRAL, ChairSimulator
 
 CHOSEN = {
@@ -53,6 +53,14 @@ def test_a_map_without_a_start_is_refused() -> None:
 def test_a_bad_start_is_refused(start: str) -> None:
     with pytest.raises(Error, match=r"/sim_node: start: must be x y yaw"):
         settings(start=start)
+
+
+def test_a_start_outside_of_the_walls_is_said() -> None:
+    assert start_outside(settings(start="1.5 2.0 0.5").world) == ""
+    assert start_outside(settings().world) == ""
+    words = start_outside(settings(start="50 2 0").world)
+    assert words.startswith("start: x 50, y 2 m lies outside of the walls of ")
+    assert "room.world, which reach from x " in words
 
 
 def test_values_of_the_world(tmp_path: Path) -> None:

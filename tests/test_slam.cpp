@@ -110,6 +110,42 @@ TEST(Deskew, GivesTheScanThatAChairAtRestWouldTake) {
   EXPECT_LT(wrong, 10);
 }
 
+TEST(Deskew, DoesSoWithWhatASparseScanHas) {
+  const double t = 3.0;
+  k::Scan sparse = room::scanAt(t, room::kUrg, room::kBeams, nullptr);
+  k::Fan at_once = room::kUrg;
+  at_once.time_increment = 0;
+  const k::Scan expected = room::scanAt(t, at_once, room::kBeams, nullptr);
+  for (int i = 0; i < room::kBeams; ++i) {
+    if (i % 3 != 0) sparse.ranges[i] = std::nanf("");
+  }
+  const k::Scan got = k::deskew(
+      sparse, k::between(room::truth(t), room::truth(t + room::kUrg.time_increment * (room::kBeams - 1))));
+  int there = 0;
+  int wrong = 0;
+  for (int i = 0; i < room::kBeams; ++i) {
+    there += !std::isnan(got.ranges[i]);
+    wrong += std::isfinite(got.ranges[i]) && !(std::abs(got.ranges[i] - expected.ranges[i]) < 0.004F);
+  }
+  EXPECT_NEAR(there, room::kBeams / 3, 10);
+  EXPECT_LT(wrong, 10);
+}
+
+TEST(Dropouts, AreFewBeamsWithoutAReturn) {
+  const float none = std::nanf("");
+  const k::Scan scan{
+      0, {-1.0, 0.1, 0, 4.0, {0, 0, 0}}, {kInf, 1.0F, kInf, none, 5.0F, kInf, 3.0F, kInf, kInf, kInf}};
+  const auto kept = [&scan](int most) {
+    std::string out;
+    for (const float range : k::withoutDropouts(scan, most).ranges) out += std::isnan(range) ? '-' : 'x';
+    return out;
+  };
+  EXPECT_EQ(kept(0), "xxx-xxxxxx");
+  EXPECT_EQ(kept(1), "-x--xxxxxx");
+  EXPECT_EQ(kept(2), "-x----xxxx");
+  EXPECT_EQ(kept(3), "-x----x---");
+}
+
 TEST(Deskew, WithoutMotionKeepsEveryReading) {
   k::Scan scan{0, {-1.0, 0.5, 0, 4.0, {0.3, 0, 0}}, {1.0F, 1.02F, std::nanf(""), kInf, 5.0F}};
   const k::Scan got = k::deskew(scan, {0, 0, 0});
@@ -177,6 +213,18 @@ TEST(Mapper, BeamsWithoutReturnClearAndUnknownOnesDoNot) {
     const double edge = grid.x + grid.width * grid.resolution;
     EXPECT_NEAR(edge, no_return ? 4.0 : 2.0, 0.06);
   }
+}
+
+TEST(Mapper, ADropoutOfInfClearsNoMoreThanOneOfNaN) {
+  std::vector<std::vector<std::int8_t>> maps;
+  for (const float dropout : {kInf, std::nanf("")}) {
+    k::Mapper mapper(room::settings(), 1);
+    k::Scan scan{0, {-1.0, 0.01, 0, 4.0, {0, 0, 0}}, std::vector<float>(201, 2.0F)};
+    for (int i = 0; i < 201; i += 2) scan.ranges[i] = dropout;
+    mapper.add(scan, {0, 0, 0}, {0, 0, 0});
+    maps.push_back(mapper.grid().cells);
+  }
+  EXPECT_EQ(maps[0], maps[1]);
 }
 
 TEST(Mapper, IsTheSameForASeedInAnyThread) {

@@ -17,6 +17,7 @@ from PIL import Image
 from kurumaisu import settings
 from kurumaisu.bounded_files import MOST_IMAGE, MOST_TEXT, check_file, read_text
 from kurumaisu.errors import Error, told
+from kurumaisu.plausible import require
 from kurumaisu.settings import Section
 from kurumaisu.types import FloatArray
 
@@ -104,7 +105,7 @@ def _with_line(path: Path, message: str) -> str:
 def _said(path: Path, top: Section) -> _Said:
     said = _Said(
         image=path.parent / top.text("image"),
-        resolution=top.number("resolution", above=0),
+        resolution=_within(top, "resolution", "resolution", top.number("resolution", above=0)),
         origin=_origin(top),
         negate=_negate(top),
         occupied=top.number("occupied_thresh"),
@@ -122,7 +123,17 @@ def _said(path: Path, top: Section) -> _Said:
 
 def _origin(top: Section) -> tuple[float, float, float]:
     x, y, yaw = top.numbers("origin", 3)
+    _within(top, "position", "origin[0]", x)
+    _within(top, "position", "origin[1]", y)
+    _within(top, "angle", "origin[2]", yaw)
     return x, y, yaw
+
+
+def _within(top: Section, quantity: str, key: str, value: float) -> float:
+    try:
+        return require(quantity, key, value)
+    except Error as error:
+        raise top.error(key, str(error).removeprefix(f"{key}: ")) from error
 
 
 def _negate(top: Section) -> bool:

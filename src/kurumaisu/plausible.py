@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from kurumaisu import _core
 from kurumaisu.errors import Error
+from kurumaisu.types import FloatArray
 
 
 def require(quantity: str, what: str, value: float) -> float:
@@ -29,5 +30,13 @@ def yaw_of(x: float, y: float, z: float, w: float) -> float:
     """
     try:
         return _core.yaw_of(x, y, z, w)
+    except ValueError as error:
+        raise Error(str(error)) from error
+
+
+def require_covariance(covariance: FloatArray) -> None:
+    """Raise Error unless this (3, 3) can be the covariance of x, y [m], heading [rad]."""
+    try:
+        _core.require_covariance(covariance)
     except ValueError as error:
         raise Error(str(error)) from error

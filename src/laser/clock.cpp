@@ -29,12 +29,15 @@ double nearest(std::uint32_t clock, double host) {
 
 double DeviceClock::stamp(std::uint32_t clock, double first_byte, double least_delay) {
   const double latest = first_byte - least_delay;
+  state_.stands = mode_ != TimeMode::kHost && newest_ == clock;
+  newest_ = clock;
+  if (state_.stands) restart();
   const double device = follow(clock, first_byte, least_delay);
   double time = latest;
   if (mode_ != TimeMode::kHost) time = std::min(device + envelope_.at(device) - state_.send_delay, latest);
   if (mode_ == TimeMode::kDevice) {
     const double own = nearest(clock, first_byte);
-    state_.fallback = !isHosts(own, first_byte);
+    state_.fallback = !isHosts(own, first_byte) || state_.stands;
     if (!state_.fallback) time = own;
   }
   if (stamped_ && first_byte >= stamped_->host) time = std::max(time, stamped_->stamp);

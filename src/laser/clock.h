@@ -25,13 +25,14 @@ enum class TimeMode {
 class DeviceClock {
  public:
   struct State {
-    double offset = 0;         ///< [s] host's time less the sensor's, which counts on where it wraps
-    double drift = 0;          ///< [s/s] by which the sensor's clock runs fast; found after a few seconds
-    double latency = 0;        ///< [s] of the newest scan, from its last step to its first byte
-    double send_delay = 0;     ///< [s] the shortest latency, if calibrated; else unknown and taken as 0
-    double span = 0;           ///< [s] that the line rests on
-    bool calibrated = false;   ///< by calibrate()
-    bool fallback = false;     ///< TimeMode::kDevice is asked for, but the clock is not the host's
+    double offset = 0;        ///< [s] host's time less the sensor's, which counts on where it wraps
+    double drift = 0;         ///< [s/s] by which the sensor's clock runs fast; found after a few seconds
+    double latency = 0;       ///< [s] of the newest scan, from its last step to its first byte
+    double send_delay = 0;    ///< [s] the shortest latency, if calibrated; else unknown and taken as 0
+    double span = 0;          ///< [s] that the line rests on
+    bool calibrated = false;  ///< by calibrate()
+    bool fallback = false;    ///< TimeMode::kDevice is asked for, but the clock is not the host's
+    bool stands = false;  ///< the sensor's clock has not moved since the scan before: a stamp is the host's
     std::uint64_t resets = 0;  ///< reboots of the sensor, steps of either clock
   };
 
@@ -96,6 +97,7 @@ class DeviceClock {
   State state_;
   Envelope envelope_;  // of the sensor's time [s], host's time less the sensor's [s]
   std::optional<Reading> last_;
+  std::optional<std::uint32_t> newest_;  // [ms] clock of the last scan
   std::optional<Stamped> stamped_;
   std::optional<Own> own_;  // while the sensor's clock is the host's
   std::optional<Late> late_;

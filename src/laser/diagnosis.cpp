@@ -175,6 +175,9 @@ Diagnosis diagnoseScans(const Status& status, std::optional<double> rate, double
   } else if (rate && std::abs(*rate - expected) > tolerance * expected) {
     diagnosis.level = Level::kWarn;
     diagnosis.summary = shown("%.2f scans a second", *rate) + shown(" instead of %.2f", expected);
+  } else if (status.clock.stands) {
+    diagnosis.level = Level::kWarn;
+    diagnosis.summary = "LASER_CLOCK: the sensor's clock stands: stamps are the host's";
   } else if (status.clock.fallback) {
     diagnosis.level = Level::kWarn;
     diagnosis.summary = "LASER_CLOCK: time_mode device, but the sensor's clock is not the host's";

@@ -67,7 +67,7 @@ class Driver::Impl {
         now_(std::move(now)),
         monitor(now_, std::move(log)),
         control(settings_.live),
-        memory_{DeviceClock(settings_.time_mode), {}, {}, false, 0, false} {}
+        memory_{DeviceClock(settings_.time_mode), {}, {}, false, 0, false, false} {}
 
   void start() {
     if (!thread_.joinable()) thread_ = std::thread([this] { run(); });

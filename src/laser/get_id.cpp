@@ -97,17 +97,24 @@ std::unique_ptr<k::Port> open(const std::string& name, const k::Link::Interrupte
   return std::make_unique<k::Tcp>(name.substr(0, colon), port, kPatience, interrupted);
 }
 
-std::string serialNumber(const std::string& name) {
+std::string serialNumber(const std::string& name, bool ask_once) {
   const double deadline = k::steadyTime() + kPatience;
   const auto interrupted = [deadline] { return k::steadyTime() > deadline; };
   k::Link link(open(name, interrupted), k::steadyTime, interrupted);
   const k::Sensor sensor =
-      k::handshake(link, {kBaud, kAnswerTimeout},
+      k::handshake(link, {kBaud, kAnswerTimeout, ask_once},
                    [](k::Report::Level, const std::string& text) { std::cerr << text << "\n"; });
   const auto version = kurumaisu::scip::keyed(sensor.version);
   const auto found = version.find("SERI");
   if (found == version.end() || found->second.empty()) throw std::runtime_error("VV has no SERI");
   return found->second;
+}
+
+std::string serialNumber(const std::string& name) try {
+  return serialNumber(name, false);
+} catch (const k::WentSilent& problem) {
+  std::cerr << problem.what() << "\n";
+  return serialNumber(name, true);
 }
 
 bool report(const std::string& port, bool quiet) {

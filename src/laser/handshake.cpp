@@ -93,18 +93,29 @@ int changeBaud(Link& link, int from, const HandshakeSettings& settings, const Te
                  " baud, but does not answer there");
 }
 
+scip::Message askAgain(Link& link, const std::string& command, double timeout) try {
+  return link.ask(command, timeout);
+} catch (const NoAnswer& problem) {
+  throw WentSilent(std::string(problem.what()) + " after one with a wrong sum: it is asked once from now on");
+}
+
 /// VV, PP or II. A wrong sum may be the line's or the firmware's: real ones send VV with one. What comes twice alike
 /// is what was meant.
-scip::Message describe(Link& link, const std::string& command, double timeout, const Tell& tell) {
-  scip::Message reply = link.ask(command, timeout);
+scip::Message describe(Link& link, const std::string& command, const HandshakeSettings& settings,
+                       const Tell& tell) {
+  const auto told = [&](const scip::Message& reply, const char* when) {
+    tell(Report::Level::kWarning, "LASER_BAD_SUM: " + command + when + std::to_string(reply.bad_sums) +
+                                      " wrong sums: accepted as it is");
+    return reply;
+  };
+  scip::Message reply = link.ask(command, settings.answer_timeout);
+  if (reply.bad_sums == 0) return reply;
+  if (settings.ask_once) return told(reply, ", which is asked once, comes with ");
   for (int i = 1; i < kTries && reply.bad_sums > 0; ++i) {
-    scip::Message again = link.ask(command, timeout);
+    scip::Message again = askAgain(link, command, settings.answer_timeout);
     const bool alike = again.lines == reply.lines;
     reply = std::move(again);
-    if (!alike || reply.bad_sums == 0) continue;
-    tell(Report::Level::kWarning, "LASER_BAD_SUM: " + command + " always comes with " +
-                                      std::to_string(reply.bad_sums) + " wrong sums: accepted as it is");
-    return reply;
+    if (alike && reply.bad_sums > 0) return told(reply, " always comes with ");
   }
   if (reply.bad_sums == 0) return reply;
   throw LinkLost("LASER_BAD_SUM: " + command + " has a wrong sum each time, and never the same content");
@@ -121,8 +132,8 @@ std::optional<Told> timeIn(const std::map<std::string, std::string>& state, doub
   return Told{clock, host};
 }
 
-scip::Parameters askParameters(Link& link, double timeout, const Tell& tell) {
-  const scip::Message reply = describe(link, "PP", timeout, tell);
+scip::Parameters askParameters(Link& link, const HandshakeSettings& settings, const Tell& tell) {
+  const scip::Message reply = describe(link, "PP", settings, tell);
   if (reply.status != "00") throw Refused("LASER_REFUSED: PP is answered by status " + reply.status);
   try {
     return scip::parameters(reply);
@@ -142,9 +153,9 @@ Sensor handshake(Link& link, const HandshakeSettings& settings, const Tell& tell
     sensor.baud = changeBaud(link, found.baud, settings, tell);
   link.ask("TM2", settings.answer_timeout,
            settings.answer_timeout);  // out of the adjust mode, in which another program may have died
-  sensor.version = describe(link, "VV", settings.answer_timeout, tell);
-  sensor.parameters = askParameters(link, settings.answer_timeout, tell);
-  const scip::Message state = describe(link, "II", settings.answer_timeout, tell);
+  sensor.version = describe(link, "VV", settings, tell);
+  sensor.parameters = askParameters(link, settings, tell);
+  const scip::Message state = describe(link, "II", settings, tell);
   sensor.state = scip::keyed(state);
   sensor.time = timeIn(sensor.state, state.first_byte);
   return sensor;

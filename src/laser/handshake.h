@@ -26,6 +26,11 @@ struct NoIntensity : Refused {
   using Refused::Refused;
 };
 
+/// It gave an answer with a wrong sum, and fell silent when asked once more.
+struct WentSilent : LinkLost {
+  using LinkLost::LinkLost;
+};
+
 /// What is told on the way.
 using Tell = std::function<void(Report::Level, const std::string&)>;
 
@@ -47,12 +52,13 @@ struct Sensor {
 struct HandshakeSettings {
   int baud;               ///< [baud] wanted
   double answer_timeout;  ///< [s]
+  bool ask_once;          ///< what comes with a wrong sum is taken as it is: see WentSilent
 };
 
 /// Finds a sensor's rate and protocol, quiets it, and asks what it is.
 ///
 /// It may be streaming, be at a rate that another program left, or have just been switched on: SCIP 1.1 at 19200 baud.
-/// Throws LinkLost if nothing answers, Refused for parameters that cannot be.
+/// Throws LinkLost if nothing answers, WentSilent, Refused for parameters that cannot be.
 Sensor handshake(Link& link, const HandshakeSettings& settings, const Tell& tell);
 
 }  // namespace kurumaisu::laser

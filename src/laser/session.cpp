@@ -51,8 +51,16 @@ void Session::run() {
   }
 }
 
+void Session::shake() try {
+  const auto& settings = with_.settings;
+  sensor_ = handshake(link_, {settings.serial_baud, settings.answer_timeout, with_.memory.ask_once}, tell_);
+} catch (const WentSilent&) {
+  with_.memory.ask_once = true;
+  throw;
+}
+
 void Session::identify() {
-  sensor_ = handshake(link_, {with_.settings.serial_baud, with_.settings.answer_timeout}, tell_);
+  shake();
   is_first_ = true;
   Device device{scip::keyed(sensor_.version), sensor_.state, sensor_.parameters, sensor_.baud};
   if (device.version["SERI"] != with_.memory.serial) {

@@ -25,6 +25,7 @@ struct Memory {
   bool wedged = false;          ///< it fell silent when asked for intensities
   int starts_without_scan = 0;  ///< in a row
   bool has_streamed = false;
+  bool ask_once = false;  ///< asked again after a wrong sum it fell silent
 };
 
 /// What a session is given; all of it must outlive the session.
@@ -58,6 +59,7 @@ class Session {
     int errors = 0;      // since then
   };
 
+  void shake();
   void identify();
   std::unique_ptr<Urg> start(std::shared_ptr<ScipStream>& stream);
   std::unique_ptr<Urg> startForm(std::shared_ptr<ScipStream>& stream, const Window& window);

@@ -2,6 +2,7 @@
 #include "laser/stream.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <stdexcept>
 
@@ -37,15 +38,29 @@ std::optional<Arrival> ScipStream::await(double timeout) {
   if (!is_scan) return Arrival{Arrival::Kind::kStatus, {}, message->first_byte, message->status};
   try {
     Arrival arrival{Arrival::Kind::kScan, scip::decodeScan(*message, request_), message->first_byte, {}};
-    if (clock_ == arrival.rotation.clock) {
-      return Arrival{Arrival::Kind::kDuplicate, {}, message->first_byte, "clock " + std::to_string(*clock_)};
+    if (isDuplicate(arrival)) {
+      return Arrival{Arrival::Kind::kDuplicate,
+                     {},
+                     message->first_byte,
+                     "clock " + std::to_string(arrival.rotation.clock)};
     }
-    clock_ = arrival.rotation.clock;
+    last_ = arrival;
     put(started_, message->status, message->lines);
     return arrival;
   } catch (const scip::BadFrame& problem) {
     return Arrival{Arrival::Kind::kDamaged, {}, message->first_byte, problem.what()};
   }
+}
+
+/// The same again at once. A turn later it is a clock that stands: then nothing tells a scan from the one before.
+bool ScipStream::isDuplicate(const Arrival& arrival) {
+  constexpr double kAtOnce = 0.5;  // of the time from scan to scan
+  const bool same_clock = last_ && last_->rotation.clock == arrival.rotation.clock;
+  const double period = sensor_.parameters.scanTime() * (request_.interval + 1);
+  const bool is_duplicate = same_clock && !stands_ && last_->rotation == arrival.rotation &&
+                            std::abs(arrival.first_byte - last_->first_byte) < kAtOnce * period;
+  if (!is_duplicate) stands_ = same_clock;
+  return is_duplicate;
 }
 
 void ScipStream::rethrow() const {

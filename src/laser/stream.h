@@ -22,7 +22,7 @@ struct Arrival {
   enum class Kind {
     kScan,       ///< whole and good
     kDamaged,    ///< a scan that is not
-    kDuplicate,  ///< a scan of a time that was already there
+    kDuplicate,  ///< the scan before once more
     kStatus,     ///< the sensor's own report of trouble
   };
   Kind kind;
@@ -54,6 +54,7 @@ class ScipStream : public mrpt::io::CStream {
   std::uint64_t getPosition() const override { return 0; }
 
  private:
+  bool isDuplicate(const Arrival& arrival);
   void answer(const std::string& command);
   void start(const std::string& command);
   void put(const std::string& command, const std::string& status, const std::vector<std::string>& lines);
@@ -63,10 +64,11 @@ class ScipStream : public mrpt::io::CStream {
   const Sensor sensor_;
   const scip::Request request_;
   const double answer_timeout_;
-  std::string started_;                 // the command by which MRPT started scanning
-  std::string ready_;                   // bytes for MRPT
-  std::size_t read_ = 0;                // of them
-  std::optional<std::uint32_t> clock_;  // [ms] of the last scan
+  std::string started_;          // the command by which MRPT started scanning
+  std::string ready_;            // bytes for MRPT
+  std::size_t read_ = 0;         // of them
+  std::optional<Arrival> last_;  // scan
+  bool stands_ = false;          // the sensor's clock
   std::exception_ptr failure_;
 };
 

@@ -16,9 +16,17 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;  // [ns]
 constexpr std::array<int, 3> kRows{0, 1, 5};     // x, y, yaw among six
+constexpr double kWallTime = 600;  // [s] clocks of computers that stand beside each other are so near
 
 std::int64_t nanoseconds(const ros::Time& time) {
   return kSecond * static_cast<std::int64_t>(time.sec) + static_cast<std::int64_t>(time.nsec);
+}
+
+std::string seconds(const ros::Time& time) {
+  std::ostringstream text;
+  text.precision(15);
+  text << time.toSec() << " s";
+  return text.str();
 }
 
 }  // namespace
@@ -42,10 +50,15 @@ void requireStamp(const ros::Time& stamp, const ros::Time& now, double ahead) {
   requireStamp(stamp);
   if (now.isZero() || secondsFrom(now, stamp) <= ahead) return;
   std::ostringstream text;
-  text.precision(15);
-  text << "stamp: must be at most " << ahead << " s ahead of this clock, " << now.toSec()
-       << " s: " << stamp.toSec() << " s";
+  text << "stamp: must be at most " << ahead << " s ahead of this clock, " << seconds(now) << ": "
+       << seconds(stamp)
+       << (isWallTime(stamp) ? ", which is the wall's time, while this clock is /clock" : "");
   throw std::invalid_argument(text.str());
+}
+
+bool isWallTime(const ros::Time& stamp) {
+  const ros::WallTime wall = ros::WallTime::now();
+  return ros::Time::isSimTime() && std::abs(secondsFrom(stamp, {wall.sec, wall.nsec})) < kWallTime;
 }
 
 Pose2D planarOf(const geometry_msgs::Pose& pose) {
@@ -66,6 +79,7 @@ Eigen::Matrix3d planarOf(const boost::array<double, 36>& values) {
 
 void requireScan(const sensor_msgs::LaserScan& scan, const ros::Time& now) {
   requireStamp(scan.header.stamp, now);
+  if (scan.header.stamp.isZero()) throw std::invalid_argument("stamp: must be above 0 s: it was not set");
   require(plausible::kAngle, "angle_min", scan.angle_min);
   require(plausible::kAngle, "angle_increment", scan.angle_increment);
   require(plausible::kDuration, "time_increment, times the number of readings",

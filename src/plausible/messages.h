@@ -33,6 +33,9 @@ void requireStamp(const ros::Time& stamp);
 /// of simulated time.
 void requireStamp(const ros::Time& stamp, const ros::Time& now, double ahead = kOtherClock);
 
+/// Whether a stamp is of the wall's clock, while time is simulated.
+bool isWallTime(const ros::Time& stamp);
+
 /// x, y, yaw of a pose.
 Pose2D planarOf(const geometry_msgs::Pose& pose);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plausible/transform_input.h"
 
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -10,6 +11,7 @@ namespace kurumaisu {
 namespace {
 
 constexpr double kWarningPeriod = 5.0;  // [s] of throttled warnings
+constexpr double kMemory = 10.0;        // [s] of a buffer: later ones of a child keep those before out
 constexpr std::uint32_t kQueue = 100;   // messages that may wait, as with tf2_ros
 
 geometry_msgs::TransformStamped checked(geometry_msgs::TransformStamped transform, const ros::Time& now,
@@ -47,11 +49,19 @@ void TransformInput::take(const Event& event, bool is_static) {
   last_clock_ = now;
   for (const auto& transform : event.getConstMessage()->transforms) {
     try {
+      if (!is_static) requireNear(transform, now);
       buffer_->setTransform(checked(transform, now, is_static), event.getPublisherName(), is_static);
     } catch (const std::exception& error) {  // of any kind: this thread must go on
       refuse(transform.header.frame_id + " -> " + transform.child_frame_id + ": " + error.what());
     }
   }
+}
+
+/// One alone that is ahead of this clock is a mistake; if all are, the clock is another computer's.
+void TransformInput::requireNear(const geometry_msgs::TransformStamped& transform, const ros::Time& now) {
+  ros::Time& last = stamps_[transform.child_frame_id];
+  const ros::Time before = std::exchange(last, transform.header.stamp);
+  if (std::abs(secondsFrom(before, last)) > kMemory) requireStamp(last, now, kMemory);
 }
 
 void TransformInput::refuse(const std::string& why) {

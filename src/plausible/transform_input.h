@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // /tf and /tf_static into a buffer, in a thread of their own. In place of tf2_ros::TransformListener, which ends its
-// program at a stamp near the end of ros::Time, and lets one transform of next year keep all later ones out.
+// program at a stamp near the end of ros::Time, and lets one transform of the future keep all others out.
 #pragma once
 
 #include <ros/callback_queue.h>
@@ -10,6 +10,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <map>
 #include <string>
 
 namespace kurumaisu {
@@ -27,12 +28,14 @@ class TransformInput {
 
   ros::Subscriber hear(const std::string& topic, bool is_static);
   void take(const Event& event, bool is_static);
+  void requireNear(const geometry_msgs::TransformStamped& transform, const ros::Time& now);
   void refuse(const std::string& why);
 
   tf2_ros::Buffer* buffer_;
   std::string prefix_;
   std::atomic<std::uint64_t> refused_{0};
   ros::Time last_clock_;
+  std::map<std::string, ros::Time> stamps_;  ///< of the last transform of each child
   ros::CallbackQueue queue_;
   ros::NodeHandle nh_;
   ros::Subscriber moving_, fixed_;

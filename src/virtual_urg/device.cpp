@@ -66,6 +66,10 @@ std::uint32_t Device::State::clockAt(double time) const {
 
 double Device::State::scanTime() const { return 60.0 / motorSpeed(parameters, memory); }
 
+bool Device::State::isDeaf(double now) const {
+  return faults.find("blackhole") != nullptr || now < deaf_until;
+}
+
 void Device::State::restartClock(double now) {
   clock.start = 0;
   clock_zero = now;
@@ -81,6 +85,12 @@ void Device::State::powerUp(double now, double boot_time) {
 
 void Device::State::hear(const std::string& line, double now, Output& output) {
   ++counts.commands;
+  const Fault* deaf = faults.find("vv-deaf");
+  if (deaf != nullptr && line == "VV" && ++versions > 1) {
+    deaf_until = now + *deaf->value;
+    versions = 0;
+  }
+  if (isDeaf(now)) return;
   const bool is_repeated = !heard.insert(line.substr(0, 2)).second;
   const bool is_full = waiting.size() >= kMostWaiting && !endsWaiting(line);
   if (line.size() > kLongestLine || is_repeated || is_full) {
@@ -118,6 +128,7 @@ Device& Device::operator=(Device&&) noexcept = default;
 
 Output Device::connect(double /*now*/) {
   Output output;
+  state_->versions = 0;
   const Fault* closes = state_->faults.find("close-on-accept");
   const auto number = static_cast<double>(++state_->connections);
   if (closes != nullptr && number <= closes->value.value_or(number)) output.event = Event::kClose;
@@ -133,7 +144,7 @@ void Device::disconnect(double /*now*/) {
 Output Device::receive(std::string_view bytes, double now) {
   Output output;
   State& state = *state_;
-  if (isBlackHole() || now < state.deaf_until) {
+  if (state.isDeaf(now)) {
     state.counts.lost_input += bytes.size();
     return output;
   }

@@ -83,9 +83,10 @@ std::string Device::State::frame(const Order& order, const Measurement& measurem
   memory.ill = isTrouble(status);
   const std::string echo = echoOf(order);
   if (!status.empty()) return reply(echo, status);
+  const double time = faults.find("t-stands") != nullptr ? clock_zero : measurement.start;
   const Steps steps = mismeasured(stepsOf(measurement, model, parameters), faults, scan);
   return reply(echo, order.request.stream ? kData : kGood,
-               scanBody(order.request, clockAt(measurement.start), steps, parameters.distance_min));
+               scanBody(order.request, clockAt(time), steps, parameters.distance_min));
 }
 
 std::string Device::State::playedStatus(const Order& order) {

@@ -20,6 +20,7 @@ struct Device::State {
   std::uint32_t clockAt(double time) const;
   double scanTime() const;
   void restartClock(double now);
+  bool isDeaf(double now) const;
   void powerUp(double now, double boot_time);
 
   /// Commands, in device.cpp. A line may be refused unread, wait for a rotation, or be carried out.
@@ -47,6 +48,7 @@ struct Device::State {
   std::deque<std::string> waiting;  // commands behind one that waits for a rotation
   Counts counts;
   std::uint64_t connections = 0;
+  int versions = 0;  // VV, in this connection, or since it was deaf
 };
 
 }  // namespace kurumaisu::virtual_urg

@@ -12,7 +12,7 @@ import rospy
 from geometry_msgs.msg import Twist
 
 from kurumaisu.errors import Error, one_line
-from kurumaisu.plausible import require
+from kurumaisu.plausible import require, require_covariance
 from kurumaisu.ros.rotation import planar
 
 Rates = tuple[float, float, float]
@@ -83,6 +83,8 @@ def check_scan(message: Any) -> None:
     seconds_of(message)
     require("angle", "angle_min", message.angle_min)
     require("angle", "angle_increment", message.angle_increment)
+    sweep = message.time_increment * len(message.ranges)
+    require("duration", "time_increment, times the number of readings", sweep)
     require("range", "range_min", message.range_min)
     if not message.range_max > 0:  # inf: the sensor has no limit
         raise Error(f"range_max: must be above 0 m: {message.range_max}")
@@ -95,7 +97,6 @@ def check_odometry(message: Any) -> None:
 
 
 def check_covariance(values: Any) -> None:
-    """Raise Error unless x, y [m], yaw [rad] of a covariance (36,) have variances that make sense."""
-    diagonal = np.asarray(values).reshape(6, 6).diagonal()
-    for i, name in ((0, "x"), (1, "y"), (5, "yaw")):
-        require("variance", f"variance of {name}", float(diagonal[i]))
+    """Raise Error unless this (36,) can be the covariance of a pose, seen from above."""
+    rows = [0, 1, 5]  # x, y, yaw among six
+    require_covariance(np.asarray(values, dtype=np.float64).reshape(6, 6)[np.ix_(rows, rows)])

@@ -34,16 +34,26 @@ Moved move(const Fan& fan, double bearing, double range, const Pose2D& laser_mot
           std::isfinite(range) ? std::hypot(point.x, point.y) : range};
 }
 
-/// Sets the ray nearest to a moved reading, unless a nearer surface has it.
-void setNearest(std::vector<float>& ranges, const Moved& reading) {
-  const double ray = std::nearbyint(reading.beam);
-  if (ray < 0 || ray >= static_cast<double>(ranges.size())) return;
-  float& range = ranges[static_cast<std::size_t>(ray)];
-  if (!(range <= reading.range)) range = static_cast<float>(reading.range);
+/// Range [m] on the line through two readings: along it 1 / range is linear for small angles. part: 0 at a, 1 at b.
+double onLine(const Moved& a, const Moved& b, double part) {
+  return 1.0 / ((1 - part) / a.range + part / b.range);
 }
 
-/// Sets the rays between two moved readings of one surface: along a line 1 / range is linear for small
-/// angles.
+void setNearer(float& range, double value) {
+  if (!(range <= value)) range = static_cast<float>(value);
+}
+
+/// Sets the ray nearest to a moved reading, unless a nearer surface has it. other: a reading of its surface, or null.
+void setNearest(std::vector<float>& ranges, const Moved& reading, const Moved* other) {
+  const double ray = std::nearbyint(reading.beam);
+  if (ray < 0 || ray >= static_cast<double>(ranges.size())) return;
+  const double apart = other != nullptr ? reading.beam - other->beam : 0;
+  const bool slopes = std::abs(apart) > kRounding;
+  setNearer(ranges[static_cast<std::size_t>(ray)],
+            slopes ? onLine(*other, reading, (ray - other->beam) / apart) : reading.range);
+}
+
+/// Sets the rays between two moved readings of one surface.
 void setBetween(std::vector<float>& ranges, const Moved& a, const Moved& b) {
   const Moved& first = a.beam < b.beam ? a : b;
   const Moved& last = a.beam < b.beam ? b : a;
@@ -52,14 +62,12 @@ void setBetween(std::vector<float>& ranges, const Moved& a, const Moved& b) {
   for (int ray = static_cast<int>(std::fmax(0.0, std::ceil(first.beam - kRounding))); ray <= end; ++ray) {
     const double part =
         last.beam > first.beam ? std::clamp((ray - first.beam) / (last.beam - first.beam), 0.0, 1.0) : 0.0;
-    const double range = 1.0 / ((1 - part) / first.range + part / last.range);
-    if (!(ranges[ray] <= range)) ranges[ray] = static_cast<float>(range);
+    setNearer(ranges[ray], onLine(first, last, part));
   }
 }
 
-bool sameSurface(const Moved& a, const Moved& b) {
-  return std::isfinite(a.range) && std::isfinite(b.range) &&
-         std::abs(a.range - b.range) <= kSameSurface * std::fmin(a.range, b.range);
+bool sameSurface(double a, double b) {
+  return std::isfinite(a) && std::isfinite(b) && std::abs(a - b) <= kSameSurface * std::fmin(a, b);
 }
 
 }  // namespace
@@ -80,29 +88,40 @@ void validate(const Scan& scan) {
   }
 }
 
+Scan withoutDropouts(Scan scan, int most) {
+  auto& ranges = scan.ranges;
+  const auto nothing = [&scan](float range) { return std::isinf(range) || range > scan.fan.range_max; };
+  for (auto at = ranges.begin(); at != ranges.end();) {
+    const auto first = std::find_if(at, ranges.end(), nothing);
+    at = std::find_if_not(first, ranges.end(), nothing);
+    if (at - first <= most) std::fill(first, at, kNothing);
+  }
+  return scan;
+}
+
 Scan deskew(const Scan& scan, const Pose2D& motion) {
   const Fan& fan = scan.fan;
   const std::size_t n = scan.ranges.size();
   Scan out{scan.stamp, fan, std::vector<float>(n, kNothing)};
-  Moved last{0, 0};
-  bool has_last = false;
+  Moved last{0, std::nan("")};  // that met something
+  std::size_t last_beam = n;
   for (std::size_t i = 0; i < n; ++i) {
     double range = scan.ranges[i];
     if (range > fan.range_max) range = std::numeric_limits<double>::infinity();
-    const bool known = range > 0;
-    if (known) {
-      const Pose2D moved_base = part(motion, static_cast<double>(i) / static_cast<double>(n - 1));
-      const Pose2D laser_motion = between(fan.base_from_laser, compose(moved_base, fan.base_from_laser));
-      const double bearing = fan.angle_min + fan.angle_increment * static_cast<double>(i);
-      const Moved reading = move(fan, bearing, range, laser_motion);
-      if (has_last && sameSurface(last, reading)) {
-        setBetween(out.ranges, last, reading);
-      } else {
-        setNearest(out.ranges, reading);
-      }
-      last = reading;
+    if (!(range > 0)) continue;
+    const Pose2D moved_base = part(motion, static_cast<double>(i) / static_cast<double>(n - 1));
+    const Pose2D laser_motion = between(fan.base_from_laser, compose(moved_base, fan.base_from_laser));
+    const double bearing = fan.angle_min + fan.angle_increment * static_cast<double>(i);
+    const Moved reading = move(fan, bearing, range, laser_motion);
+    const bool same = sameSurface(last.range, reading.range);
+    if (same && i == last_beam + 1) {
+      setBetween(out.ranges, last, reading);
+    } else {
+      setNearest(out.ranges, reading, same ? &last : nullptr);
     }
-    has_last = known;
+    if (!std::isfinite(range)) continue;
+    last = reading;
+    last_beam = i;
   }
   out.fan.time_increment = 0;
   return out;

@@ -31,6 +31,9 @@ struct Scan {
 /// Readings above range_max are taken as no return.
 Scan deskew(const Scan& scan, const Pose2D& motion);
 
+/// The scan without its dropouts: so many beams in a row without a return, or fewer, are NaN.
+Scan withoutDropouts(Scan scan, int most);
+
 /// Throws std::invalid_argument naming what makes no sense in a scan: fewer than 2 beams, a fan of 0 or too
 /// wide.
 void validate(const Scan& scan);

@@ -22,7 +22,6 @@ struct Beam {
 struct Beams {
   Pose2D base_from_laser;
   std::vector<Beam> beams;
-  std::size_t asked = 0;    ///< beams looked at, with those that met nothing
   double independence = 1;  ///< share of them that count as independent of their neighbours
 };
 
@@ -33,7 +32,8 @@ constexpr int kGrades = 8;
 /// Deviation [m] of the readings of a grade: up to its share of max_range, by equation (4) and sigma_hit.
 double deviationOf(int grade, const ReadingSettings& settings, const LaserError& error);
 
-/// Picks readings, evenly spread, and takes out what base moved during the scan.
+/// Picks readings, evenly spread, and takes out what base moved during the scan. Where a beam has none, the nearest that
+/// has one stands for it.
 ///
 /// motion: pose of base at the last beam, seen from base at beam 0. NaN, 0, negative and infinite readings,
 /// and those beyond range_max or the settings' max_range, say nothing of a wall and are left out.

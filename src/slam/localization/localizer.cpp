@@ -71,12 +71,13 @@ class Localizer::Impl {
     const Gaussian motion = motionBetween(*at_, start, settings_.motion, process_);
     const double way = last_ ? wayOf(between(last_->pose, start.pose)) : 0;
     travelled_ += way;
-    blind_ = beams.beams.size() < kLeastReadings ? blind_ + way : 0;
+    const bool blind = beams.beams.size() < kLeastReadings;
+    blind_ = blind ? blind_ + way : 0;
     last_ = start;
     const bool moves = std::hypot(motion.mean.x, motion.mean.y) >= settings_.update_min_d ||
                        std::abs(motion.mean.theta) >= settings_.update_min_a;
     const bool update = moves || once_;
-    Estimate estimate{moved(pose_, motion), knowledge_, 0, 0, 0, 0, update};
+    Estimate estimate{moved(pose_, motion), knowledge_, 0, 0, 0, 0, update, blind};
     if (knowledge_ == Knowledge::kTracking) {
       track(beams, motion, update, estimate);
     } else if (knowledge_ == Knowledge::kLost) {

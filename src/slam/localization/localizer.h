@@ -52,6 +52,7 @@ class Localizer {
     int particles;     ///< or places
     double searched;   ///< share of the map, while lost
     bool updated;      ///< this scan was weighed
+    bool blind;        ///< this scan has too few readings to go by
   };
 
   /// Adds a scan, whose mean error has been taken out. start, end: odometry at the first and at the last beam.

@@ -37,6 +37,7 @@ const char* nameOf(Knowledge knowledge) {
 }
 
 LocalizationVerdict judge(const LocalizationState& state) {
+  if (!state.clock_problem.empty()) return {2, "LOCALIZATION_NO_CLOCK: " + state.clock_problem};
   if (!state.bad_map.empty()) return {2, "LOCALIZATION_BAD_MAP: " + state.bad_map};
   if (!state.has_map) return {2, "LOCALIZATION_NO_MAP: no map has come"};
   if (!state.missing.empty()) return {2, "LOCALIZATION_NO_TRANSFORM: scans come, but " + state.missing};
@@ -44,6 +45,9 @@ LocalizationVerdict judge(const LocalizationState& state) {
   if (state.estimate == nullptr) return {1, "no scan yet"};
   if (state.estimate->knowledge == Knowledge::kLost) return {2, lost(*state.estimate)};
   if (state.estimate->knowledge == Knowledge::kAmbiguous) return {1, ambiguous(*state.estimate)};
+  if (state.estimate->blind) {
+    return {1, "LOCALIZATION_BLIND: the scans show nothing to go by; odometry alone"};
+  }
   if (state.newly_skipped > 0) {
     return {1, "LOCALIZATION_TOO_SLOW: scans skipped since the last message: " +
                    std::to_string(state.newly_skipped)};

@@ -10,6 +10,7 @@ namespace kurumaisu {
 
 /// What is known at the moment of diagnostics.
 struct LocalizationState {
+  std::string clock_problem;  ///< of simulated time, or empty
   bool has_map;
   std::string bad_map;                         ///< why the last map was refused, or empty
   double silence;                              ///< since the last scan came [s]

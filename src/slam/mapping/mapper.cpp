@@ -156,8 +156,9 @@ class Mapper::Impl {
   Scan deskewed(const Scan& raw, const Pose2D& start, const Pose2D& end) const {
     const double sweep = raw.fan.time_increment * static_cast<double>(raw.ranges.size() - 1);
     const Pose2D motion = between(start, end);
-    if (isJump(motion, sweep)) return deskew(raw, scaled(rate_, sweep));
-    return deskew(raw, slip_.corrected(motion, sweep));
+    const Scan scan = withoutDropouts(raw, settings_.dropout_beams);
+    if (isJump(motion, sweep)) return deskew(scan, scaled(rate_, sweep));
+    return deskew(scan, slip_.corrected(motion, sweep));
   }
 
   Estimate begin(const Scan& raw, const Pose2D& start, const Pose2D& end) {

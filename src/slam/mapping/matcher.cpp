@@ -3,6 +3,8 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <unordered_set>
@@ -12,12 +14,12 @@
 namespace kurumaisu {
 namespace {
 
-// A line is fitted to the readings within this distance of one [m], or within so many spacings of the beams
+// A line is fitted to the readings within this distance of one [m], or within so many of their usual spacings
 // at its range where that is more; so many to each side at most. Short enough for door frames, long enough
 // that 3 mm of noise turn it by 2 degrees.
 constexpr double kLineReach = 0.12;
 constexpr double kLineSpacings = 4;
-constexpr int kLineBeams = 12;
+constexpr int kLineReadings = 12;
 constexpr int kLinePoints = 4;
 // Smaller spread over larger spread of a line's points [-]: above it they are no line.
 constexpr double kLineThickness = 0.1;
@@ -42,26 +44,55 @@ Eigen::Vector2d apply(const Pose2D& pose, const Eigen::Vector2d& point) {
   return {moved.x, moved.y};
 }
 
-/// Points of a scan in the base's frame; NaN where the beam has none.
-std::vector<Eigen::Vector2d> pointsOf(const Scan& scan) {
-  std::vector<Eigen::Vector2d> points;
-  points.reserve(scan.ranges.size());
-  for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
-    const double range = std::isfinite(scan.ranges[i]) ? scan.ranges[i] : std::nan("");
-    const double bearing = scan.fan.angle_min + scan.fan.angle_increment * static_cast<double>(i);
-    points.push_back(apply(scan.fan.base_from_laser, {range * std::cos(bearing), range * std::sin(bearing)}));
+struct Reading {
+  int beam;
+  double range;
+  Eigen::Vector2d point;  ///< in the base's frame
+};
+
+/// Those that met something.
+std::vector<Reading> readingsOf(const Scan& scan) {
+  std::vector<Reading> readings;
+  readings.reserve(scan.ranges.size());
+  for (int i = 0; i < static_cast<int>(scan.ranges.size()); ++i) {
+    const double range = scan.ranges[i];
+    if (!std::isfinite(range)) continue;
+    const double bearing = scan.fan.angle_min + scan.fan.angle_increment * i;
+    readings.push_back(
+        {i, range, apply(scan.fan.base_from_laser, {range * std::cos(bearing), range * std::sin(bearing)})});
   }
-  return points;
+  return readings;
+}
+
+/// The readings around one, itself among them: from the first to before the last.
+struct Around {
+  Around(const std::vector<Reading>& readings, int centre)
+      : first(std::max(0, centre - kLineReadings)),
+        last(std::min(static_cast<int>(readings.size()), centre + kLineReadings + 1)) {}
+  int first, last;
+};
+
+/// From one reading to the next [beams]: the median, so that a doorway among them does not count.
+double spacingAround(const std::vector<Reading>& readings, int centre) {
+  const Around around(readings, centre);
+  std::array<int, 2 * kLineReadings> gaps{};
+  const int count = around.last - around.first - 1;
+  if (count < 1) return 1;
+  for (int i = 0; i < count; ++i) {
+    gaps[i] = readings[around.first + i + 1].beam - readings[around.first + i].beam;
+  }
+  std::nth_element(gaps.begin(), gaps.begin() + count / 2, gaps.begin() + count);
+  return gaps[count / 2];
 }
 
 /// Normal of the line through the readings around one; false where there is none.
-bool normalAt(const std::vector<Eigen::Vector2d>& points, int centre, double reach, Eigen::Vector2d& normal) {
+bool normalAt(const std::vector<Reading>& readings, int centre, double reach, Eigen::Vector2d& normal) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
   int count = 0;
-  const int last = std::min(static_cast<int>(points.size()) - 1, centre + kLineBeams);
-  for (int i = std::max(0, centre - kLineBeams); i <= last; ++i) {
-    const Eigen::Vector2d offset = points[i] - points[centre];
+  const Around around(readings, centre);
+  for (int i = around.first; i < around.last; ++i) {
+    const Eigen::Vector2d offset = readings[i].point - readings[centre].point;
     if (!(offset.squaredNorm() < reach * reach)) continue;
     mean += offset;
     square += offset * offset.transpose();
@@ -87,10 +118,8 @@ Matcher::Match Matcher::add(const Scan& scan, const Pose2D& motion) {
     return {pose_, Eigen::Matrix3d::Zero(), true};
   }
   Points points;
-  const Points all = pointsOf(scan);
-  for (std::size_t i = 0; i < all.size(); i += settings_.every) {
-    if (all[i].allFinite()) points.push_back(all[i]);
-  }
+  const auto readings = readingsOf(scan);
+  for (std::size_t i = 0; i < readings.size(); i += settings_.every) points.push_back(readings[i].point);
   Match match = align(points, start, motion);
   pose_ = match.pose;
   const Pose2D since = between(key_pose_, pose_);
@@ -193,17 +222,17 @@ const Matcher::Line* Matcher::nearestOf(const Cells& cells, double size, const E
 }
 
 void Matcher::insert(const Scan& scan) {
-  const Points points = pointsOf(scan);
+  const auto readings = readingsOf(scan);
   std::vector<Line> lines;
   const Pose2D turn{0, 0, pose_.theta};
   const Eigen::Vector2d eye(base_from_laser_.x, base_from_laser_.y);
-  for (int i = 0; i < static_cast<int>(points.size()); ++i) {
+  for (int i = 0; i < static_cast<int>(readings.size()); ++i) {
     Eigen::Vector2d normal;
-    const double spacing = std::abs(scan.fan.angle_increment) * scan.ranges[i];
-    const double reach = std::fmax(kLineReach, kLineSpacings * spacing);
-    if (!points[i].allFinite() || !normalAt(points, i, reach, normal)) continue;
-    if (normal.dot(eye - points[i]) < 0) normal = -normal;
-    lines.push_back({apply(pose_, points[i]), apply(turn, normal)});
+    const auto& [beam, range, point] = readings[i];
+    const double spacing = std::abs(scan.fan.angle_increment) * spacingAround(readings, i) * range;
+    if (!normalAt(readings, i, std::fmax(kLineReach, kLineSpacings * spacing), normal)) continue;
+    if (normal.dot(eye - point) < 0) normal = -normal;
+    lines.push_back({apply(pose_, point), apply(turn, normal)});
   }
   keys_.push_back(std::move(lines));
   if (static_cast<int>(keys_.size()) > settings_.key_scans) keys_.pop_front();

@@ -9,6 +9,7 @@ namespace kurumaisu {
 
 /// What is known at the moment of diagnostics. Counts are of what came since the last diagnostics.
 struct MappingState {
+  std::string clock_problem;  ///< of simulated time, or empty
   bool paused = false;
   std::string start_problem;  ///< why a map cannot be gone on from, or empty
   double silence = 0;         ///< since the last scan came [s]

@@ -23,6 +23,7 @@ void visitSettings(MapperSettings& s, Visit&& visit) {
   visit("slip_gain", s.slip_gain, 0, 1);
   visit("resolution", s.resolution, 0.005, 1);
   visit("range", s.range, 0.1, 200);
+  visit("dropout_beams", s.dropout_beams, 0, 1000);
   visit("certainty", s.certainty, 0.51, 0.99);
   visit("most_cells", s.most_cells, 1e4, 1e9);
   visit("particles", s.particles, 1, 10000);

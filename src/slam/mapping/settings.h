@@ -32,6 +32,7 @@ struct MapperSettings {
 
   double resolution;  ///< of the grid [m]
   double range;       ///< readings beyond are not mapped; beams without a return clear so far [m]
+  int dropout_beams;  ///< so many in a row without a return, or fewer, clear nothing
   double certainty;   ///< of one reading for its cell [-], 0.5 to 1
   double most_cells;  ///< of a map; a scan that would make it larger does not go in
 

@@ -78,6 +78,14 @@ void warnPose(const char* source, std::uint64_t refused, const char* why) {
   ROS_WARN("LOCALIZATION_BAD_POSE: %s: refused, %lu so far: %s", source, refused, why);
 }
 
+void warnWallTime(double stamp) {
+  ROS_WARN(
+      "LOCALIZATION_POSE_STAMP: initialpose: stamp %.3f s is the wall's time, while this clock is /clock, "
+      "%.3f s: "
+      "taken as of now; set /use_sim_time before its sender starts",
+      stamp, ros::Time::now().toSec());
+}
+
 void warnOdometry(std::uint64_t refused, const char* why) {
   ROS_WARN_THROTTLE(kWarningPeriod, "LOCALIZATION_BAD_ODOMETRY: odom: refused, %lu so far: %s", refused, why);
 }
@@ -256,7 +264,11 @@ void LocalizationNode::requirePose(const PoseMessage& message) const {
   if (!frame.empty() && frame != settings_.map_frame) {
     throw std::invalid_argument("frame_id: must be " + settings_.map_frame + ", or empty: " + frame);
   }
-  k::requireStamp(message.header.stamp, ros::Time::now(), kAhead);
+  if (k::isWallTime(message.header.stamp)) {
+    warnWallTime(message.header.stamp.toSec());
+  } else {
+    k::requireStamp(message.header.stamp, ros::Time::now(), kAhead);
+  }
 }
 
 void LocalizationNode::add(const k::ScanQueue::Ready& ready) {
@@ -320,7 +332,8 @@ void LocalizationNode::reset() {
 void LocalizationNode::diagnose(Status& status) {
   const auto& queue = feed_.queue();
   const std::uint64_t lost = queue.dropped().lost();
-  const k::LocalizationState state{map_.has_value(),
+  const k::LocalizationState state{feed_.clockProblem(settings_.silence),
+                                   map_.has_value(),
                                    bad_map_,
                                    feed_.silence(),
                                    settings_.silence,
@@ -331,7 +344,7 @@ void LocalizationNode::diagnose(Status& status) {
   const k::LocalizationVerdict verdict = k::judge(state);
   status.summary(static_cast<unsigned char>(verdict.level), verdict.summary);
   if (estimate_) {
-    status.add("knowledge", k::nameOf(estimate_->knowledge));
+    status.add("knowledge", estimate_->blind ? "blind" : k::nameOf(estimate_->knowledge));
     status.add("fit", estimate_->fit);
     status.add("usual fit", estimate_->fit_usual);
     status.add("particles", estimate_->particles);

@@ -274,6 +274,7 @@ void MappingNode::diagnose(Status& status) {
   const auto& dropped = feed_.queue().dropped();
   const std::uint64_t lost = dropped.lost();
   k::MappingState state;
+  state.clock_problem = feed_.clockProblem(settings_.silence);
   state.paused = feed_.paused();
   state.start_problem = start_problem_;
   state.silence = feed_.silence();

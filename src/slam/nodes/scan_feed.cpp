@@ -11,11 +11,20 @@ namespace {
 constexpr double kSlowWarningPeriod = 5.0;  // [s] of throttled warnings
 constexpr double kWorkLimit = 0.1;          // [s] of work in a row before scans that wait are skipped
 constexpr std::size_t kQueue = 100;         // scans that may wait
-constexpr int kSeveral = 3;                 // old scans in a row are no mistake: time began anew
+// Old scans alone, so many and for so long [s], are no mistake: time began anew. Beside others they are of another clock.
+constexpr int kSeveral = 3;
+constexpr double kOldFor = 2.0;
 
 // Apart, because the macro counts as a handful of branches.
 void warnSlow(const std::string& prefix, std::uint64_t skipped) {
   ROS_WARN_THROTTLE(kSlowWarningPeriod, "%s_TOO_SLOW: scan: skipped, %lu so far", prefix.c_str(), skipped);
+}
+
+std::string ageOf(const ros::Time& stamp, const ros::Time& last) {
+  std::ostringstream text;
+  text.precision(15);
+  text << "stamp " << stamp.toSec() << " s, " << secondsFrom(stamp, last) << " s older than the last one";
+  return text.str();
 }
 
 }  // namespace
@@ -29,10 +38,10 @@ ScanFeed::ScanFeed(ros::NodeHandle& nh, FeedSettings settings, Use use, Reset re
       scan_(nh.subscribe("scan", kQueue, &ScanFeed::onScan, this)) {}
 
 void ScanFeed::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) try {
-  requireScan(*scan, ros::Time::now());
-  if (isOld(scan->header.stamp)) return;
   came_ = ros::SteadyTime::now();
   frame_ = frameOf(scan->header.frame_id);
+  requireScan(*scan, ros::Time::now());
+  if (isOld(scan->header.stamp)) return;
   if (paused_ || came_in_all_++ % settings_.every != 0) return;
   queue_.push(scan);
 } catch (const std::invalid_argument& error) {
@@ -41,20 +50,19 @@ void ScanFeed::onScan(const sensor_msgs::LaserScan::ConstPtr& scan) try {
 
 /// Whether a scan is to be dropped, because it is older than what has been used.
 bool ScanFeed::isOld(const ros::Time& stamp) {
-  const double age = secondsFrom(stamp, last_scan_);
-  if (age <= kTimeJump) {
+  if (secondsFrom(stamp, last_scan_) <= kTimeJump) {
     old_ = 0;
     return false;
   }
   lookAtClock();
   if (last_scan_.isZero()) return false;
-  if (++old_ >= kSeveral) {
-    begin("several scans in a row are older than the last one");
+  const ros::SteadyTime now = ros::SteadyTime::now();
+  if (old_++ == 0) old_since_ = now;
+  if (old_ >= kSeveral && (now - old_since_).toSec() >= kOldFor) {
+    begin("all scans have been older than the last one for a while");
     return false;
   }
-  std::ostringstream why;
-  why << age << " s older than the last one";
-  queue_.refuseOld(why.str());
+  queue_.refuseOld(ageOf(stamp, last_scan_));
   return true;
 }
 
@@ -62,6 +70,7 @@ bool ScanFeed::isOld(const ros::Time& stamp) {
 void ScanFeed::lookAtClock() {
   const ros::Time now = ros::Time::now();
   if (secondsFrom(now, last_clock_) > kTimeJump) begin("time ran backwards");
+  if (now != last_clock_) ticked_ = ros::SteadyTime::now();
   last_clock_ = now;
 }
 
@@ -82,6 +91,8 @@ void ScanFeed::work() {
 
 void ScanFeed::take(const ScanQueue::Ready& ready) try {
   taken_ = ros::SteadyTime::now();
+  if (!last_scan_.isZero() && ready.stamp <= last_scan_)
+    return queue_.refuseOld(ageOf(ready.stamp, last_scan_));
   last_scan_ = ready.stamp;
   const std::clock_t start = std::clock();
   use_(ready);
@@ -105,7 +116,15 @@ std::string ScanFeed::missing(double since) const {
   if (!buffer_.canTransform(odom, base, ros::Time())) return "no odometry: tf has no " + odom + " -> " + base;
   if (!buffer_.canTransform(base, frame_, ros::Time()))
     return "the mounting of the laser is unknown: tf has no " + base + " -> " + frame_;
-  return "no odometry for their times within transform_deadline, or all of them are invalid";
+  return "none is used; the last dropped: " + queue_.reason();
+}
+
+std::string ScanFeed::clockProblem(double since) const {
+  const bool stands = ros::Time::isSimTime() && (ros::SteadyTime::now() - ticked_).toSec() > since;
+  if (!stands) return "";
+  if (last_clock_.isZero()) return "/use_sim_time is true, but nothing comes on /clock";
+  return silence() < since ? "/use_sim_time is true, and scans come, but nothing on /clock"
+                           : "";  // else a pause
 }
 
 void ScanFeed::begin(const char* why) {

@@ -24,7 +24,7 @@ struct FeedSettings {
 };
 
 /// Listens to scan and tf. Calls use() for every scan that has its transforms, and reset() when time has jumped back: the
-/// clock, or several scans in a row. One old scan is dropped.
+/// clock, or all scans for a while. An old scan among others is dropped.
 class ScanFeed {
  public:
   /// Throws std::invalid_argument for a scan that it cannot use.
@@ -46,6 +46,9 @@ class ScanFeed {
   /// What scans wait for in vain since so many seconds, in words; empty if for nothing.
   std::string missing(double since) const;
 
+  /// What is wrong with simulated time since so many seconds, in words; empty if nothing, or if nobody needs it.
+  std::string clockProblem(double since) const;
+
   const ScanQueue& queue() const { return queue_; }
   std::uint64_t refusedTransforms() const { return transforms_.refused(); }
   std::uint64_t used() const { return used_; }
@@ -64,9 +67,11 @@ class ScanFeed {
   Reset reset_;
   bool paused_ = false;
   ros::Time last_scan_, last_clock_;  // scans may be ahead of the clock: it comes on a connection of its own
+  ros::SteadyTime ticked_ = ros::SteadyTime::now();                ///< the clock changed last
   ros::SteadyTime came_ = ros::SteadyTime::now(), taken_ = came_;  ///< the last scan, and the last one used
   std::string frame_;                                              ///< of the last scan
   int old_ = 0;                                                    ///< scans in a row that are too old
+  ros::SteadyTime old_since_;
   std::uint64_t came_in_all_ = 0, used_ = 0, skipped_ = 0;
   double seconds_ = 0;
   tf2_ros::Buffer buffer_;

@@ -24,7 +24,7 @@ from kurumaisu.ros.services import Services
 from kurumaisu.ros.sim.effects import NAMESPACE, LiveEffects
 from kurumaisu.ros.sim.laser import LaserOutput, laser_output
 from kurumaisu.ros.sim.publish import SimTopics
-from kurumaisu.ros.sim.settings import SimSettings, read_settings
+from kurumaisu.ros.sim.settings import SimSettings, read_settings, start_outside
 from kurumaisu.ros.view.fans import ChairFan
 from kurumaisu.ros.view.topics import ViewTopics
 from kurumaisu.sim.chair.holder import VoltageHolder
@@ -240,5 +240,7 @@ def _simulate(own: life.Life) -> int:
     node = SimNode(settings)
     for warning in settings.world.warnings:
         rospy.logwarn(f"SIM_WORLD_IGNORED {warning}")
+    if words := start_outside(settings.world):
+        rospy.logwarn(f"SIM_START_OUTSIDE {words}")
     node.run(own.asked)
     return 0

@@ -108,6 +108,20 @@ def _world(top: Section) -> World:
     return replace(world, starts=(Start("chair", pose), *world.starts[1:]))
 
 
+def start_outside(world: World) -> str:
+    """Return words for a start that lies outside of the world's walls, or none."""
+    if not world.starts or not world.has_walls:
+        return ""
+    x, y, _ = world.start.tolist()
+    x0, y0, x1, y1 = world.bounds
+    if x0 <= x <= x1 and y0 <= y <= y1:
+        return ""
+    return (
+        f"start: x {x:g}, y {y:g} m lies outside of the walls of {world.path}, which reach from x {x0:g} to {x1:g}, "
+        f"y {y0:g} to {y1:g} m"
+    )
+
+
 def _sensors(top: Section) -> tuple[SensorSettings, ...]:
     file = top.text("sensors")
     return () if file == NONE else load_sensors(Path(file))

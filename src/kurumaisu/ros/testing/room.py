@@ -168,7 +168,7 @@ class Room:
         """Publish at a time of the test what has stamps of others: transforms, and three scans, one of them old."""
         last, year = rospy.Time(4294967295), rospy.Duration(31536000)
         now = rospy.Time.from_sec(self.begin + t)
-        for stamp in (last, now + year):
+        for stamp in (last, now + year, now + rospy.Duration(3600)):
             self.tf.publish([transform("odom", "base_link", np.array([7.0, 7.0, 1.0]), stamp)])
         for stamp in (last, now + year, now - rospy.Duration(1.5)):
             self.scan.publish(self.sweep(t, stamp))
